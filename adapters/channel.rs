@@ -1,0 +1,312 @@
+//! The one table of channels: what scripts, SQL, HTTP and CSV all read.
+//!
+//! A channel's name ends in its unit; the names are those of the recording format.
+
+use std::fmt;
+
+/// How a channel behaves between two readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A physical quantity that may be interpolated.
+    Continuous,
+    /// A command, counter or flag that holds until it changes.
+    Held,
+    /// A state word or name; holds until it changes.
+    Text,
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// Name used everywhere; ends in the unit.
+    pub name: &'static str,
+    /// Unit symbol; `1` for pure numbers, empty for text.
+    pub unit: &'static str,
+    /// Least and greatest value that is physically possible, in the unit.
+    pub range: (f64, f64),
+    /// Continuous, held or text.
+    pub kind: Kind,
+    /// What it is, in English.
+    pub en: &'static str,
+    /// What it is, in Chinese.
+    pub zh: &'static str,
+}
+
+impl Channel {
+    /// Is this a finite number within the physical range?
+    #[must_use]
+    pub fn holds(&self, number: f64) -> bool {
+        number.is_finite() && number >= self.range.0 && number <= self.range.1
+    }
+}
+
+const fn number(
+    name: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    kind: Kind,
+    en: &'static str,
+    zh: &'static str,
+) -> Channel {
+    Channel { name, unit, range, kind, en, zh }
+}
+
+const fn text(name: &'static str, en: &'static str, zh: &'static str) -> Channel {
+    Channel { name, unit: "", range: (0.0, 0.0), kind: Kind::Text, en, zh }
+}
+
+/// Every channel the gateway knows. The position is the [`ChannelId`]; new channels are appended.
+pub static CHANNELS: &[Channel] = &[
+    number(
+        "spindle_programmed_rpm",
+        "rpm",
+        (-100000.0, 100000.0),
+        Kind::Held,
+        "Commanded spindle speed before overrides",
+        "主轴编程转速",
+    ),
+    number(
+        "feed_programmed_mm_min",
+        "mm/min",
+        (0.0, 200000.0),
+        Kind::Held,
+        "Commanded feed before overrides",
+        "编程进给速度",
+    ),
+    number(
+        "spindle_speed_rpm",
+        "rpm",
+        (-100000.0, 100000.0),
+        Kind::Continuous,
+        "Actual spindle speed, positive in M3",
+        "主轴实际转速",
+    ),
+    number("feed_mm_min", "mm/min", (0.0, 200000.0), Kind::Continuous, "Actual feed along the path", "实际进给速度"),
+    number(
+        "feed_per_rev_mm",
+        "mm/rev",
+        (0.0, 100.0),
+        Kind::Continuous,
+        "Actual feed per spindle revolution",
+        "每转进给量",
+    ),
+    number("feed_override_pct", "%", (0.0, 254.0), Kind::Held, "Feed override in force", "进给倍率"),
+    number("spindle_override_pct", "%", (0.0, 254.0), Kind::Held, "Spindle override in force", "主轴倍率"),
+    number("depth_of_cut_mm", "mm", (0.0, 500.0), Kind::Held, "Depth of cut", "背吃刀量"),
+    number("width_of_cut_mm", "mm", (0.0, 2000.0), Kind::Held, "Width of cut", "切削宽度"),
+    number(
+        "diameter_mm",
+        "mm",
+        (0.0, 10000.0),
+        Kind::Continuous,
+        "Diameter of the work (turning) or of the tool (milling)",
+        "工件或刀具直径",
+    ),
+    number("teeth", "1", (0.0, 1000.0), Kind::Held, "Number of teeth of the tool", "刀具齿数"),
+    number("removal_rate_cm3_min", "cm3/min", (0.0, 100000.0), Kind::Continuous, "Material removal rate", "材料去除率"),
+    number("engaged", "1", (0.0, 1.0), Kind::Held, "Tool in the work: 0 to 1", "刀具切入标志"),
+    number("axis_position_mm", "mm", (-100000.0, 100000.0), Kind::Continuous, "Axis position", "轴位置"),
+    number("axis_velocity_mm_min", "mm/min", (-200000.0, 200000.0), Kind::Continuous, "Axis velocity", "轴速度"),
+    number("x_axis_position_mm", "mm", (-100000.0, 100000.0), Kind::Continuous, "X axis position", "X轴位置"),
+    number("x_axis_velocity_mm_min", "mm/min", (-200000.0, 200000.0), Kind::Continuous, "X axis velocity", "X轴速度"),
+    number("y_axis_position_mm", "mm", (-100000.0, 100000.0), Kind::Continuous, "Y axis position", "Y轴位置"),
+    number("y_axis_velocity_mm_min", "mm/min", (-200000.0, 200000.0), Kind::Continuous, "Y axis velocity", "Y轴速度"),
+    number("z_axis_position_mm", "mm", (-100000.0, 100000.0), Kind::Continuous, "Z axis position", "Z轴位置"),
+    number("z_axis_velocity_mm_min", "mm/min", (-200000.0, 200000.0), Kind::Continuous, "Z axis velocity", "Z轴速度"),
+    number(
+        "spindle_power_w",
+        "W",
+        (-1000000.0, 1000000.0),
+        Kind::Continuous,
+        "Power into the spindle drive, negative when it brakes into the supply",
+        "主轴驱动功率",
+    ),
+    number(
+        "total_power_w",
+        "W",
+        (-1000000.0, 1000000.0),
+        Kind::Continuous,
+        "Power into the whole machine",
+        "机床总功率",
+    ),
+    number("spindle_current_a", "A", (0.0, 10000.0), Kind::Continuous, "Spindle motor current, true rms", "主轴电流"),
+    number(
+        "spindle_load_pct",
+        "%",
+        (-500.0, 500.0),
+        Kind::Continuous,
+        "Spindle load as the controller shows it",
+        "主轴负载",
+    ),
+    number("axis_current_a", "A", (-10000.0, 10000.0), Kind::Continuous, "Axis motor current", "进给轴电流"),
+    number("axis_power_w", "W", (-1000000.0, 1000000.0), Kind::Continuous, "Axis drive power", "进给轴功率"),
+    number("x_axis_current_a", "A", (-10000.0, 10000.0), Kind::Continuous, "X axis motor current", "X轴电流"),
+    number(
+        "x_axis_load_pct",
+        "%",
+        (-500.0, 500.0),
+        Kind::Continuous,
+        "X axis load as the controller shows it",
+        "X轴负载",
+    ),
+    number("y_axis_current_a", "A", (-10000.0, 10000.0), Kind::Continuous, "Y axis motor current", "Y轴电流"),
+    number(
+        "y_axis_load_pct",
+        "%",
+        (-500.0, 500.0),
+        Kind::Continuous,
+        "Y axis load as the controller shows it",
+        "Y轴负载",
+    ),
+    number("z_axis_current_a", "A", (-10000.0, 10000.0), Kind::Continuous, "Z axis motor current", "Z轴电流"),
+    number(
+        "z_axis_load_pct",
+        "%",
+        (-500.0, 500.0),
+        Kind::Continuous,
+        "Z axis load as the controller shows it",
+        "Z轴负载",
+    ),
+    number("cutting_force_n", "N", (-1000000.0, 1000000.0), Kind::Continuous, "Main cutting force", "主切削力"),
+    number(
+        "bearing_temperature_c",
+        "°C",
+        (-60.0, 300.0),
+        Kind::Continuous,
+        "Spindle bearing temperature",
+        "主轴轴承温度",
+    ),
+    number("motor_temperature_c", "°C", (-60.0, 300.0), Kind::Continuous, "Spindle motor temperature", "主轴电机温度"),
+    number("ambient_temperature_c", "°C", (-60.0, 100.0), Kind::Continuous, "Air temperature in the shop", "环境温度"),
+    number("coolant_temperature_c", "°C", (-60.0, 150.0), Kind::Continuous, "Coolant temperature", "冷却液温度"),
+    number(
+        "thermal_error_um",
+        "um",
+        (-10000.0, 10000.0),
+        Kind::Continuous,
+        "Displacement of the tool against the work",
+        "热误差",
+    ),
+    number("supply_voltage_v", "V", (0.0, 1000.0), Kind::Continuous, "Supply voltage, phase to phase", "供电电压"),
+    number("coolant_on", "1", (0.0, 1.0), Kind::Held, "Coolant pump running", "冷却泵运行"),
+    number("hydraulics_on", "1", (0.0, 1.0), Kind::Held, "Hydraulic pump running", "液压泵运行"),
+    number("gear_stage", "1", (0.0, 20.0), Kind::Held, "Gear or belt stage of the spindle", "主轴档位"),
+    number("rapid", "1", (0.0, 1.0), Kind::Held, "Rapid traverse (G0) active", "快速移动标志"),
+    number("part_count", "1", (0.0, 1000000000.0), Kind::Held, "Parts counted by the controller", "工件计数"),
+    number("drive_on", "1", (0.0, 1.0), Kind::Held, "Drives ready", "驱动就绪"),
+    text("run", "Grouping: the unit of hold-out", "批次"),
+    text("pass", "Grouping: one pass of the tool", "走刀"),
+    text("part", "Work piece", "工件号"),
+    text("tool", "Tool or edge in use", "刀具"),
+    text("lot", "Lot of material", "材料批号"),
+    text("program", "NC program running", "数控程序"),
+    text("block", "NC block running", "程序段"),
+    text("operation", "Operation, as the process plan names it", "工序"),
+    text("mode", "Controller mode", "控制方式"),
+    text("execution", "Execution state of the controller", "执行状态"),
+    text("alarm", "Alarm shown by the controller, empty when there is none", "报警"),
+    text("motion", "Motion word of the controller", "运动状态"),
+];
+
+/// Index into [`CHANNELS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ChannelId(u16);
+
+impl ChannelId {
+    /// How many channels there are.
+    #[must_use]
+    pub fn count() -> usize {
+        CHANNELS.len()
+    }
+
+    /// The channel of this name. A linear search: look names up once, not in a loop.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        let index = CHANNELS.iter().position(|channel| channel.name == name)?;
+        u16::try_from(index).ok().map(Self)
+    }
+
+    /// The channel at this position of the table.
+    #[must_use]
+    pub fn at(index: usize) -> Option<Self> {
+        (index < CHANNELS.len()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
+    }
+
+    /// Every channel, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..CHANNELS.len()).filter_map(Self::at)
+    }
+
+    /// Position in the table.
+    #[must_use]
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+
+    /// The row of the table.
+    #[must_use]
+    pub fn channel(self) -> &'static Channel {
+        &CHANNELS[usize::from(self.0)]
+    }
+
+    /// Name, as everywhere.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.channel().name
+    }
+}
+
+impl fmt::Display for ChannelId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The name of the table nearest to `name`, for "did you mean".
+#[must_use]
+pub fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let limit = (name.len() / 3).max(2);
+    names
+        .into_iter()
+        .map(|known| (distance(name, known), known))
+        .min()
+        .filter(|(d, _)| *d <= limit)
+        .map(|(_, known)| known)
+}
+
+/// Levenshtein distance in characters.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let above = row[j + 1];
+            row[j + 1] = (diagonal + usize::from(ca != *cb)).min(above + 1).min(row[j] + 1);
+            diagonal = above;
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_found() {
+        let names: BTreeSet<_> = CHANNELS.iter().map(|channel| channel.name).collect();
+        assert_eq!(names.len(), CHANNELS.len());
+        for id in ChannelId::all() {
+            assert_eq!(ChannelId::of(id.name()), Some(id));
+        }
+    }
+
+    #[test]
+    fn a_misspelt_name_finds_its_neighbour() {
+        let names = CHANNELS.iter().map(|channel| channel.name);
+        assert_eq!(nearest("spindel_speed_rpm", names), Some("spindle_speed_rpm"));
+    }
+}

@@ -1,0 +1,25 @@
+//! The world, in units: controllers, meters and recordings, read into one vocabulary.
+//!
+//! An adapter turns what a device says into [`Reading`]s: one channel, one time, a value or a typed reason for its
+//! absence. Readings of all sources are merged onto the gateway's tick as a [`Sample`], and samples over time are a
+//! [`Recording`].
+//!
+//! What is deliberately absent here:
+//! - no estimation: an adapter reports, it never infers;
+//! - no tokio: a driver is synchronous and lives on its own thread;
+//! - no NaN: a missing value is an [`Absence`] with a reason;
+//! - no `unsafe` outside files named `ffi.rs`.
+
+pub mod channel;
+pub mod clock;
+pub mod driver;
+pub mod reading;
+pub mod recording;
+pub mod sample;
+pub mod units;
+
+pub use channel::{Channel, ChannelId};
+pub use driver::{Actuator, Source, SourceError};
+pub use reading::{Absence, Reading, Stamp, Value};
+pub use recording::Recording;
+pub use sample::{Sample, Slot};

@@ -1,0 +1,206 @@
+//! One channel, one time, a value or a reason for none.
+
+use crate::channel::ChannelId;
+use crate::clock::TimeNs;
+use std::fmt;
+use std::sync::Arc;
+
+/// Why there is no value. The text is what an operator reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Absence {
+    /// No source of this machine delivers the channel.
+    NotProvided,
+    /// The source has not answered yet since the gateway started.
+    NotYetRead,
+    /// The machine is switched off; a normal state.
+    MachineOff,
+    /// The source is not connected.
+    Disconnected,
+    /// The source did not answer in time.
+    Timeout,
+    /// The device answered and refused.
+    Refused,
+    /// This device does not have the value (model, option or firmware).
+    NotSupported,
+    /// The device answered with something outside the channel's physical range.
+    OutOfRange,
+    /// The last value is older than two periods of its source.
+    Stale,
+    /// The recording holds an empty cell.
+    NotRecorded,
+}
+
+impl Absence {
+    /// Every reason, in the order of their codes.
+    pub const ALL: [Self; 10] = [
+        Self::NotProvided,
+        Self::NotYetRead,
+        Self::MachineOff,
+        Self::Disconnected,
+        Self::Timeout,
+        Self::Refused,
+        Self::NotSupported,
+        Self::OutOfRange,
+        Self::Stale,
+        Self::NotRecorded,
+    ];
+
+    /// The word used in `<channel>_missing` columns, JSON and SQL.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotProvided => "not_provided",
+            Self::NotYetRead => "not_yet_read",
+            Self::MachineOff => "machine_off",
+            Self::Disconnected => "disconnected",
+            Self::Timeout => "timeout",
+            Self::Refused => "refused",
+            Self::NotSupported => "not_supported",
+            Self::OutOfRange => "out_of_range",
+            Self::Stale => "stale",
+            Self::NotRecorded => "not_recorded",
+        }
+    }
+
+    /// The reason written as `word`, if there is one.
+    #[must_use]
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|absence| absence.word() == word)
+    }
+
+    /// A small stable number for compact storage.
+    #[must_use]
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The reason with this code.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied()
+    }
+}
+
+impl fmt::Display for Absence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// A value of a channel: a finite number in the channel's unit, or a state word.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// Finite, in the unit of the channel table.
+    Number(f64),
+    /// A state word, program name or similar; cloning does not allocate.
+    Text(Arc<str>),
+}
+
+impl Value {
+    /// A finite number as a value; NaN and infinities are an [`Absence::OutOfRange`].
+    ///
+    /// # Errors
+    /// [`Absence::OutOfRange`] for a number that is not finite.
+    pub fn number(number: f64) -> Result<Self, Absence> {
+        if number.is_finite() { Ok(Self::Number(number)) } else { Err(Absence::OutOfRange) }
+    }
+
+    /// The number, if it is one.
+    #[must_use]
+    pub fn as_number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::Text(_) => None,
+        }
+    }
+
+    /// The text, if it is one.
+    #[must_use]
+    pub fn as_text(&self) -> Option<&str> {
+        match self {
+            Self::Number(_) => None,
+            Self::Text(text) => Some(text),
+        }
+    }
+}
+
+/// When a value was true: the middle of the request and half its duration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamp {
+    /// Middle of the request on the gateway's clock.
+    pub mid_ns: TimeNs,
+    /// Half the round trip: the value is from `mid_ns` plus or minus this.
+    pub half_width_ns: i64,
+}
+
+impl Stamp {
+    /// The stamp of a request that began and ended at these times.
+    #[must_use]
+    pub fn of_request(began_ns: TimeNs, ended_ns: TimeNs) -> Self {
+        let half_width_ns = (ended_ns - began_ns).max(0) / 2;
+        Self { mid_ns: began_ns + half_width_ns, half_width_ns }
+    }
+
+    /// A stamp known exactly, as in a recording.
+    #[must_use]
+    pub fn exact(mid_ns: TimeNs) -> Self {
+        Self { mid_ns, half_width_ns: 0 }
+    }
+}
+
+/// One channel, one time, a value or a reason for none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// Which quantity.
+    pub channel: ChannelId,
+    /// When.
+    pub stamp: Stamp,
+    /// What, or why not.
+    pub value: Result<Value, Absence>,
+}
+
+impl Reading {
+    /// A number; one that is not finite or outside the channel's range becomes [`Absence::OutOfRange`].
+    #[must_use]
+    pub fn number(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
+        let value = if channel.channel().holds(number) { Value::number(number) } else { Err(Absence::OutOfRange) };
+        Self { channel, stamp, value }
+    }
+
+    /// A state word.
+    #[must_use]
+    pub fn text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
+        Self { channel, stamp, value: Ok(Value::Text(text)) }
+    }
+
+    /// No value, with the reason.
+    #[must_use]
+    pub fn absent(channel: ChannelId, stamp: Stamp, reason: Absence) -> Self {
+        Self { channel, stamp, value: Err(reason) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_absence_survives_its_word_and_its_code() {
+        for absence in Absence::ALL {
+            assert_eq!(Absence::from_word(absence.word()), Some(absence));
+            assert_eq!(Absence::from_code(absence.code()), Some(absence));
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_none_becomes_an_absence() {
+        let channel = ChannelId::of("spindle_speed_rpm").expect("in the table");
+        let reading = Reading::number(channel, Stamp::exact(0), f64::NAN);
+        assert_eq!(reading.value, Err(Absence::OutOfRange));
+    }
+
+    #[test]
+    fn the_stamp_is_the_middle_of_the_request() {
+        assert_eq!(Stamp::of_request(10, 30), Stamp { mid_ns: 20, half_width_ns: 10 });
+    }
+}

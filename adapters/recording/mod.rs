@@ -1,0 +1,257 @@
+//! Samples over time: a table with one row per sample (`recording/1`).
+//!
+//! Columns are numbers or text; an empty cell has no value and, where the recording says so, a reason. Rows stand in
+//! the order they were measured.
+
+mod csv;
+mod derive;
+
+pub use csv::{ReadRecording, RecordingError, RowProblem, read_csv, read_path};
+pub use derive::{derived, with_derived};
+
+use crate::clock::TimeNs;
+
+/// Columns that hold text even when their cells look like numbers.
+pub const TEXT_COLUMNS: [&str; 12] =
+    ["run", "pass", "part", "tool", "lot", "program", "block", "operation", "mode", "execution", "alarm", "motion"];
+
+/// Numbers with typed absence: `values[i]` is meaningful only where `present[i]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Numbers {
+    values: Vec<f64>,
+    present: Vec<bool>,
+}
+
+impl Numbers {
+    /// A column with a value in every row.
+    #[must_use]
+    pub fn full(values: Vec<f64>) -> Self {
+        let present = values.iter().map(|value| value.is_finite()).collect();
+        Self { values, present }
+    }
+
+    /// Appends a row. A number that is not finite counts as absent.
+    pub fn push(&mut self, value: Option<f64>) {
+        let value = value.filter(|value| value.is_finite());
+        self.values.push(value.unwrap_or(0.0));
+        self.present.push(value.is_some());
+    }
+
+    /// The value in `row`, if there is one.
+    #[must_use]
+    pub fn get(&self, row: usize) -> Option<f64> {
+        (*self.present.get(row)?).then(|| self.values[row])
+    }
+
+    /// Row by row.
+    pub fn iter(&self) -> impl Iterator<Item = Option<f64>> + '_ {
+        self.values.iter().zip(&self.present).map(|(value, present)| present.then_some(*value))
+    }
+
+    /// The values that are present.
+    pub fn present(&self) -> impl Iterator<Item = f64> + '_ {
+        self.iter().flatten()
+    }
+
+    /// How many rows have a value.
+    #[must_use]
+    pub fn count_present(&self) -> usize {
+        self.present.iter().filter(|present| **present).count()
+    }
+
+    /// How many rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// No rows at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+}
+
+impl FromIterator<Option<f64>> for Numbers {
+    fn from_iter<I: IntoIterator<Item = Option<f64>>>(iter: I) -> Self {
+        let mut numbers = Self::default();
+        iter.into_iter().for_each(|value| numbers.push(value));
+        numbers
+    }
+}
+
+/// Text, stored once per distinct word.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Words {
+    codes: Vec<Option<u32>>,
+    words: Vec<String>,
+}
+
+impl Words {
+    /// Appends a row; empty text counts as absent.
+    pub fn push(&mut self, text: &str) {
+        let code = (!text.is_empty()).then(|| self.code_of(text));
+        self.codes.push(code);
+    }
+
+    fn code_of(&mut self, text: &str) -> u32 {
+        // The last words seen are the likeliest to come again.
+        let found = self.words.iter().rposition(|word| word == text);
+        let index = found.unwrap_or_else(|| {
+            self.words.push(text.to_owned());
+            self.words.len() - 1
+        });
+        u32::try_from(index).unwrap_or(u32::MAX)
+    }
+
+    /// The word in `row`, if there is one.
+    #[must_use]
+    pub fn get(&self, row: usize) -> Option<&str> {
+        self.code(row).map(|code| self.words[code as usize].as_str())
+    }
+
+    /// The number of the word in `row` within [`Words::words`].
+    #[must_use]
+    pub fn code(&self, row: usize) -> Option<u32> {
+        *self.codes.get(row)?
+    }
+
+    /// The distinct words, in the order of first appearance.
+    #[must_use]
+    pub fn words(&self) -> &[String] {
+        &self.words
+    }
+
+    /// How many rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// No rows at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+}
+
+impl<'a> FromIterator<&'a str> for Words {
+    fn from_iter<I: IntoIterator<Item = &'a str>>(iter: I) -> Self {
+        let mut words = Self::default();
+        iter.into_iter().for_each(|text| words.push(text));
+        words
+    }
+}
+
+/// The cells of one column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cells {
+    /// A quantity; the unit ends the column's name.
+    Numbers(Numbers),
+    /// A grouping or state word.
+    Words(Words),
+}
+
+/// A named column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name, ending in its unit for quantities.
+    pub name: String,
+    /// One cell per row.
+    pub cells: Cells,
+}
+
+/// A stretch of consecutive rows of one run: the unit of hold-out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Run {
+    /// Text of the `run` column; `1` where the recording has none.
+    pub name: String,
+    /// Rows of this run.
+    pub rows: std::ops::Range<usize>,
+}
+
+/// Samples over time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// Where it came from, for messages.
+    pub source: String,
+    /// Seconds: `time_s` as given, or seconds since the first row where the recording has `time_utc`.
+    pub time_s: Vec<f64>,
+    /// Time of the first row where the recording has `time_utc`.
+    pub start_ns: Option<TimeNs>,
+    columns: Vec<Column>,
+}
+
+impl Recording {
+    /// A recording of these times and no columns yet.
+    #[must_use]
+    pub fn new(source: impl Into<String>, time_s: Vec<f64>, start_ns: Option<TimeNs>) -> Self {
+        Self { source: source.into(), time_s, start_ns, columns: Vec::new() }
+    }
+
+    /// Adds or replaces a column. Cells beyond the last row are cut, missing ones are absent.
+    pub fn set_column(&mut self, name: &str, mut cells: Cells) {
+        match &mut cells {
+            Cells::Numbers(numbers) => {
+                numbers.values.resize(self.rows(), 0.0);
+                numbers.present.resize(self.rows(), false);
+            }
+            Cells::Words(words) => words.codes.resize(self.rows(), None),
+        }
+        match self.columns.iter_mut().find(|column| column.name == name) {
+            Some(column) => column.cells = cells,
+            None => self.columns.push(Column { name: name.to_owned(), cells }),
+        }
+    }
+
+    /// How many rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// The columns besides time, in the order of the recording.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The quantity of this name.
+    #[must_use]
+    pub fn numbers(&self, name: &str) -> Option<&Numbers> {
+        self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.cells {
+            Cells::Numbers(numbers) => Some(numbers),
+            Cells::Words(_) => None,
+        })
+    }
+
+    /// The text column of this name.
+    #[must_use]
+    pub fn words(&self, name: &str) -> Option<&Words> {
+        self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.cells {
+            Cells::Words(words) => Some(words),
+            Cells::Numbers(_) => None,
+        })
+    }
+
+    /// Stretches of rows with the same `run`, in order. A run that returns later is a second stretch.
+    #[must_use]
+    pub fn runs(&self) -> Vec<Run> {
+        let words = self.words("run");
+        let name = |row: usize| words.map_or("1", |words| words.get(row).unwrap_or(""));
+        let mut runs: Vec<Run> = Vec::new();
+        for row in 0..self.rows() {
+            match runs.last_mut() {
+                Some(run) if run.name == name(row) => run.rows.end = row + 1,
+                _ => runs.push(Run { name: name(row).to_owned(), rows: row..row + 1 }),
+            }
+        }
+        runs
+    }
+
+    /// Is the pause between one run and the next known? It is with `time_utc`, and when `time_s` goes on increasing.
+    #[must_use]
+    pub fn pauses_known(&self) -> bool {
+        self.start_ns.is_some() || self.time_s.windows(2).all(|pair| pair[1] >= pair[0])
+    }
+}

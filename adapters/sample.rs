@@ -1,0 +1,71 @@
+//! Every channel at one tick, each with its age.
+
+use crate::channel::ChannelId;
+use crate::clock::TimeNs;
+use crate::reading::{Absence, Value};
+
+/// What is known of one channel at a tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slot {
+    /// The value, or why there is none.
+    pub value: Result<Value, Absence>,
+    /// Tick minus the time the value was true; 0 when interpolated between two readings around the tick.
+    pub age_ns: i64,
+}
+
+impl Slot {
+    /// A channel that has no value for this reason.
+    #[must_use]
+    pub fn absent(reason: Absence) -> Self {
+        Self { value: Err(reason), age_ns: 0 }
+    }
+}
+
+/// Every channel of the table at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// The tick, nanoseconds since 1970 on the gateway's clock.
+    pub at_ns: TimeNs,
+    slots: Vec<Slot>,
+}
+
+impl Sample {
+    /// A sample in which no channel is provided.
+    #[must_use]
+    pub fn empty(at_ns: TimeNs) -> Self {
+        Self { at_ns, slots: vec![Slot::absent(Absence::NotProvided); ChannelId::count()] }
+    }
+
+    /// What is known of `channel`.
+    #[must_use]
+    pub fn slot(&self, channel: ChannelId) -> &Slot {
+        &self.slots[channel.index()]
+    }
+
+    /// Replaces what is known of `channel`.
+    pub fn set(&mut self, channel: ChannelId, slot: Slot) {
+        self.slots[channel.index()] = slot;
+    }
+
+    /// The number of `channel`, or the reason there is none.
+    ///
+    /// # Errors
+    /// The reason of absence; [`Absence::NotSupported`] when the channel holds text.
+    pub fn number(&self, channel: ChannelId) -> Result<f64, Absence> {
+        match &self.slot(channel).value {
+            Ok(value) => value.as_number().ok_or(Absence::NotSupported),
+            Err(reason) => Err(*reason),
+        }
+    }
+
+    /// The text of `channel`, if it has one.
+    #[must_use]
+    pub fn text(&self, channel: ChannelId) -> Option<&str> {
+        self.slot(channel).value.as_ref().ok().and_then(Value::as_text)
+    }
+
+    /// Every channel that a source provides, with its slot.
+    pub fn provided(&self) -> impl Iterator<Item = (ChannelId, &Slot)> {
+        ChannelId::all().zip(&self.slots).filter(|(_, slot)| slot.value != Err(Absence::NotProvided))
+    }
+}

@@ -1,0 +1,1 @@
+//! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.

@@ -1,0 +1,3 @@
+//! `cnc-gateway`: parses the arguments and calls one function.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! What is inferred: estimators invert the laws of [`crate::physics`].

@@ -1,0 +1,1 @@
+//! What is known: one physical effect per file.

@@ -1,0 +1,1 @@
+//! What the integrator decides: the rhai host.

@@ -1,0 +1,1 @@
+//! What is doubted: simulate, compare, locate, name, refit, report.
