@@ -1,1 +1,148 @@
 //! What is known: one physical effect per file.
+//!
+//! An [`Effect`] is a law that is linear in some parameters and has a shape governed by the others. The same effect
+//! serves as a part of a model and as a candidate for what a model has left out. Its [`EffectDoc`] is written once:
+//! rustdoc, `effects show`, the diagnosis report and the check of model files all read it.
+
+pub mod catalogue;
+mod scene;
+pub mod state;
+
+pub use catalogue::{CATALOGUE, effect};
+pub use scene::{OutputKind, Role, Scene, SceneError};
+
+/// How a parameter enters the law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Entry {
+    /// The contribution is proportional to it.
+    Linear,
+    /// It bends the shape of the contribution (an exponent, a time constant, a threshold).
+    Shape,
+}
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterDoc {
+    /// Name in model files and reports.
+    pub name: &'static str,
+    /// Unit; `output` stands for the unit of the simulated output.
+    pub unit: &'static str,
+    /// Proportional or shaping.
+    pub entry: Entry,
+    /// Least and greatest value that is physically possible. A range on one side of zero is the sign of the effect.
+    pub range: (f64, f64),
+    /// What it is, in English.
+    pub en: &'static str,
+    /// What it is, in Chinese.
+    pub zh: &'static str,
+}
+
+/// The texts of an effect in one language.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Texts {
+    /// A short name, as in a sentence.
+    pub name: &'static str,
+    /// One sentence a machinist understands.
+    pub statement: &'static str,
+    /// How a recording looks when the simulation lacks it.
+    pub absence: &'static str,
+    /// What it is confused with, and why.
+    pub confused_with: &'static str,
+    /// The experiment that separates it from those.
+    pub experiment: &'static str,
+}
+
+/// Everything a user is told about an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectDoc {
+    /// Public name, as in model files and diagnoses.
+    pub kind: &'static str,
+    /// `model`, `drive`, `spindle`, `cutting`, `axis`, `auxiliary`, `thermal`, `measurement` or `control`.
+    pub family: &'static str,
+    /// The law, in plain ASCII.
+    pub law: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [ParameterDoc],
+    /// What it needs: roles or columns; alternatives separated by `|`.
+    pub needs: &'static [&'static str],
+    /// Where the law is from.
+    pub source: &'static str,
+    /// Minutes the separating experiment takes.
+    pub experiment_minutes: f64,
+    /// Kinds it is confused with.
+    pub rivals: &'static [&'static str],
+    /// English texts.
+    pub en: Texts,
+    /// Chinese texts.
+    pub zh: Texts,
+}
+
+impl EffectDoc {
+    /// The parameter of this name.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&'static ParameterDoc> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+}
+
+/// One concrete shape of an effect: a form of the law with values for its shape parameters.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Form {
+    /// Which of the effect's forms; empty for the only one.
+    pub name: &'static str,
+    /// Shape parameters with their values.
+    pub shape: Vec<(&'static str, f64)>,
+    /// A text condition, such as an operation or the run since when: column and word.
+    pub place: Option<(String, String)>,
+    /// Natural logarithm of how many alternatives of the same freedom are tried (steps at any run, any operation,
+    /// any threshold): the price of having chosen this one.
+    pub ln_choices: f64,
+}
+
+impl Form {
+    /// A form with these shape parameters.
+    #[must_use]
+    pub fn of(shape: &[(&'static str, f64)]) -> Self {
+        Self { shape: shape.to_vec(), ..Self::default() }
+    }
+
+    /// The only form of an effect without shape parameters.
+    #[must_use]
+    pub fn plain() -> Self {
+        Self::default()
+    }
+
+    /// The value of a shape parameter.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.shape.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
+    }
+}
+
+/// Contribution per unit of each linear parameter: name of the parameter and one number per row, in the output's
+/// unit over the parameter's unit.
+pub type Columns = Vec<(&'static str, Vec<f64>)>;
+
+/// One physical law.
+pub trait Effect: Sync + Send {
+    /// Everything a user is told.
+    fn doc(&self) -> &'static EffectDoc;
+
+    /// The forms worth trying as a candidate in this scene, coarse in the shape parameters; empty when the scene lacks
+    /// what the effect needs or never excites it.
+    fn forms(&self, scene: &Scene) -> Vec<Form>;
+
+    /// The columns of this form, `None` when the scene lacks an input.
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns>;
+
+    /// The form a model file means when it gives no form: its shape parameters are replaced by the file's.
+    fn default_form(&self, scene: &Scene) -> Form {
+        self.forms(scene).into_iter().next().unwrap_or_default()
+    }
+
+    /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
+    /// that it must be followed through a held-out run?
+    fn has_hidden_state(&self) -> bool {
+        false
+    }
+}

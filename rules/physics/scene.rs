@@ -1,0 +1,403 @@
+//! What an effect sees: the inputs of a recording by the part they play.
+
+use adapters::recording::{Recording, Words, with_derived};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use thiserror::Error;
+
+/// The parts that columns play for the effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Spindle speed, rpm.
+    Speed,
+    /// Acceleration of an axis or drive.
+    Acceleration,
+    /// Velocity of an axis or drive.
+    Velocity,
+    /// Position of an axis or drive.
+    Position,
+    /// Load on the drive, where the model has no `cutting_power`.
+    Load,
+    /// Tool in the work, 0 to 1.
+    Engaged,
+    /// Temperature of the machine part that matters (bearing), degrees Celsius.
+    Temperature,
+    /// Temperature of the shop, degrees Celsius.
+    Ambient,
+    /// Supply voltage, V.
+    Voltage,
+    /// Position of the axis that moves against gravity, or the word that names the axis.
+    Vertical,
+}
+
+impl Role {
+    /// Every role.
+    pub const ALL: [Self; 10] = [
+        Self::Speed,
+        Self::Acceleration,
+        Self::Velocity,
+        Self::Position,
+        Self::Load,
+        Self::Engaged,
+        Self::Temperature,
+        Self::Ambient,
+        Self::Voltage,
+        Self::Vertical,
+    ];
+
+    /// The name in `[roles]` of a model file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+            Self::Velocity => "velocity",
+            Self::Position => "position",
+            Self::Load => "load",
+            Self::Engaged => "engaged",
+            Self::Temperature => "temperature",
+            Self::Ambient => "ambient",
+            Self::Voltage => "voltage",
+            Self::Vertical => "vertical",
+        }
+    }
+
+    /// The role of this name.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|role| role.name() == name)
+    }
+
+    /// The channels that play the role by their meaning, best first.
+    #[must_use]
+    pub fn defaults(self) -> &'static [&'static str] {
+        match self {
+            Self::Speed => &["spindle_speed_rpm", "motor_speed_rpm", "spindle_programmed_rpm"],
+            Self::Acceleration => &["acceleration_m_s2", "axis_acceleration_mm_s2"],
+            Self::Velocity => &["axis_velocity_mm_min", "velocity_m_s"],
+            Self::Position => &["axis_position_mm", "position_m", "z_axis_position_mm"],
+            Self::Load => &[],
+            Self::Engaged => &["engaged"],
+            Self::Temperature => &["bearing_temperature_c", "motor_temperature_c"],
+            Self::Ambient => &["ambient_temperature_c"],
+            Self::Voltage => &["supply_voltage_v"],
+            Self::Vertical => &[],
+        }
+    }
+}
+
+/// What kind of quantity the output is: it decides whether friction is a level or grows with speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutputKind {
+    /// Power: a friction force costs power in proportion to speed.
+    Power,
+    /// Force, torque, load or current of a drive: a friction force is a level with the sign of motion.
+    Force,
+    /// Displacement of the tool against the work.
+    Displacement,
+    /// Anything else.
+    Other,
+}
+
+impl OutputKind {
+    /// From the unit at the end of the output's name; drive counts follow the word before the unit.
+    #[must_use]
+    pub fn of(output: &str) -> Self {
+        let has = |word: &str| output.contains(word);
+        if output.ends_with("_um") {
+            Self::Displacement
+        } else if output.ends_with("_w") || has("power") {
+            Self::Power
+        } else if has("force") || has("torque") || has("current") || has("load") {
+            Self::Force
+        } else {
+            Self::Other
+        }
+    }
+}
+
+/// Why a scene cannot be made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SceneError {
+    /// The output is not a quantity of the recording.
+    #[error("the recording has no quantity {output}, the output of the model. {hint}")]
+    NoOutput {
+        /// The output named by the model.
+        output: String,
+        /// What to do.
+        hint: String,
+    },
+}
+
+/// A recording seen by the effects. Gaps of an input are filled by holding the last value within the run (a run's
+/// head by the first value that comes); [`Scene::usable`] tells where an output value stands.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    rows: usize,
+    time_s: Vec<f64>,
+    runs: Vec<Range<usize>>,
+    run_names: Vec<String>,
+    restarts: Vec<usize>,
+    period_s: f64,
+    columns: BTreeMap<String, Vec<f64>>,
+    absent: BTreeMap<String, Vec<bool>>,
+    words: BTreeMap<String, Words>,
+    roles: BTreeMap<Role, String>,
+    output: String,
+    recorded: Vec<f64>,
+    usable: Vec<bool>,
+    passes: Vec<Range<usize>>,
+    load: Option<Vec<f64>>,
+    simulated: Option<Vec<f64>>,
+}
+
+impl Scene {
+    /// Prepares a recording for a model with this output and these declared roles.
+    ///
+    /// # Errors
+    /// [`SceneError::NoOutput`] when the output is not recorded.
+    pub fn new(recording: &Recording, output: &str, roles: &BTreeMap<Role, String>) -> Result<Self, SceneError> {
+        let recording = with_derived(recording.clone());
+        let measured = recording.numbers(output).ok_or_else(|| SceneError::NoOutput {
+            output: output.to_owned(),
+            hint: format!("Record the channel {output}, or name another output in the model."),
+        })?;
+        let runs = recording.runs();
+        let run_names = runs.iter().map(|run| run.name.clone()).collect();
+        let runs: Vec<Range<usize>> = runs.into_iter().map(|run| run.rows).collect();
+        let mut scene = Self {
+            rows: recording.rows(),
+            time_s: recording.time_s.clone(),
+            restarts: restarts(&recording, &runs),
+            period_s: median_period_s(&recording.time_s, &runs),
+            recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
+            usable: measured.iter().map(|value| value.is_some()).collect(),
+            run_names,
+            columns: BTreeMap::new(),
+            absent: BTreeMap::new(),
+            words: BTreeMap::new(),
+            roles: BTreeMap::new(),
+            output: output.to_owned(),
+            passes: Vec::new(),
+            load: None,
+            simulated: None,
+            runs,
+        };
+        scene.take_columns(&recording);
+        scene.take_roles(roles);
+        scene.passes = scene.find_passes();
+        Ok(scene)
+    }
+
+    fn take_columns(&mut self, recording: &Recording) {
+        for column in recording.columns() {
+            match &column.cells {
+                adapters::recording::Cells::Numbers(numbers) if numbers.count_present() > 0 => {
+                    let values: Vec<Option<f64>> = numbers.iter().collect();
+                    self.absent.insert(column.name.clone(), values.iter().map(Option::is_none).collect());
+                    self.columns.insert(column.name.clone(), hold_fill(&values, &self.runs));
+                }
+                adapters::recording::Cells::Words(words) if !words.words().is_empty() => {
+                    self.words.insert(column.name.clone(), words.clone());
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn take_roles(&mut self, declared: &BTreeMap<Role, String>) {
+        for role in Role::ALL {
+            let default = role.defaults().iter().find(|name| self.columns.contains_key(**name));
+            let column = declared.get(&role).cloned().or_else(|| default.map(|name| (*name).to_owned()));
+            if let Some(column) = column {
+                self.roles.insert(role, column);
+            }
+        }
+    }
+
+    /// Stretches with the tool in the work, within a run.
+    fn find_passes(&self) -> Vec<Range<usize>> {
+        let Some(engaged) = self.role(Role::Engaged) else { return Vec::new() };
+        let mut passes: Vec<Range<usize>> = Vec::new();
+        for run in &self.runs {
+            let mut start = None;
+            for row in run.clone() {
+                match (engaged[row] > 0.5, start) {
+                    (true, None) => start = Some(row),
+                    (false, Some(first)) => {
+                        passes.push(first..row);
+                        start = None;
+                    }
+                    _ => {}
+                }
+            }
+            if let Some(first) = start {
+                passes.push(first..run.end);
+            }
+        }
+        passes
+    }
+
+    /// How many rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Seconds, as recorded; restarts at a run where the recording does.
+    #[must_use]
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// Rows of each run.
+    #[must_use]
+    pub fn runs(&self) -> &[Range<usize>] {
+        &self.runs
+    }
+
+    /// Name of each run.
+    #[must_use]
+    pub fn run_names(&self) -> &[String] {
+        &self.run_names
+    }
+
+    /// Rows at which a state starts from an unknown value: the first row, and the first row of every run before which
+    /// the pause is unknown.
+    #[must_use]
+    pub fn restarts(&self) -> &[usize] {
+        &self.restarts
+    }
+
+    /// Median time between two rows of a run.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// A quantity by its name in the recording.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// Names of the quantities.
+    pub fn column_names(&self) -> impl Iterator<Item = &str> {
+        self.columns.keys().map(String::as_str)
+    }
+
+    /// Where a quantity has no value of its own (the filled value is held).
+    #[must_use]
+    pub fn absent(&self, name: &str) -> Option<&[bool]> {
+        self.absent.get(name).map(Vec::as_slice)
+    }
+
+    /// A text column by its name.
+    #[must_use]
+    pub fn words(&self, name: &str) -> Option<&Words> {
+        self.words.get(name)
+    }
+
+    /// The quantity that plays this role.
+    #[must_use]
+    pub fn role(&self, role: Role) -> Option<&[f64]> {
+        self.column(self.roles.get(&role)?)
+    }
+
+    /// The name of the column that plays this role, or the word declared for it.
+    #[must_use]
+    pub fn role_name(&self, role: Role) -> Option<&str> {
+        self.roles.get(&role).map(String::as_str)
+    }
+
+    /// The simulated output's name.
+    #[must_use]
+    pub fn output(&self) -> &str {
+        &self.output
+    }
+
+    /// What kind of quantity the output is.
+    #[must_use]
+    pub fn output_kind(&self) -> OutputKind {
+        OutputKind::of(&self.output)
+    }
+
+    /// The recorded output; meaningful only where [`Scene::usable`].
+    #[must_use]
+    pub fn recorded(&self) -> &[f64] {
+        &self.recorded
+    }
+
+    /// Rows with a recorded output.
+    #[must_use]
+    pub fn usable(&self) -> &[bool] {
+        &self.usable
+    }
+
+    /// Takes rows out of the comparison (spikes, dropouts, absent inputs).
+    pub fn exclude(&mut self, rows: impl IntoIterator<Item = usize>) {
+        rows.into_iter().for_each(|row| self.usable[row] = false);
+    }
+
+    /// Stretches with the tool in the work.
+    #[must_use]
+    pub fn passes(&self) -> &[Range<usize>] {
+        &self.passes
+    }
+
+    /// The load of the cut in the output's unit: the simulated cutting power where the model has one, else the role
+    /// `load`. `None` when nothing tells how hard the cut is.
+    #[must_use]
+    pub fn load(&self) -> Option<&[f64]> {
+        self.load.as_deref().or_else(|| self.role(Role::Load))
+    }
+
+    /// Sets what the model simulates as the cut.
+    pub fn set_load(&mut self, load: Option<Vec<f64>>) {
+        self.load = load;
+    }
+
+    /// The output as the model simulates it, for effects of the measurement.
+    #[must_use]
+    pub fn simulated(&self) -> Option<&[f64]> {
+        self.simulated.as_deref()
+    }
+
+    /// Sets the simulated output.
+    pub fn set_simulated(&mut self, simulated: Option<Vec<f64>>) {
+        self.simulated = simulated;
+    }
+}
+
+fn restarts(recording: &Recording, runs: &[Range<usize>]) -> Vec<usize> {
+    if recording.pauses_known() {
+        return vec![0];
+    }
+    runs.iter().map(|run| run.start).collect()
+}
+
+fn median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
+    let mut steps: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]))
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.is_empty() {
+        return 1.0;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn hold_fill(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {
+    let mut filled = vec![0.0; values.len()];
+    for run in runs {
+        let head = values[run.clone()].iter().flatten().next().copied().unwrap_or(0.0);
+        let mut last = head;
+        for row in run.clone() {
+            last = values[row].unwrap_or(last);
+            filled[row] = last;
+        }
+    }
+    filled
+}
