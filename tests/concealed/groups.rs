@@ -1,0 +1,229 @@
+//! The groups of cases, and how many of which effect they hold.
+
+use crate::baseline::Process;
+use crate::case::{Case, Expect};
+use crate::dice::Dice;
+use crate::law::Entry;
+use crate::laws;
+use crate::noise::Noise;
+use crate::schedule::{Mode, Needs};
+use crate::spindle_case::Wish;
+
+/// A case that can be built.
+pub(crate) enum Order {
+    Spindle(Box<Wish>),
+}
+
+impl Order {
+    pub(crate) fn build(&self) -> Option<Case> {
+        match self {
+            Self::Spindle(wish) => wish.build(),
+        }
+    }
+
+    /// Group and name of the case.
+    pub(crate) fn label(&self) -> String {
+        match self {
+            Self::Spindle(wish) => format!("{}/{}", wish.group, wish.name),
+        }
+    }
+
+    pub(crate) fn group(&self) -> &str {
+        match self {
+            Self::Spindle(wish) => &wish.group,
+        }
+    }
+}
+
+/// Every case of one seed.
+pub(crate) fn orders(seed: u64) -> Vec<Order> {
+    let mut list = singles(seed);
+    list.extend(several(seed));
+    list.extend(unlisted(seed));
+    list.extend(nothing(seed));
+    list.extend(alike(seed));
+    list.extend(faulty(seed));
+    list.into_iter().map(|w| Order::Spindle(Box::new(w))).collect()
+}
+
+fn wish(group: String, name: String, seed: u64, mode: Mode, entries: Vec<Entry>, rho: f64) -> Wish {
+    let mut dice = Dice::seeded(&format!("{group}/{name}/wish"), seed);
+    Wish {
+        noise: Noise::draw(&mut dice),
+        process: Process::Turning,
+        seconds: dice.uniform(1900.0, 2100.0),
+        expect: Expect::Named,
+        needs: Needs::default(),
+        current: false,
+        name: format!("{name}-s{seed}"),
+        group,
+        seed,
+        mode,
+        entries,
+        rho,
+    }
+}
+
+/// Names of the effects that a spindle-power recording can show.
+fn names() -> Vec<&'static str> {
+    let mut names: Vec<&str> = laws::listed().iter().map(|e| e.name).collect();
+    names.dedup();
+    names
+}
+
+/// One form of `name`, another with every seed.
+fn form(name: &str, seed: u64) -> Entry {
+    let forms = laws::named(name);
+    forms[seed as usize % forms.len()].clone()
+}
+
+fn singles(seed: u64) -> Vec<Wish> {
+    let mut list = Vec::new();
+    let plain = [
+        (Mode::Rich, &[0.25, 0.5, 1.0, 2.0][..]),
+        (Mode::Production, &[0.25, 0.5, 1.0, 2.0]),
+        (Mode::Mono, &[1.0]),
+        (Mode::ClosedLoop, &[1.0]),
+    ];
+    for (mode, strengths) in plain {
+        for rho in strengths {
+            let group = format!("single-{}-rho{rho}", mode.name());
+            list.extend(
+                names()
+                    .iter()
+                    .map(|name| wish(group.clone(), name.to_string(), seed, mode, vec![form(name, seed)], *rho)),
+            );
+        }
+    }
+    list.extend(other_processes(seed));
+    list.extend(special(seed));
+    list
+}
+
+fn other_processes(seed: u64) -> Vec<Wish> {
+    let milling =
+        ["flank_wear", "hardness_batch", "bearing_warm_up", "auxiliary_switch", "clock_lag", "spindle_inertia"];
+    let drilling = ["flank_wear", "hardness_batch", "meter_window", "zero_drift"];
+    let one = |process: Process, label: &str, name: &&str| {
+        let mut wish =
+            wish(format!("single-{label}-rho1"), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        wish.process = process;
+        wish
+    };
+    let mills = milling.iter().map(|n| one(Process::Milling, "milling", n));
+    mills.chain(drilling.iter().map(|n| one(Process::Drilling, "drilling", n))).collect()
+}
+
+fn special(seed: u64) -> Vec<Wish> {
+    let group = "single-special-rho1";
+    let one = |name: &str, mode: Mode| wish(group.into(), name.into(), seed, mode, vec![form(name, seed)], 1.0);
+    let mut list = vec![
+        one("runout", Mode::Rich),
+        one("inverter_loss", Mode::Rich),
+        one("constant_load_control", Mode::ClosedLoop),
+    ];
+    for name in ["sensor_gain", "clock_lag", "zero_drift", "bearing_warm_up", "flank_wear"] {
+        let mut wish = wish("single-current-rho1".into(), name.into(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        wish.current = true;
+        list.push(wish);
+    }
+    list
+}
+
+fn several(seed: u64) -> Vec<Wish> {
+    let mut list = Vec::new();
+    let mut dice = Dice::seeded("several", seed);
+    for (mode, rho, count) in [(Mode::Rich, 1.0, 10), (Mode::Rich, 0.5, 4), (Mode::Production, 1.0, 6)] {
+        let group = format!("pair-{}-rho{rho}", mode.name());
+        list.extend((0..count).map(|i| together(&group, i, seed, mode, 2, rho, &mut dice)));
+    }
+    list.extend((0..4).map(|i| together("triple-rich-rho1", i, seed, Mode::Rich, 3, 1.0, &mut dice)));
+    let opposites = [
+        ("bearing_warm_up", "preload_growth"),
+        ("flank_wear", "speed_softening"),
+        ("flank_wear", "sensor_gain"),
+        ("hardness_batch", "flank_wear"),
+    ];
+    for (a, b) in opposites {
+        let pair = vec![form(a, seed), form(b, seed / 2)];
+        list.push(wish("opposite-rich-rho1".into(), format!("{a}+{b}"), seed, Mode::Rich, pair, 1.0));
+    }
+    list
+}
+
+/// Effects that are found together often and whose sum says something.
+fn together(group: &str, index: usize, seed: u64, mode: Mode, count: usize, rho: f64, dice: &mut Dice) -> Wish {
+    let clerks = ["engagement_timing", "recipe_error", "override_delay"];
+    let excluded = ["regeneration", "saturation", "stribeck", "ripple_alias"];
+    let pool: Vec<&str> = names().into_iter().filter(|n| !clerks.contains(n) && !excluded.contains(n)).collect();
+    let mut chosen: Vec<&str> = Vec::new();
+    while chosen.len() < count {
+        let name = *dice.pick(&pool);
+        if !chosen.contains(&name) {
+            chosen.push(name);
+        }
+    }
+    let entries = chosen.iter().map(|n| form(n, dice.whole(0, 5) as u64)).collect();
+    wish(group.into(), format!("{index}-{}", chosen.join("+")), seed, mode, entries, rho)
+}
+
+fn unlisted(seed: u64) -> Vec<Wish> {
+    let mut list = Vec::new();
+    for (mode, rho) in [(Mode::Rich, 1.0), (Mode::Rich, 0.5), (Mode::Production, 1.0)] {
+        for entry in laws::unlisted() {
+            let name = entry.form.replace([' ', ','], "_");
+            let group = format!("unlisted-{}-rho{rho}", mode.name());
+            let mut wish = wish(group, name, seed, mode, vec![entry], rho);
+            wish.expect = Expect::Unknown;
+            list.push(wish);
+        }
+    }
+    list
+}
+
+fn nothing(seed: u64) -> Vec<Wish> {
+    let mut list = Vec::new();
+    for noise in Noise::ALL {
+        for mode in [Mode::Rich, Mode::Production, Mode::Mono, Mode::ClosedLoop] {
+            let mut wish = wish(format!("nothing-{}", noise.name()), mode.name().into(), seed, mode, Vec::new(), 1.0);
+            (wish.noise, wish.expect) = (noise, Expect::Nothing);
+            list.push(wish);
+        }
+    }
+    list
+}
+
+/// Not to be told apart by construction.
+fn alike(seed: u64) -> Vec<Wish> {
+    let one_speed = Needs { one_speed: true, ..Needs::default() };
+    let one_feed = Needs { one_feed: true, ..Needs::default() };
+    let lots_with_tools = Needs { lots_with_tools: true, ..Needs::default() };
+    let kinds = [
+        ("windage", "one_speed", Mode::Rich, one_speed),
+        ("copper_loss", "one_speed", Mode::Rich, one_speed),
+        ("load_loss", "one_speed", Mode::Rich, one_speed),
+        ("edge_force", "one_feed", Mode::Rich, one_feed),
+        ("hardness_batch", "lot_is_edge", Mode::Production, lots_with_tools),
+        ("speed_softening", "mono", Mode::Mono, Needs::default()),
+        ("field_weakening", "one_speed", Mode::Rich, one_speed),
+    ];
+    let mut list = Vec::new();
+    for (name, why, mode, needs) in kinds {
+        let mut wish = wish("alike".into(), format!("{name}-{why}"), seed, mode, vec![form(name, seed)], 1.0);
+        (wish.needs, wish.expect) = (needs, Expect::Class);
+        list.push(wish);
+    }
+    list
+}
+
+/// Effects under spikes, dropouts, zeros and repeats.
+fn faulty(seed: u64) -> Vec<Wish> {
+    let names =
+        ["flank_wear", "hardness_batch", "bearing_warm_up", "auxiliary_switch", "speed_softening", "zero_drift"];
+    let one = |name: &&str| {
+        let mut wish = wish("faulty-rich-rho1".into(), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        wish.noise = Noise::Faulty;
+        wish
+    };
+    names.iter().map(one).collect()
+}

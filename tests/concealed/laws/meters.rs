@@ -1,0 +1,126 @@
+//! What the meter makes of the power: late, smeared, off zero, clipped, beating with the mains.
+
+use crate::dice::Dice;
+use crate::law::Planted;
+use crate::schedule::Plan;
+use crate::tick::{STEP_S, Tick};
+
+/// The series `delay_s` earlier, linear in between, held at the start of a part.
+fn delayed(ticks: &[Tick], power: &[f64], delay_s: impl Fn(f64) -> f64) -> Vec<f64> {
+    let mut start = 0;
+    (0..power.len())
+        .map(|i| {
+            if i > 0 && ticks[i].run != ticks[i - 1].run {
+                start = i;
+            }
+            let back = (i - start) as f64 - delay_s(ticks[i].t_s) / STEP_S;
+            let whole = back.floor().max(0.0);
+            let share = (back - whole).clamp(0.0, 1.0);
+            let j = start + whole as usize;
+            power[j] + share * (power[(j + 1).min(power.len() - 1)] - power[j])
+        })
+        .collect()
+}
+
+/// The meter's clock is behind and drifts by some ppm.
+pub(crate) fn lag(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (delay_s, ppm) = (strength * dice.uniform(0.5, 1.6), dice.uniform(-100.0, 100.0));
+    Planted::meter(move |ticks, power| delayed(ticks, power, |t| (delay_s + ppm * 1e-6 * t).max(0.0)))
+        .with("lag_s", delay_s)
+}
+
+/// Two first-order filters in a row, as in a transducer with a damped output.
+pub(crate) fn window(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (first_s, second_s) = (strength * dice.uniform(0.5, 1.6), strength * dice.uniform(0.1, 0.4));
+    Planted::meter(move |ticks, power| {
+        let (mut a, mut b) = (power[0], power[0]);
+        (0..power.len())
+            .map(|i| {
+                if ticks[i].gap_s > 0.0 {
+                    (a, b) = (power[i], power[i]);
+                }
+                a = power[i] + (a - power[i]) * (-STEP_S / first_s).exp();
+                b = a + (b - a) * (-STEP_S / second_s).exp();
+                b
+            })
+            .collect()
+    })
+}
+
+/// Zero that follows the temperature of the cabinet, which follows a random walk that is held back.
+pub(crate) fn zero_drift(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (tau_s, watt) = (dice.uniform(400.0, 900.0), dice.uniform(18.0, 45.0));
+    let mut dice = dice.clone();
+    Planted::meter(move |ticks, power| {
+        let (mut load, mut cabinet) = (dice.normal(), dice.normal());
+        let shifted = ticks.iter().zip(power).map(|(tick, p)| {
+            let keep = (-tick.elapsed_s() / tau_s).exp();
+            load = keep * load + (1.0 - keep * keep).sqrt() * dice.normal();
+            cabinet += (1.6 * load - cabinet) * (1.0 - (-tick.elapsed_s() / (0.7 * tau_s)).exp());
+            p + strength * watt * cabinet
+        });
+        shifted.collect()
+    })
+}
+
+/// Zero that runs off as the cabinet warms after switching on.
+pub(crate) fn zero_warm_up(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (tau_s, watt) = (dice.uniform(700.0, 1600.0), dice.sign() * dice.uniform(40.0, 90.0));
+    Planted::meter(move |ticks, power| {
+        let drift = |t: f64| 1.0 - (-t / tau_s).exp() * (1.0 + 0.4 * t / tau_s);
+        ticks.iter().zip(power).map(|(tick, p)| p + strength * watt * drift(tick.t_s)).collect()
+    })
+}
+
+/// The gain of the current transformer jumps when somebody touches it.
+pub(crate) fn gain_step(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted {
+    let (gain, from) =
+        (dice.sign() * dice.uniform(0.03, 0.06), dice.whole(plan.parts.len() / 3, 2 * plan.parts.len() / 3));
+    Planted::meter(move |ticks, power| {
+        let factor = |run: usize| if run >= from { 1.0 + strength * gain } else { 1.0 };
+        ticks.iter().zip(power).map(|(tick, p)| p * factor(tick.run)).collect()
+    })
+}
+
+/// The gain runs off with the warming of the burden.
+pub(crate) fn gain_drift(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (gain, tau_s) = (dice.sign() * dice.uniform(0.04, 0.08), dice.uniform(900.0, 2000.0));
+    Planted::meter(move |ticks, power| {
+        let run_off = |t: f64| strength * gain * (1.0 - (-t / tau_s).exp());
+        ticks.iter().zip(power).map(|(tick, p)| p * (1.0 + run_off(tick.t_s))).collect()
+    })
+}
+
+/// Power that follows the mains voltage with an exponent of its own.
+pub(crate) fn supply(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let exponent = strength * dice.uniform(0.8, 1.7);
+    Planted::meter(move |ticks, power| {
+        ticks.iter().zip(power).map(|(tick, p)| p * (tick.supply_v / 400.0).powf(exponent)).collect()
+    })
+    .with("supply_exponent", exponent)
+}
+
+/// Twice the mains frequency, folded by the polling into a slow line that wanders with the grid.
+pub(crate) fn ripple(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (share, offset_hz) = (dice.uniform(0.02, 0.04), dice.uniform(0.03, 0.30));
+    let mut dice = dice.clone();
+    Planted::meter(move |ticks, power| {
+        let (mut phase, mut grid_hz) = (dice.uniform(0.0, 1.0), 0.0);
+        let rippled = ticks.iter().zip(power).map(|(tick, p)| {
+            let keep = (-tick.elapsed_s() / 400.0).exp();
+            grid_hz = keep * grid_hz + (1.0 - keep * keep).sqrt() * 0.0008 * dice.normal();
+            phase += (offset_hz + 2.0 * grid_hz) * tick.elapsed_s();
+            p + strength * share * (120.0 + p) * (std::f64::consts::TAU * phase).sin()
+        });
+        rippled.collect()
+    })
+}
+
+/// An input that bends and then stops: the ceiling lies at a quantile of the day's power.
+pub(crate) fn ceiling(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let share = (0.97 - 0.08 * strength * dice.uniform(0.5, 1.0)).clamp(0.72, 0.985);
+    Planted::meter(move |_, power| {
+        let ceiling = crate::least_squares::quantile(power, share);
+        power.iter().map(|p| p.min(ceiling)).collect()
+    })
+}

@@ -1,0 +1,91 @@
+//! Recordings whose missing physics is known to this suite and to nobody else.
+
+mod baseline;
+mod case;
+mod dice;
+mod groups;
+mod law;
+mod laws;
+mod least_squares;
+mod motion;
+mod noise;
+mod schedule;
+mod spindle_case;
+mod spindle_record;
+mod tick;
+mod world;
+
+use std::path::PathBuf;
+
+/// Seeds to run: `CONCEALED_SEEDS` is a count ("10": 1 to 10) or a range ("1000..1010").
+fn seeds(default: &str) -> Vec<u64> {
+    let text = std::env::var("CONCEALED_SEEDS").unwrap_or_else(|_| default.into());
+    let number = |s: &str| s.trim().parse::<u64>().expect("CONCEALED_SEEDS is a count or a range like 1000..1010");
+    match text.split_once("..") {
+        Some((from, to)) => (number(from)..number(to)).collect(),
+        None => (1..=number(&text)).collect(),
+    }
+}
+
+/// Orders of all seeds whose group contains `CONCEALED_FILTER`.
+fn wanted(default_seeds: &str) -> Vec<groups::Order> {
+    let filter = std::env::var("CONCEALED_FILTER").unwrap_or_default();
+    let all = seeds(default_seeds).into_iter().flat_map(groups::orders);
+    all.filter(|order| order.group().contains(&filter)).collect()
+}
+
+/// Writes cases to `CONCEALED_OUT` and their truth to `CONCEALED_OUT-truth`.
+#[test]
+#[ignore = "writes files; set CONCEALED_OUT"]
+fn write_cases() {
+    let out = std::env::var("CONCEALED_OUT").expect("set CONCEALED_OUT to the directory to write to");
+    let (given, sealed) = (PathBuf::from(&out), PathBuf::from(format!("{out}-truth")));
+    let mut written = 0;
+    for order in wanted("1") {
+        match order.build() {
+            Some(case) => {
+                case.write(&given, &sealed).expect("the case can be written");
+                written += 1;
+            }
+            None => println!("no plausible strength: {}", order.label()),
+        }
+    }
+    println!("{written} cases in {out}");
+}
+
+/// The same seed gives the same bytes, and the next one others.
+#[test]
+fn generation_is_deterministic() {
+    let text = |seed: u64| {
+        let orders = groups::orders(seed);
+        let case = orders.iter().filter(|o| o.group() == "single-rich-rho1").find_map(groups::Order::build);
+        let case = case.expect("some effect of the group can be planted");
+        (case.table.csv(), case.model.clone(), case.truth().to_string())
+    };
+    assert_eq!(text(3), text(3));
+    assert_ne!(text(3).0, text(4).0);
+}
+
+/// Without a hidden effect the output is the nominal law plus noise of the stated size, and nothing else.
+#[test]
+fn an_empty_case_holds_noise_alone() {
+    for order in groups::orders(2).iter().filter(|o| o.group() == "nothing-iid") {
+        let case = order.build().expect("an empty case needs no strength");
+        let errors = case.noise_of_rows();
+        let ratio = least_squares::rms(&errors) / case.noise_sd;
+        assert!((0.93..1.07).contains(&ratio), "{}: noise is {ratio} of what is stated", order.label());
+        assert!(case.hidden.is_empty());
+    }
+}
+
+/// Every wished remainder is met, and every contribution is a number.
+#[test]
+fn effects_have_the_wished_size() {
+    for order in groups::orders(2).iter().filter(|o| o.group() == "single-rich-rho0.5") {
+        let Some(case) = order.build() else { continue };
+        for effect in &case.hidden {
+            assert!((0.45..0.9).contains(&effect.rho), "{}: rho {}", order.label(), effect.rho);
+            assert!(effect.contribution.iter().all(|c| c.is_finite()), "{}", order.label());
+        }
+    }
+}
