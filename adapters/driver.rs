@@ -1,8 +1,8 @@
 //! What a driver can do: read, and separately command. Small traits, one verb each.
 
 use crate::channel::ChannelId;
-use crate::clock::Clock;
-use crate::reading::Reading;
+use crate::clock::{Clock, TimeNs};
+use crate::reading::{Absence, Reading};
 use crate::units::OverridePct;
 use std::time::Duration;
 use thiserror::Error;
@@ -18,6 +18,18 @@ pub enum SourceError {
         source_name: String,
         /// What happened.
         what: String,
+        /// What to do next.
+        next: String,
+    },
+    /// The device did not answer in time; worth trying again.
+    #[error("{source_name}: no answer to {request} within {deadline_ms} ms. {next}")]
+    Timeout {
+        /// Which source, as its address.
+        source_name: String,
+        /// What was asked.
+        request: String,
+        /// How long was waited.
+        deadline_ms: u64,
         /// What to do next.
         next: String,
     },
@@ -57,6 +69,20 @@ pub enum SourceError {
     },
 }
 
+impl SourceError {
+    /// The reason that every channel of the source gets while this lasts.
+    #[must_use]
+    pub fn absence(&self) -> Absence {
+        match self {
+            Self::Line { .. } | Self::End { .. } => Absence::Disconnected,
+            Self::Timeout { .. } => Absence::Timeout,
+            Self::Refused { .. } => Absence::Refused,
+            Self::Decode { .. } => Absence::OutOfRange,
+            Self::Off { .. } => Absence::MachineOff,
+        }
+    }
+}
+
 /// Something that can be read.
 pub trait Source: Send {
     /// The address, as in the configuration.
@@ -74,6 +100,27 @@ pub trait Source: Send {
     /// # Errors
     /// See [`SourceError`].
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError>;
+}
+
+/// A source that brings its own time: a recording or the simulated machine, read as fast as the pipeline takes it.
+pub trait Pull: Send {
+    /// The address, as in the configuration.
+    fn name(&self) -> &str;
+
+    /// The channels this source can deliver.
+    fn channels(&self) -> &[ChannelId];
+
+    /// The pace of its readings.
+    fn period(&self) -> Duration;
+
+    /// When the next answer is there; `None` at the end.
+    fn next_ns(&self) -> Option<TimeNs>;
+
+    /// Appends the next answer to `out`.
+    ///
+    /// # Errors
+    /// See [`SourceError`]. After a failure [`Pull::next_ns`] has moved on; a source whose time stands still is given up.
+    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError>;
 }
 
 /// Something that accepts a feed override. Only the gate holds one.

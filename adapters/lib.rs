@@ -10,16 +10,20 @@
 //! - no NaN: a missing value is an [`Absence`] with a reason;
 //! - no `unsafe` outside files named `ffi.rs`.
 
+pub mod address;
 pub mod channel;
 pub mod clock;
 pub mod driver;
+pub mod merge;
 pub mod reading;
 pub mod recording;
+pub mod replay;
 pub mod sample;
 pub mod units;
 
+pub use address::Address;
 pub use channel::{Channel, ChannelId};
-pub use driver::{Actuator, Source, SourceError};
+pub use driver::{Actuator, Pull, Source, SourceError};
 pub use reading::{Absence, Reading, Stamp, Value};
 pub use recording::Recording;
 pub use sample::{Sample, Slot};

@@ -1,0 +1,122 @@
+//! The part of an address after the question mark, taken key by key so that what is left over can be refused.
+
+use crate::channel::nearest;
+use std::fmt::Display;
+use std::str::FromStr;
+
+/// `key=value` pairs joined by `&`; values may hold `%20`-style escapes.
+pub(super) struct Keys {
+    given: Vec<(String, String)>,
+    known: Vec<&'static str>,
+    problems: Vec<String>,
+}
+
+impl Keys {
+    pub(super) fn of(query: &str) -> Self {
+        let mut keys = Self { given: Vec::new(), known: Vec::new(), problems: Vec::new() };
+        for pair in query.split('&').filter(|pair| !pair.is_empty()) {
+            match pair.split_once('=') {
+                Some((key, value)) if !value.is_empty() => keys.add(key, value),
+                _ => keys.problem(format!("{pair:?} is not key=value")),
+            }
+        }
+        keys
+    }
+
+    fn add(&mut self, key: &str, value: &str) {
+        if self.given.iter().any(|(known, _)| known == key) {
+            return self.problem(format!("{key} is given twice"));
+        }
+        self.given.push((key.to_owned(), unescaped(value)));
+    }
+
+    pub(super) fn problem(&mut self, problem: String) {
+        self.problems.push(problem);
+    }
+
+    /// The text of a key, if it was given.
+    pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+        self.known.push(key);
+        let at = self.given.iter().position(|(given, _)| given == key)?;
+        Some(self.given.swap_remove(at).1)
+    }
+
+    /// A number within a range, or the default.
+    pub(super) fn number<T>(&mut self, key: &'static str, default: T, least: T, greatest: T) -> T
+    where
+        T: FromStr + PartialOrd + Display + Copy,
+    {
+        let Some(text) = self.text(key) else { return default };
+        match text.parse::<T>() {
+            Ok(number) if number >= least && number <= greatest => number,
+            _ => {
+                self.problem(format!("{key}={text}: give a number from {least} to {greatest}"));
+                default
+            }
+        }
+    }
+
+    /// One of several words, or the first of them.
+    pub(super) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> T {
+        let Some(text) = self.text(key) else { return choices[0].1 };
+        if let Some((_, value)) = choices.iter().find(|(word, _)| *word == text) {
+            return *value;
+        }
+        let words: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
+        self.problem(format!("{key}={text}: give one of {}", words.join(", ")));
+        choices[0].1
+    }
+
+    /// Every problem, with the keys that nobody asked for.
+    pub(super) fn finish(mut self) -> Vec<String> {
+        for (key, _) in std::mem::take(&mut self.given) {
+            let hint = match nearest(&key, self.known.iter().copied()) {
+                Some(near) => format!("; did you mean {near}?"),
+                None if self.known.is_empty() => "; this address has no keys".to_owned(),
+                None => format!("; the keys here are {}", self.known.join(", ")),
+            };
+            self.problems.push(format!("unknown key {key}{hint}"));
+        }
+        self.problems
+    }
+}
+
+/// `%20` and the like as the bytes they stand for; anything else as it is.
+fn unescaped(text: &str) -> String {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((&first, after)) = rest.split_first() {
+        match after.first_chunk::<2>().filter(|_| first == b'%').and_then(|pair| hex(*pair)) {
+            Some(byte) => {
+                bytes.push(byte);
+                rest = &after[2..];
+            }
+            None => {
+                bytes.push(first);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
+}
+
+fn hex(pair: [u8; 2]) -> Option<u8> {
+    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
+    Some(digit(pair[0])? * 16 + digit(pair[1])?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_are_undone_and_stray_percent_signs_kept() {
+        assert_eq!(unescaped("a%20b%2"), "a b%2");
+        assert_eq!(unescaped("100%"), "100%");
+    }
+
+    #[test]
+    fn a_key_given_twice_is_a_problem() {
+        assert_eq!(Keys::of("a=1&a=2").problems, vec!["a is given twice"]);
+    }
+}

@@ -1,0 +1,161 @@
+//! Sources and sinks as addresses: the same notation in the configuration, on the command line and in messages.
+
+mod keys;
+mod target;
+
+pub use target::{
+    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
+    Speed, Target,
+};
+
+use keys::Keys;
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// The schemes of the notation, for "did you mean" and for help texts.
+pub const SCHEMES: [&str; 10] =
+    ["simulated", "replay", "fanuc", "nclink", "nclinks", "hncnet", "modbus-tcp", "modbus-rtu", "eda9033a", "waveform"];
+
+/// A text that is no usable address, with everything that is wrong with it.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{address}: {}", .problems.join("; "))]
+pub struct AddressError {
+    /// The text as given.
+    pub address: String,
+    /// Each problem, with what to do about it.
+    pub problems: Vec<String>,
+}
+
+/// Where a source or sink is, and how to talk to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Address {
+    text: String,
+    target: Target,
+}
+
+impl Address {
+    /// The address as it was written: the name of the source everywhere.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What it means.
+    #[must_use]
+    pub fn target(&self) -> &Target {
+        &self.target
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for Address {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let text = text.trim();
+        let fail = |problems| AddressError { address: text.to_owned(), problems };
+        let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
+        let (body, query) = match rest.rsplit_once('?') {
+            Some((body, query)) => (body, query),
+            None => (rest, ""),
+        };
+        let mut keys = Keys::of(query);
+        let target = target::parse(scheme, body, &mut keys);
+        let mut problems = keys.finish();
+        match target {
+            Ok(target) if problems.is_empty() => Ok(Self { text: text.to_owned(), target }),
+            Ok(_) => Err(fail(problems)),
+            Err(problem) => {
+                problems.insert(0, problem);
+                Err(fail(problems))
+            }
+        }
+    }
+}
+
+fn no_scheme(text: &str) -> String {
+    if std::path::Path::new(text).extension().is_some_and(|end| end == "csv" || end == "gz") {
+        return format!("no scheme; a recording is written replay:{text}");
+    }
+    format!("no scheme; write one of {} followed by a colon", SCHEMES.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Target {
+        Address::from_str(text).expect("usable").target().clone()
+    }
+
+    fn refused(text: &str) -> String {
+        Address::from_str(text).expect_err("unusable").to_string()
+    }
+
+    #[test]
+    fn every_example_of_the_notation_is_understood() {
+        for text in [
+            "simulated://lathe",
+            "simulated://mill?seed=7&speed=60",
+            "replay:recording.csv.gz?speed=max",
+            "replay:/data/with space.csv",
+            "fanuc://10.0.0.5:8193?path=1&backend=native",
+            "fanuc://cnc?backend=vendor&library=/opt/fwlib/libfwlib32.so",
+            "nclink://broker:1883/SERIAL",
+            "nclinks://broker:8883/SERIAL",
+            "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
+            "modbus-tcp://[::1]:502?unit=1&profile=sdm630",
+            "modbus-rtu:///dev/ttyUSB0?baud=9600&parity=none&unit=1&profile=eda9033a",
+            "eda9033a:///dev/ttyUSB0?baud=9600&address=1&ct=20",
+            "waveform://daq:5000",
+        ] {
+            assert_eq!(Address::from_str(text).expect(text).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn the_replay_speed_is_a_factor_or_as_fast_as_possible() {
+        let speed = |text| match parse(text) {
+            Target::Replay(replay) => replay.speed,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(speed("replay:a.csv?speed=max"), Speed::Max);
+        assert_eq!(speed("replay:a.csv?speed=2.5"), Speed::Times(2.5));
+        assert_eq!(speed("replay:a.csv"), Speed::Times(1.0));
+    }
+
+    #[test]
+    fn a_misspelt_scheme_or_key_gets_a_suggestion() {
+        assert!(refused("fanuk://x").contains("fanuc"), "{}", refused("fanuk://x"));
+        assert!(refused("simulated://lathe?sede=1").contains("seed"), "{}", refused("simulated://lathe?sede=1"));
+        assert!(refused("simulated://lath").contains("lathe"), "{}", refused("simulated://lath"));
+        assert!(refused("recording.csv").contains("replay:recording.csv"));
+    }
+
+    #[test]
+    fn all_problems_are_told_at_once() {
+        let text = refused("modbus-tcp://meter:99999?unit=900&colour=red&profile=sdm630");
+        for part in ["99999", "unit", "colour"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+
+    #[test]
+    fn a_vendor_library_must_be_named() {
+        assert!(refused("fanuc://cnc?backend=vendor").contains("library"));
+        assert!(refused("hncnet://cnc").contains("library"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_makes_it_panic(text in "(simulated|replay|fanuc|nclink|modbus-rtu|:|//|\\?|&|=|%|\\[|\\]|[0-9a-z.]|\\PC){0,24}") {
+            let _ = Address::from_str(&text);
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! What each scheme of an address means, typed.
+
+use super::SCHEMES;
+use super::keys::Keys;
+use crate::channel::nearest;
+use std::path::PathBuf;
+
+/// How fast a replay or a simulated machine runs against the clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Speed {
+    /// So many times real time.
+    Times(f64),
+    /// As fast as the pipeline takes it.
+    Max,
+}
+
+/// Which built-in machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatedMachine {
+    /// A two-axis lathe with a turret.
+    Lathe,
+    /// A three-axis mill with a tool changer.
+    Mill,
+}
+
+/// Which of the built-in machine's two devices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatedDevice {
+    /// The controller and the meter.
+    Both,
+    /// Only the controller.
+    Controller,
+    /// Only the meter.
+    Meter,
+}
+
+/// The built-in machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimulatedTarget {
+    /// Lathe or mill.
+    pub machine: SimulatedMachine,
+    /// Which of its devices are sources.
+    pub device: SimulatedDevice,
+    /// Seed of everything random; the same seed gives the same readings.
+    pub seed: u64,
+    /// Against the clock; the gateway runs all its clocks at this factor.
+    pub speed: Speed,
+    /// Time constant of the spindle start, s.
+    pub tau_s: f64,
+    /// Strength of every cut in percent of the plan; 5 is a very light cut.
+    pub cut_pct: f64,
+    /// Noise of the meter, percent of the reading.
+    pub noise_pct: f64,
+    /// Meter dropouts per hour.
+    pub dropouts_per_h: f64,
+    /// Does the controller deliver what the program is annotated with (depth of cut, diameter, operation)?
+    pub annotations: bool,
+}
+
+/// A recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplayTarget {
+    /// The file, `.csv` or `.csv.gz`.
+    pub file: PathBuf,
+    /// Against the clock.
+    pub speed: Speed,
+}
+
+/// A host and port.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Endpoint {
+    /// Name or number of the host, without brackets.
+    pub host: String,
+    /// TCP port.
+    pub port: u16,
+}
+
+/// How FOCAS2 is spoken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FanucBackend {
+    /// By ourselves.
+    Native,
+    /// Through this vendor library, in a child process.
+    Vendor(PathBuf),
+}
+
+/// Parity of a serial line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// Even parity.
+    Even,
+    /// Odd parity.
+    Odd,
+}
+
+/// A serial line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SerialTarget {
+    /// The device file.
+    pub port: PathBuf,
+    /// Bits per second.
+    pub baud: u32,
+    /// Parity bit.
+    pub parity: Parity,
+}
+
+/// What an address means.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// The built-in machine.
+    Simulated(SimulatedTarget),
+    /// A recording.
+    Replay(ReplayTarget),
+    /// A FANUC controller.
+    Fanuc {
+        /// Where.
+        at: Endpoint,
+        /// Path (channel) of the controller, from 1.
+        path: u8,
+        /// How.
+        backend: FanucBackend,
+    },
+    /// A Huazhong controller by NC-Link over MQTT.
+    NcLink {
+        /// The broker.
+        at: Endpoint,
+        /// Serial number of the device.
+        serial: String,
+        /// Encrypted?
+        tls: bool,
+    },
+    /// A Huazhong controller through its vendor library.
+    HncNet {
+        /// Where.
+        at: Endpoint,
+        /// The vendor library.
+        library: PathBuf,
+    },
+    /// A Modbus device on the network.
+    ModbusTcp {
+        /// Where.
+        at: Endpoint,
+        /// Unit identifier.
+        unit: u8,
+        /// Name of the register profile.
+        profile: String,
+    },
+    /// A Modbus device on a serial line.
+    ModbusRtu {
+        /// Where.
+        line: SerialTarget,
+        /// Unit identifier.
+        unit: u8,
+        /// Name of the register profile.
+        profile: String,
+    },
+    /// An EDA9033A meter in its native protocol.
+    Eda9033a {
+        /// Where.
+        line: SerialTarget,
+        /// Device address.
+        address: u8,
+        /// Ratio of the current transformers.
+        ct: f64,
+    },
+    /// A framed stream of samples.
+    Waveform {
+        /// Where.
+        at: Endpoint,
+    },
+}
+
+pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target, String> {
+    match scheme {
+        "simulated" => simulated(body, keys),
+        "replay" => replay(body, keys),
+        "fanuc" => fanuc(body, keys),
+        "nclink" => nclink(body, keys, false),
+        "nclinks" => nclink(body, keys, true),
+        "hncnet" => {
+            let library = library(keys);
+            Ok(Target::HncNet { at: endpoint(body, Some(10001))?, library: library? })
+        }
+        "modbus-tcp" => {
+            let (unit, profile) = (keys.number("unit", 1, 0, 247), profile(keys));
+            Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, unit, profile: profile? })
+        }
+        "modbus-rtu" => {
+            let (line, unit, profile) = (serial(body, keys), keys.number("unit", 1, 1, 247), profile(keys));
+            Ok(Target::ModbusRtu { line: line?, unit, profile: profile? })
+        }
+        "eda9033a" => {
+            let (line, address) = (serial(body, keys), keys.number("address", 1, 0, 255));
+            let ct = keys.number("ct", 1.0, 0.001, 10000.0);
+            Ok(Target::Eda9033a { line: line?, address, ct })
+        }
+        "waveform" => Ok(Target::Waveform { at: endpoint(body, None)? }),
+        other => Err(unknown_scheme(other)),
+    }
+}
+
+fn unknown_scheme(scheme: &str) -> String {
+    let hint = nearest(scheme, SCHEMES)
+        .map_or_else(|| format!("the schemes are {}", SCHEMES.join(", ")), |near| format!("did you mean {near}?"));
+    format!("unknown scheme {scheme}; {hint}")
+}
+
+fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    use SimulatedDevice::{Both, Controller, Meter};
+    let target = SimulatedTarget {
+        machine: SimulatedMachine::Lathe,
+        device: keys.choice("device", &[("both", Both), ("controller", Controller), ("meter", Meter)]),
+        seed: keys.number("seed", 1, 0, u64::MAX),
+        speed: speed(keys),
+        tau_s: keys.number("tau_s", 0.6, 0.05, 10.0),
+        cut_pct: keys.number("cut_pct", 100.0, 0.0, 300.0),
+        noise_pct: keys.number("noise_pct", 1.0, 0.0, 50.0),
+        dropouts_per_h: keys.number("dropouts_per_h", 1.0, 0.0, 3600.0),
+        annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),
+    };
+    match body.strip_prefix("//").unwrap_or(body) {
+        "lathe" => Ok(Target::Simulated(target)),
+        "mill" => Ok(Target::Simulated(SimulatedTarget { machine: SimulatedMachine::Mill, ..target })),
+        other => Err(format!("no simulated machine {other:?}; there are simulated://lathe and simulated://mill")),
+    }
+}
+
+fn replay(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let speed = speed(keys);
+    let file = body.strip_prefix("//").unwrap_or(body);
+    if file.is_empty() {
+        return Err("no file; write replay:FILE".to_owned());
+    }
+    Ok(Target::Replay(ReplayTarget { file: PathBuf::from(file), speed }))
+}
+
+fn speed(keys: &mut Keys) -> Speed {
+    let Some(text) = keys.text("speed") else { return Speed::Times(1.0) };
+    if text == "max" {
+        return Speed::Max;
+    }
+    match text.parse::<f64>() {
+        Ok(times) if (0.001..=100_000.0).contains(&times) => Speed::Times(times),
+        _ => {
+            keys.problem(format!("speed={text}: give max or a factor from 0.001 to 100000"));
+            Speed::Times(1.0)
+        }
+    }
+}
+
+fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let path = keys.number("path", 1, 1, 10);
+    let vendor = keys.choice("backend", &[("native", false), ("vendor", true)]);
+    let backend = if vendor { library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
+    Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend? })
+}
+
+fn nclink(body: &str, _keys: &mut Keys, tls: bool) -> Result<Target, String> {
+    let rest = body.strip_prefix("//").unwrap_or(body);
+    let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
+    if serial.is_empty() {
+        return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
+    }
+    let at = endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
+    Ok(Target::NcLink { at, serial: serial.to_owned(), tls })
+}
+
+fn library(keys: &mut Keys) -> Result<PathBuf, String> {
+    keys.text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
+}
+
+fn profile(keys: &mut Keys) -> Result<String, String> {
+    keys.text("profile").ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())
+}
+
+fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
+    let baud = keys.number("baud", 9600, 300, 4_000_000);
+    let parity = keys.choice("parity", &[("none", Parity::None), ("even", Parity::Even), ("odd", Parity::Odd)]);
+    let port = body.strip_prefix("//").unwrap_or(body);
+    if port.is_empty() {
+        return Err("no serial port; write it like :///dev/ttyUSB0".to_owned());
+    }
+    Ok(SerialTarget { port: PathBuf::from(port), baud, parity })
+}
+
+fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
+    let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
+    let (host, port) = split_port(text);
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    if host.is_empty() || host.contains('/') {
+        return Err(format!("{text:?} is not a host; write HOST:PORT"));
+    }
+    let port = match port {
+        Some(port) => port.parse().ok().filter(|port| *port > 0),
+        None => default_port,
+    };
+    let port = port.ok_or_else(|| format!("{text:?} has no port from 1 to 65535; write HOST:PORT"))?;
+    Ok(Endpoint { host: host.to_owned(), port })
+}
+
+/// Splits at the last colon, unless it belongs to a bracketed IPv6 address.
+fn split_port(text: &str) -> (&str, Option<&str>) {
+    match text.rsplit_once(':') {
+        Some((host, port)) if !port.contains(']') => (host, Some(port)),
+        _ => (text, None),
+    }
+}

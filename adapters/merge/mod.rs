@@ -1,0 +1,274 @@
+//! Readings of all sources onto the gateway's tick.
+//!
+//! The merge looks a little back in time ([`Merge::delay_ns`], one period of the slowest source unless set otherwise),
+//! so that a continuous channel usually has a reading on either side of the tick. Between the two it interpolates;
+//! commands, counters and words hold. Nothing bridges a gap of more than two periods of its source: then the slot holds
+//! the reason the source gave, or [`Absence::Stale`]. Every value carries its age.
+//!
+//! A source may deliver late and out of order: a reading that still matters is put in its place, one that does not is
+//! counted and dropped. Where a clock steps, readings stamped by the wrong clock are dropped and counted.
+//!
+//! The merge is pure: time is an argument, the same readings and ticks give the same samples. It allocates nothing per
+//! tick once its rings have their size.
+
+mod counts;
+mod lockstep;
+mod track;
+
+#[cfg(test)]
+mod properties;
+
+pub use counts::MergeCounts;
+pub use lockstep::Lockstep;
+
+use crate::channel::ChannelId;
+use crate::clock::TimeNs;
+use crate::driver::{Pull, Source, SourceError};
+use crate::reading::{Absence, Reading};
+use crate::sample::{Sample, Slot};
+use std::ops::Range;
+use std::time::Duration;
+use track::{Pace, Put, Track};
+
+/// Position of a source in the list the merge was built from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SourceId(pub usize);
+
+/// What the merge must know of a source.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourcePlan {
+    /// The address, as in the configuration.
+    pub name: String,
+    /// The channels it can deliver.
+    pub channels: Vec<ChannelId>,
+    /// Its pace.
+    pub period: Duration,
+}
+
+impl SourcePlan {
+    /// The plan of a live source.
+    #[must_use]
+    pub fn of(source: &dyn Source) -> Self {
+        Self { name: source.name().to_owned(), channels: source.channels().to_vec(), period: source.period() }
+    }
+
+    /// The plan of a source that brings its own time.
+    #[must_use]
+    pub fn of_pull(source: &dyn Pull) -> Self {
+        Self { name: source.name().to_owned(), channels: source.channels().to_vec(), period: source.period() }
+    }
+}
+
+/// How far back the merge looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delay {
+    /// One and a quarter periods of the slowest source, at most [`DELAY_MAX`].
+    #[default]
+    SlowestPeriod,
+    /// Exactly this; zero means that the newest values are held and never interpolated.
+    Fixed(Duration),
+}
+
+/// [`Delay::SlowestPeriod`] waits no longer than this for a slow source; its values are then held between readings.
+pub const DELAY_MAX: Duration = Duration::from_secs(1);
+
+/// No gap of more than this many periods of a source is bridged.
+pub const GAP_PERIODS: i64 = 2;
+
+struct SourceState {
+    pace: Pace,
+    failure: Option<Failure>,
+    counts: MergeCounts,
+}
+
+/// A stretch in which whole polls of a source failed.
+#[derive(Debug, Clone, Copy)]
+struct Failure {
+    since_ns: TimeNs,
+    until_ns: Option<TimeNs>,
+    reason: Absence,
+}
+
+impl Failure {
+    fn holds_at(&self, at_ns: TimeNs) -> bool {
+        self.since_ns <= at_ns && self.until_ns.is_none_or(|until_ns| at_ns < until_ns)
+    }
+}
+
+/// The tracks of one channel, in the order of the sources.
+struct Lane {
+    channel: ChannelId,
+    tracks: Range<usize>,
+}
+
+const NO_TRACK: u16 = u16::MAX;
+
+/// Readings in, samples out. See the [module](self).
+pub struct Merge {
+    sources: Vec<SourceState>,
+    lanes: Vec<Lane>,
+    tracks: Vec<Track>,
+    /// Track of (source, channel), or [`NO_TRACK`].
+    lookup: Vec<u16>,
+    delay_ns: i64,
+    last_tick_ns: TimeNs,
+    tick_steps: u64,
+}
+
+impl Merge {
+    /// A merge of these sources. Where several deliver a channel, the first one in the list wins as long as it has a
+    /// value.
+    #[must_use]
+    pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
+        let delay_ns = delay_of(plans, delay);
+        let pace = |plan: &SourcePlan| Pace::new(nanoseconds(plan.period), delay_ns);
+        let mut merge = Self {
+            sources: plans
+                .iter()
+                .map(|plan| SourceState { pace: pace(plan), failure: None, counts: MergeCounts::default() })
+                .collect(),
+            lanes: Vec::new(),
+            tracks: Vec::new(),
+            lookup: vec![NO_TRACK; plans.len() * ChannelId::count()],
+            delay_ns,
+            last_tick_ns: TimeNs::MIN,
+            tick_steps: 0,
+        };
+        ChannelId::all().for_each(|channel| merge.add_lane(plans, channel));
+        merge
+    }
+
+    fn add_lane(&mut self, plans: &[SourcePlan], channel: ChannelId) {
+        let first = self.tracks.len();
+        for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
+            let track = self.tracks.len();
+            self.lookup[source * ChannelId::count() + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
+            self.tracks.push(Track::new(channel, source, self.sources[source].pace));
+        }
+        if self.tracks.len() > first {
+            self.lanes.push(Lane { channel, tracks: first..self.tracks.len() });
+        }
+    }
+
+    /// How far back to look: sample at `now - delay_ns`.
+    #[must_use]
+    pub fn delay_ns(&self) -> i64 {
+        self.delay_ns
+    }
+
+    /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
+    pub fn set_period(&mut self, source: SourceId, period: Duration) {
+        let Some(state) = self.sources.get_mut(source.0) else { return };
+        state.pace = Pace::new(nanoseconds(period), self.delay_ns);
+    }
+
+    /// Takes a reading. One of a channel that the source did not announce is counted and dropped.
+    pub fn push(&mut self, source: SourceId, reading: Reading) {
+        let Some(state) = self.sources.get_mut(source.0) else { return };
+        state.counts.readings += 1;
+        let track = self.lookup[source.0 * ChannelId::count() + reading.channel.index()];
+        let Some(track) = self.tracks.get_mut(usize::from(track)) else {
+            state.counts.unannounced += 1;
+            return;
+        };
+        let mid_ns = reading.stamp.mid_ns;
+        if let Some(failure) = state.failure.as_mut().filter(|failure| failure.since_ns < mid_ns) {
+            failure.until_ns.get_or_insert(mid_ns);
+        }
+        let late = mid_ns <= self.last_tick_ns;
+        let put = track.put(mid_ns, reading.value, self.last_tick_ns, &state.pace);
+        state.counts.count(put, late);
+    }
+
+    /// Takes every reading out of `readings`.
+    pub fn push_all(&mut self, source: SourceId, readings: &mut Vec<Reading>) {
+        readings.drain(..).for_each(|reading| self.push(source, reading));
+    }
+
+    /// A whole poll of the source failed at `at_ns`. Its channels get the reason once their last values are too old; at
+    /// once when the machine is off.
+    pub fn fail(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
+        let Some(state) = self.sources.get_mut(source.0) else { return };
+        state.counts.failures += 1;
+        let since_ns = match state.failure {
+            Some(Failure { since_ns, until_ns: None, .. }) => since_ns.min(at_ns),
+            _ => at_ns,
+        };
+        state.failure = Some(Failure { since_ns, until_ns: None, reason: error.absence() });
+    }
+
+    /// Writes every announced channel at `at_ns` into `sample` (from [`Sample::empty`]); other slots are left alone.
+    /// Ticks normally increase; one that goes back counts as a clock step.
+    pub fn sample_into(&mut self, sample: &mut Sample, at_ns: TimeNs) {
+        if at_ns < self.last_tick_ns {
+            self.step_back(at_ns);
+        }
+        self.last_tick_ns = at_ns;
+        sample.at_ns = at_ns;
+        for lane in &self.lanes {
+            let slot = best(&mut self.tracks[lane.tracks.clone()], &mut self.sources, at_ns);
+            sample.set(lane.channel, slot);
+        }
+    }
+
+    fn step_back(&mut self, at_ns: TimeNs) {
+        self.tick_steps += 1;
+        for track in &mut self.tracks {
+            track.drop_after(at_ns + self.sources[track.source].pace.horizon_ns);
+        }
+    }
+
+    /// What happened to the readings of a source.
+    #[must_use]
+    pub fn counts(&self, source: SourceId) -> MergeCounts {
+        self.sources.get(source.0).map(|state| state.counts).unwrap_or_default()
+    }
+
+    /// How often a tick was earlier than the one before: steps of the gateway's clock.
+    #[must_use]
+    pub fn tick_steps(&self) -> u64 {
+        self.tick_steps
+    }
+}
+
+/// The first source with a value wins; without any, the reason of the first one stands.
+fn best(tracks: &mut [Track], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
+    let mut reason: Option<Slot> = None;
+    for track in tracks {
+        let state = &mut sources[track.source];
+        let slot = explained(track.at(at_ns, state.pace.gap_ns), state.failure, at_ns);
+        if slot.value.is_ok() {
+            state.counts.stepped_in += u64::from(reason.is_some());
+            return slot;
+        }
+        reason.get_or_insert(slot);
+    }
+    reason.unwrap_or_else(|| Slot::absent(Absence::NotProvided))
+}
+
+/// Replaces "stale" and "not yet read" by what the source itself said; a machine that is off has no fresh values.
+fn explained(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
+    let Some(failure) = failure.filter(|failure| failure.holds_at(at_ns)) else { return slot };
+    match slot.value {
+        Err(Absence::Stale | Absence::NotYetRead) => Slot { value: Err(failure.reason), age_ns: slot.age_ns },
+        Ok(_) if failure.reason == Absence::MachineOff => {
+            Slot { value: Err(Absence::MachineOff), age_ns: at_ns - failure.since_ns }
+        }
+        _ => slot,
+    }
+}
+
+fn delay_of(plans: &[SourcePlan], delay: Delay) -> i64 {
+    let slowest = plans.iter().map(|plan| plan.period).max().unwrap_or_default();
+    match delay {
+        Delay::Fixed(delay) => nanoseconds(delay),
+        Delay::SlowestPeriod => nanoseconds((slowest * 5 / 4).min(DELAY_MAX)),
+    }
+}
+
+fn nanoseconds(duration: Duration) -> i64 {
+    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8).min(i64::MAX / 8)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,157 @@
+//! The last readings of one channel from one source, in the order of their stamps.
+
+use crate::channel::{ChannelId, Kind};
+use crate::clock::TimeNs;
+use crate::reading::{Absence, Value};
+use crate::sample::Slot;
+use std::collections::VecDeque;
+
+/// A track holds at least and at most this many readings.
+const DEPTH: (i64, i64) = (8, 4096);
+
+/// What follows from a source's period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Pace {
+    /// The widest gap that is bridged.
+    pub(super) gap_ns: i64,
+    /// A reading this much older than the newest one means that a clock stepped.
+    pub(super) horizon_ns: i64,
+    depth: usize,
+}
+
+impl Pace {
+    pub(super) fn new(period_ns: i64, delay_ns: i64) -> Self {
+        let period_ns = period_ns.max(1);
+        let gap_ns = period_ns.saturating_mul(super::GAP_PERIODS);
+        let horizon_ns = gap_ns.saturating_add(delay_ns.max(0));
+        let depth = (2 * (delay_ns / period_ns) + 8).clamp(DEPTH.0, DEPTH.1);
+        Self { gap_ns, horizon_ns, depth: usize::try_from(depth).unwrap_or(8) }
+    }
+}
+
+/// Where a reading went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Put {
+    /// Behind all others.
+    Newest,
+    /// Between earlier readings.
+    Between,
+    /// In the place of one with the same stamp.
+    Repeated,
+    /// Nowhere: no tick to come can see it.
+    TooLate,
+    /// Behind all others, after readings from a clock running ahead were dropped.
+    AfterStep,
+}
+
+struct Point {
+    mid_ns: TimeNs,
+    value: Result<Value, Absence>,
+}
+
+pub(super) struct Track {
+    continuous: bool,
+    /// Position of the source in the merge's list.
+    pub(super) source: usize,
+    points: VecDeque<Point>,
+    depth: usize,
+}
+
+impl Track {
+    pub(super) fn new(channel: ChannelId, source: usize, pace: Pace) -> Self {
+        let continuous = channel.channel().kind == Kind::Continuous;
+        Self { continuous, source, points: VecDeque::with_capacity(pace.depth), depth: pace.depth }
+    }
+
+    /// Stamp of the newest reading.
+    fn last_ns(&self) -> Option<TimeNs> {
+        self.points.back().map(|point| point.mid_ns)
+    }
+
+    /// Puts a reading in its place.
+    pub(super) fn put(
+        &mut self,
+        mid_ns: TimeNs,
+        value: Result<Value, Absence>,
+        last_tick_ns: TimeNs,
+        pace: &Pace,
+    ) -> Put {
+        let Some(last_ns) = self.last_ns().filter(|last_ns| mid_ns <= *last_ns) else {
+            return self.insert(self.points.len(), Point { mid_ns, value }, Put::Newest);
+        };
+        let first_ns = self.points.front().map_or(last_ns, |point| point.mid_ns);
+        if mid_ns < first_ns && first_ns <= last_tick_ns {
+            return Put::TooLate;
+        }
+        if mid_ns < last_ns.saturating_sub(pace.horizon_ns) && last_ns > last_tick_ns {
+            self.drop_after(mid_ns.saturating_add(pace.horizon_ns));
+            let at = self.before(mid_ns);
+            return self.insert(at, Point { mid_ns, value }, Put::AfterStep);
+        }
+        let at = self.before(mid_ns);
+        match at.checked_sub(1).and_then(|at| self.points.get_mut(at)).filter(|point| point.mid_ns == mid_ns) {
+            Some(point) => {
+                point.value = value;
+                Put::Repeated
+            }
+            None => self.insert(at, Point { mid_ns, value }, Put::Between),
+        }
+    }
+
+    /// How many readings are not after `at_ns`.
+    fn before(&self, at_ns: TimeNs) -> usize {
+        self.points.partition_point(|point| point.mid_ns <= at_ns)
+    }
+
+    /// Never grows beyond the depth: the oldest reading makes room.
+    fn insert(&mut self, at: usize, point: Point, put: Put) -> Put {
+        let full = self.points.len() >= self.depth;
+        match at {
+            0 if full => return Put::TooLate,
+            _ if full => {
+                self.points.pop_front();
+                self.points.insert(at - 1, point);
+            }
+            _ => self.points.insert(at, point),
+        }
+        put
+    }
+
+    /// Forgets the readings after `limit_ns`.
+    pub(super) fn drop_after(&mut self, limit_ns: TimeNs) {
+        self.points.truncate(self.before(limit_ns));
+    }
+
+    /// What is known at `at_ns`; forgets what no later tick can need.
+    pub(super) fn at(&mut self, at_ns: TimeNs, gap_ns: i64) -> Slot {
+        while self.points.get(1).is_some_and(|point| point.mid_ns <= at_ns) {
+            self.points.pop_front();
+        }
+        let Some(before) = self.points.front().filter(|point| point.mid_ns <= at_ns) else {
+            return Slot::absent(Absence::NotYetRead);
+        };
+        let age_ns = at_ns - before.mid_ns;
+        if let Some(value) = self.points.get(1).and_then(|after| self.between(before, after, at_ns, gap_ns)) {
+            return Slot { value: Ok(Value::Number(value)), age_ns: 0 };
+        }
+        if age_ns > gap_ns {
+            return Slot { value: Err(Absence::Stale), age_ns };
+        }
+        Slot { value: before.value.clone(), age_ns }
+    }
+
+    /// Linear between two numbers around the tick, when they are close enough together.
+    fn between(&self, before: &Point, after: &Point, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
+        let width_ns = after.mid_ns.checked_sub(before.mid_ns).filter(|width_ns| *width_ns <= gap_ns)?;
+        if !self.continuous || before.mid_ns == at_ns {
+            return None;
+        }
+        let (from, to) = (before.value.as_ref().ok()?.as_number()?, after.value.as_ref().ok()?.as_number()?);
+        Some(from + (to - from) * share(at_ns - before.mid_ns, width_ns))
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "both are within two periods, far below 2^53 ns")]
+fn share(part_ns: i64, whole_ns: i64) -> f64 {
+    part_ns as f64 / whole_ns as f64
+}
