@@ -1,0 +1,221 @@
+//! What one tick yields: every quantity with its uncertainty, or the reason why there is none.
+
+use super::state::State;
+use adapters::clock::TimeNs;
+use adapters::{Absence, ChannelId};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A value and one standard deviation, both in the unit that the quantity's name ends in, both finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// One standard deviation, not negative.
+    pub sd: f64,
+}
+
+/// A value with its uncertainty, or why there is none.
+pub type Estimated = Result<Estimate, NoEstimate>;
+
+/// Why there is no estimate. The text is what an operator reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoEstimate {
+    /// No sample has been seen yet.
+    NotYet,
+    /// An input is missing.
+    Input {
+        /// Which channel.
+        channel: ChannelId,
+        /// Why.
+        absence: Absence,
+    },
+    /// The machine is off.
+    MachineOff,
+    /// The spindle stands still.
+    SpindleStopped,
+    /// The spindle starts or changes speed; its power also accelerates masses.
+    SpeedChanging,
+    /// Too few samples since the last change or gap.
+    NotSettled,
+    /// No no-load power is known near this speed in this gear stage.
+    NotLearned,
+    /// The speed lies so far outside the learned ones that extrapolation would amplify noise too much.
+    Extrapolated {
+        /// By how much.
+        noise_gain: f64,
+    },
+    /// The load-loss coefficients contradict the measured power (negative discriminant).
+    Imbalance,
+    /// The power lies below the no-load power by more than the uncertainty: braking, or the no-load power is outdated.
+    BelowNoLoad,
+}
+
+impl NoEstimate {
+    /// The word used in `<quantity>_missing` columns, JSON and SQL.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotYet => "not_yet",
+            Self::Input { .. } => "input_missing",
+            Self::MachineOff => "machine_off",
+            Self::SpindleStopped => "spindle_stopped",
+            Self::SpeedChanging => "speed_changing",
+            Self::NotSettled => "not_settled",
+            Self::NotLearned => "not_learned",
+            Self::Extrapolated { .. } => "extrapolated",
+            Self::Imbalance => "imbalance",
+            Self::BelowNoLoad => "below_no_load",
+        }
+    }
+}
+
+impl fmt::Display for NoEstimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotYet => f.write_str("no sample yet"),
+            Self::Input { channel, absence } => write!(f, "{channel} is missing: {absence}"),
+            Self::MachineOff => f.write_str("the machine is off"),
+            Self::SpindleStopped => f.write_str("the spindle stands still"),
+            Self::SpeedChanging => f.write_str("the spindle is changing speed"),
+            Self::NotSettled => f.write_str("too few samples since the last change"),
+            Self::NotLearned => f.write_str(
+                "no-load power at this speed and gear stage is not known; let the spindle run there without feed",
+            ),
+            Self::Extrapolated { noise_gain } => write!(
+                f,
+                "this speed is too far from those learned (noise gain {noise_gain:.1}); let the spindle run here without feed"
+            ),
+            Self::Imbalance => f.write_str("load-loss coefficients contradict the power; identify them again"),
+            Self::BelowNoLoad => f.write_str("power is below no-load power: braking, or no-load power is outdated"),
+        }
+    }
+}
+
+/// Where the no-load power in force comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoLoadOrigin {
+    /// There is none.
+    None,
+    /// Measured, or configured, at this very speed.
+    Measured,
+    /// Quadratic, or with two speeds linear, interpolation between neighbouring speeds.
+    Interpolated,
+    /// The same beyond the slowest or fastest known speed; see the noise gain.
+    Extrapolated,
+    /// Not learned: the level right after a spindle start with the axes already moving. A spindle starts in the air,
+    /// but this is only an upper bound, so cutting power is a lower one.
+    UpperBound,
+}
+
+impl NoLoadOrigin {
+    /// The word used in SQL, scripts, JSON and CSV.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Measured => "measured",
+            Self::Interpolated => "interpolated",
+            Self::Extrapolated => "extrapolated",
+            Self::UpperBound => "upper_bound",
+        }
+    }
+}
+
+/// Can cutting be seen in the spindle power at this moment?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Visibility {
+    /// Nothing could be cutting: no feed, rapid traverse, or the spindle is not steady.
+    NotAsked,
+    /// Feed is on and the power stands out: cutting is seen.
+    Visible,
+    /// Feed is on and the power does not stand out: either no cut, or one below the least visible cutting power.
+    BelowVisibility,
+    /// Feed is on and there is no no-load power to compare with.
+    NoReference,
+}
+
+impl Visibility {
+    /// The word used in SQL, scripts, JSON and CSV.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotAsked => "not_asked",
+            Self::Visible => "visible",
+            Self::BelowVisibility => "below_visibility",
+            Self::NoReference => "no_reference",
+        }
+    }
+}
+
+/// Everything inferred at one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimates {
+    /// The tick.
+    pub at_ns: TimeNs,
+    /// What the machine is doing.
+    pub state: State,
+    /// Since when.
+    pub since_ns: TimeNs,
+    /// Why the state is unknown, where it is.
+    pub unknown_because: Option<NoEstimate>,
+    /// Spindle power after the anti-pulse moving average, W.
+    pub filtered_power_w: Estimated,
+    /// Power the spindle would take at this speed without cutting, W.
+    pub no_load_power_w: Estimated,
+    /// Power that removes material, W.
+    pub cutting_power_w: Estimated,
+    /// Additional loss that exists only under load, W.
+    pub load_loss_w: Estimated,
+    /// Least cutting power that stands out of no-load power and noise, W.
+    pub visible_cutting_power_w: Estimated,
+    /// Where the no-load power comes from.
+    pub no_load_origin: NoLoadOrigin,
+    /// By how much the interpolation amplifies the noise of the learned powers; 0 where there is no no-load power.
+    pub noise_gain: f64,
+    /// Can cutting be seen?
+    pub visibility: Visibility,
+    /// Gear stage in force.
+    pub gear_stage: u8,
+}
+
+impl Estimates {
+    /// Before the first sample.
+    #[must_use]
+    pub fn none(at_ns: TimeNs) -> Self {
+        Self {
+            at_ns,
+            state: State::Unknown,
+            since_ns: at_ns,
+            unknown_because: Some(NoEstimate::NotYet),
+            filtered_power_w: Err(NoEstimate::NotYet),
+            no_load_power_w: Err(NoEstimate::NotYet),
+            cutting_power_w: Err(NoEstimate::NotYet),
+            load_loss_w: Err(NoEstimate::NotYet),
+            visible_cutting_power_w: Err(NoEstimate::NotYet),
+            no_load_origin: NoLoadOrigin::None,
+            noise_gain: 0.0,
+            visibility: Visibility::NotAsked,
+            gear_stage: 0,
+        }
+    }
+
+    /// Every quantity with its name (which ends in the unit), for scripts, storage and HTTP.
+    pub fn quantities(&self) -> [(&'static str, Estimated); 5] {
+        [
+            ("filtered_power_w", self.filtered_power_w),
+            ("no_load_power_w", self.no_load_power_w),
+            ("cutting_power_w", self.cutting_power_w),
+            ("load_loss_w", self.load_loss_w),
+            ("visible_cutting_power_w", self.visible_cutting_power_w),
+        ]
+    }
+
+    /// Is the no-load power extrapolated beyond the learned speeds?
+    #[must_use]
+    pub fn extrapolated(&self) -> bool {
+        self.no_load_origin == NoLoadOrigin::Extrapolated
+    }
+}

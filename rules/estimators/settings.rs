@@ -1,0 +1,300 @@
+//! Every tolerance and length the estimators use: one table that scripts, configuration and documentation read.
+
+use super::no_load::NoLoadPoint;
+use adapters::channel::nearest;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Gear stages are numbered 0 to 7; a machine without a gear box runs in stage 0.
+pub const STAGES: usize = 8;
+
+/// At most this many no-load speeds are kept per gear stage.
+pub const SPEEDS_PER_STAGE: usize = 16;
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting {
+    /// Name in scripts and configuration.
+    pub name: &'static str,
+    /// Unit symbol; `1` for pure numbers.
+    pub unit: &'static str,
+    /// Least and greatest value accepted.
+    pub range: (f64, f64),
+    /// Value when nobody sets one.
+    pub default: f64,
+    /// Is it a count?
+    pub whole: bool,
+    /// What it does, in English.
+    pub en: &'static str,
+    get: fn(&Settings) -> f64,
+    set: fn(&mut Settings, f64),
+}
+
+/// Why a setting was not accepted. The text is what the integrator reads.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SettingError {
+    /// No such name.
+    #[error("there is no estimator setting {name:?}{}", .nearest.map(|near| format!("; did you mean {near}?")).unwrap_or_default())]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The nearest existing name.
+        nearest: Option<&'static str>,
+    },
+    /// Outside the range, or not a whole number where one is needed.
+    #[error("{name} = {value} {unit} is outside {least} to {greatest} {unit}{}", if *.whole { " or not a whole number" } else { "" })]
+    Range {
+        /// Which setting.
+        name: String,
+        /// What was given.
+        value: f64,
+        /// Unit of the value and the range.
+        unit: &'static str,
+        /// Least value accepted.
+        least: f64,
+        /// Greatest value accepted.
+        greatest: f64,
+        /// Whether only whole numbers are accepted.
+        whole: bool,
+    },
+    /// Two settings contradict each other, or a table is unusable.
+    #[error("{0}")]
+    Contradiction(String),
+}
+
+macro_rules! settings {
+    ($($name:ident $unit:literal $least:literal $greatest:literal $default:literal $whole:literal $en:literal)*) => {
+        /// Every tolerance and length, checked against its range when set. See [`SETTINGS`].
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Settings {
+            $(#[doc = $en] pub(super) $name: f64,)*
+            pub(super) stage_load_loss_linear: [Option<f64>; STAGES],
+            pub(super) stage_load_loss_quadratic_per_w: [Option<f64>; STAGES],
+            pub(super) no_load_table: Vec<NoLoadPoint>,
+        }
+
+        impl Default for Settings {
+            fn default() -> Self {
+                Self {
+                    $($name: $default,)*
+                    stage_load_loss_linear: [None; STAGES],
+                    stage_load_loss_quadratic_per_w: [None; STAGES],
+                    no_load_table: Vec::new(),
+                }
+            }
+        }
+
+        /// The table of settings.
+        pub static SETTINGS: &[Setting] = &[$(Setting {
+            name: stringify!($name),
+            unit: $unit,
+            range: ($least, $greatest),
+            default: $default,
+            whole: $whole,
+            en: $en,
+            get: |settings| settings.$name,
+            set: |settings, value| settings.$name = value,
+        },)*];
+    };
+}
+
+settings! {
+    c1 "1" 0.02 0.5 0.15 false
+    "Stationarity: how far the filtered spindle power in a window may spread, relative to its mean (source: 0.15 to 0.25)"
+    stationarity_reading "1" 1.0 2.0 1.0 true
+    "How c1 is read: 1 = greatest minus least value over the mean, 2 = greatest deviation from the mean over the mean"
+    c2_on "1" 0.005 0.5 0.03 false
+    "Cutting begins when the spindle power stays above no-load power by this share of it (source: 0.05 to 0.10; noise raises it by itself)"
+    c2_off "1" 0.002 0.5 0.02 false
+    "Cutting ends when the spindle power stays below no-load power plus this share of it; below c2_on"
+    cutting_evidence "1" 2.0 50.0 5.0 false
+    "Sum of excesses, in standard deviations of the noise, that begins or ends cutting; one sample counts for half of it at most"
+    window_samples "samples" 5.0 100.0 10.0 true
+    "Length of each of the two windows that must agree before the spindle counts as settled"
+    filter_samples "samples" 3.0 50.0 5.0 true
+    "Length N of the anti-pulse moving average: mean of N samples without the greatest and the least"
+    dwell_s "s" 0.0 10.0 0.3 false
+    "Least time in idle or cutting before the other may follow"
+    spindle_min_rpm "rpm" 0.1 200.0 10.0 false
+    "Below this the spindle counts as standing still"
+    speed_tolerance "1" 0.002 0.2 0.02 false
+    "Speeds closer than this share are the same speed to the no-load table"
+    speed_rate_per_s "1/s" 0.01 2.0 0.1 false
+    "Relative change of speed per second above which the spindle counts as changing speed"
+    feed_min_mm_min "mm/min" 0.0 100.0 0.5 false
+    "Above this the feed counts as on"
+    feed_debounce_s "s" 0.0 10.0 0.3 false
+    "How long the feed must be at rest before it counts as off"
+    rapid_feed_mm_min "mm/min" 0.0 200000.0 0.0 false
+    "Feed above this counts as rapid traverse even without the rapid flag; 0 = only the flag counts"
+    off_power_w "W" 0.1 5000.0 20.0 false
+    "Total power below this means the machine is off; meters never read exactly 0"
+    reversal_s "s" 0.0 10.0 1.0 false
+    "How long a spindle that passes zero speed while the feed is on (tapping, threading) is not yet standing still"
+    dropout_hold_s "s" 0.0 5.0 0.2 false
+    "How long a missing input may last before the state becomes unknown"
+    gap_s "s" 0.1 600.0 2.0 false
+    "A longer pause between samples, or time running backwards, makes the detector begin anew; what it has learned stays"
+    learn_guard_s "s" 0.0 30.0 0.5 false
+    "How long the feed must have been off before, and stay off after, power that is learned as no-load power"
+    relearn_up_s "s" 0.0 3600.0 10.0 false
+    "How long power above the known no-load power must last with the feed off before it replaces it"
+    no_load_drift_per_h "1/h" 0.0 2.0 0.05 false
+    "How much no-load power may drift in an hour (warm-up), one standard deviation; ages what was learned"
+    noise_gain_limit "1" 1.0 50.0 3.0 false
+    "Extrapolation of the no-load table that amplifies noise more than this is refused"
+    power_noise "1" 0.001 0.5 0.02 false
+    "Noise of the spindle power, standard deviation relative to no-load power, until it has been measured"
+    load_loss_linear "1" -0.5 2.0 0.18 false
+    "a0: load loss per watt of cutting power, for gear stages without a value of their own"
+    load_loss_quadratic_per_w "1/W" -0.001 0.01 0.0 false
+    "a1: growth of the load loss coefficient per watt of cutting power, for gear stages without a value of their own"
+    load_loss_sd "1" 0.0 0.5 0.05 false
+    "Uncertainty of a0, one standard deviation"
+}
+
+impl Settings {
+    /// The value of a setting, also `load_loss_linear_stage_3` and `load_loss_quadratic_per_w_stage_3`.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<f64> {
+        match staged(name) {
+            Some(("load_loss_linear", stage)) => Some(self.load_loss(stage).0),
+            Some(("load_loss_quadratic_per_w", stage)) => Some(self.load_loss(stage).1),
+            _ => row(name).map(|setting| (setting.get)(self)),
+        }
+    }
+
+    /// Sets a value by name. The names of [`SETTINGS`], and `load_loss_linear_stage_N`,
+    /// `load_loss_quadratic_per_w_stage_N` for one gear stage.
+    ///
+    /// # Errors
+    /// An unknown name or a value outside the range; the settings are unchanged then.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), SettingError> {
+        let stage = staged(name);
+        let base = stage.map_or(name, |(base, _)| base);
+        let setting = row(base).ok_or_else(|| unknown(name))?;
+        setting.check(name, value)?;
+        match stage {
+            Some(("load_loss_linear", stage)) => self.stage_load_loss_linear[stage] = Some(value),
+            Some(("load_loss_quadratic_per_w", stage)) => self.stage_load_loss_quadratic_per_w[stage] = Some(value),
+            Some(_) => return Err(unknown(name)),
+            None => (setting.set)(self, value),
+        }
+        Ok(())
+    }
+
+    /// No-load powers known beforehand for a gear stage, as pairs of speed in rpm and power in W; they replace those
+    /// given before for this stage.
+    ///
+    /// # Errors
+    /// A stage above 7, too many points, a speed or power that is not positive and finite.
+    pub fn set_no_load_table(&mut self, stage: usize, rpm_and_w: &[(f64, f64)]) -> Result<(), SettingError> {
+        let refuse = |text: String| Err(SettingError::Contradiction(text));
+        if stage >= STAGES {
+            return refuse(format!("gear stage {stage} does not exist; stages are 0 to {}", STAGES - 1));
+        }
+        if rpm_and_w.len() > SPEEDS_PER_STAGE {
+            return refuse(format!("{} no-load speeds; at most {SPEEDS_PER_STAGE} fit", rpm_and_w.len()));
+        }
+        if let Some((rpm, w)) =
+            rpm_and_w.iter().find(|(rpm, w)| !(*rpm > 0.0 && *w > 0.0 && rpm.is_finite() && w.is_finite()))
+        {
+            return refuse(format!("a no-load power of {w} W at {rpm} rpm: both must be positive"));
+        }
+        self.no_load_table.retain(|point| point.stage != stage);
+        self.no_load_table.extend(rpm_and_w.iter().map(|(rpm, w)| NoLoadPoint { stage, speed_rpm: *rpm, power_w: *w }));
+        Ok(())
+    }
+
+    /// Everything that contradicts something else; empty when the settings can be used as they are.
+    #[must_use]
+    pub fn contradictions(&self) -> Vec<SettingError> {
+        let mut found = Vec::new();
+        if self.c2_off >= self.c2_on {
+            let (off, on) = (self.c2_off, self.c2_on);
+            found.push(SettingError::Contradiction(format!(
+                "c2_off = {off} must be less than c2_on = {on}, or the state chatters between idle and cutting"
+            )));
+        }
+        found
+    }
+
+    /// a0 and a1 (1/W) of a gear stage.
+    #[must_use]
+    pub fn load_loss(&self, stage: usize) -> (f64, f64) {
+        let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
+        (
+            own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
+            own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
+        )
+    }
+}
+
+impl Setting {
+    fn check(&self, name: &str, value: f64) -> Result<(), SettingError> {
+        let (least, greatest) = self.range;
+        if value >= least && value <= greatest && !(self.whole && value.fract() != 0.0) {
+            return Ok(());
+        }
+        Err(SettingError::Range { name: name.to_owned(), value, unit: self.unit, least, greatest, whole: self.whole })
+    }
+}
+
+fn row(name: &str) -> Option<&'static Setting> {
+    SETTINGS.iter().find(|setting| setting.name == name)
+}
+
+/// `load_loss_linear_stage_3` as base name and stage.
+fn staged(name: &str) -> Option<(&str, usize)> {
+    let (base, stage) = name.rsplit_once("_stage_")?;
+    stage.parse().ok().filter(|stage| *stage < STAGES).map(|stage| (base, stage))
+}
+
+fn unknown(name: &str) -> SettingError {
+    let nearest = nearest(name, SETTINGS.iter().map(|setting| setting.name));
+    SettingError::Unknown { name: name.to_owned(), nearest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_lies_in_its_range_and_can_be_set_by_name() {
+        let mut settings = Settings::default();
+        for setting in SETTINGS {
+            assert_eq!(settings.set(setting.name, setting.default), Ok(()));
+            assert_eq!(settings.get(setting.name), Some(setting.default));
+            assert!(!setting.en.is_empty() && !setting.unit.is_empty());
+        }
+        assert_eq!(settings, Settings::default());
+        assert!(settings.contradictions().is_empty());
+    }
+
+    #[test]
+    fn a_bad_name_or_value_says_what_was_meant() {
+        let mut settings = Settings::default();
+        let unknown = settings.set("c2_onn", 0.1).expect_err("no such name").to_string();
+        assert!(unknown.contains("did you mean c2_on?"), "{unknown}");
+        let range = settings.set("window_samples", 10.5).expect_err("not whole").to_string();
+        assert!(range.contains("5 to 100 samples or not a whole number"), "{range}");
+        assert!(settings.set("c1", f64::NAN).is_err());
+        assert!(settings.set("c1_stage_2", 0.1).is_err());
+        assert_eq!(settings, Settings::default());
+    }
+
+    #[test]
+    fn a_gear_stage_may_have_its_own_load_loss() {
+        let mut settings = Settings::default();
+        settings.set("load_loss_linear_stage_2", 0.25).expect("in range");
+        assert_eq!((settings.load_loss(2), settings.load_loss(1)), ((0.25, 0.0), (0.18, 0.0)));
+    }
+
+    #[test]
+    fn hysteresis_the_wrong_way_round_is_a_contradiction() {
+        let mut settings = Settings::default();
+        settings.set("c2_off", 0.05).expect("in range");
+        assert_eq!(settings.contradictions().len(), 1);
+    }
+}
