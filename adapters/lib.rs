@@ -20,6 +20,7 @@ pub mod recording;
 pub mod replay;
 pub mod sample;
 pub mod units;
+pub mod worker;
 
 pub use address::Address;
 pub use channel::{Channel, ChannelId};

@@ -1,0 +1,254 @@
+//! One thread per source, at the source's own pace.
+//!
+//! Vendor libraries block for seconds; nothing else waits for them. The thread sleeps to absolute times, skips the
+//! beats it missed and counts them, and fills a bounded queue from which the gateway takes what there is at each tick.
+//! A poll that fails is repeated at the next beat; from the second failure on, the pause grows from 1 s to 30 s. A
+//! machine that is off is a normal state and asked again every two seconds.
+
+mod queue;
+mod stats;
+
+#[cfg(test)]
+mod tests;
+
+pub use stats::{Spread, WorkerState, WorkerStats};
+
+use crate::clock::{Clock, SECOND_NS, TimeNs};
+use crate::driver::{Source, SourceError};
+use crate::merge::{Merge, SourceId};
+use crate::reading::Reading;
+use queue::Queue;
+use stats::Ledger;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// A sleeping worker looks this often whether it shall stop.
+const STOP_LOOK_NS: i64 = SECOND_NS / 5;
+
+/// Limits of a worker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WorkerSettings {
+    /// At most this many polls wait to be taken; then the oldest is dropped and counted.
+    pub queue_polls: usize,
+    /// First pause after repeated failures.
+    pub backoff_min: Duration,
+    /// Longest pause after repeated failures.
+    pub backoff_max: Duration,
+    /// Pause between two looks at a machine that is off.
+    pub off_pause: Duration,
+    /// A poll that has not returned after this time is shown as stuck.
+    pub deadline: Duration,
+}
+
+impl Default for WorkerSettings {
+    fn default() -> Self {
+        Self {
+            queue_polls: 1024,
+            backoff_min: Duration::from_secs(1),
+            backoff_max: Duration::from_secs(30),
+            off_pause: Duration::from_secs(2),
+            deadline: Duration::from_secs(10),
+        }
+    }
+}
+
+/// What one poll gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Poll {
+    /// When it was over.
+    pub ended_ns: TimeNs,
+    /// Its readings; also a failed poll may have some.
+    pub readings: Vec<Reading>,
+    /// Why the poll as a whole failed.
+    pub error: Option<SourceError>,
+}
+
+struct Shared {
+    stop: AtomicBool,
+    queue: Mutex<Queue>,
+    ledger: Mutex<Ledger>,
+}
+
+/// A source on its own thread.
+pub struct Worker {
+    name: String,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// Starts to poll.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn start(
+        source: Box<dyn Source>,
+        clock: Arc<dyn Clock>,
+        settings: WorkerSettings,
+    ) -> Result<Self, std::io::Error> {
+        let name = source.name().to_owned();
+        let ledger = Ledger::new(source.period(), settings.deadline, clock.now_ns());
+        let shared = Arc::new(Shared {
+            stop: AtomicBool::new(false),
+            queue: Mutex::new(Queue::new(settings.queue_polls)),
+            ledger: Mutex::new(ledger),
+        });
+        let mut poller = Poller { source, clock, settings, shared: shared.clone(), failures: 0 };
+        let thread = std::thread::Builder::new().name("source".to_owned()).spawn(move || poller.run())?;
+        Ok(Self { name, shared, thread: Some(thread) })
+    }
+
+    /// The address of the source.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Gives every waiting poll to the merge, and tells it when the source keeps a slower pace than it promised.
+    /// Returns how many polls there were.
+    pub fn drain_into(&self, merge: &mut Merge, source: SourceId) -> usize {
+        let polls = self.drain(|poll| {
+            merge.push_all(source, &mut poll.readings);
+            if let Some(error) = &poll.error {
+                merge.fail(source, poll.ended_ns, error);
+            }
+        });
+        if let Some(period) = locked(&self.shared.ledger).take_new_pace() {
+            merge.set_period(source, period);
+        }
+        polls
+    }
+
+    /// Shows every waiting poll to `take`, the oldest first.
+    pub fn drain(&self, mut take: impl FnMut(&mut Poll)) -> usize {
+        let mut polls = locked(&self.shared.queue).take_all();
+        let count = polls.len();
+        polls.iter_mut().for_each(&mut take);
+        locked(&self.shared.queue).give_back(polls);
+        count
+    }
+
+    /// How the source has been doing, as of `now_ns`.
+    #[must_use]
+    pub fn stats(&self, now_ns: TimeNs) -> WorkerStats {
+        let dropped = locked(&self.shared.queue).dropped();
+        locked(&self.shared.ledger).stats(now_ns, dropped)
+    }
+
+    /// Tells the thread to end after the poll it is in; does not wait for it.
+    pub fn stop(&self) {
+        self.shared.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// Has the thread ended?
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Stops and waits until the thread has ended, which takes as long as the poll it is in.
+    pub fn join(mut self) {
+        self.stop();
+        if let Some(thread) = self.thread.take() {
+            // A poll that panics is caught in the thread, so there is no panic to pass on.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Poller {
+    source: Box<dyn Source>,
+    clock: Arc<dyn Clock>,
+    settings: WorkerSettings,
+    shared: Arc<Shared>,
+    failures: u32,
+}
+
+impl Poller {
+    fn run(&mut self) {
+        let mut due_ns = self.clock.now_ns();
+        while !self.stopping() {
+            let readings = locked(&self.shared.queue).spare();
+            let (began_ns, poll) = self.poll(readings);
+            let ended_ns = poll.ended_ns;
+            let error = poll.error.clone();
+            locked(&self.shared.queue).put(poll);
+            locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
+            if matches!(error, Some(SourceError::End { .. })) {
+                return;
+            }
+            due_ns = self.next_due(due_ns, ended_ns, error.as_ref());
+            self.sleep_until(due_ns);
+        }
+        locked(&self.shared.ledger).stopped(self.clock.now_ns());
+    }
+
+    fn stopping(&self) -> bool {
+        self.shared.stop.load(Ordering::SeqCst)
+    }
+
+    fn poll(&mut self, mut readings: Vec<Reading>) -> (TimeNs, Poll) {
+        let began_ns = self.clock.now_ns();
+        locked(&self.shared.ledger).poll_began(began_ns);
+        let read = AssertUnwindSafe(|| self.source.read(self.clock.as_ref(), &mut readings));
+        let result = catch_unwind(read).unwrap_or_else(|_| Err(panicked(self.source.name())));
+        (began_ns, Poll { ended_ns: self.clock.now_ns(), readings, error: result.err() })
+    }
+
+    /// The next beat after `ended_ns`, or the end of the pause after a failure.
+    fn next_due(&mut self, due_ns: TimeNs, ended_ns: TimeNs, error: Option<&SourceError>) -> TimeNs {
+        let period_ns = nanoseconds(self.source.period()).max(1);
+        self.failures = if error.is_some() { self.failures.saturating_add(1) } else { 0 };
+        match error {
+            Some(SourceError::Off { .. }) => return ended_ns + nanoseconds(self.settings.off_pause),
+            Some(_) if self.failures > 1 => return ended_ns + self.backoff_ns().max(period_ns),
+            _ => {}
+        }
+        let beats = (ended_ns - due_ns).max(0) / period_ns;
+        if beats > 0 {
+            locked(&self.shared.ledger).missed(beats.unsigned_abs());
+        }
+        due_ns + (beats + 1) * period_ns
+    }
+
+    /// 1, 2, 4 ... seconds for the second, third, fourth ... failure in a row.
+    fn backoff_ns(&self) -> i64 {
+        let doublings = self.failures.saturating_sub(2).min(16);
+        nanoseconds((self.settings.backoff_min * (1 << doublings)).min(self.settings.backoff_max))
+    }
+
+    fn sleep_until(&self, until_ns: TimeNs) {
+        while !self.stopping() {
+            let now_ns = self.clock.now_ns();
+            if now_ns >= until_ns {
+                return;
+            }
+            self.clock.sleep_until(until_ns.min(now_ns + STOP_LOOK_NS));
+        }
+    }
+}
+
+fn panicked(name: &str) -> SourceError {
+    SourceError::Decode {
+        source_name: name.to_owned(),
+        request: "the whole poll".to_owned(),
+        what: "the driver failed on it; please report this with the log".to_owned(),
+    }
+}
+
+fn nanoseconds(duration: Duration) -> i64 {
+    i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX / 8)
+}

@@ -1,0 +1,256 @@
+//! How a source has been doing: pace, lateness, round trip, failures.
+
+use crate::clock::TimeNs;
+use crate::driver::SourceError;
+use std::time::Duration;
+
+/// Percentiles are over at most this many polls.
+const WINDOW: usize = 512;
+
+/// The pace is looked at again after so many polls.
+const PACE_POLLS: u64 = 16;
+
+/// A source is never taken for more than this many times slower than it promised.
+const SLOWER_AT_MOST: u32 = 5;
+
+/// What a source is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorkerState {
+    /// No poll has ended yet.
+    Starting,
+    /// The last poll succeeded.
+    Reading,
+    /// The machine is off; a normal state.
+    Off,
+    /// The last poll failed.
+    Failing,
+    /// The current poll has not returned within the deadline.
+    Stuck,
+    /// The recording is over.
+    Ended,
+    /// Stopped on request.
+    Stopped,
+}
+
+impl WorkerState {
+    /// The word used in JSON, SQL and on the page.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Reading => "reading",
+            Self::Off => "off",
+            Self::Failing => "failing",
+            Self::Stuck => "stuck",
+            Self::Ended => "ended",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// Median and 99th percentile of the last polls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Spread {
+    /// Half of the polls are at or below.
+    pub p50: Duration,
+    /// 99 of 100 polls are at or below.
+    pub p99: Duration,
+}
+
+/// How a source has been doing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkerStats {
+    /// What it is doing now.
+    pub state: WorkerState,
+    /// Since when.
+    pub state_since_ns: TimeNs,
+    /// The pace it promised.
+    pub period: Duration,
+    /// The pace it keeps, from beginning to beginning of successful polls.
+    pub period_kept: Spread,
+    /// How late polls begin against their beat.
+    pub lateness: Spread,
+    /// Duration of a poll.
+    pub round_trip: Spread,
+    /// Polls that ended.
+    pub polls: u64,
+    /// Polls that failed; a machine that is off does not count.
+    pub failures: u64,
+    /// Beats that were skipped because a poll took too long.
+    pub missed: u64,
+    /// Polls dropped because nobody took them.
+    pub dropped: u64,
+    /// The last error, also after it has passed.
+    pub last_error: Option<SourceError>,
+    /// When the last error was first seen in a row.
+    pub last_error_since_ns: Option<TimeNs>,
+}
+
+/// The last durations, in nanoseconds.
+struct Window {
+    values: Vec<i64>,
+    next: usize,
+}
+
+impl Window {
+    fn new() -> Self {
+        Self { values: Vec::with_capacity(WINDOW), next: 0 }
+    }
+
+    fn add(&mut self, value: i64) {
+        if self.values.len() < WINDOW {
+            self.values.push(value);
+        } else {
+            self.values[self.next] = value;
+            self.next = (self.next + 1) % WINDOW;
+        }
+    }
+
+    fn spread(&self) -> Spread {
+        let mut sorted = self.values.clone();
+        sorted.sort_unstable();
+        let rank = |percent: usize| (sorted.len() * percent).div_ceil(100).saturating_sub(1);
+        let at = |percent| sorted.get(rank(percent)).map_or(0, |value| value.unsigned_abs());
+        Spread { p50: Duration::from_nanos(at(50)), p99: Duration::from_nanos(at(99)) }
+    }
+}
+
+/// Where the worker's thread writes and [`WorkerStats`] are read.
+pub(super) struct Ledger {
+    period: Duration,
+    deadline: Duration,
+    state: WorkerState,
+    state_since_ns: TimeNs,
+    in_poll_since_ns: Option<TimeNs>,
+    last_began_ns: Option<TimeNs>,
+    intervals: Window,
+    lateness: Window,
+    round_trip: Window,
+    polls: u64,
+    failures: u64,
+    missed: u64,
+    last_error: Option<SourceError>,
+    last_error_since_ns: Option<TimeNs>,
+    pace: Duration,
+    new_pace: Option<Duration>,
+}
+
+impl Ledger {
+    pub(super) fn new(period: Duration, deadline: Duration, now_ns: TimeNs) -> Self {
+        Self {
+            period,
+            deadline,
+            state: WorkerState::Starting,
+            state_since_ns: now_ns,
+            in_poll_since_ns: None,
+            last_began_ns: None,
+            intervals: Window::new(),
+            lateness: Window::new(),
+            round_trip: Window::new(),
+            polls: 0,
+            failures: 0,
+            missed: 0,
+            last_error: None,
+            last_error_since_ns: None,
+            pace: period,
+            new_pace: None,
+        }
+    }
+
+    pub(super) fn poll_began(&mut self, began_ns: TimeNs) {
+        self.in_poll_since_ns = Some(began_ns);
+    }
+
+    pub(super) fn poll_over(
+        &mut self,
+        due_ns: TimeNs,
+        began_ns: TimeNs,
+        ended_ns: TimeNs,
+        error: Option<&SourceError>,
+    ) {
+        self.in_poll_since_ns = None;
+        self.polls += 1;
+        self.lateness.add((began_ns - due_ns).max(0));
+        self.round_trip.add(ended_ns - began_ns);
+        if let Some(last_ns) = self.last_began_ns {
+            self.intervals.add(began_ns - last_ns);
+        }
+        self.last_began_ns = error.is_none().then_some(began_ns);
+        self.enter(state_after(error), ended_ns);
+        if let Some(error) = error {
+            self.failed(error, ended_ns);
+        }
+        if self.polls.is_multiple_of(PACE_POLLS) {
+            self.look_at_pace();
+        }
+    }
+
+    fn failed(&mut self, error: &SourceError, ended_ns: TimeNs) {
+        if matches!(error, SourceError::Off { .. } | SourceError::End { .. }) {
+            return;
+        }
+        self.failures += 1;
+        if self.last_error.as_ref() != Some(error) {
+            self.last_error = Some(error.clone());
+            self.last_error_since_ns = Some(ended_ns);
+        }
+    }
+
+    fn enter(&mut self, state: WorkerState, at_ns: TimeNs) {
+        if self.state != state {
+            self.state = state;
+            self.state_since_ns = at_ns;
+        }
+    }
+
+    fn look_at_pace(&mut self) {
+        let kept = self.intervals.spread().p50;
+        let slower = kept > self.period * 6 / 5;
+        let pace = if slower { kept.min(self.period * SLOWER_AT_MOST) } else { self.period };
+        if pace.abs_diff(self.pace) > self.period / 10 {
+            self.pace = pace;
+            self.new_pace = Some(pace);
+        }
+    }
+
+    /// The pace the source keeps, if that has changed since it was last asked for.
+    pub(super) fn take_new_pace(&mut self) -> Option<Duration> {
+        self.new_pace.take()
+    }
+
+    pub(super) fn missed(&mut self, beats: u64) {
+        self.missed += beats;
+    }
+
+    pub(super) fn stopped(&mut self, at_ns: TimeNs) {
+        self.enter(WorkerState::Stopped, at_ns);
+    }
+
+    pub(super) fn stats(&self, now_ns: TimeNs, dropped: u64) -> WorkerStats {
+        let deadline_ns = i64::try_from(self.deadline.as_nanos()).unwrap_or(i64::MAX);
+        let stuck_ns = self.in_poll_since_ns.filter(|since_ns| now_ns - since_ns > deadline_ns);
+        WorkerStats {
+            state: if stuck_ns.is_some() { WorkerState::Stuck } else { self.state },
+            state_since_ns: stuck_ns.unwrap_or(self.state_since_ns),
+            period: self.period,
+            period_kept: self.intervals.spread(),
+            lateness: self.lateness.spread(),
+            round_trip: self.round_trip.spread(),
+            polls: self.polls,
+            failures: self.failures,
+            missed: self.missed,
+            dropped,
+            last_error: self.last_error.clone(),
+            last_error_since_ns: self.last_error_since_ns,
+        }
+    }
+}
+
+fn state_after(error: Option<&SourceError>) -> WorkerState {
+    match error {
+        None => WorkerState::Reading,
+        Some(SourceError::Off { .. }) => WorkerState::Off,
+        Some(SourceError::End { .. }) => WorkerState::Ended,
+        Some(_) => WorkerState::Failing,
+    }
+}

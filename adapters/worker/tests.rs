@@ -1,0 +1,200 @@
+//! Workers with real threads and sources that misbehave.
+
+use super::*;
+use crate::channel::ChannelId;
+use crate::clock::SystemClock;
+use crate::merge::{Delay, SourcePlan};
+use crate::reading::{Absence, Stamp};
+use crate::sample::Sample;
+use std::sync::atomic::AtomicU32;
+
+const PERIOD: Duration = Duration::from_millis(5);
+
+/// What the source does at its n-th poll.
+type Behaviour = Box<dyn Fn(u32) -> Result<(), SourceError> + Send>;
+
+struct Faulty {
+    channels: [ChannelId; 1],
+    polls: Arc<AtomicU32>,
+    behaviour: Behaviour,
+}
+
+impl Source for Faulty {
+    fn name(&self) -> &str {
+        "faulty"
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        PERIOD
+    }
+
+    fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let poll = self.polls.fetch_add(1, Ordering::SeqCst);
+        (self.behaviour)(poll)?;
+        out.push(Reading::number(self.channels[0], Stamp::exact(clock.now_ns()), f64::from(poll)));
+        Ok(())
+    }
+}
+
+fn quick() -> WorkerSettings {
+    WorkerSettings {
+        backoff_min: Duration::from_millis(20),
+        backoff_max: Duration::from_millis(60),
+        off_pause: Duration::from_millis(10),
+        deadline: Duration::from_millis(50),
+        ..WorkerSettings::default()
+    }
+}
+
+fn part_count() -> ChannelId {
+    ChannelId::of("part_count").expect("in the table")
+}
+
+fn start(settings: WorkerSettings, behaviour: Behaviour) -> (Worker, Arc<AtomicU32>, Arc<SystemClock>) {
+    let (polls, clock) = (Arc::new(AtomicU32::new(0)), Arc::new(SystemClock::new()));
+    let source = Faulty { channels: [part_count()], polls: polls.clone(), behaviour };
+    (Worker::start(Box::new(source), clock.clone(), settings).expect("a thread"), polls, clock)
+}
+
+/// Waits until the source was polled so often; the test fails after ten seconds.
+fn wait_for(polls: &AtomicU32, count: u32) {
+    wait_until(|| polls.load(Ordering::SeqCst) >= count);
+}
+
+fn wait_until(mut done: impl FnMut() -> bool) {
+    for _ in 0..10_000 {
+        if done() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("nothing happened for ten seconds");
+}
+
+fn line() -> SourceError {
+    SourceError::Line { source_name: "faulty".into(), what: "reset".into(), next: "Check the cable.".into() }
+}
+
+#[test]
+fn a_good_source_keeps_its_pace_and_reaches_the_merge() {
+    let (worker, polls, clock) = start(quick(), Box::new(|_| Ok(())));
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let mut merge = Merge::new(&[plan], Delay::default());
+    wait_for(&polls, 40);
+    assert!(worker.drain_into(&mut merge, SourceId(0)) >= 39);
+    let mut sample = Sample::empty(0);
+    merge.sample_into(&mut sample, clock.now_ns());
+    assert!(merge.counts(SourceId(0)).readings >= 39);
+    let stats = worker.stats(clock.now_ns());
+    assert_eq!((stats.state, stats.failures, stats.dropped), (WorkerState::Reading, 0, 0));
+    assert!(stats.period_kept.p50 >= PERIOD * 9 / 10, "{stats:?}");
+    assert!(stats.polls >= 39 && stats.last_error.is_none());
+    worker.join();
+}
+
+#[test]
+fn failures_are_retried_with_growing_pauses_and_told() {
+    let (worker, polls, clock) = start(quick(), Box::new(|poll| if poll < 4 { Err(line()) } else { Ok(()) }));
+    let began_ns = clock.now_ns();
+    wait_for(&polls, 3);
+    assert_eq!(worker.stats(clock.now_ns()).state, WorkerState::Failing);
+    wait_for(&polls, 6);
+    // Pauses: 5 (the next beat), 20, 40, 60 ms.
+    assert!(clock.now_ns() - began_ns >= 120_000_000);
+    let stats = worker.stats(clock.now_ns());
+    assert_eq!((stats.state, stats.failures, stats.last_error), (WorkerState::Reading, 4, Some(line())));
+    assert!(stats.last_error_since_ns.is_some());
+    worker.join();
+}
+
+#[test]
+fn a_machine_that_is_off_is_no_failure() {
+    let off = || SourceError::Off { source_name: "faulty".into() };
+    let (worker, polls, clock) = start(quick(), Box::new(move |_| Err(off())));
+    wait_for(&polls, 4);
+    let stats = worker.stats(clock.now_ns());
+    assert_eq!((stats.state, stats.failures, stats.last_error), (WorkerState::Off, 0, None));
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::default()), Sample::empty(0));
+    worker.drain_into(&mut merge, SourceId(0));
+    merge.sample_into(&mut sample, clock.now_ns());
+    assert_eq!(sample.number(part_count()), Err(Absence::MachineOff));
+    worker.join();
+}
+
+#[test]
+fn a_poll_that_does_not_return_is_shown_as_stuck() {
+    let (worker, polls, clock) = start(
+        quick(),
+        Box::new(|poll| {
+            std::thread::sleep(Duration::from_millis(if poll == 1 { 400 } else { 0 }));
+            Ok(())
+        }),
+    );
+    wait_for(&polls, 2);
+    wait_until(|| worker.stats(clock.now_ns()).state == WorkerState::Stuck);
+    wait_until(|| worker.stats(clock.now_ns()).state == WorkerState::Reading);
+    assert!(worker.stats(clock.now_ns()).missed >= 50, "{:?}", worker.stats(clock.now_ns()));
+    worker.join();
+}
+
+#[test]
+fn a_driver_that_panics_is_caught() {
+    let (worker, polls, clock) = start(quick(), Box::new(|poll| if poll == 0 { panic!("a bug") } else { Ok(()) }));
+    wait_for(&polls, 3);
+    let stats = worker.stats(clock.now_ns());
+    assert!(matches!(stats.last_error, Some(SourceError::Decode { .. })), "{stats:?}");
+    worker.join();
+}
+
+#[test]
+fn the_queue_is_bounded_and_the_newest_survives() {
+    let settings = WorkerSettings { queue_polls: 4, ..quick() };
+    let (worker, polls, clock) = start(settings, Box::new(|_| Ok(())));
+    wait_for(&polls, 12);
+    worker.stop();
+    wait_until(|| worker.is_finished());
+    let mut last = None;
+    let waiting = worker.drain(|poll| last = poll.readings.last().and_then(|reading| reading.value.clone().ok()));
+    assert_eq!(waiting, 4);
+    let asked = f64::from(polls.load(Ordering::SeqCst) - 1);
+    assert_eq!(last.and_then(|value| value.as_number()), Some(asked));
+    let stats = worker.stats(clock.now_ns());
+    assert_eq!(stats.dropped, stats.polls - 4);
+    assert_eq!(stats.state, WorkerState::Stopped);
+}
+
+#[test]
+fn the_end_of_a_recording_ends_the_thread() {
+    let end = || SourceError::End { source_name: "faulty".into() };
+    let (worker, _, clock) = start(quick(), Box::new(move |poll| if poll == 2 { Err(end()) } else { Ok(()) }));
+    wait_until(|| worker.is_finished());
+    assert_eq!(worker.stats(clock.now_ns()).state, WorkerState::Ended);
+}
+
+#[test]
+fn a_slow_source_is_believed_its_own_pace() {
+    let (worker, polls, clock) = start(
+        quick(),
+        Box::new(|_| {
+            std::thread::sleep(Duration::from_millis(12));
+            Ok(())
+        }),
+    );
+    wait_for(&polls, 20);
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let (mut merge, mut sample) = (Merge::new(&[plan], Delay::Fixed(Duration::ZERO)), Sample::empty(0));
+    worker.stop();
+    wait_until(|| worker.is_finished());
+    worker.drain_into(&mut merge, SourceId(0));
+    merge.sample_into(&mut sample, clock.now_ns());
+    // Three promised periods after the newest reading it still counts, because the kept period is three times longer.
+    let newest_ns = sample.at_ns - sample.slot(part_count()).age_ns;
+    merge.sample_into(&mut sample, newest_ns + 15_000_000);
+    assert!(sample.number(part_count()).is_ok(), "{:?}", sample.slot(part_count()));
+    worker.join();
+}
