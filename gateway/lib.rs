@@ -1,1 +1,3 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
+
+pub mod config;

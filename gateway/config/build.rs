@@ -1,0 +1,168 @@
+//! From checked values to the configuration, and the rules that concern more than one key.
+
+use super::check_value::Scalar;
+use super::read::{Found, Origin, Reading, Values};
+use super::{Config, Gate, GateMode, Gateway, History, Http, Language, Log, Scripts, Source, Twin};
+use adapters::channel::nearest;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The configuration, or `None` where a value is missing; the problem has been reported then.
+pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
+    let sources: Option<Vec<Source>> = reading.sources.iter().map(source).collect();
+    check_names(reading);
+    check_gate(reading);
+    let gateway = gateway(reading, base)?;
+    Some(Config {
+        scripts: scripts(reading, &gateway.data_dir)?,
+        gate: gate(reading)?,
+        history: history(reading, &gateway.data_dir)?,
+        http: Http { listen: text(reading, "http", "listen")?, enabled: flag(reading, "http", "enabled")? },
+        twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
+        log: Log { level: text(reading, "log", "level")?, json: text(reading, "log", "format")? == "json" },
+        gateway,
+        sources: sources?,
+    })
+}
+
+fn gateway(reading: &Reading<'_>, base: &Path) -> Option<Gateway> {
+    Some(Gateway {
+        name: text(reading, "gateway", "name")?,
+        tick_hz: number(reading, "gateway", "tick_hz")?,
+        language: if text(reading, "gateway", "language")? == "zh" { Language::Zh } else { Language::En },
+        data_dir: base.join(text(reading, "gateway", "data_dir")?),
+    })
+}
+
+fn scripts(reading: &Reading<'_>, data_dir: &Path) -> Option<Scripts> {
+    Some(Scripts {
+        directory: data_dir.join(text(reading, "scripts", "directory")?),
+        reload: flag(reading, "scripts", "reload")?,
+    })
+}
+
+fn gate(reading: &Reading<'_>) -> Option<Gate> {
+    Some(Gate {
+        mode: mode(&text(reading, "gate", "mode")?),
+        source: text(reading, "gate", "source"),
+        min_pct: number(reading, "gate", "min_pct")?,
+        max_pct: number(reading, "gate", "max_pct")?,
+        slew_up_pct_per_s: number(reading, "gate", "slew_up_pct_per_s")?,
+        slew_down_pct_per_s: number(reading, "gate", "slew_down_pct_per_s")?,
+        stale: seconds(reading, "gate", "stale_s")?,
+        armed_for: seconds(reading, "gate", "armed_for_s")?,
+    })
+}
+
+fn mode(word: &str) -> GateMode {
+    match word {
+        "off" => GateMode::Off,
+        "armed" => GateMode::Armed,
+        _ => GateMode::Shadow,
+    }
+}
+
+fn history(reading: &Reading<'_>, data_dir: &Path) -> Option<History> {
+    Some(History {
+        path: data_dir.join(PathBuf::from(text(reading, "history", "path")?)),
+        retention_days: number(reading, "history", "retention_days")?,
+        max_gb: number(reading, "history", "max_gb")?,
+        commit: seconds(reading, "history", "commit_s")?,
+    })
+}
+
+fn source(values: &Values) -> Option<Source> {
+    let number = |key| values.found.get(key).and_then(as_number);
+    let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
+    Some(Source {
+        name: source_name(values)?,
+        address,
+        period: number("period_s").map(Duration::from_secs_f64),
+        deadline: Duration::from_secs_f64(number("deadline_s")?),
+    })
+}
+
+fn source_name(values: &Values) -> Option<String> {
+    let named = |key| values.found.get(key).and_then(as_text).map(str::to_owned);
+    named("name").or_else(|| named("address"))
+}
+
+/// Sources exist and have different names.
+fn check_names(reading: &mut Reading<'_>) {
+    if reading.sources.is_empty() {
+        let next = "write [[source]] with address = \"simulated://lathe\" to begin with";
+        return reading.problem(&Origin::Default, "there is no source to read", next);
+    }
+    let names: Vec<Option<String>> = reading.sources.iter().map(source_name).collect();
+    for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
+        if names[..index].contains(name) {
+            let origin = origin_of_name(&reading.sources[index]);
+            let what = format!("there are two sources named {:?}", name.clone().unwrap_or_default());
+            reading.problem(&origin, what, "give each [[source]] its own `name`");
+        }
+    }
+}
+
+fn origin_of_name(values: &Values) -> Origin {
+    let found = values.found.get("name").or_else(|| values.found.get("address"));
+    found.map_or(Origin::Default, |found| found.origin.clone())
+}
+
+/// What is armed has somewhere to write to.
+fn check_gate(reading: &mut Reading<'_>) {
+    let armed = text(reading, "gate", "mode").as_deref() == Some("armed");
+    let origin = |key: &str| reading.get("gate", key).map_or(Origin::Default, |found| found.origin.clone());
+    let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
+    match text(reading, "gate", "source") {
+        None if armed => {
+            let (at, next) = (origin("mode"), format!("write source = ... under [gate]; there is {}", quoted(&names)));
+            reading.problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
+        }
+        Some(name) if !names.contains(&name) && !names.is_empty() => {
+            let next = match nearest(&name, names.iter().map(String::as_str)) {
+                Some(near) => format!("did you mean {near:?}?"),
+                None => format!("there is {}", quoted(&names)),
+            };
+            let at = origin("source");
+            reading.problem(&at, format!("no source is named {name:?}"), next);
+        }
+        _ => {}
+    }
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
+}
+
+fn as_text(found: &Found) -> Option<&str> {
+    match &found.value {
+        Scalar::Text(text) => Some(text),
+        _ => None,
+    }
+}
+
+fn as_number(found: &Found) -> Option<f64> {
+    match found.value {
+        Scalar::Number(number) => Some(number),
+        _ => None,
+    }
+}
+
+fn text(reading: &Reading<'_>, section: &str, key: &str) -> Option<String> {
+    reading.get(section, key).and_then(as_text).map(str::to_owned)
+}
+
+fn number(reading: &Reading<'_>, section: &str, key: &str) -> Option<f64> {
+    reading.get(section, key).and_then(as_number)
+}
+
+fn seconds(reading: &Reading<'_>, section: &str, key: &str) -> Option<Duration> {
+    number(reading, section, key).map(Duration::from_secs_f64)
+}
+
+fn flag(reading: &Reading<'_>, section: &str, key: &str) -> Option<bool> {
+    match reading.get(section, key).map(|found| &found.value) {
+        Some(Scalar::Flag(flag)) => Some(*flag),
+        _ => None,
+    }
+}

@@ -1,0 +1,344 @@
+//! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
+
+/// What a key accepts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Any text that is not empty.
+    Text,
+    /// One of these words.
+    OneOf(&'static [&'static str]),
+    /// A number from the first to the second limit, both included.
+    Number(f64, f64),
+    /// `true` or `false`.
+    Flag,
+    /// A file or directory.
+    Path,
+    /// `HOST:PORT` to listen on.
+    Listen,
+    /// The address of a source, as listed in the table of sources.
+    Address,
+}
+
+/// What happens when a key is not written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Absent {
+    /// The file is refused.
+    Required,
+    /// The gateway does without, or decides by itself as the text of the key says.
+    Optional,
+    /// This value, written as in the file.
+    Default(&'static str),
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Key {
+    /// The section it belongs to.
+    pub section: &'static str,
+    /// Its name in that section; the unit comes last.
+    pub name: &'static str,
+    /// What it accepts.
+    pub kind: Kind,
+    /// What holds when it is absent.
+    pub absent: Absent,
+    /// What it does, in English.
+    pub en: &'static str,
+    /// What it does, in Chinese.
+    pub zh: &'static str,
+}
+
+/// A section of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Section {
+    /// Its name.
+    pub name: &'static str,
+    /// Written as `[[name]]`, any number of times.
+    pub repeated: bool,
+    /// What it is about, in English.
+    pub en: &'static str,
+}
+
+const fn section(name: &'static str, en: &'static str) -> Section {
+    Section { name, repeated: false, en }
+}
+
+/// Every section, in the order of the example file.
+pub const SECTIONS: &[Section] = &[
+    section("gateway", "the box itself"),
+    Section { name: "source", repeated: true, en: "one controller or meter; write the section once for each" },
+    section("scripts", "the rules that the integrator edits"),
+    section("gate", "what may be written to the machine"),
+    section("history", "what is remembered"),
+    section("http", "the page and the interface on the network"),
+    section("twin", "the simulation that the machine is compared with"),
+    section("log", "what is written to the standard error output"),
+];
+
+const fn key(
+    path: (&'static str, &'static str),
+    kind: Kind,
+    absent: Absent,
+    en: &'static str,
+    zh: &'static str,
+) -> Key {
+    Key { section: path.0, name: path.1, kind, absent, en, zh }
+}
+
+use Absent::{Default, Optional, Required};
+use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
+
+/// Every key the gateway knows.
+pub const KEYS: &[Key] = &[
+    key(
+        ("gateway", "name"),
+        Text,
+        Default("\"cnc-gateway\""),
+        "Name of the machine on the page and in exports",
+        "机床名称",
+    ),
+    key(
+        ("gateway", "tick_hz"),
+        Number(0.1, 1000.0),
+        Default("10.0"),
+        "Ticks per second: merge, infer, decide, store",
+        "每秒节拍数",
+    ),
+    key(
+        ("gateway", "language"),
+        OneOf(&["en", "zh"]),
+        Default("\"en\""),
+        "Language of messages to the operator",
+        "操作者界面语言",
+    ),
+    key(
+        ("gateway", "data_dir"),
+        Path,
+        Default("\"cnc-gateway-data\""),
+        "Directory of everything the gateway writes; relative to this file",
+        "数据目录",
+    ),
+    key(
+        ("source", "address"),
+        Address,
+        Required,
+        "Which controller, meter or recording, and how to reach it",
+        "数据源地址",
+    ),
+    key(("source", "name"), Text, Optional, "Short name in messages and in [gate]; default: the address", "数据源名称"),
+    key(
+        ("source", "period_s"),
+        Number(0.001, 3600.0),
+        Optional,
+        "Time between two polls; default: the driver's own pace",
+        "轮询周期（秒）",
+    ),
+    key(
+        ("source", "deadline_s"),
+        Number(0.01, 60.0),
+        Default("3.0"),
+        "A poll that takes longer has failed",
+        "轮询超时（秒）",
+    ),
+    key(
+        ("scripts", "directory"),
+        Path,
+        Default("\"scripts\""),
+        "Directory of the .rhai scripts; relative to data_dir",
+        "脚本目录",
+    ),
+    key(
+        ("scripts", "reload"),
+        Flag,
+        Default("true"),
+        "Look for changed scripts every second",
+        "脚本修改后自动重新加载",
+    ),
+    key(
+        ("gate", "mode"),
+        OneOf(&["off", "shadow", "armed"]),
+        Default("\"shadow\""),
+        "off: decide nothing. shadow: decide and record, write nothing. armed: may be armed on the box",
+        "写入方式：关闭、影子、允许",
+    ),
+    key(("gate", "source"), Text, Optional, "Name of the source whose feed override may be written", "可写入的数据源"),
+    key(
+        ("gate", "min_pct"),
+        Number(10.0, 100.0),
+        Default("50.0"),
+        "Least feed override ever written; no script can widen the band",
+        "最小进给倍率",
+    ),
+    key(
+        ("gate", "max_pct"),
+        Number(100.0, 200.0),
+        Default("120.0"),
+        "Greatest feed override ever written; no script can widen the band",
+        "最大进给倍率",
+    ),
+    key(
+        ("gate", "slew_up_pct_per_s"),
+        Number(0.1, 100.0),
+        Default("10.0"),
+        "Greatest rise of the override per second",
+        "倍率上升速率限制",
+    ),
+    key(
+        ("gate", "slew_down_pct_per_s"),
+        Number(0.1, 254.0),
+        Default("50.0"),
+        "Greatest fall of the override per second",
+        "倍率下降速率限制",
+    ),
+    key(
+        ("gate", "stale_s"),
+        Number(0.05, 10.0),
+        Default("0.5"),
+        "Data older than this holds 100 %; at most two polling periods is sensible",
+        "数据过期时间（秒）",
+    ),
+    key(
+        ("gate", "armed_for_s"),
+        Number(1.0, 86400.0),
+        Default("28800.0"),
+        "Arming ends by itself after this time",
+        "允许写入的有效时间（秒）",
+    ),
+    key(
+        ("history", "path"),
+        Path,
+        Default("\"history.db\""),
+        "History database (SQLite); relative to data_dir",
+        "历史数据库",
+    ),
+    key(
+        ("history", "retention_days"),
+        Number(0.01, 36500.0),
+        Default("400.0"),
+        "Raw samples older than this are dropped",
+        "原始数据保留天数",
+    ),
+    key(
+        ("history", "max_gb"),
+        Number(0.01, 10000.0),
+        Default("8.0"),
+        "Size of the history; beyond it the oldest raw samples go first, alarms and commands last",
+        "历史数据最大容量（GB）",
+    ),
+    key(
+        ("history", "commit_s"),
+        Number(0.01, 60.0),
+        Default("1.0"),
+        "At most this much is lost when the power fails",
+        "提交间隔（秒）",
+    ),
+    key(
+        ("http", "listen"),
+        Listen,
+        Default("\"127.0.0.1:8080\""),
+        "Address and port of the page; 127.0.0.1 is reachable from this box only",
+        "网页监听地址",
+    ),
+    key(("http", "enabled"), Flag, Default("true"), "Serve the page and the interface at all", "启用网页"),
+    key(("twin", "model"), Path, Optional, "Model file (model/1); relative to this file", "仿真模型文件"),
+    key(
+        ("log", "level"),
+        OneOf(&["error", "warn", "info", "debug", "trace"]),
+        Default("\"info\""),
+        "Least important message that is written",
+        "日志级别",
+    ),
+    key(
+        ("log", "format"),
+        OneOf(&["text", "json"]),
+        Default("\"text\""),
+        "Text for people, json for log collectors",
+        "日志格式",
+    ),
+];
+
+/// The keys of one section.
+pub fn keys_of(section: &str) -> impl Iterator<Item = &'static Key> {
+    KEYS.iter().filter(move |key| key.section == section)
+}
+
+/// The key of this name in this section.
+#[must_use]
+pub fn find(section: &str, name: &str) -> Option<&'static Key> {
+    KEYS.iter().find(|key| key.section == section && key.name == name)
+}
+
+/// The section of this name.
+#[must_use]
+pub fn find_section(name: &str) -> Option<&'static Section> {
+    SECTIONS.iter().find(|section| section.name == name)
+}
+
+impl Kind {
+    /// What is accepted, as a reader of the table needs it.
+    #[must_use]
+    pub fn range(&self) -> String {
+        match self {
+            Text => "text".to_string(),
+            OneOf(words) => words.join(", "),
+            Number(min, max) => format!("{min} to {max}"),
+            Flag => "true, false".to_string(),
+            Path => "path".to_string(),
+            Listen => "HOST:PORT".to_string(),
+            Address => "address".to_string(),
+        }
+    }
+}
+
+impl Absent {
+    fn text(self) -> &'static str {
+        match self {
+            Required => "required",
+            Optional => "-",
+            Default(value) => value,
+        }
+    }
+}
+
+/// The table as Markdown, one row per key: what `check --keys` prints.
+#[must_use]
+pub fn table() -> String {
+    let mut text = String::from("| key | default | accepts | what |\n|---|---|---|---|\n");
+    for key in KEYS {
+        let section = find_section(key.section).filter(|section| section.repeated);
+        let path = if section.is_some() { format!("[[{}]] {}", key.section, key.name) } else { key.path() };
+        text += &format!("| `{path}` | {} | {} | {} |\n", key.absent.text(), key.kind.range(), key.en);
+    }
+    text
+}
+
+impl Key {
+    /// `section.name`.
+    #[must_use]
+    pub fn path(&self) -> String {
+        format!("{}.{}", self.section, self.name)
+    }
+}
+
+/// A complete commented file with every default: what `check --example` prints.
+#[must_use]
+pub fn example() -> String {
+    let mut text =
+        String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
+    for section in SECTIONS {
+        let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
+        text += &format!("\n{open}{}{close}{}# {}\n", section.name, " ", section.en);
+        for key in keys_of(section.name) {
+            text += &example_line(key);
+        }
+    }
+    text
+}
+
+fn example_line(key: &Key) -> String {
+    let written = match key.absent {
+        Required => format!("{} = \"simulated://lathe\"", key.name),
+        Optional => format!("# {} = ...", key.name),
+        Default(value) => format!("# {} = {value}", key.name),
+    };
+    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
+}

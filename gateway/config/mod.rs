@@ -1,0 +1,228 @@
+//! The configuration: one TOML file, read completely or refused with everything that is wrong with it.
+//!
+//! [`load`] reads a file and the environment, [`parse`] does the same from text. The keys, their defaults, ranges and
+//! texts are the rows of [`keys::KEYS`]. An environment variable `CNC_GATEWAY__SECTION__KEY` goes before the file.
+//!
+//! Nothing is guessed: an unknown key, a wrong type or a value out of range refuses the file, all of them at once.
+
+mod build;
+mod check_value;
+pub mod keys;
+mod problem;
+mod read;
+
+pub use problem::Problem;
+
+use adapters::Address;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What every environment variable that overrides a key begins with.
+pub const ENVIRONMENT_PREFIX: &str = "CNC_GATEWAY__";
+
+/// Name under which the built-in configuration appears in messages.
+pub const BUILT_IN: &str = "built-in configuration";
+
+/// The configuration that is used when no file is given: the embedded simulated lathe.
+pub const BUILT_IN_TEXT: &str =
+    "[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe\"\n";
+
+/// A complete, checked configuration. Every path in it is ready to be opened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// The box itself.
+    pub gateway: Gateway,
+    /// At least one source.
+    pub sources: Vec<Source>,
+    /// The scripts.
+    pub scripts: Scripts,
+    /// What may be written to the machine.
+    pub gate: Gate,
+    /// What is remembered.
+    pub history: History,
+    /// The page.
+    pub http: Http,
+    /// The simulation.
+    pub twin: Twin,
+    /// The log.
+    pub log: Log,
+}
+
+/// `[gateway]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gateway {
+    /// Name of the machine.
+    pub name: String,
+    /// Ticks per second, 0.1 to 1000.
+    pub tick_hz: f64,
+    /// Language of operator messages.
+    pub language: Language,
+    /// Directory of everything the gateway writes.
+    pub data_dir: PathBuf,
+}
+
+/// Language of operator messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// English.
+    En,
+    /// Chinese.
+    Zh,
+}
+
+/// One `[[source]]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Where it is and how to talk to it.
+    pub address: Address,
+    /// Short name; the text of the address when none was given.
+    pub name: String,
+    /// Time between two polls; `None`: the driver's own pace.
+    pub period: Option<Duration>,
+    /// A poll that takes longer has failed.
+    pub deadline: Duration,
+}
+
+/// `[scripts]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scripts {
+    /// Directory of the `.rhai` files.
+    pub directory: PathBuf,
+    /// Look for changes every second.
+    pub reload: bool,
+}
+
+/// How far the gate goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GateMode {
+    /// Nothing is decided.
+    Off,
+    /// Decided and recorded, never written.
+    Shadow,
+    /// May be armed on the box; until then as in shadow.
+    Armed,
+}
+
+impl GateMode {
+    /// The word in the configuration, in the history and on the page.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Shadow => "shadow",
+            Self::Armed => "armed",
+        }
+    }
+}
+
+/// `[gate]`: the limits that no script can widen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gate {
+    /// How far it goes.
+    pub mode: GateMode,
+    /// Name of the source that is written to.
+    pub source: Option<String>,
+    /// Least override, whole percent, 10 to 100.
+    pub min_pct: f64,
+    /// Greatest override, whole percent, 100 to 200.
+    pub max_pct: f64,
+    /// Greatest rise, percent per second.
+    pub slew_up_pct_per_s: f64,
+    /// Greatest fall, percent per second.
+    pub slew_down_pct_per_s: f64,
+    /// Data older than this holds 100 %.
+    pub stale: Duration,
+    /// Arming ends by itself after this.
+    pub armed_for: Duration,
+}
+
+/// `[history]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    /// The database.
+    pub path: PathBuf,
+    /// Age at which raw samples are dropped, days.
+    pub retention_days: f64,
+    /// Greatest size, GB (1e9 bytes).
+    pub max_gb: f64,
+    /// Time between two commits.
+    pub commit: Duration,
+}
+
+/// `[http]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Http {
+    /// `HOST:PORT`.
+    pub listen: String,
+    /// Serve at all.
+    pub enabled: bool,
+}
+
+/// `[twin]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Twin {
+    /// Model file.
+    pub model: Option<PathBuf>,
+}
+
+/// `[log]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Log {
+    /// `error`, `warn`, `info`, `debug` or `trace`.
+    pub level: String,
+    /// Lines of JSON instead of text.
+    pub json: bool,
+}
+
+/// Reads the file, or without one the built-in configuration, and overlays the environment.
+///
+/// # Errors
+/// Everything that is wrong, in the order of the file; then the variables.
+pub fn load(
+    file: Option<&Path>,
+    environment: impl IntoIterator<Item = (String, String)>,
+) -> Result<Config, Vec<Problem>> {
+    let Some(path) = file else {
+        return parse(BUILT_IN, BUILT_IN_TEXT, Path::new(""), environment);
+    };
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&name, &error)])?;
+    let base = path.parent().unwrap_or(Path::new(""));
+    parse(&name, &text, base, environment)
+}
+
+fn unreadable(name: &str, error: &std::io::Error) -> Problem {
+    let next = match error.kind() {
+        std::io::ErrorKind::NotFound => "`cnc-gateway check --example` prints a file to start from",
+        std::io::ErrorKind::InvalidData => "save the file as UTF-8",
+        _ => "",
+    };
+    Problem::of(name, format!("the configuration cannot be read: {error}"), next)
+}
+
+/// The same from text. `file` is its name in messages, `base` the directory that relative paths begin at.
+///
+/// # Errors
+/// Everything that is wrong, in the order of the file; then the variables.
+pub fn parse(
+    file: &str,
+    text: &str,
+    base: &Path,
+    environment: impl IntoIterator<Item = (String, String)>,
+) -> Result<Config, Vec<Problem>> {
+    let mut reading = read::Reading::of(file, text);
+    let mut variables: Vec<_> =
+        environment.into_iter().filter(|(name, _)| name.starts_with(ENVIRONMENT_PREFIX)).collect();
+    variables.sort();
+    for (name, value) in &variables {
+        reading.variable(name, ENVIRONMENT_PREFIX, value);
+    }
+    reading.complete();
+    let config = build::build(&mut reading, base);
+    let mut problems = std::mem::take(&mut reading.problems);
+    problems.sort_by_key(|problem| (problem.line.is_none(), problem.line, problem.column));
+    match config {
+        Some(config) if problems.is_empty() => Ok(config),
+        _ => Err(problems),
+    }
+}

@@ -1,0 +1,266 @@
+//! From text to checked values: walks the file by the table of keys and collects every problem on the way.
+
+use super::check_value::{Scalar, check_scalar, check_written};
+use super::keys::{Absent, Key, SECTIONS, Section, find, find_section, keys_of};
+use super::problem::Problem;
+use adapters::channel::nearest;
+use std::collections::BTreeMap;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Where a value was written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Origin {
+    /// Byte offset in the file.
+    File(usize),
+    /// An environment variable.
+    Variable(String),
+    /// Nowhere: the default of the table.
+    Default,
+}
+
+/// A checked value and where it was written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    pub(super) value: Scalar,
+    pub(super) origin: Origin,
+}
+
+/// One section as found: values by key name, and where it begins.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Values {
+    pub(super) found: BTreeMap<&'static str, Found>,
+    offset: Option<usize>,
+}
+
+/// Everything found in the file and the environment.
+#[derive(Debug, Default)]
+pub(super) struct Reading<'a> {
+    file: &'a str,
+    text: &'a str,
+    single: BTreeMap<&'static str, Values>,
+    pub(super) sources: Vec<Values>,
+    pub(super) problems: Vec<Problem>,
+}
+
+impl<'a> Reading<'a> {
+    /// Reads `text`; `file` is its name in messages.
+    pub(super) fn of(file: &'a str, text: &'a str) -> Self {
+        let mut reading = Self { file, text, ..Self::default() };
+        let (table, errors) = DeTable::parse_recoverable(text);
+        for error in &errors {
+            reading.syntax(error);
+        }
+        let broken: Vec<_> = reading.problems.iter().map(|problem| problem.line).collect();
+        for (name, value) in table.get_ref().iter() {
+            reading.section(name, value);
+        }
+        let syntax = errors.len();
+        let (found, semantic) = reading.problems.split_at(syntax);
+        let semantic = semantic.iter().filter(|problem| !broken.contains(&problem.line));
+        reading.problems = found.iter().chain(semantic).cloned().collect();
+        reading
+    }
+
+    fn syntax(&mut self, error: &toml::de::Error) {
+        let what = format!("this is not TOML: {}", error.message());
+        let next = "write one `key = value` per line; text stands in \"quotes\"";
+        let problem = Problem::of(self.file, what, next);
+        self.problems.push(problem.at(self.text, error.span().map_or(0, |span| span.start)));
+    }
+
+    /// Adds a problem at an origin.
+    pub(super) fn problem(&mut self, origin: &Origin, what: impl Into<String>, next: impl Into<String>) {
+        let problem = match origin {
+            Origin::File(offset) => Problem::of(self.file, what, next).at(self.text, *offset),
+            Origin::Variable(name) => Problem::of(name.clone(), what, next),
+            Origin::Default => Problem::of(self.file, what, next),
+        };
+        self.problems.push(problem);
+    }
+
+    fn section(&mut self, name: &Spanned<std::borrow::Cow<'_, str>>, value: &Spanned<DeValue<'_>>) {
+        let at = Origin::File(name.span().start);
+        let Some(section) = find_section(name.get_ref()) else {
+            let outside = !matches!(value.get_ref(), DeValue::Table(_) | DeValue::Array(_));
+            let stands = format!("`{}` stands outside every section", name.get_ref());
+            let what = if outside { stands } else { unknown_section(name.get_ref()) };
+            return self.problem(&at, what, section_hint(name.get_ref()));
+        };
+        match (section.repeated, value.get_ref()) {
+            (false, DeValue::Table(table)) => {
+                let values = self.values(section, table, name.span().start);
+                self.single.insert(section.name, values);
+            }
+            (true, DeValue::Array(items)) => {
+                for item in items.iter() {
+                    self.repeated(section, item);
+                }
+            }
+            (true, DeValue::Table(_)) => self.problem(
+                &at,
+                format!("[{0}] can stand there several times and is written with two brackets", section.name),
+                format!("write [[{}]]", section.name),
+            ),
+            _ => self.problem(&at, format!("{} is a section", section.name), format!("write [{}]", section.name)),
+        }
+    }
+
+    fn repeated(&mut self, section: &'static Section, item: &Spanned<DeValue<'_>>) {
+        let start = item.span().start;
+        match item.get_ref() {
+            DeValue::Table(table) => {
+                let values = self.values(section, table, start);
+                self.sources.push(values);
+            }
+            other => self.problem(
+                &Origin::File(start),
+                format!("{} holds a {}", section.name, other.type_str()),
+                format!("write each one as a section [[{}]]", section.name),
+            ),
+        }
+    }
+
+    fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> Values {
+        let mut values = Values { offset: Some(offset), ..Values::default() };
+        for (name, value) in table.iter() {
+            let Some(key) = find(section.name, name.get_ref()) else {
+                let at = Origin::File(name.span().start);
+                self.problem(
+                    &at,
+                    format!("[{}] has no key `{}`", section.name, name.get_ref()),
+                    key_hint(section.name, name.get_ref()),
+                );
+                continue;
+            };
+            let origin = Origin::File(value.span().start);
+            match check_written(key, value.get_ref()) {
+                Ok(value) => drop(values.found.insert(key.name, Found { value, origin })),
+                Err((what, next)) => self.problem(&origin, what, next),
+            }
+        }
+        values
+    }
+
+    /// Overlays an environment variable whose name begins with the prefix.
+    pub(super) fn variable(&mut self, name: &str, prefix: &str, text: &str) {
+        let origin = Origin::Variable(name.to_owned());
+        let path = name[prefix.len()..].to_lowercase();
+        let parts: Vec<&str> = path.split("__").collect();
+        let (section, index, key_name) = match parts[..] {
+            [section, key] => (section, None, key),
+            [section, index, key] => (section, index.parse::<usize>().ok(), key),
+            _ => return self.problem(&origin, "this variable names no key", variable_form(prefix)),
+        };
+        let Some(known) = find_section(section) else {
+            return self.problem(&origin, unknown_section(section), section_hint(section));
+        };
+        if known.repeated != index.is_some() || index.is_some_and(|index| index > self.sources.len()) {
+            return self.problem(&origin, "this variable names no key", variable_form(prefix));
+        }
+        let Some(key) = find(known.name, key_name) else {
+            let what = format!("[{section}] has no key `{key_name}`");
+            return self.problem(&origin, what, key_hint(known.name, key_name));
+        };
+        match check_scalar(key, text) {
+            Ok(value) => drop(self.place(known, index).found.insert(key.name, Found { value, origin })),
+            Err((what, next)) => self.problem(&origin, what, next),
+        }
+    }
+
+    fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut Values {
+        match index {
+            Some(index) => {
+                if index >= self.sources.len() {
+                    self.sources.push(Values::default());
+                }
+                let last = self.sources.len() - 1;
+                &mut self.sources[index.min(last)]
+            }
+            None => self.single.entry(section.name).or_default(),
+        }
+    }
+
+    /// Fills in the defaults and reports required keys that are missing.
+    pub(super) fn complete(&mut self) {
+        for section in SECTIONS.iter().filter(|section| !section.repeated) {
+            let mut values = self.single.remove(section.name).unwrap_or_default();
+            self.fill(section, &mut values);
+            self.single.insert(section.name, values);
+        }
+        let mut sources = std::mem::take(&mut self.sources);
+        let section = find_section("source");
+        for values in &mut sources {
+            section.into_iter().for_each(|section| self.fill(section, values));
+        }
+        self.sources = sources;
+    }
+
+    fn fill(&mut self, section: &Section, values: &mut Values) {
+        for key in keys_of(section.name) {
+            match key.absent {
+                Absent::Default(text) => fill_default(key, text, values),
+                Absent::Required if !values.found.contains_key(key.name) => self.missing(section, key, values.offset),
+                Absent::Required | Absent::Optional => {}
+            }
+        }
+    }
+
+    fn missing(&mut self, section: &Section, key: &Key, offset: Option<usize>) {
+        let already = offset.map(|offset| Problem::of("", "", "").at(self.text, offset));
+        let named = |problem: &Problem| {
+            problem.what.contains(key.name) && already.as_ref().is_none_or(|here| problem.line >= here.line)
+        };
+        if !self.problems.iter().any(named) {
+            let origin = offset.map_or(Origin::Default, Origin::File);
+            self.problem(&origin, format!("[[{}]] needs the key `{}`", section.name, key.name), key.en);
+        }
+    }
+
+    /// A value of a section that is written once.
+    pub(super) fn get(&self, section: &str, key: &str) -> Option<&Found> {
+        self.single.get(section).and_then(|values| values.found.get(key))
+    }
+}
+
+fn fill_default(key: &'static Key, text: &str, values: &mut Values) {
+    if let Ok(value) = check_scalar(key, text.trim_matches('"')) {
+        values.found.entry(key.name).or_insert(Found { value, origin: Origin::Default });
+    }
+}
+
+fn unknown_section(name: &str) -> String {
+    format!("there is no section [{name}]")
+}
+
+fn section_hint(name: &str) -> String {
+    let homes: Vec<String> = SECTIONS
+        .iter()
+        .filter(|section| find(section.name, name).is_some())
+        .map(|section| format!("[{}]", section.name))
+        .collect();
+    if !homes.is_empty() {
+        return format!("`{name}` belongs under {}", homes.join(" or "));
+    }
+    let names = SECTIONS.iter().map(|section| section.name);
+    match nearest(name, names.clone()) {
+        Some(near) => format!("did you mean [{near}]?"),
+        None => format!("the sections are {}", names.collect::<Vec<_>>().join(", ")),
+    }
+}
+
+fn key_hint(section: &str, name: &str) -> String {
+    let names: Vec<&str> = keys_of(section).map(|key| key.name).collect();
+    let begins = || names.iter().copied().find(|key| key.starts_with(name));
+    if let Some(near) = nearest(name, names.iter().copied()).or_else(begins) {
+        return format!("did you mean `{near}`?");
+    }
+    match SECTIONS.iter().find(|other| find(other.name, name).is_some()) {
+        Some(other) => format!("`{name}` belongs under [{}]", other.name),
+        None => format!("the keys here are {}", names.join(", ")),
+    }
+}
+
+fn variable_form(prefix: &str) -> String {
+    format!("write {prefix}SECTION__KEY, for sources {prefix}SOURCE__0__ADDRESS; the sources count from 0")
+}

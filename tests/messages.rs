@@ -1,0 +1,115 @@
+//! What a user reads when something that they wrote is wrong: real files in, the complete text out.
+//!
+//! The expected texts stand beside the files in `tests/data/messages`; `UPDATE_MESSAGES=1 cargo test --test messages`
+//! writes them anew, and the change is then read in review.
+
+use gateway::config::{self, Problem};
+use std::path::{Path, PathBuf};
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/messages").join(name)
+}
+
+/// Compares `text` with the golden file `name`.
+fn golden(name: &str, text: &str) {
+    let path = data(name);
+    if std::env::var_os("UPDATE_MESSAGES").is_some() {
+        std::fs::write(&path, text).expect("the golden file can be written");
+    }
+    let expected = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(text == expected, "{name} differs\n--- is ---\n{text}\n--- should be ---\n{expected}");
+}
+
+fn told(problems: &[Problem]) -> String {
+    problems.iter().map(|problem| format!("{problem}\n")).collect()
+}
+
+fn parse(text: &str, environment: &[(&str, &str)]) -> Result<config::Config, Vec<Problem>> {
+    let pairs = environment.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+    config::parse("cnc-gateway.toml", text, Path::new(""), pairs)
+}
+
+#[test]
+fn a_configuration_is_refused_with_everything_that_is_wrong() {
+    let text = std::fs::read_to_string(data("config.toml")).expect("the file is there");
+    golden("config.txt", &told(&parse(&text, &[]).expect_err("nothing in it is right")));
+}
+
+#[test]
+fn variables_are_checked_like_the_file() {
+    let problems = parse(
+        config::BUILT_IN_TEXT,
+        &[
+            ("CNC_GATEWAY__GATEWAY__TICK_HZ", "fast"),
+            ("CNC_GATEWAY__GATEWAY__TIK_HZ", "10"),
+            ("CNC_GATEWAY__GATES__MODE", "off"),
+            ("CNC_GATEWAY__TICK_HZ", "10"),
+            ("CNC_GATEWAY__SOURCE__7__NAME", "meter"),
+            ("CNC_GATEWAY__SOURCE__1__NAME", "meter"),
+            ("CNC_GATEWAY__HTTP__ENABLED", "no"),
+        ],
+    )
+    .expect_err("every variable is wrong");
+    golden("environment.txt", &told(&problems));
+}
+
+#[test]
+fn the_table_and_the_example_are_what_the_readme_shows() {
+    golden("keys.md", &config::keys::table());
+    golden("example.toml", &config::keys::example());
+}
+
+#[test]
+fn the_example_file_and_the_built_in_configuration_are_accepted() {
+    let example = parse(&config::keys::example(), &[]).expect("every default is accepted");
+    let built_in = parse(config::BUILT_IN_TEXT, &[]).expect("what is built in is accepted");
+    assert_eq!(example.gate, built_in.gate);
+    assert_eq!(built_in.gate.mode, config::GateMode::Shadow, "by default nothing is written to a machine");
+    assert_eq!(built_in.http.listen, "127.0.0.1:8080", "by default reachable from this box only");
+}
+
+#[test]
+fn a_missing_file_says_how_to_begin() {
+    let problems = config::load(Some(Path::new("/nowhere/cnc-gateway.toml")), []).expect_err("there is none");
+    assert_eq!(problems.len(), 1);
+    assert!(problems[0].to_string().contains("check --example"), "{}", problems[0]);
+}
+
+#[test]
+fn variables_go_before_the_file() {
+    let text = "[gateway]\ntick_hz = 5\n[[source]]\naddress = \"simulated://lathe\"\n";
+    let config = parse(
+        text,
+        &[
+            ("CNC_GATEWAY__GATEWAY__TICK_HZ", "20"),
+            ("CNC_GATEWAY__SOURCE__0__NAME", "lathe"),
+            ("CNC_GATEWAY__SOURCE__1__ADDRESS", "simulated://mill"),
+            ("PATH", "/bin"),
+        ],
+    )
+    .expect("all of it is right");
+    assert_eq!(config.gateway.tick_hz, 20.0);
+    assert_eq!(config.sources.len(), 2);
+    assert_eq!(config.sources[0].name, "lathe");
+    assert_eq!(config.sources[1].name, "simulated://mill");
+}
+
+#[test]
+fn armed_without_a_machine_to_write_to_is_refused() {
+    let text = "[[source]]\naddress = \"simulated://lathe\"\n[gate]\nmode = \"armed\"\n";
+    let problems = parse(text, &[]).expect_err("source is missing");
+    assert_eq!(
+        told(&problems),
+        "cnc-gateway.toml:4:8: the gate may be armed, but `source` does not say what it writes to\n    \
+         write source = ... under [gate]; there is \"simulated://lathe\"\n"
+    );
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_text_makes_the_configuration_panic(
+        text in "(\\[|\\]|=|\"|\n|gate|gateway|source|history|tick_hz|address|mode|[0-9.eE+-]{1,6}|true|#|\\PC){0,60}"
+    ) {
+        let _ = parse(&text, &[]);
+    }
+}
