@@ -1,0 +1,164 @@
+//! The directory of a block: which series it holds, where, how, and the summary of each. It is a column of its own, so
+//! that deciding whether a block is wanted does not read the samples.
+
+use super::super::reason::Reasons;
+use super::super::rounding::{TEN, nearest};
+use super::cells::{Encoding, Summary};
+use super::varint::{Bytes, put, put_text, unzigzag, zigzag};
+
+/// Version of the block format, the first byte.
+const VERSION: u8 = 1;
+/// No block has more rows: refuses a damaged count before memory is claimed.
+const ROWS_MAX: usize = 1 << 20;
+const PLANES: u8 = 0x40;
+const WORDS: u8 = 0x41;
+const MISSING: u8 = 0x80;
+
+/// Where the bytes of a series lie and how they are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Span {
+    pub(crate) offset: usize,
+    pub(crate) stored: usize,
+    /// Length after decompression; equal to `stored` when the bytes are not compressed.
+    pub(crate) unpacked: usize,
+}
+
+/// One series of a block.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    pub(crate) series: i64,
+    pub(crate) encoding: Encoding,
+    pub(crate) any_missing: bool,
+    pub(crate) summary: Summary,
+    pub(crate) span: Span,
+}
+
+/// What a block holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Directory {
+    pub(crate) rows: usize,
+    pub(crate) times: Span,
+    pub(crate) entries: Vec<Entry>,
+    /// Estimators' own reasons used in this block: code and word.
+    pub(crate) words: Vec<(u8, String)>,
+}
+
+impl Directory {
+    pub(crate) fn entry(&self, series: i64) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.series == series)
+    }
+
+    /// The directory as bytes. Offsets follow from the lengths and are not written.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let mut out = vec![VERSION];
+        put(&mut out, self.rows as u64);
+        put_span(&mut out, self.times);
+        put(&mut out, self.entries.len() as u64);
+        self.entries.iter().for_each(|entry| put_entry(&mut out, entry));
+        put(&mut out, self.words.len() as u64);
+        for (code, word) in &self.words {
+            out.push(*code);
+            put_text(&mut out, word);
+        }
+        out
+    }
+
+    /// The directory in `bytes`; `None` when it is of another version or damaged.
+    pub(crate) fn parse(bytes: &[u8]) -> Option<Self> {
+        let mut bytes = Bytes(bytes);
+        if bytes.byte()? != VERSION {
+            return None;
+        }
+        let rows = bytes.count().filter(|rows| *rows <= ROWS_MAX)?;
+        let mut offset = 0;
+        let times = take_span(&mut bytes, &mut offset)?;
+        let mut entries = Vec::new();
+        for _ in 0..bytes.count()? {
+            entries.push(take_entry(&mut bytes, &mut offset)?);
+        }
+        let mut words = Vec::new();
+        for _ in 0..bytes.count()? {
+            words.push((bytes.byte()?, bytes.text()?.to_owned()));
+        }
+        Some(Self { rows, times, entries, words })
+    }
+
+    /// Notes which own reasons may occur, with their words.
+    pub(crate) fn note_words(&mut self, codes: &[bool; 256], reasons: &Reasons) {
+        let used = (0..=u8::MAX).filter(|code| codes[usize::from(*code)] && Reasons::is_own(*code));
+        self.words = used.filter_map(|code| Some((code, reasons.word(code)?.to_owned()))).collect();
+    }
+}
+
+fn put_span(out: &mut Vec<u8>, span: Span) {
+    put(out, span.stored as u64);
+    put(out, span.unpacked as u64);
+}
+
+fn take_span(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<Span> {
+    let span = Span { offset: *offset, stored: bytes.count()?, unpacked: bytes.count()? };
+    *offset = offset.checked_add(span.stored)?;
+    Some(span)
+}
+
+fn put_entry(out: &mut Vec<u8>, entry: &Entry) {
+    put(out, zigzag(entry.series));
+    let encoding = match entry.encoding {
+        Encoding::Scaled(places) => places,
+        Encoding::Planes => PLANES,
+        Encoding::Words => WORDS,
+    };
+    out.push(encoding | if entry.any_missing { MISSING } else { 0 });
+    put(out, entry.summary.count);
+    if entry.summary.count > 0 {
+        put_summary(out, entry);
+    }
+    put_span(out, entry.span);
+}
+
+fn put_summary(out: &mut Vec<u8>, entry: &Entry) {
+    let Summary { min, max, mean, .. } = entry.summary;
+    match entry.encoding {
+        Encoding::Words => {}
+        Encoding::Scaled(places) => {
+            let scale = TEN[usize::from(places)];
+            [min, max].iter().for_each(|value| put(out, zigzag(nearest(value * scale) as i64)));
+            out.extend_from_slice(&mean.to_le_bytes());
+        }
+        Encoding::Planes => [min, max, mean].iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes())),
+    }
+}
+
+fn take_entry(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<Entry> {
+    let series = unzigzag(bytes.varint()?);
+    let byte = bytes.byte()?;
+    let encoding = match byte & !MISSING {
+        PLANES => Encoding::Planes,
+        WORDS => Encoding::Words,
+        places if usize::from(places) < TEN.len() => Encoding::Scaled(places),
+        _ => return None,
+    };
+    let mut summary = Summary { count: bytes.varint()?, ..Summary::default() };
+    if summary.count > 0 {
+        take_summary(bytes, encoding, &mut summary)?;
+    }
+    let span = take_span(bytes, offset)?;
+    Some(Entry { series, encoding, any_missing: byte & MISSING != 0, summary, span })
+}
+
+fn take_summary(bytes: &mut Bytes<'_>, encoding: Encoding, summary: &mut Summary) -> Option<()> {
+    match encoding {
+        Encoding::Words => return Some(()),
+        Encoding::Scaled(places) => {
+            let scale = TEN[usize::from(places)];
+            summary.min = unzigzag(bytes.varint()?) as f64 / scale;
+            summary.max = unzigzag(bytes.varint()?) as f64 / scale;
+        }
+        Encoding::Planes => {
+            summary.min = bytes.f64()?;
+            summary.max = bytes.f64()?;
+        }
+    }
+    summary.mean = bytes.f64()?;
+    Some(())
+}

@@ -1,0 +1,171 @@
+//! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
+
+use adapters::clock::{SECOND_NS, TimeNs};
+use std::time::Duration;
+
+/// One day in nanoseconds.
+pub const DAY_NS: i64 = 86_400 * SECOND_NS;
+
+/// What happens to a sample that finds the queue full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WhenFull {
+    /// It is dropped and counted: the tick of a live machine never waits for a disk.
+    Drop,
+    /// The caller waits: a recording is replayed as fast as the disk allows, and completely.
+    Wait,
+}
+
+/// How exactly numbers are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fidelity {
+    /// A decimal of at most 9 significant digits and 9 places comes back bit for bit; any other number is rounded to
+    /// the series' resolution. See [`rounded`](super::rounded).
+    Resolution,
+    /// Every number comes back bit for bit. Interpolated values then need about 7 bytes each instead of 1 to 2.
+    Exact,
+}
+
+/// Number or text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SeriesKind {
+    /// A quantity in its unit.
+    Number,
+    /// A state word.
+    Text,
+}
+
+/// A series that is stored beside the channels of the table: an estimate, its standard deviation, a residual, or a
+/// further column of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtraSeries {
+    /// Name, ending in its unit for quantities.
+    pub name: String,
+    /// Unit symbol; `1` for pure numbers, empty for text.
+    pub unit: String,
+    /// What it is, in English.
+    pub en: String,
+    /// What it is, in Chinese.
+    pub zh: String,
+    /// Number or text.
+    pub kind: SeriesKind,
+    /// Decimal places that are kept of numbers with a longer fraction; `None` takes the usual ones of the unit.
+    pub decimals: Option<u8>,
+}
+
+impl ExtraSeries {
+    /// A quantity, with the usual resolution of its unit.
+    #[must_use]
+    pub fn number(name: &str, unit: &str, en: &str, zh: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            en: en.to_owned(),
+            zh: zh.to_owned(),
+            kind: SeriesKind::Number,
+            decimals: None,
+        }
+    }
+
+    /// A state word.
+    #[must_use]
+    pub fn text(name: &str, en: &str, zh: &str) -> Self {
+        Self { kind: SeriesKind::Text, ..Self::number(name, "", en, zh) }
+    }
+}
+
+/// The value of an [`ExtraSeries`] at one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ExtraValue<'a> {
+    /// Finite, in the unit of the series; anything else is stored as `out_of_range`.
+    Number(f64),
+    /// A state word.
+    Text(&'a str),
+    /// No value, with the reason as one word (`not_learned`, `stale`, ...).
+    Missing(&'a str),
+}
+
+impl<'a> From<Result<f64, &'a str>> for ExtraValue<'a> {
+    fn from(value: Result<f64, &'a str>) -> Self {
+        value.map_or_else(Self::Missing, Self::Number)
+    }
+}
+
+/// How long what is kept. Whatever the ages: when `max_bytes` is reached the oldest raw samples go first, then minute
+/// summaries, then hours, states and parts, then events and diagnoses, and alarms, decisions and commands last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Retention {
+    /// Raw samples, days.
+    pub raw_days: f64,
+    /// Minute summaries, days.
+    pub minutes_days: f64,
+    /// Hour and day summaries, states, parts, events, models and diagnoses, days.
+    pub records_days: f64,
+    /// Alarms, decisions and commands, days.
+    pub audit_days: f64,
+    /// The database never grows beyond this, bytes.
+    pub max_bytes: u64,
+    /// The gateway stops growing the database when the disk has less than this free, bytes.
+    pub keep_free_bytes: u64,
+}
+
+impl Default for Retention {
+    fn default() -> Self {
+        Self {
+            raw_days: 366.0,
+            minutes_days: 3.0 * 366.0,
+            records_days: 5.0 * 366.0,
+            audit_days: 10.0 * 366.0,
+            max_bytes: 8_000_000_000,
+            keep_free_bytes: 200_000_000,
+        }
+    }
+}
+
+impl Retention {
+    /// The oldest time that an age of `days` still keeps.
+    #[must_use]
+    pub fn horizon_ns(days: f64, now_ns: TimeNs) -> TimeNs {
+        // An age beyond the range of the clock keeps everything: the cast saturates.
+        #[allow(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
+        now_ns.saturating_sub((days * DAY_NS as f64) as i64)
+    }
+}
+
+/// How a history is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// At most this long until what was handed in is durable; every commit ends in an fsync. 1 s unless configured.
+    pub group_commit: Duration,
+    /// Samples that may wait for the writer; about 200 bytes each with 20 channels.
+    pub queue_rows: usize,
+    /// Events, decisions and the like that may wait for the writer.
+    pub queue_records: usize,
+    /// What happens to a sample that finds the queue full.
+    pub when_full: WhenFull,
+    /// How exactly numbers are kept.
+    pub fidelity: Fidelity,
+    /// Ages and sizes.
+    pub retention: Retention,
+    /// What is stored beside the channels of the table, in the order in which values are handed to `sample`.
+    pub extras: Vec<ExtraSeries>,
+    /// Why this history is opened, for the segment table: `live`, or the name of the recording that is replayed.
+    pub origin: String,
+    /// Room reserved on disk so that a full disk can still be tidied up, bytes.
+    pub reserve_bytes: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            group_commit: Duration::from_secs(1),
+            queue_rows: 16_384,
+            queue_records: 16_384,
+            when_full: WhenFull::Drop,
+            fidelity: Fidelity::Resolution,
+            retention: Retention::default(),
+            extras: Vec::new(),
+            origin: "live".to_owned(),
+            reserve_bytes: 4_000_000,
+        }
+    }
+}

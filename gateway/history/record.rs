@@ -1,0 +1,196 @@
+//! What is remembered besides samples: one struct per kind, one row each.
+
+use adapters::clock::TimeNs;
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Event {
+    /// When.
+    pub at_ns: TimeNs,
+    /// One word: `started`, `script_reloaded`, `source_lost`, ...
+    pub kind: String,
+    /// Who says so: a source, a script, `gateway`.
+    pub source: String,
+    /// For the operator, in words.
+    pub text: String,
+    /// For the engineer, JSON; empty when there is nothing to add.
+    pub detail: String,
+}
+
+/// An alarm that begins. Raising one that is already raised counts up and changes nothing else.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Alarm {
+    /// When it was raised.
+    pub at_ns: TimeNs,
+    /// Identifies it until it is cleared, together with the source.
+    pub code: String,
+    /// Who raises it: the controller, a script, `gateway`.
+    pub source: String,
+    /// `info`, `warning`, `critical`.
+    pub severity: String,
+    /// For the operator, English.
+    pub en: String,
+    /// For the operator, Chinese.
+    pub zh: String,
+}
+
+/// An alarm that ends.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AlarmClear {
+    /// When it was cleared.
+    pub at_ns: TimeNs,
+    /// Code of the alarm.
+    pub code: String,
+    /// Source of the alarm.
+    pub source: String,
+}
+
+/// The machine enters a state; the one before ends at this moment.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StateChange {
+    /// Since when.
+    pub at_ns: TimeNs,
+    /// `off`, `standby`, `spindle_start`, `idle`, `cutting`, ...
+    pub state: String,
+    /// Programme running then; empty when unknown.
+    pub program: String,
+    /// Tool in use then; empty when unknown.
+    pub tool: String,
+}
+
+/// A finished part or cycle.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Part {
+    /// Beginning of the cycle.
+    pub began_ns: TimeNs,
+    /// End of the cycle.
+    pub ended_ns: TimeNs,
+    /// Name or number of the part; empty when unknown.
+    pub part: String,
+    /// Programme; empty when unknown.
+    pub program: String,
+    /// Parts finished in this cycle.
+    pub count: i64,
+    /// Time in cut, seconds.
+    pub cutting_s: Option<f64>,
+    /// Energy drawn, joules.
+    pub energy_j: Option<f64>,
+    /// Further figures, JSON; empty when there are none.
+    pub detail: String,
+}
+
+/// What a script wanted, and what the gate made of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Decision {
+    /// The tick.
+    pub at_ns: TimeNs,
+    /// Script that decided.
+    pub script: String,
+    /// Version (hash) of that script.
+    pub script_version: String,
+    /// What was wanted: `feed_override_pct`, `alarm`, ...
+    pub wanted: String,
+    /// The value wanted, in `unit`.
+    pub value: Option<f64>,
+    /// Unit of the value.
+    pub unit: String,
+    /// The script's reason, in words.
+    pub reason: String,
+    /// `written`, `shadow`, `held`, `limited`, `refused`.
+    pub outcome: String,
+    /// Why the gate did so.
+    pub outcome_reason: String,
+}
+
+/// A command to the machine, as sent and as read back.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Command {
+    /// When it was sent.
+    pub at_ns: TimeNs,
+    /// `feed_override_pct`, ...
+    pub command: String,
+    /// Which machine or controller.
+    pub target: String,
+    /// Value before, as read.
+    pub before: Option<f64>,
+    /// Value asked for.
+    pub asked: Option<f64>,
+    /// Value after, as read back.
+    pub after: Option<f64>,
+    /// Unit of the three.
+    pub unit: String,
+    /// `done`, `failed`, `refused`, `shadow`.
+    pub outcome: String,
+    /// Why it was sent, or why it failed.
+    pub reason: String,
+    /// Script that asked, empty when the gateway did by itself.
+    pub script: String,
+    /// Version (hash) of that script.
+    pub script_version: String,
+}
+
+/// A model in force from now on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Model {
+    /// Since when.
+    pub at_ns: TimeNs,
+    /// Its name.
+    pub name: String,
+    /// Where it came from: a file, `identify`, `diagnose --accept`.
+    pub origin: String,
+    /// The model itself, TOML.
+    pub toml: String,
+}
+
+/// A finished diagnosis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Diagnosis {
+    /// When it was finished.
+    pub at_ns: TimeNs,
+    /// Beginning of the stretch that was examined.
+    pub from_ns: TimeNs,
+    /// End of the stretch that was examined.
+    pub to_ns: TimeNs,
+    /// `explained`, `ambiguous`, ...
+    pub verdict: String,
+    /// In plain words.
+    pub summary: String,
+    /// The whole diagnosis, `diagnosis/1`.
+    pub json: String,
+}
+
+/// Any of them, on its way to the writer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// See [`Event`].
+    Event(Event),
+    /// See [`Alarm`].
+    Alarm(Alarm),
+    /// See [`AlarmClear`].
+    AlarmClear(AlarmClear),
+    /// See [`StateChange`].
+    State(StateChange),
+    /// See [`Part`].
+    Part(Part),
+    /// See [`Decision`].
+    Decision(Decision),
+    /// See [`Command`].
+    Command(Command),
+    /// See [`Model`].
+    Model(Model),
+    /// See [`Diagnosis`].
+    Diagnosis(Diagnosis),
+}
+
+macro_rules! into_record {
+    ($($kind:ident => $variant:ident),*) => {
+        $(impl From<$kind> for Record {
+            fn from(record: $kind) -> Self {
+                Self::$variant(record)
+            }
+        })*
+    };
+}
+
+into_record!(Event => Event, Alarm => Alarm, AlarmClear => AlarmClear, StateChange => State, Part => Part,
+    Decision => Decision, Command => Command, Model => Model, Diagnosis => Diagnosis);
