@@ -11,9 +11,54 @@ macro_rules! catalogue {
 }
 
 catalogue! {
+    no_load_power::NoLoadPower,
+    cutting_power::CuttingPower,
+    load_loss::LoadLoss,
     offset::Offset,
+    copper_loss::CopperLoss,
+    iron_loss::IronLoss,
+    inverter_loss::InverterLoss,
+    field_weakening::FieldWeakening,
+    gear_stage::GearStage,
+    regeneration::Regeneration,
     dry_friction::DryFriction,
+    viscous_friction::ViscousFriction,
+    stribeck::Stribeck,
+    direction_asymmetry::DirectionAsymmetry,
+    windage::Windage,
+    bearing_warm_up::BearingWarmUp,
+    preload_growth::PreloadGrowth,
+    spindle_inertia::SpindleInertia,
+    edge_force::EdgeForce,
     flank_wear::FlankWear,
+    speed_softening::SpeedSoftening,
+    hardness_batch::HardnessBatch,
+    built_up_edge::BuiltUpEdge,
+    runout::Runout,
+    chatter::Chatter,
+    entry_exit::EntryExit,
+    depth_taper::DepthTaper,
+    chip_thinning::ChipThinning,
+    coolant_regime::CoolantRegime,
+    auxiliary_switch::AuxiliarySwitch,
+    axis_friction::AxisFriction,
+    axis_inertia::AxisInertia,
+    gravity_axis::GravityAxis,
+    spindle_growth::SpindleGrowth,
+    ambient_drift::AmbientDrift,
+    coolant_temperature::CoolantTemperature,
+    screw_growth::ScrewGrowth,
+    sensor_gain::SensorGain,
+    zero_drift::ZeroDrift,
+    supply_voltage::SupplyVoltage,
+    ripple_alias::RippleAlias,
+    clock_lag::ClockLag,
+    meter_window::MeterWindow,
+    saturation::Saturation,
+    engagement_timing::EngagementTiming,
+    recipe_error::RecipeError,
+    constant_load_control::ConstantLoadControl,
+    override_delay::OverrideDelay,
 }
 
 /// The effect of this kind.
@@ -21,3 +66,6 @@ catalogue! {
 pub fn effect(kind: &str) -> Option<&'static dyn Effect> {
     CATALOGUE.iter().copied().find(|effect| effect.doc().kind == kind)
 }
+
+#[cfg(test)]
+mod tests;

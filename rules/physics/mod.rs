@@ -5,6 +5,9 @@
 //! rustdoc, `effects show`, the diagnosis report and the check of model files all read it.
 
 pub mod catalogue;
+mod cut;
+mod drive;
+mod excitation;
 mod scene;
 pub mod state;
 

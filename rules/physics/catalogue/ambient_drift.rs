@@ -1,0 +1,82 @@
+//! The machine follows the temperature of the shop, late.
+
+use crate::physics::drive::is_displacement;
+use crate::physics::excitation::{lag_forms, spread};
+use crate::physics::state::first_order;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+
+/// Displacement that follows the shop.
+#[derive(Debug, Clone, Copy)]
+pub struct AmbientDrift;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "ambient_drift",
+    family: "thermal",
+    law: "E = per_k * w; dw/dt = ((T - T0) - w) / tau, T0 at the start; without tau: w = T - T0",
+    parameters: &[
+        ParameterDoc {
+            name: "per_k",
+            unit: "output/K",
+            entry: Entry::Linear,
+            range: (-100.0, 100.0),
+            en: "displacement per kelvin of the shop",
+            zh: "环境每变化1 K的位移",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (60.0, 43200.0),
+            en: "time the machine takes to follow",
+            zh: "机床跟随环境的时间常数",
+        },
+    ],
+    needs: &["ambient"],
+    source: "ISO 230-3 environmental variation: 1-6 um/K, 1-4 h",
+    experiment_minutes: 720.0,
+    rivals: &["spindle_growth", "coolant_temperature", "zero_drift"],
+    en: Texts {
+        name: "ambient drift",
+        statement: "The machine bends and grows with the temperature of the shop, hours late",
+        absence: "the displacement follows day and night and open doors, also at standstill",
+        confused_with: "spindle growth (follows speed), coolant (only when it runs)",
+        experiment: "measure the displacement overnight at standstill, with the shop temperature",
+    },
+    zh: Texts {
+        name: "环境温度漂移",
+        statement: "机床随车间温度变形，滞后数小时",
+        absence: "位移随昼夜和开门变化，静止时也有",
+        confused_with: "主轴热伸长（随转速）、冷却液（仅运行时）",
+        experiment: "静止状态下整夜测量位移和环境温度",
+    },
+};
+
+impl Effect for AmbientDrift {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let known = scene.role(Role::Ambient).is_some_and(|ambient| spread(ambient) > 0.2);
+        if !known || !is_displacement(scene) {
+            return Vec::new();
+        }
+        let direct = Form { name: "direct", ..Form::plain() };
+        [direct].into_iter().chain(lag_forms(scene, "lag", &[1800.0, 3600.0, 7200.0])).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let ambient = scene.role(Role::Ambient)?;
+        let first = *ambient.first()?;
+        let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
+        let followed = match form.value("tau_s") {
+            Some(tau_s) => first_order(scene, &change, tau_s),
+            None => change,
+        };
+        Some(vec![("per_k", followed)])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) }
+    }
+}

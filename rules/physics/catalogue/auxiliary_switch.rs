@@ -1,0 +1,67 @@
+//! A consumer goes on and off: coolant, hydraulics, chip conveyor, chiller.
+
+use crate::physics::drive::{is_axis_output, is_power};
+use crate::physics::excitation::{ln_count, varies};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// A consumer that goes on and off.
+#[derive(Debug, Clone, Copy)]
+pub struct AuxiliarySwitch;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "auxiliary_switch",
+    family: "auxiliary",
+    law: "P = level while the consumer runs",
+    parameters: &[ParameterDoc {
+        name: "level",
+        unit: "output",
+        entry: Entry::Linear,
+        range: (0.0, f64::INFINITY),
+        en: "power of the consumer",
+        zh: "该用电设备的功率",
+    }],
+    needs: &["coolant_on | hydraulics_on | a column ending in _on | the recorded output"],
+    source: "coolant 0.3-1.5 kW, high-pressure coolant 2-7 kW, hydraulics 0.5-2 kW in cycles of 5-60 s",
+    experiment_minutes: 4.0,
+    rivals: &["offset", "coolant_regime", "zero_drift", "hardness_batch"],
+    en: Texts {
+        name: "auxiliary consumer",
+        statement: "A pump, conveyor or chiller goes on and off without the simulation knowing",
+        absence: "the residual jumps between two levels at moments that speed and cut do not explain, idle as in the cut",
+        confused_with: "a constant offset (never off), material or coolant in the cut (scale with the cut)",
+        experiment: "switch coolant, hydraulics and conveyor on and off by hand, half a minute each, at standstill",
+    },
+    zh: Texts {
+        name: "辅助设备启停",
+        statement: "泵、排屑器或冷却机启停，而仿真不知道",
+        absence: "残差在两个水平之间跳变，与转速和切削无关，空转和切削时都有",
+        confused_with: "常量偏差（从不断开）、材料或冷却状态（与切削成比例）",
+        experiment: "静止状态下手动启停冷却泵、液压和排屑器，各半分钟",
+    },
+};
+
+impl Effect for AuxiliarySwitch {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if !is_power(scene) || is_axis_output(scene) {
+            return Vec::new();
+        }
+        let names = scene.column_names().filter(|name| name.ends_with("_on") && *name != "drive_on");
+        let flags: Vec<&str> = names.filter(|name| scene.column(name).is_some_and(varies)).collect();
+        let ln_choices = ln_count(flags.len());
+        let place = |flag: &&str| Some(((*flag).to_owned(), "1".to_owned()));
+        flags.iter().map(|flag| Form { name: "flag", place: place(flag), ln_choices, ..Form::default() }).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let (flag, _) = form.place.as_ref()?;
+        Some(vec![("level", scene.column(flag)?.to_vec())])
+    }
+
+    fn has_hidden_state(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,76 @@
+//! Feed axes take power to move, and the meter sees it.
+
+use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Power to move the feed axes.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisFriction;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "axis_friction",
+    family: "axis",
+    law: "P = force * sum |v|; viscous: P = per_speed * sum v^2; v in m/s",
+    parameters: &[
+        ParameterDoc {
+            name: "force",
+            unit: "output/(m/s)",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "friction force of the axes; newtons when the output is in watts",
+            zh: "进给轴摩擦力；输出为W时单位为N",
+        },
+        ParameterDoc {
+            name: "per_speed",
+            unit: "output/(m/s)2",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "friction force per speed",
+            zh: "单位速度的摩擦力",
+        },
+    ],
+    needs: &["feed_mm_min | axis velocities"],
+    source: "guideways, screws and wipers: 20-300 W at rapid traverse",
+    experiment_minutes: 4.0,
+    rivals: &["axis_inertia", "gravity_axis", "auxiliary_switch", "viscous_friction"],
+    en: Texts {
+        name: "axis friction",
+        statement: "Moving the feed axes takes power that the simulation lacks",
+        absence: "the residual follows the speed of the axes, most at rapid traverse, also without cutting",
+        confused_with: "gravity on a vertical axis (changes sign with direction), auxiliary consumers (do not follow the motion)",
+        experiment: "move each axis back and forth at three speeds with the spindle stopped",
+    },
+    zh: Texts {
+        name: "进给轴摩擦",
+        statement: "进给轴运动消耗功率，而仿真中没有",
+        absence: "残差随进给轴速度变化，快移时最大，不切削时也有",
+        confused_with: "垂直轴重力（随方向变号）、辅助设备（不随运动）",
+        experiment: "主轴停止，每个轴以三种速度往复运动",
+    },
+};
+
+impl Effect for AxisFriction {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let named = ["coulomb", "viscous"].map(|name| Form { name, ..Form::plain() });
+        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+        named.into_iter().filter(acts).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let velocities = axis_velocities(scene);
+        if velocities.is_empty() || !is_power(scene) || is_axis_output(scene) {
+            return None;
+        }
+        let sum =
+            |law: fn(f64) -> f64| (0..scene.rows()).map(|row| velocities.iter().map(|v| law(v[row])).sum()).collect();
+        Some(match form.name {
+            "viscous" => vec![("per_speed", sum(|v| v * v))],
+            _ => vec![("force", sum(f64::abs))],
+        })
+    }
+}

@@ -1,0 +1,84 @@
+//! Force and power that accelerate a feed axis.
+
+use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, rate};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+
+/// Inertia of the feed axes.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisInertia;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "axis_inertia",
+    family: "axis",
+    law: "P = mass_kg * sum v a; of a single axis in a force or current: F = per_m_s2 * a; v in m/s, a in m/s2",
+    parameters: &[
+        ParameterDoc {
+            name: "mass_kg",
+            unit: "kg",
+            entry: Entry::Linear,
+            range: (0.0, 1000000.0),
+            en: "moved mass, with the inertia of motor and screw",
+            zh: "移动质量，包括电机和丝杠惯量",
+        },
+        ParameterDoc {
+            name: "per_m_s2",
+            unit: "output/(m/s2)",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "output per acceleration",
+            zh: "单位加速度的输出",
+        },
+    ],
+    needs: &["acceleration | velocity | axis velocities"],
+    source: "Newton; P = m v a",
+    experiment_minutes: 3.0,
+    rivals: &["axis_friction", "clock_lag", "spindle_inertia"],
+    en: Texts {
+        name: "axis inertia",
+        statement: "Accelerating a feed axis takes force, braking gives it back",
+        absence: "a peak at every start of a move and a dip at every stop",
+        confused_with: "friction (follows speed, not its change), a time shift (also where loads change)",
+        experiment: "make ten short rapid moves back and forth with the spindle stopped",
+    },
+    zh: Texts {
+        name: "进给轴惯量",
+        statement: "进给轴加速需要力，减速时返还",
+        absence: "每次启动出现峰、每次停止出现谷",
+        confused_with: "摩擦（随速度而非加速度）、时间偏移（负载变化处也有）",
+        experiment: "主轴停止，快速往复短行程十次",
+    },
+};
+
+impl Effect for AxisInertia {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.columns(scene, &Form::plain());
+        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+        if is_axis_output(scene) && !is_power(scene) {
+            return Some(vec![("per_m_s2", acceleration(scene)?)]);
+        }
+        let velocities = axis_velocities(scene);
+        if velocities.is_empty() || !is_power(scene) {
+            return None;
+        }
+        let rates: Vec<Vec<f64>> = velocities.iter().map(|velocity| rate(scene, velocity)).collect();
+        let power = |row: usize| velocities.iter().zip(&rates).map(|(v, a)| v[row] * a[row]).sum();
+        Some(vec![("mass_kg", (0..scene.rows()).map(power).collect())])
+    }
+}
+
+/// Acceleration of the axis: recorded, or else the rate of its velocity.
+fn acceleration(scene: &Scene) -> Option<Vec<f64>> {
+    if is_displacement(scene) {
+        return None;
+    }
+    let recorded = scene.role_name(Role::Acceleration).and_then(|name| in_si(scene, name));
+    recorded.or_else(|| Some(rate(scene, &in_si(scene, scene.role_name(Role::Velocity)?)?)))
+}

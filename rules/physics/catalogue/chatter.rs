@@ -1,0 +1,70 @@
+//! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
+
+use crate::physics::cut::cut_times;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Self-excited vibration in the cut.
+#[derive(Debug, Clone, Copy)]
+pub struct Chatter;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "chatter",
+    family: "cutting",
+    law: "y = gain * L where ap > limit; mostly the scatter grows, the mean by 0-10 %",
+    parameters: &[
+        ParameterDoc {
+            name: "gain",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 0.3),
+            en: "growth of the mean cut while it chatters",
+            zh: "颤振时平均切削量的增长",
+        },
+        ParameterDoc {
+            name: "limit_mm",
+            unit: "mm",
+            entry: Entry::Shape,
+            range: (0.05, 20.0),
+            en: "depth of cut above which it chatters",
+            zh: "开始颤振的切深",
+        },
+    ],
+    needs: &["load | engaged", "depth_of_cut_mm"],
+    source: "stability lobes; an effect of the scatter, not searched for in the mean",
+    experiment_minutes: 6.0,
+    rivals: &["runout", "built_up_edge", "edge_force"],
+    en: Texts {
+        name: "chatter",
+        statement: "Tool and work swing against each other above a certain depth of cut",
+        absence: "above a certain depth of cut the scatter of the residual grows, its mean hardly",
+        confused_with: "built-up edge (low cutting speed), interrupted cut (follows the work)",
+        experiment: "repeat the cut with half the depth, and with the speed changed by a tenth",
+    },
+    zh: Texts {
+        name: "颤振",
+        statement: "超过某一切深时刀具与工件自激振动",
+        absence: "超过某一切深后残差离散增大，均值几乎不变",
+        confused_with: "积屑瘤（低切速）、断续切削（随工件变化）",
+        experiment: "切深减半重复切削，再将转速改变十分之一",
+    },
+};
+
+impl Effect for Chatter {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, _scene: &Scene) -> Vec<Form> {
+        Vec::new()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let depth = scene.column("depth_of_cut_mm")?;
+        let limit_mm = form.value("limit_mm").unwrap_or(2.0);
+        Some(vec![("gain", cut_times(scene, |row| if depth[row] > limit_mm { 1.0 } else { 0.0 })?)])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("limit_mm", 2.0)])
+    }
+}

@@ -1,0 +1,89 @@
+//! The meter's clock is late or early against the controller's.
+
+use crate::physics::drive::rate;
+use crate::physics::excitation::{delays, varies};
+use crate::physics::state::delayed;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Meter late or early against the controller.
+#[derive(Debug, Clone, Copy)]
+pub struct ClockLag;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "clock_lag",
+    family: "measurement",
+    law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt",
+    parameters: &[
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.5, 1.5),
+            en: "one, when the delay explains all",
+            zh: "为1时延时可完全解释",
+        },
+        ParameterDoc {
+            name: "lag_s",
+            unit: "s",
+            entry: Entry::Linear,
+            range: (-2.0, 5.0),
+            en: "how late the recording is, where it is small against the ramps",
+            zh: "记录滞后的时间（相对斜坡较小时）",
+        },
+        ParameterDoc {
+            name: "delay_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (-3.0, 10.0),
+            en: "how late the recording is; negative when early",
+            zh: "记录滞后的时间；超前为负",
+        },
+    ],
+    needs: &["the simulated output"],
+    source: "definition; 0.1-3 s and 10-100 ppm between a power meter and a controller",
+    experiment_minutes: 2.0,
+    rivals: &["meter_window", "spindle_inertia", "engagement_timing", "override_delay"],
+    en: Texts {
+        name: "clock lag",
+        statement: "The recorded output is later (or earlier) than what the controller reports",
+        absence: "at every edge, of speed as of cutting, a pair of opposite peaks as large as the edge; nothing in steady states",
+        confused_with: "inertia (only where speed changes), averaging in the meter (smears one way), a late engagement flag (cutting edges only)",
+        experiment: "start and stop the spindle five times idle, and enter the cut five times",
+    },
+    zh: Texts {
+        name: "时钟滞后",
+        statement: "记录的输出比控制器报告的时间晚（或早）",
+        absence: "每个跳变处（转速和切削）出现一对与跳变同样大的正负峰，稳态无差异",
+        confused_with: "惯量（仅转速变化处）、仪表平均（单向拖尾）、切入标志滞后（仅切削边沿）",
+        experiment: "空转启停主轴五次，再切入五次",
+    },
+};
+
+impl Effect for ClockLag {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if !scene.simulated().is_some_and(varies) {
+            return Vec::new();
+        }
+        let delays = delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
+        let both = delays.iter().flat_map(|delay| [*delay, -delay]);
+        let late = both.map(|delay| Form { name: "delay", ..Form::of(&[("delay_s", delay)]) });
+        late.chain([Form { name: "small", ..Form::plain() }]).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let simulated = scene.simulated()?;
+        if form.name == "small" {
+            return Some(vec![("lag_s", rate(scene, simulated).iter().map(|rate| -rate).collect())]);
+        }
+        let late = delayed(scene, simulated, form.value("delay_s").unwrap_or(0.0));
+        Some(vec![("share", late.iter().zip(simulated).map(|(late, now)| late - now).collect())])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "delay", ..Form::of(&[("delay_s", 0.0)]) }
+    }
+}

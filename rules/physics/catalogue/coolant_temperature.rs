@@ -1,0 +1,82 @@
+//! Coolant warms bed, work and fixture.
+
+use crate::physics::drive::is_displacement;
+use crate::physics::excitation::{lag_forms, spread};
+use crate::physics::state::first_order;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Displacement that follows the coolant.
+#[derive(Debug, Clone, Copy)]
+pub struct CoolantTemperature;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "coolant_temperature",
+    family: "thermal",
+    law: "E = per_k * w; dw/dt = ((Tc - Tc0) - w) / tau, Tc0 at the start; without tau: w = Tc - Tc0",
+    parameters: &[
+        ParameterDoc {
+            name: "per_k",
+            unit: "output/K",
+            entry: Entry::Linear,
+            range: (-100.0, 100.0),
+            en: "displacement per kelvin of the coolant",
+            zh: "冷却液每变化1 K的位移",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (30.0, 14400.0),
+            en: "time bed and work take to follow",
+            zh: "床身和工件跟随的时间常数",
+        },
+    ],
+    needs: &["coolant_temperature_c"],
+    source: "expansion of what the coolant washes: 11.5 um/(m K) for steel",
+    experiment_minutes: 40.0,
+    rivals: &["ambient_drift", "spindle_growth"],
+    en: Texts {
+        name: "coolant temperature",
+        statement: "Warm coolant warms bed, work and fixture",
+        absence: "the displacement follows the temperature of the coolant",
+        confused_with: "ambient drift (also without coolant), spindle growth (follows speed)",
+        experiment: "run the coolant for forty minutes with the spindle stopped",
+    },
+    zh: Texts {
+        name: "冷却液温度",
+        statement: "温热的冷却液加热床身、工件和夹具",
+        absence: "位移随冷却液温度变化",
+        confused_with: "环境漂移（无冷却液时也有）、主轴热伸长（随转速）",
+        experiment: "主轴停止，冷却液运行四十分钟",
+    },
+};
+
+impl Effect for CoolantTemperature {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let known = scene.column("coolant_temperature_c").is_some_and(|coolant| spread(coolant) > 0.2);
+        if !known || !is_displacement(scene) {
+            return Vec::new();
+        }
+        let direct = Form { name: "direct", ..Form::plain() };
+        [direct].into_iter().chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let coolant = scene.column("coolant_temperature_c")?;
+        let first = *coolant.first()?;
+        let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
+        let followed = match form.value("tau_s") {
+            Some(tau_s) => first_order(scene, &change, tau_s),
+            None => change,
+        };
+        Some(vec![("per_k", followed)])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "direct", ..Form::plain() }
+    }
+}

@@ -1,0 +1,89 @@
+//! The depth of cut changes along the pass: a tapered blank, or tool and work that bend away.
+
+use crate::physics::cut::{cut, cut_times};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+
+/// Depth that changes along the pass.
+#[derive(Debug, Clone, Copy)]
+pub struct DepthTaper;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "depth_taper",
+    family: "cutting",
+    law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by time",
+    parameters: &[
+        ParameterDoc {
+            name: "slope",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.5, 0.5),
+            en: "change of the cut from one end of the pass to the other, as a share",
+            zh: "走刀两端之间切削量变化的比例",
+        },
+        ParameterDoc {
+            name: "curve",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-2.0, 2.0),
+            en: "how much the ends differ from the middle",
+            zh: "两端与中部之差的比例",
+        },
+    ],
+    needs: &["load | engaged"],
+    source: "ap(z) = ap0 (1 + k1 z + k2 z^2), 2-15 % over a pass",
+    experiment_minutes: 4.0,
+    rivals: &["entry_exit", "clock_lag", "bearing_warm_up"],
+    en: Texts {
+        name: "taper along the pass",
+        statement: "The depth of cut changes along each pass: the blank is tapered, or tool and work bend away",
+        absence: "within every pass the residual rises or falls steadily, and starts again in the next pass",
+        confused_with: "a late meter (only at the ends), warm-up (does not start again with each pass)",
+        experiment: "cut one pass in the opposite direction",
+    },
+    zh: Texts {
+        name: "沿走刀的切深变化",
+        statement: "每次走刀中切深逐渐变化：毛坯带锥度，或刀具工件让刀",
+        absence: "每次走刀内残差稳定上升或下降，下一次走刀重新开始",
+        confused_with: "仪表滞后（仅在两端）、热机（不随每次走刀重新开始）",
+        experiment: "反向走刀一次",
+    },
+};
+
+impl Effect for DepthTaper {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if cut(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
+            return Vec::new();
+        }
+        vec![Form { name: "linear", ..Form::plain() }, Form { name: "quadratic", ..Form::plain() }]
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let along = along_pass(scene);
+        let mut columns = vec![("slope", cut_times(scene, |row| along[row].unwrap_or(0.0))?)];
+        if form.name == "quadratic" {
+            let curve = |row: usize| along[row].map_or(0.0, |s| s * s - 1.0 / 12.0);
+            columns.push(("curve", cut_times(scene, curve)?));
+        }
+        Some(columns)
+    }
+}
+
+/// Where each row stands along its pass, -1/2 to 1/2; `None` out of the cut.
+fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
+    let mut along = vec![None; scene.rows()];
+    let position = scene.role(Role::Position);
+    for pass in scene.passes() {
+        let moved = position.map(|position| &position[pass.clone()]).filter(|position| varies(position));
+        let places = moved.unwrap_or(&scene.time_s()[pass.clone()]);
+        let low = places.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let length = (high - low).max(f64::MIN_POSITIVE);
+        along[pass.clone()].iter_mut().zip(places).for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
+    }
+    along
+}

@@ -1,0 +1,82 @@
+//! Friction differs between the two directions of motion.
+
+use crate::physics::drive::{goes_both_ways, is_power, motion, soft_sign};
+use crate::physics::excitation::greatest;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Friction that differs between directions.
+#[derive(Debug, Clone, Copy)]
+pub struct DirectionAsymmetry;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "direction_asymmetry",
+    family: "axis",
+    law: "F = level * |sign(v)|; viscous: F = slope * |v|; in a power: P = slope * v, step: P = level * sign(v); v in m/s, of a spindle in rad/s",
+    parameters: &[
+        ParameterDoc {
+            name: "level",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "half the difference between the directions",
+            zh: "两个方向之差的一半",
+        },
+        ParameterDoc {
+            name: "slope",
+            unit: "output/(m/s)",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "half the difference per speed; of a spindle per rad/s",
+            zh: "单位速度下两方向之差的一半；主轴按rad/s",
+        },
+    ],
+    needs: &["velocity | speed"],
+    source: "preload of nut and wipers, fans and belts that act one way",
+    experiment_minutes: 3.0,
+    rivals: &["offset", "gravity_axis", "dry_friction"],
+    en: Texts {
+        name: "direction asymmetry",
+        statement: "Friction differs between the two directions of motion",
+        absence: "when moving, the residual has the same sign both ways; at rest there is none",
+        confused_with: "a constant offset (also at rest), weight on an axis (only where the axis is declared vertical)",
+        experiment: "move back and forth at one speed with rests of five seconds between",
+    },
+    zh: Texts {
+        name: "方向差异",
+        statement: "两个运动方向的摩擦不同",
+        absence: "运动时残差在两个方向符号相同，静止时没有",
+        confused_with: "常量偏差（静止时也有）、垂直轴重力（仅当声明了垂直轴）",
+        experiment: "以同一速度往复运动，中间各停五秒",
+    },
+};
+
+impl Effect for DirectionAsymmetry {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if !motion(scene).is_some_and(|motion| goes_both_ways(&motion)) {
+            return Vec::new();
+        }
+        let names = if is_power(scene) { ["slope", "step"] } else { ["level", "viscous"] };
+        names.into_iter().map(|name| Form { name, ..Form::plain() }).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let velocity = motion(scene)?;
+        let width = 0.01 * greatest(&velocity);
+        let power = is_power(scene);
+        let (name, law): (_, &dyn Fn(&f64) -> f64) = match form.name {
+            "step" => ("level", &|v| soft_sign(*v, width)),
+            "viscous" => ("slope", &|v| v.abs()),
+            _ if power => ("slope", &|v| *v),
+            _ => ("level", &|v| soft_sign(*v, width).abs()),
+        };
+        Some(vec![(name, velocity.iter().map(law).collect())])
+    }
+
+    fn default_form(&self, scene: &Scene) -> Form {
+        Form { name: if is_power(scene) { "slope" } else { "level" }, ..Form::plain() }
+    }
+}

@@ -1,0 +1,60 @@
+//! Ploughing of the cutting edge: a force along the edge that does not depend on feed.
+
+use crate::physics::cut::{engaged, in_output};
+use crate::physics::drive::{is_axis_output, is_displacement};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Force along the cutting edge.
+#[derive(Debug, Clone, Copy)]
+pub struct EdgeForce;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "edge_force",
+    family: "cutting",
+    law: "P = kte * ap * vc / 60 * engaged; a force output takes kte * ap, a torque output D / 2000 of it",
+    parameters: &[ParameterDoc {
+        name: "kte_n_per_mm",
+        unit: "N/mm",
+        entry: Entry::Linear,
+        range: (0.0, 500.0),
+        en: "force per length of edge in the cut",
+        zh: "单位切削刃长度的力",
+    }],
+    needs: &["depth_of_cut_mm", "cutting_speed_m_min"],
+    source: "edge-force model F = kt b h + kte b; kte 10-80 N/mm for steel and aluminium",
+    experiment_minutes: 6.0,
+    rivals: &["cutting_power", "flank_wear", "chip_thinning"],
+    en: Texts {
+        name: "edge force",
+        statement: "The edge ploughs: part of the force is there even with hardly any feed",
+        absence: "at small feeds the cut takes more than simulated, at large feeds less, constant over time",
+        confused_with: "the chip-thickness exponent of the cutting law (absorbs nearly all of it unless feeds differ widely), wear (grows with time)",
+        experiment: "cut at four feeds, the largest at least four times the smallest, same depth and speed",
+    },
+    zh: Texts {
+        name: "刃口力",
+        statement: "刀刃犁切：即使进给极小也存在的一部分力",
+        absence: "小进给时实测偏大，大进给时偏小，不随时间变化",
+        confused_with: "切削力公式中的厚度指数（进给范围不大时几乎完全吸收它）、磨损（随时间增长）",
+        experiment: "切深和转速不变，用四种进给切削，最大至少为最小的四倍",
+    },
+};
+
+impl Effect for EdgeForce {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        self.columns(scene, &Form::plain()).map(|_| Form::plain()).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+        if is_displacement(scene) || is_axis_output(scene) {
+            return None;
+        }
+        let edge = in_output(scene, scene.column("depth_of_cut_mm")?)?;
+        let engaged = engaged(scene);
+        Some(vec![("kte_n_per_mm", edge.iter().zip(&engaged).map(|(edge, engaged)| edge * engaged).collect())])
+    }
+}

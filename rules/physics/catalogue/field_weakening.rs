@@ -1,0 +1,90 @@
+//! Above its base speed the motor is run with a weakened field: currents and losses change there.
+
+use crate::physics::drive::{driven_krpm, is_power};
+use crate::physics::excitation::{between_speeds, ln_count};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Change of losses above base speed.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldWeakening;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "field_weakening",
+    family: "drive",
+    law: "P = magnetising * (n - nb) / 1000 rpm + per_load2 * (L / (nb / 1000 rpm))^2, both for n > nb only",
+    parameters: &[
+        ParameterDoc {
+            name: "magnetising",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "change of no-load power per 1000 rpm above base speed",
+            zh: "基速以上每1000 rpm空载功率的变化",
+        },
+        ParameterDoc {
+            name: "per_load2",
+            unit: "1/output",
+            entry: Entry::Linear,
+            range: (-1.0, 1.0),
+            en: "loss per squared load above base speed",
+            zh: "基速以上单位负载平方的损耗",
+        },
+        ParameterDoc {
+            name: "base_speed_rpm",
+            unit: "rpm",
+            entry: Entry::Shape,
+            range: (200.0, 20000.0),
+            en: "base speed of the motor",
+            zh: "电机基速",
+        },
+    ],
+    needs: &["speed"],
+    source: "torque constant proportional to nb / n above base speed; nb 750-3000 rpm",
+    experiment_minutes: 12.0,
+    rivals: &["gear_stage", "windage", "copper_loss", "speed_softening"],
+    en: Texts {
+        name: "field weakening",
+        statement: "Above its base speed the motor runs with a weakened field and needs more current for the same torque",
+        absence: "no-load power bends at one speed, and above it heavy cuts take more than simulated",
+        confused_with: "gear stage (a step rather than a bend), windage (bends everywhere)",
+        experiment: "run idle at three speeds on each side of the suspected base speed, then the same heavy cut on each side",
+    },
+    zh: Texts {
+        name: "弱磁",
+        statement: "高于基速时电机弱磁运行，相同转矩需要更大电流",
+        absence: "空载功率在某一转速处转折，高于该转速时重切实测偏大",
+        confused_with: "档位（跳变而非转折）、风阻（处处弯曲）",
+        experiment: "在疑似基速两侧各取三档转速空转，再在两侧进行相同的重切",
+    },
+};
+
+impl Effect for FieldWeakening {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if driven_krpm(scene).is_none() {
+            return Vec::new();
+        }
+        let speeds = between_speeds(scene, 5);
+        let ln_choices = ln_count(speeds.len());
+        let form = |speed: &f64| Form { ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
+        speeds.iter().map(form).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let krpm = driven_krpm(scene)?;
+        let base = form.value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
+        let mut columns = vec![("magnetising", krpm.iter().map(|n| (n - base).max(0.0)).collect())];
+        if let Some(load) = scene.load().filter(|_| is_power(scene)) {
+            let law = |(n, load): (&f64, &f64)| if *n > base { (load / base).powi(2) } else { 0.0 };
+            columns.push(("per_load2", krpm.iter().zip(load).map(law).collect()));
+        }
+        Some(columns)
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("base_speed_rpm", 1500.0)])
+    }
+}

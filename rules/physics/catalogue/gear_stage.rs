@@ -1,0 +1,114 @@
+//! Each gear or belt stage has its own drag and efficiency.
+
+use crate::physics::drive::driven_krpm;
+use crate::physics::excitation::{between_speeds, ln_count};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use std::collections::BTreeSet;
+
+/// Drag and efficiency of a gear stage.
+#[derive(Debug, Clone, Copy)]
+pub struct GearStage;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "gear_stage",
+    family: "drive",
+    law: "y = step + share * L in one stage; without the channel gear_stage: below a switching speed",
+    parameters: &[
+        ParameterDoc {
+            name: "step",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "change of no-load output in this stage",
+            zh: "该档空载输出的变化",
+        },
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "share of the load lost in this stage beyond the others",
+            zh: "该档相对其他档多损失的负载比例",
+        },
+        ParameterDoc {
+            name: "switch_rpm",
+            unit: "rpm",
+            entry: Entry::Shape,
+            range: (20.0, 20000.0),
+            en: "speed below which the stage is engaged",
+            zh: "换档转速",
+        },
+    ],
+    needs: &["speed | gear_stage"],
+    source: "efficiency differs by 2-6 % between stages",
+    experiment_minutes: 10.0,
+    rivals: &["speed_softening", "field_weakening", "copper_loss", "load_loss"],
+    en: Texts {
+        name: "gear stage",
+        statement: "Each gear or belt stage drags and loses in its own way",
+        absence: "on one side of a speed both idle and cut step away from the simulation",
+        confused_with: "speed softening (gradual, cut only), field weakening (a bend, not a step)",
+        experiment: "run the same speed in both stages, idle and in the same cut",
+    },
+    zh: Texts {
+        name: "档位",
+        statement: "每个齿轮或皮带档有各自的阻力和效率",
+        absence: "在某一转速的一侧，空转和切削都与仿真出现跳变",
+        confused_with: "高速软化（渐变，仅切削）、弱磁（转折而非跳变）",
+        experiment: "在两个档位用同一转速，空转并进行相同切削",
+    },
+};
+
+impl Effect for GearStage {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if driven_krpm(scene).is_none() {
+            return Vec::new();
+        }
+        let stages = stages(scene);
+        let ln_choices = ln_count(stages.len());
+        if stages.len() > 1 {
+            let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
+            let form = |stage: &i64| Form { name: "stage", place: place(stage), ln_choices, ..Form::default() };
+            return stages.iter().skip(1).map(form).collect();
+        }
+        let speeds = between_speeds(scene, 6);
+        let ln_choices = ln_count(speeds.len());
+        let form = |speed: &f64| Form { name: "speed", ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
+        speeds.iter().map(form).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let krpm = driven_krpm(scene)?;
+        let here: Vec<bool> = match &form.place {
+            Some((column, stage)) => {
+                let stage: i64 = stage.parse().ok()?;
+                scene.column(column)?.iter().map(|now| now.round() as i64 == stage).collect()
+            }
+            None => {
+                let switch = form.value("switch_rpm").unwrap_or(1000.0) / 1000.0;
+                krpm.iter().map(|n| *n > 0.001 && *n < switch).collect()
+            }
+        };
+        let mut columns = vec![("step", here.iter().map(|here| f64::from(u8::from(*here))).collect())];
+        if let Some(load) = scene.load() {
+            let law = |(here, load): (&bool, &f64)| if *here { *load } else { 0.0 };
+            columns.push(("share", here.iter().zip(load).map(law).collect()));
+        }
+        Some(columns)
+    }
+
+    fn default_form(&self, scene: &Scene) -> Form {
+        let speed = Form { name: "speed", ..Form::of(&[("switch_rpm", 1000.0)]) };
+        self.forms(scene).into_iter().next().unwrap_or(speed)
+    }
+}
+
+/// The stages in use, in rising order; at most eight.
+fn stages(scene: &Scene) -> Vec<i64> {
+    let stages = scene.column("gear_stage").unwrap_or_default().iter().map(|stage| stage.round() as i64);
+    stages.collect::<BTreeSet<_>>().into_iter().take(8).collect()
+}

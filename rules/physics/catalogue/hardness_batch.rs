@@ -1,0 +1,134 @@
+//! A lot of material is harder or softer than the one before.
+
+use crate::physics::cut::{cut, cut_times};
+use crate::physics::excitation::{since_run, step_forms, where_word, word_forms};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Hardness that differs between lots.
+#[derive(Debug, Clone, Copy)]
+pub struct HardnessBatch;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "hardness_batch",
+    family: "cutting",
+    law: "y = gain * L in one lot, or from one run on; lots: y = gain_i * L in lot i against the first",
+    parameters: &[
+        ParameterDoc {
+            name: "gain",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "share by which the cut is heavier",
+            zh: "切削负载增加的比例",
+        },
+        ParameterDoc {
+            name: "gain_2",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 2 against the first lot",
+            zh: "第2批相对第一批的比例",
+        },
+        ParameterDoc {
+            name: "gain_3",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 3 against the first lot",
+            zh: "第3批相对第一批的比例",
+        },
+        ParameterDoc {
+            name: "gain_4",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 4 against the first lot",
+            zh: "第4批相对第一批的比例",
+        },
+        ParameterDoc {
+            name: "gain_5",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 5 against the first lot",
+            zh: "第5批相对第一批的比例",
+        },
+        ParameterDoc {
+            name: "gain_6",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 6 against the first lot",
+            zh: "第6批相对第一批的比例",
+        },
+        ParameterDoc {
+            name: "gain_7",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.4, 0.4),
+            en: "the same for lot 7 against the first lot",
+            zh: "第7批相对第一批的比例",
+        },
+    ],
+    needs: &["load | engaged", "lot | run"],
+    source: "kc (1 + h) per lot, h 3-12 % either way",
+    experiment_minutes: 6.0,
+    rivals: &["flank_wear", "recipe_error", "sensor_gain", "coolant_regime"],
+    en: Texts {
+        name: "material batch",
+        statement: "A lot of material is harder or softer than what the simulation assumes",
+        absence: "from one lot on every cut is heavier by the same share; idle is unchanged; a new insert does not help",
+        confused_with: "wear (grows with cutting time and resets), a gain of the meter (also scales idle), a wrong recipe (one operation only)",
+        experiment: "cut a piece of the old lot again with the same insert",
+    },
+    zh: Texts {
+        name: "材料批次硬度",
+        statement: "某一批材料比仿真假设的更硬或更软",
+        absence: "从某一批起每次切削都按同一比例变重，空转不变，换刀片无效",
+        confused_with: "磨损（随切削时间增长并复位）、仪表增益（空转也变）、工艺参数错误（仅某一工序）",
+        experiment: "用同一刀片再切一件旧批次材料",
+    },
+};
+
+impl Effect for HardnessBatch {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if cut(scene).is_none() {
+            return Vec::new();
+        }
+        let mut forms = word_forms(scene, "lot", "lot", GAINS.len() + 1);
+        if forms.len() > 2 {
+            forms.push(Form { name: "lots", ..Form::plain() });
+        }
+        forms.extend(step_forms(scene, "step"));
+        forms
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        if form.name == "lots" {
+            return every_lot(scene);
+        }
+        let (column, word) = form.place.as_ref()?;
+        let here = if column == "run" { since_run(scene, word) } else { where_word(scene, column, word) }?;
+        Some(vec![("gain", cut_times(scene, |row| here[row])?)])
+    }
+
+    fn has_hidden_state(&self) -> bool {
+        true
+    }
+}
+
+/// Names of the gains of the second and further lots.
+const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];
+
+fn every_lot(scene: &Scene) -> Option<Columns> {
+    let lots = scene.words("lot")?;
+    let column = |(gain, lot): (&&'static str, &String)| {
+        let here = where_word(scene, "lot", lot)?;
+        Some((*gain, cut_times(scene, |row| here[row])?))
+    };
+    GAINS.iter().zip(lots.words().iter().skip(1)).map(column).collect()
+}

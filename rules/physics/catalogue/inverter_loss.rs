@@ -1,0 +1,77 @@
+//! Losses in the inverter: grow with current.
+
+use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Losses in the inverter.
+#[derive(Debug, Clone, Copy)]
+pub struct InverterLoss;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "inverter_loss",
+    family: "drive",
+    law: "P = conduction * |i| + resistive * i^2; i = L / (n / 1000 rpm) stands for the current, L load, n at least 50 rpm",
+    parameters: &[
+        ParameterDoc {
+            name: "conduction",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 0.5),
+            en: "loss per current, at 1000 rpm as a share of the load",
+            zh: "单位电流损耗，1000 rpm下相对负载的比例",
+        },
+        ParameterDoc {
+            name: "resistive",
+            unit: "1/output",
+            entry: Entry::Linear,
+            range: (0.0, 1.0),
+            en: "loss per squared current, at 1000 rpm",
+            zh: "单位电流平方损耗，1000 rpm下",
+        },
+    ],
+    needs: &["load", "speed"],
+    source: "a + b I + c I^2; 2-4 % of power",
+    experiment_minutes: 8.0,
+    rivals: &["copper_loss", "load_loss"],
+    en: Texts {
+        name: "inverter loss",
+        statement: "Losses in the inverter, growing with the motor current",
+        absence: "cuts at low speed take a little more than simulated, in proportion to torque",
+        confused_with: "copper loss (square of torque only), load loss (follows power)",
+        experiment: "make the same cutting power at a low and at a high speed, lightly and heavily",
+    },
+    zh: Texts {
+        name: "变频器损耗",
+        statement: "变频器损耗，随电机电流增长",
+        absence: "低速切削时实测略大，与转矩成比例",
+        confused_with: "铜损（仅随转矩平方）、负载损耗（随功率）",
+        experiment: "在低速和高速下，分别以轻、重负载产生相同切削功率",
+    },
+};
+
+impl Effect for InverterLoss {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
+        let known = turns && is_power(scene) && scene.load().is_some_and(varies);
+        let named = |name| Form { name, ..Form::plain() };
+        if known { vec![named("conduction"), named("both")] } else { Vec::new() }
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let current = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
+        let mut columns = vec![("conduction", current.iter().map(|i| i.abs()).collect())];
+        if form.name != "conduction" {
+            columns.push(("resistive", current.iter().map(|i| i * i).collect()));
+        }
+        Some(columns)
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "both", ..Form::plain() }
+    }
+}

@@ -1,0 +1,70 @@
+//! Losses in the motor's iron: grow a little faster than speed.
+
+use crate::physics::drive::{driven_krpm, speed_to_the};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Losses in the iron of the motor.
+#[derive(Debug, Clone, Copy)]
+pub struct IronLoss;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "iron_loss",
+    family: "drive",
+    law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
+    parameters: &[
+        ParameterDoc {
+            name: "level",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "loss at 1000 rpm",
+            zh: "1000 rpm时的损耗",
+        },
+        ParameterDoc {
+            name: "p",
+            unit: "1",
+            entry: Entry::Shape,
+            range: (1.0, 2.0),
+            en: "exponent of speed",
+            zh: "转速指数",
+        },
+    ],
+    needs: &["speed"],
+    source: "hysteresis with n^1 to n^1.3, eddy currents with n^2; 50-300 W at base speed",
+    experiment_minutes: 10.0,
+    rivals: &["no_load_power", "windage", "viscous_friction"],
+    en: Texts {
+        name: "iron loss",
+        statement: "Losses in the iron of the motor, growing with speed, loaded or not",
+        absence: "idle power bends with speed in a way a quadratic cannot follow",
+        confused_with: "the no-load polynomial (absorbs it), windage (much steeper)",
+        experiment: "run idle at five speeds, then let the spindle coast down from the top with the drive off",
+    },
+    zh: Texts {
+        name: "铁损",
+        statement: "电机铁芯损耗，随转速增长，与负载无关",
+        absence: "空载功率随转速的弯曲无法用二次多项式表示",
+        confused_with: "空载多项式（会吸收它）、风阻（陡得多）",
+        experiment: "空转五档转速，然后断开驱动从最高转速自由停车",
+    },
+};
+
+impl Effect for IronLoss {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
+        turns.then(|| self.default_form(scene)).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(1.3))?)])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("p", 1.3)])
+    }
+}

@@ -1,0 +1,125 @@
+//! The meter averages over a window: edges are smeared.
+
+use crate::physics::excitation::{delays, varies};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Averaging in the meter.
+#[derive(Debug, Clone, Copy)]
+pub struct MeterWindow;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "meter_window",
+    family: "measurement",
+    law: "y = share * (A(S) - S), S the simulated output; lag: A first order with time constant window_s; mean: A mean over the last window_s",
+    parameters: &[
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.5, 1.5),
+            en: "one, when the window explains all",
+            zh: "为1时平均窗口可完全解释",
+        },
+        ParameterDoc {
+            name: "window_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.01, 30.0),
+            en: "time constant, or length of the window",
+            zh: "时间常数或窗口长度",
+        },
+    ],
+    needs: &["the simulated output"],
+    source: "power meters average over 0.2-3 s, by a running mean or a first-order filter",
+    experiment_minutes: 2.0,
+    rivals: &["clock_lag", "spindle_inertia", "entry_exit"],
+    en: Texts {
+        name: "meter window",
+        statement: "The meter averages over a while, so edges come smeared",
+        absence: "after every edge the residual decays the same way, upwards edges one sign, downwards the other; nothing before the edge",
+        confused_with: "a pure delay (sharp pairs, also before), inertia (only where speed changes)",
+        experiment: "start and stop the spindle five times idle; halve the meter's averaging time and repeat",
+    },
+    zh: Texts {
+        name: "仪表平均窗口",
+        statement: "仪表在一段时间内取平均，边沿被抹平",
+        absence: "每个边沿之后残差以相同方式衰减，上升沿与下降沿符号相反，边沿之前没有",
+        confused_with: "纯延时（尖锐的成对峰）、惯量（仅转速变化处）",
+        experiment: "空转启停主轴五次；将仪表平均时间减半后重复",
+    },
+};
+
+impl Effect for MeterWindow {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if !scene.simulated().is_some_and(varies) {
+            return Vec::new();
+        }
+        let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);
+        let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) };
+        windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let simulated = scene.simulated()?;
+        let window_s = form.value("window_s").unwrap_or(1.0).max(1e-6);
+        let mut smeared = vec![0.0; scene.rows()];
+        for run in scene.runs() {
+            let inside = &simulated[run.clone()];
+            let time_s = &scene.time_s()[run.clone()];
+            let average = if form.name == "mean" { running_mean } else { first_order_lag };
+            smeared[run.clone()].copy_from_slice(&average(time_s, inside, window_s));
+        }
+        Some(vec![("share", smeared.iter().zip(simulated).map(|(smeared, now)| smeared - now).collect())])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("window_s", 1.0)]) }
+    }
+}
+
+/// First-order lag, settled at the start, exact for an input that is linear between rows.
+fn first_order_lag(time_s: &[f64], input: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut state = input.to_vec();
+    for row in 1..input.len() {
+        let dt_s = time_s[row] - time_s[row - 1];
+        if dt_s > 0.0 {
+            let behind = (input[row] - input[row - 1]) / dt_s * tau_s;
+            let left = (-dt_s / tau_s).exp();
+            state[row] = input[row] - behind + (state[row - 1] - input[row - 1] + behind) * left;
+        }
+    }
+    state
+}
+
+/// Mean over the last `window_s` of an input that is linear between rows, constant before the first.
+fn running_mean(time_s: &[f64], input: &[f64], window_s: f64) -> Vec<f64> {
+    let mut area = vec![0.0; input.len()];
+    for row in 1..input.len() {
+        let dt_s = (time_s[row] - time_s[row - 1]).max(0.0);
+        area[row] = area[row - 1] + 0.5 * dt_s * (input[row] + input[row - 1]);
+    }
+    let mut at = 0;
+    let mean = |row: usize| {
+        let from_s = time_s[row] - window_s;
+        while at + 1 < row && time_s[at + 1] <= from_s {
+            at += 1;
+        }
+        (area[row] - area_until(time_s, input, &area, at, from_s)) / window_s
+    };
+    (0..input.len()).map(mean).collect()
+}
+
+fn area_until(time_s: &[f64], input: &[f64], area: &[f64], at: usize, until_s: f64) -> f64 {
+    let into_s = until_s - time_s[at];
+    let Some(next) = time_s.get(at + 1) else { return area[at] + input[at] * into_s };
+    let dt_s = next - time_s[at];
+    if into_s <= 0.0 || dt_s <= 0.0 {
+        return area[at] + input[at] * into_s;
+    }
+    let slope = (input[at + 1] - input[at]) / dt_s;
+    area[at] + input[at] * into_s + 0.5 * slope * into_s * into_s
+}

@@ -1,0 +1,101 @@
+//! The real feed follows the reported one late.
+
+use crate::physics::cut::{cut, cutting_rows};
+use crate::physics::excitation::{delays, visits};
+use crate::physics::state::delayed;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Feed that follows late.
+#[derive(Debug, Clone, Copy)]
+pub struct OverrideDelay;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "override_delay",
+    family: "control",
+    law: "y = share * L * ((f(t - delay) / f(t))^0.75 - 1)",
+    parameters: &[
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.5, 1.5),
+            en: "one, when the delay explains all",
+            zh: "为1时延时可完全解释",
+        },
+        ParameterDoc {
+            name: "delay_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.0, 5.0),
+            en: "how late the real feed follows",
+            zh: "实际进给的滞后时间",
+        },
+    ],
+    needs: &["load", "feed_mm_min | feed_programmed_mm_min"],
+    source: "f_actual(t) = f_commanded(t - d), 50-500 ms and a ramp",
+    experiment_minutes: 3.0,
+    rivals: &["clock_lag", "engagement_timing", "entry_exit"],
+    en: Texts {
+        name: "override delay",
+        statement: "The real feed follows the command late",
+        absence: "after every change of the feed in the cut the residual is a short peak with the sign of the old feed",
+        confused_with: "a late meter (also where the spindle speed changes)",
+        experiment: "step the feed override between 80 and 120 % ten times in one cut",
+    },
+    zh: Texts {
+        name: "倍率延时",
+        statement: "实际进给滞后于指令",
+        absence: "切削中每次进给变化后残差出现短峰，符号取决于原进给",
+        confused_with: "仪表滞后（主轴转速变化处也有）",
+        experiment: "一次切削中进给倍率在80%和120%之间阶跃十次",
+    },
+};
+
+impl Effect for OverrideDelay {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(feed) = feed(scene).filter(|_| scene.load().is_some() && cut(scene).is_some()) else {
+            return Vec::new();
+        };
+        let cutting = cutting_rows(scene);
+        let changes =
+            |row: usize| row > 0 && cutting[row] && cutting[row - 1] && (feed[row] / feed[row - 1] - 1.0).abs() > 0.02;
+        if visits(scene, changes) < 3 {
+            return Vec::new();
+        }
+        delays(scene, &[0.1, 0.25, 0.5, 1.0]).iter().map(|delay| Form::of(&[("delay_s", *delay)])).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let feed = feed(scene)?;
+        let before = delayed(scene, &feed, form.value("delay_s").unwrap_or(0.25));
+        let law = |((load, before), now): ((&f64, &f64), &f64)| {
+            let ratio = if *now > 0.0 { (before / now).clamp(0.0, 4.0) } else { 1.0 };
+            load * (ratio.powf(0.75) - 1.0)
+        };
+        Some(vec![("share", scene.load()?.iter().zip(&before).zip(&feed).map(law).collect())])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("delay_s", 0.25)])
+    }
+}
+
+/// The feed as reported, or else as commanded times its override.
+fn feed(scene: &Scene) -> Option<Vec<f64>> {
+    if let Some(feed) = scene.column("feed_mm_min") {
+        return Some(feed.to_vec());
+    }
+    let programmed = scene.column("feed_programmed_mm_min")?;
+    let percent = scene.column("feed_override_pct");
+    Some(
+        programmed
+            .iter()
+            .enumerate()
+            .map(|(row, feed)| feed * percent.map_or(1.0, |percent| percent[row] / 100.0))
+            .collect(),
+    )
+}

@@ -1,0 +1,101 @@
+//! Inner rings warm before the housing: preload and friction rise, and fall again when the housing follows.
+
+use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
+use crate::physics::excitation::lag_forms;
+use crate::physics::state::first_order;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Friction that rises with bearing preload.
+#[derive(Debug, Clone, Copy)]
+pub struct PreloadGrowth;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "preload_growth",
+    family: "spindle",
+    law: "P = growth * (n / 1000 rpm)^2 * w; dw/dt = ((n / 1000 rpm)^(5/3) - w) / tau; gradient: w is the difference between a quick and a slow state",
+    parameters: &[
+        ParameterDoc {
+            name: "growth",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "rise of power at 1000 rpm once warm from 1000 rpm",
+            zh: "在1000 rpm下热透后功率的上升量",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (20.0, 3600.0),
+            en: "time constant of the inner ring",
+            zh: "内圈时间常数",
+        },
+        ParameterDoc {
+            name: "slow_tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (120.0, 14400.0),
+            en: "time constant of the housing",
+            zh: "轴承座时间常数",
+        },
+    ],
+    needs: &["speed"],
+    source: "angular-contact bearings: thermally induced preload, grows with speed squared and the temperature difference of the rings",
+    experiment_minutes: 20.0,
+    rivals: &["bearing_warm_up", "viscous_friction", "windage"],
+    en: Texts {
+        name: "preload growth",
+        statement: "Bearings run tighter as the inner ring warms before the housing",
+        absence: "after a step to high speed the no-load power rises for minutes before it settles or falls",
+        confused_with: "bearing warm-up (same places, opposite sign: the two hide each other)",
+        experiment: "step from rest to the highest speed, hold twenty minutes idle",
+    },
+    zh: Texts {
+        name: "预紧力增长",
+        statement: "内圈先于轴承座升温，轴承变紧",
+        absence: "阶跃到高转速后，空载功率先上升几分钟再稳定或下降",
+        confused_with: "轴承热机（位置相同、符号相反，两者相互掩盖）",
+        experiment: "从静止阶跃到最高转速，空转保持二十分钟",
+    },
+};
+
+impl Effect for PreloadGrowth {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
+            return Vec::new();
+        }
+        let mut forms = lag_forms(scene, "lag", &[120.0, 300.0, 600.0]);
+        let gradient = |form: &Form| {
+            let tau_s = form.value("tau_s").unwrap_or(TAU_S);
+            Form { name: "gradient", ..Form::of(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
+        };
+        let gradients: Vec<Form> = forms.iter().take(2).map(gradient).collect();
+        forms.extend(gradients);
+        forms
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let friction = speed_to_the(scene, 2.0)?;
+        let heat: Vec<f64> = krpm(scene)?.iter().map(|n| n.powf(5.0 / 3.0)).collect();
+        let tau_s = form.value("tau_s").unwrap_or(TAU_S);
+        let mut warmth = first_order(scene, &heat, tau_s);
+        if form.name == "gradient" {
+            let slow = first_order(scene, &heat, form.value("slow_tau_s").unwrap_or(SLOWER * tau_s));
+            warmth.iter_mut().zip(&slow).for_each(|(warmth, slow)| *warmth -= slow);
+        }
+        Some(vec![("growth", friction.iter().zip(&warmth).map(|(g, w)| g * w).collect())])
+    }
+
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("tau_s", TAU_S)]) }
+    }
+}
+
+const TAU_S: f64 = 300.0;
+
+/// How much slower the housing is than the inner ring, to start with.
+const SLOWER: f64 = 6.0;

@@ -1,0 +1,64 @@
+//! Depth or width of cut is mis-stated for one operation.
+
+use crate::physics::cut::{cut, cut_times};
+use crate::physics::excitation::{where_word, word_forms};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Depth or width mis-stated for an operation.
+#[derive(Debug, Clone, Copy)]
+pub struct RecipeError;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "recipe_error",
+    family: "measurement",
+    law: "y = gain * L in one operation",
+    parameters: &[ParameterDoc {
+        name: "gain",
+        unit: "1",
+        entry: Entry::Linear,
+        range: (-0.8, 3.0),
+        en: "share by which the real cut is heavier than stated",
+        zh: "实际切削比给定值重的比例",
+    }],
+    needs: &["load | engaged", "operation | pass | program"],
+    source: "definition; an edited offset or a blank of another size",
+    experiment_minutes: 5.0,
+    rivals: &["hardness_batch", "depth_taper", "flank_wear"],
+    en: Texts {
+        name: "recipe error",
+        statement: "Depth or width of cut is not what the recipe says for one operation",
+        absence: "in one operation every cut is off by the same share, in the others it agrees",
+        confused_with: "harder material (every operation), wear (grows)",
+        experiment: "measure the part before and after that operation",
+    },
+    zh: Texts {
+        name: "工艺参数错误",
+        statement: "某一工序的切深或切宽与工艺表不符",
+        absence: "某一工序每次切削按同一比例偏离，其他工序一致",
+        confused_with: "材料变硬（所有工序）、磨损（逐渐增长）",
+        experiment: "在该工序前后测量工件",
+    },
+};
+
+impl Effect for RecipeError {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if cut(scene).is_none() {
+            return Vec::new();
+        }
+        let forms = |column| word_forms(scene, "word", column, MOST_WORDS);
+        ["operation", "pass", "program"].into_iter().map(forms).find(|forms| !forms.is_empty()).unwrap_or_default()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let (column, word) = form.place.as_ref()?;
+        let here = where_word(scene, column, word)?;
+        Some(vec![("gain", cut_times(scene, |row| here[row])?)])
+    }
+}
+
+/// More words than this name blocks or parts rather than operations.
+const MOST_WORDS: usize = 20;

@@ -1,0 +1,82 @@
+//! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
+
+use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, rate};
+use crate::physics::excitation::visits;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+
+/// Braking power that is not fed back.
+#[derive(Debug, Clone, Copy)]
+pub struct Regeneration;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "regeneration",
+    family: "drive",
+    law: "P = braking_kg_m2 * |w dw/dt| while the spindle slows down; clipped: P = share * |S| where the simulated power S is negative",
+    parameters: &[
+        ParameterDoc {
+            name: "braking_kg_m2",
+            unit: "kg m2",
+            entry: Entry::Linear,
+            range: (0.0, 50.0),
+            en: "inertia times the share of braking power that is lost",
+            zh: "惯量乘以损失的制动功率比例",
+        },
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 1.0),
+            en: "share of the negative power that is not shown",
+            zh: "未显示的负功率比例",
+        },
+    ],
+    needs: &["speed"],
+    source: "drives with a braking resistor, and meters that count one direction only: 0-90 % of braking power",
+    experiment_minutes: 3.0,
+    rivals: &["spindle_inertia", "clock_lag", "meter_window"],
+    en: Texts {
+        name: "braking power",
+        statement: "Braking power is burnt in a resistor, or not counted by the meter",
+        absence: "at every slow-down the recording lies above the simulation, at speed-up they agree",
+        confused_with: "inertia (both ways), a time shift (pairs of opposite peaks)",
+        experiment: "ramp the spindle up and down five times, with the same time for both",
+    },
+    zh: Texts {
+        name: "制动功率",
+        statement: "制动功率消耗在制动电阻上，或仪表不计",
+        absence: "每次降速时实测高于仿真，升速时一致",
+        confused_with: "惯量（升降速都有）、时间偏移（成对正负峰）",
+        experiment: "以相同时间升降速五次",
+    },
+};
+
+impl Effect for Regeneration {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        ["braking", "clipped"]
+            .into_iter()
+            .map(|name| Form { name, ..Form::plain() })
+            .filter(|form| acts(scene, form))
+            .collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        if scene.output_kind() != OutputKind::Power {
+            return None;
+        }
+        if form.name == "clipped" {
+            return Some(vec![("share", scene.simulated()?.iter().map(|power| (-power).max(0.0)).collect())]);
+        }
+        driven_krpm(scene)?;
+        let speed = scene.role(Role::Speed)?;
+        let braking = |(rpm, rate): (&f64, f64)| (-rpm * rate * RAD_PER_S_OF_RPM.powi(2)).max(0.0);
+        Some(vec![("braking_kg_m2", speed.iter().zip(rate(scene, speed)).map(braking).collect())])
+    }
+}
+
+fn acts(scene: &Scene, form: &Form) -> bool {
+    Regeneration.columns(scene, form).is_some_and(|columns| visits(scene, |row| columns[0].1[row] > 0.0) >= 3)
+}

@@ -1,0 +1,89 @@
+//! Tool or work runs out of true: the cut swells and fades once per turn.
+
+use crate::physics::cut::{cut, cut_times};
+use crate::physics::drive::RAD_PER_S_OF_RPM;
+use crate::physics::excitation::greatest;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+
+/// Cut that swells once per turn.
+#[derive(Debug, Clone, Copy)]
+pub struct Runout;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "runout",
+    family: "cutting",
+    law: "y = (cosine * cos(phi) + sine * sin(phi)) * L; dphi/dt = 2 pi n / 60, phi = 0 at the start of each run",
+    parameters: &[
+        ParameterDoc {
+            name: "cosine",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-1.0, 1.0),
+            en: "share of the cut in step with the turn",
+            zh: "与转角同相的比例",
+        },
+        ParameterDoc {
+            name: "sine",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-1.0, 1.0),
+            en: "share a quarter turn later",
+            zh: "滞后四分之一转的比例",
+        },
+    ],
+    needs: &["load | engaged", "speed"],
+    source: "P (1 + e cos(w t + phi)), e 0.05-0.5; only where the sampling is faster than 2.2 samples per turn",
+    experiment_minutes: 2.0,
+    rivals: &["chatter", "ripple_alias", "entry_exit"],
+    en: Texts {
+        name: "run-out",
+        statement: "Tool or work runs out of true, so the cut swells and fades once per turn",
+        absence: "in the cut the residual is a tone at the frequency of the spindle",
+        confused_with: "chatter (a frequency that does not follow the spindle), mains ripple (does not follow it either)",
+        experiment: "cut at two speeds, and measure the run-out with a dial gauge",
+    },
+    zh: Texts {
+        name: "径向跳动",
+        statement: "刀具或工件偏心，每转一周切削量起伏一次",
+        absence: "切削时残差是主轴转频的单音",
+        confused_with: "颤振（频率不随主轴）、电源纹波（也不随主轴）",
+        experiment: "用两种转速切削，并用千分表测量跳动",
+    },
+};
+
+impl Effect for Runout {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(speed) = scene.role(Role::Speed).filter(|_| cut(scene).is_some()) else { return Vec::new() };
+        let told = greatest(speed) / 60.0 * scene.period_s() * 2.2 < 1.0 && varies_in_cut(scene, speed);
+        told.then(Form::plain).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+        let turn = turn_rad(scene)?;
+        let cosine = cut_times(scene, |row| turn[row].cos())?;
+        let sine = cut_times(scene, |row| turn[row].sin())?;
+        Some(vec![("cosine", cosine), ("sine", sine)])
+    }
+}
+
+/// Does the spindle turn while cutting?
+fn varies_in_cut(scene: &Scene, speed: &[f64]) -> bool {
+    cut(scene).is_some_and(|cut| cut.iter().zip(speed).any(|(cut, speed)| *cut != 0.0 && speed.abs() > 1.0))
+}
+
+/// Angle of the spindle since the start of the run.
+fn turn_rad(scene: &Scene) -> Option<Vec<f64>> {
+    let speed = scene.role(Role::Speed)?;
+    let mut turn = vec![0.0; scene.rows()];
+    for run in scene.runs() {
+        for row in run.start + 1..run.end {
+            let dt_s = scene.time_s()[row] - scene.time_s()[row - 1];
+            turn[row] = turn[row - 1] + 0.5 * (speed[row] + speed[row - 1]) * RAD_PER_S_OF_RPM * dt_s;
+        }
+    }
+    Some(turn)
+}

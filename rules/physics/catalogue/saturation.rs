@@ -1,0 +1,75 @@
+//! The meter or drive shows no more than its ceiling.
+
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Ceiling of the meter.
+#[derive(Debug, Clone, Copy)]
+pub struct Saturation;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "saturation",
+    family: "measurement",
+    law: "y = share * min(0, ceiling - S), S the simulated output",
+    parameters: &[
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.5, 1.5),
+            en: "one, when the ceiling explains all",
+            zh: "为1时上限可完全解释",
+        },
+        ParameterDoc {
+            name: "ceiling",
+            unit: "output",
+            entry: Entry::Shape,
+            range: (-1000000000.0, 1000000000.0),
+            en: "greatest value that is shown",
+            zh: "显示的最大值",
+        },
+    ],
+    needs: &["the simulated output"],
+    source: "min(P, Pmax): range of meter, transformer or controller display",
+    experiment_minutes: 3.0,
+    rivals: &["load_loss", "sensor_gain"],
+    en: Texts {
+        name: "saturation",
+        statement: "The meter or the controller shows no more than a ceiling",
+        absence: "the largest values are all the same, and the simulation lies above them",
+        confused_with: "load loss with a negative sign (bends, but does not stop)",
+        experiment: "make a cut lighter by a third: the ceiling is not reached any more",
+    },
+    zh: Texts {
+        name: "饱和",
+        statement: "仪表或控制器显示不超过上限",
+        absence: "最大值全部相同，而仿真值更高",
+        confused_with: "负号的负载损耗（弯曲但不封顶）",
+        experiment: "切削减轻三分之一：不再达到上限",
+    },
+};
+
+impl Effect for Saturation {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let ceiling = pile_up(scene).filter(|_| scene.simulated().is_some());
+        ceiling.map(|ceiling| Form::of(&[("ceiling", ceiling)])).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let ceiling = form.value("ceiling")?;
+        Some(vec![("share", scene.simulated()?.iter().map(|value| (ceiling - value).min(0.0)).collect())])
+    }
+}
+
+/// The greatest recorded value, where at least five rows share it and more do than share the value below it.
+fn pile_up(scene: &Scene) -> Option<f64> {
+    let usable = scene.recorded().iter().zip(scene.usable()).filter(|(_, usable)| **usable);
+    let values: Vec<f64> = usable.map(|(value, _)| *value).collect();
+    let top = values.iter().copied().reduce(f64::max)?;
+    let next = values.iter().copied().filter(|value| *value < top).reduce(f64::max)?;
+    let count = |level: f64| values.iter().filter(|value| (**value - level).abs() <= 1e-9 * level.abs()).count();
+    (count(top) >= 5 && count(top) > 2 * count(next)).then_some(top)
+}

@@ -1,0 +1,69 @@
+//! The meter shows a fixed share too much or too little.
+
+use crate::physics::excitation::{recording_share, since_run, step_forms, varies};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Gain of the meter.
+#[derive(Debug, Clone, Copy)]
+pub struct SensorGain;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "sensor_gain",
+    family: "measurement",
+    law: "y = gain * S, S the simulated output; from one run on, or growing as share of the recording - 1/2",
+    parameters: &[ParameterDoc {
+        name: "gain",
+        unit: "1",
+        entry: Entry::Linear,
+        range: (-0.5, 0.5),
+        en: "share by which the meter shows too much",
+        zh: "仪表多显示的比例",
+    }],
+    needs: &["the simulated output"],
+    source: "current transformers and shunts: 1-3 %",
+    experiment_minutes: 5.0,
+    rivals: &["cutting_power", "load_loss", "hardness_batch", "supply_voltage"],
+    en: Texts {
+        name: "meter gain",
+        statement: "The meter shows a fixed share too much or too little",
+        absence: "the residual is the same share of the output in every state, also idle; the controller's own current does not follow",
+        confused_with: "harder material (only in the cut), load loss (only in the cut), supply voltage (comes and goes)",
+        experiment: "compare the meter with a second one, or with the controller's load, idle and in the cut",
+    },
+    zh: Texts {
+        name: "仪表增益误差",
+        statement: "仪表按固定比例偏大或偏小",
+        absence: "残差在所有状态下（包括空转）都是输出的同一比例，控制器自身电流不跟随",
+        confused_with: "材料变硬（仅切削时）、负载损耗（仅切削时）、供电电压（时有时无）",
+        experiment: "空转和切削时与另一台仪表或控制器负载比较",
+    },
+};
+
+impl Effect for SensorGain {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if !scene.simulated().is_some_and(varies) {
+            return Vec::new();
+        }
+        let mut forms = vec![Form { name: "constant", ..Form::plain() }, Form { name: "drift", ..Form::plain() }];
+        forms.extend(step_forms(scene, "step"));
+        forms
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let simulated = scene.simulated()?;
+        let factor = match (form.name, &form.place) {
+            ("step", Some((_, run))) => since_run(scene, run)?,
+            ("drift", _) => recording_share(scene).iter().map(|share| share - 0.5).collect(),
+            _ => vec![1.0; scene.rows()],
+        };
+        Some(vec![("gain", simulated.iter().zip(&factor).map(|(value, factor)| value * factor).collect())])
+    }
+
+    fn has_hidden_state(&self) -> bool {
+        true
+    }
+}

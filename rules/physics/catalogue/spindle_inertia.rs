@@ -1,0 +1,73 @@
+//! Power and torque that accelerate spindle, chuck and work.
+
+use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, rate};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+
+/// Inertia of what the spindle turns.
+#[derive(Debug, Clone, Copy)]
+pub struct SpindleInertia;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "spindle_inertia",
+    family: "spindle",
+    law: "P = inertia_kg_m2 * w * dw/dt, w = 2 pi n / 60; a torque, current or load output takes per_rad_s2 * dw/dt",
+    parameters: &[
+        ParameterDoc {
+            name: "inertia_kg_m2",
+            unit: "kg m2",
+            entry: Entry::Linear,
+            range: (0.0, 50.0),
+            en: "moment of inertia of spindle, chuck and work that the simulation lacks",
+            zh: "仿真中缺少的主轴、卡盘和工件转动惯量",
+        },
+        ParameterDoc {
+            name: "per_rad_s2",
+            unit: "output/(rad/s2)",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "output per angular acceleration",
+            zh: "单位角加速度的输出",
+        },
+    ],
+    needs: &["speed"],
+    source: "d(J w^2 / 2)/dt; J 0.005-0.5 kg m2, in turning mostly chuck and blank",
+    experiment_minutes: 3.0,
+    rivals: &["clock_lag", "regeneration", "meter_window"],
+    en: Texts {
+        name: "spindle inertia",
+        statement: "Accelerating the spindle takes power, braking gives it back",
+        absence: "a peak at every speed-up and a dip at every slow-down, nothing at constant speed",
+        confused_with: "a time shift of the meter (also at cutting edges), braking power that is not fed back (only at slow-down)",
+        experiment: "ramp the spindle up and down three times between rest and high speed",
+    },
+    zh: Texts {
+        name: "主轴惯量",
+        statement: "主轴加速需要功率，减速时返还功率",
+        absence: "每次升速出现峰、每次降速出现谷，恒速时没有",
+        confused_with: "仪表时间偏移（切入切出处也有）、制动功率未回馈（仅降速时）",
+        experiment: "主轴在静止和高速之间升降速三次",
+    },
+};
+
+impl Effect for SpindleInertia {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.columns(scene, &Form::plain());
+        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+        driven_krpm(scene)?;
+        let speed = scene.role(Role::Speed)?;
+        let rates = rate(scene, speed).into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
+        if scene.output_kind() == OutputKind::Force {
+            return Some(vec![("per_rad_s2", rates.collect())]);
+        }
+        let power = speed.iter().zip(rates).map(|(rpm, rate)| rpm * RAD_PER_S_OF_RPM * rate).collect();
+        Some(vec![("inertia_kg_m2", power)])
+    }
+}

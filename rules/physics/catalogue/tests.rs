@@ -1,0 +1,268 @@
+//! Every effect of the catalogue: told completely, finite on a rich recording, silent on a poor one.
+
+use super::{CATALOGUE, effect};
+use crate::physics::{Columns, Effect, Entry, Form, Role, Scene, Texts};
+use adapters::recording::{Cells, Numbers, Recording, Words};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Names of the contract that are laws of the catalogue.
+const PUBLIC: &str = "no_load_power cutting_power load_loss offset copper_loss iron_loss inverter_loss field_weakening \
+    gear_stage regeneration dry_friction viscous_friction stribeck direction_asymmetry windage bearing_warm_up \
+    preload_growth spindle_inertia edge_force flank_wear speed_softening hardness_batch built_up_edge runout chatter \
+    entry_exit depth_taper chip_thinning coolant_regime auxiliary_switch axis_friction axis_inertia gravity_axis \
+    spindle_growth ambient_drift coolant_temperature screw_growth sensor_gain zero_drift supply_voltage ripple_alias \
+    clock_lag meter_window saturation engagement_timing recipe_error constant_load_control override_delay";
+
+/// Kinds whose forms another part finds (the scatter, a search over frequencies) or that need more than 1 Hz.
+const WITHOUT_FORMS: [&str; 3] = ["chatter", "ripple_alias", "runout"];
+
+fn set(recording: &mut Recording, name: &str, law: impl Fn(usize) -> f64) {
+    let values = (0..recording.rows()).map(law).collect();
+    recording.set_column(name, Cells::Numbers(Numbers::full(values)));
+}
+
+fn set_words(recording: &mut Recording, name: &str, law: impl Fn(usize) -> String) {
+    let words: Vec<String> = (0..recording.rows()).map(law).collect();
+    recording.set_column(name, Cells::Words(words.iter().map(String::as_str).collect::<Words>()));
+}
+
+/// Six runs of ten minutes at 1 Hz: passes of 40 s with pauses of 20 s, every pass other in speed, feed and depth.
+fn rich(output: &str) -> Scene {
+    const ROWS: usize = 3600;
+    let mut recording = Recording::new("rich", (0..ROWS).map(|row| row as f64).collect(), None);
+    let pass = |row: usize| (row / 60) as f64;
+    let cutting = |row: usize| row % 60 >= 15 && row % 60 < 55;
+    let feed = move |row: usize| 60.0 + 20.0 * (pass(row) % 5.0) + if row % 60 > 30 { 30.0 } else { 0.0 };
+    let speed = move |row: usize| {
+        let ramp = ((row % 60) as f64 / 8.0).min((60 - row % 60) as f64 / 8.0).min(1.0);
+        let direction = if (row / 60) % 7 == 6 { -1.0 } else { 1.0 };
+        direction * ramp * (400.0 + 350.0 * (pass(row) % 6.0))
+    };
+    set(&mut recording, "spindle_speed_rpm", speed);
+    set(&mut recording, "feed_mm_min", feed);
+    set(&mut recording, "depth_of_cut_mm", |row| 0.3 + 0.4 * (pass(row) % 4.0));
+    set(&mut recording, "diameter_mm", |row| 20.0 + 10.0 * (pass(row) % 3.0));
+    set(&mut recording, "engaged", |row| f64::from(u8::from(cutting(row))));
+    for (name, reach) in [("axis_velocity_mm_min", 900.0), ("z_axis_velocity_mm_min", 3000.0)] {
+        set(&mut recording, name, |row| reach * (row as f64 / 7.0).sin());
+    }
+    set(&mut recording, "axis_position_mm", |row| -200.0 * (row as f64 / 7.0).cos());
+    for (name, span) in
+        [("bearing_temperature_c", 20.0), ("ambient_temperature_c", 4.0), ("coolant_temperature_c", 6.0)]
+    {
+        set(&mut recording, name, |row| 20.0 + span * (1.0 - (-(row as f64) / 900.0).exp()));
+    }
+    set(&mut recording, "supply_voltage_v", |row| 400.0 + 10.0 * (row as f64 / 300.0).sin());
+    set(&mut recording, "coolant_on", |row| f64::from(u8::from((row / 60) % 3 == 1)));
+    set(&mut recording, output, |row| {
+        (300.0 + speed(row).abs() * 0.2 + 900.0 * f64::from(u8::from(cutting(row)))).min(1500.0)
+    });
+    set_words(&mut recording, "run", |row| format!("{}", row / 600 + 1));
+    set_words(&mut recording, "lot", |row| ["A", "B", "C"][row / 1200].to_owned());
+    set_words(&mut recording, "operation", |row| ["rough", "finish"][(row / 60) % 2].to_owned());
+    scene(&recording, output)
+}
+
+/// A scene as a model would show it: with a load, a simulation and a vertical axis.
+fn scene(recording: &Recording, output: &str) -> Scene {
+    let roles = BTreeMap::from([(Role::Vertical, "z".to_owned())]);
+    let mut scene = Scene::new(recording, output, &roles).expect("the output is recorded");
+    let depth = |row: usize| scene.column("depth_of_cut_mm").map_or(1.0, |depth| depth[row]);
+    let engaged = |row: usize| scene.role(Role::Engaged).map_or(0.0, |engaged| engaged[row]);
+    let cut = (0..scene.rows()).map(|row| 800.0 * engaged(row) * depth(row)).collect();
+    let simulated = scene.recorded().iter().map(|value| 1.1 * value - 50.0).collect();
+    scene.set_load(Some(cut));
+    scene.set_simulated(Some(simulated));
+    scene
+}
+
+fn columns_of(effect: &dyn Effect, scene: &Scene, form: &Form) -> Option<Columns> {
+    let columns = effect.columns(scene, form)?;
+    let kind = effect.doc().kind;
+    for (name, column) in &columns {
+        let parameter = effect.doc().parameter(name);
+        assert!(parameter.is_some_and(|parameter| parameter.entry == Entry::Linear), "{kind}.{name} is not declared");
+        assert_eq!(column.len(), scene.rows(), "{kind}.{name}");
+        assert!(column.iter().all(|value| value.is_finite()), "{kind}.{name} {form:?} is not finite");
+    }
+    Some(columns)
+}
+
+fn check_scene(scene: &Scene) {
+    for effect in CATALOGUE {
+        for form in effect.forms(scene) {
+            let columns = columns_of(*effect, scene, &form);
+            assert!(columns.is_some(), "{} offers {form:?} but cannot make it", effect.doc().kind);
+        }
+        for form in [effect.default_form(scene), Form::plain()] {
+            columns_of(*effect, scene, &form);
+        }
+    }
+}
+
+#[test]
+fn every_public_name_is_a_law_of_the_catalogue() {
+    let public: BTreeSet<&str> = PUBLIC.split_whitespace().collect();
+    let kinds: BTreeSet<&str> = CATALOGUE.iter().map(|effect| effect.doc().kind).collect();
+    assert_eq!(kinds, public);
+    assert_eq!(kinds.len(), CATALOGUE.len(), "kinds are unique");
+}
+
+fn is_told(texts: &Texts) -> bool {
+    let texts = [texts.name, texts.statement, texts.absence, texts.confused_with, texts.experiment];
+    texts.iter().all(|text| !text.trim().is_empty() && !text.ends_with('.') && !text.ends_with('。'))
+}
+
+fn is_chinese(text: &str) -> bool {
+    text.chars().any(|c| ('\u{4e00}'..='\u{9fff}').contains(&c))
+}
+
+#[test]
+fn every_effect_is_told_completely_in_both_languages() {
+    for effect in CATALOGUE {
+        let doc = effect.doc();
+        assert!(is_told(&doc.en) && is_told(&doc.zh), "{}", doc.kind);
+        assert!(
+            [doc.zh.name, doc.zh.statement, doc.zh.absence, doc.zh.experiment].into_iter().all(is_chinese),
+            "{}",
+            doc.kind
+        );
+        assert!(doc.law.is_ascii() && !doc.law.is_empty() && !doc.source.is_empty(), "{}", doc.kind);
+        assert!(doc.experiment_minutes > 0.0 && !doc.rivals.is_empty(), "{}", doc.kind);
+        for rival in doc.rivals {
+            assert!(super::effect(rival).is_some() && *rival != doc.kind, "{} has no rival {rival}", doc.kind);
+        }
+    }
+}
+
+#[test]
+fn every_parameter_has_a_unit_and_a_range() {
+    for effect in CATALOGUE {
+        let doc = effect.doc();
+        let names: BTreeSet<&str> = doc.parameters.iter().map(|parameter| parameter.name).collect();
+        assert_eq!(names.len(), doc.parameters.len(), "{}", doc.kind);
+        for parameter in doc.parameters {
+            let (low, high) = parameter.range;
+            assert!(low < high && !parameter.unit.is_empty(), "{}.{}", doc.kind, parameter.name);
+            assert!(!parameter.en.is_empty() && is_chinese(parameter.zh), "{}.{}", doc.kind, parameter.name);
+            let bounded = low.is_finite() && high.is_finite();
+            assert!(bounded || parameter.entry == Entry::Linear, "{}.{} has no bounds", doc.kind, parameter.name);
+        }
+    }
+}
+
+#[test]
+fn shapes_of_forms_are_declared_and_in_range() {
+    for output in ["spindle_power_w", "axis_current_a", "thermal_error_um"] {
+        let scene = rich(output);
+        for effect in CATALOGUE {
+            for form in effect.forms(&scene).iter().chain([&effect.default_form(&scene)]) {
+                for (name, value) in &form.shape {
+                    let parameter = effect.doc().parameter(name).expect("declared");
+                    assert_eq!(parameter.entry, Entry::Shape);
+                    let (low, high) = parameter.range;
+                    assert!((low..=high).contains(value), "{} {name} = {value}", effect.doc().kind);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rich_recording_offers_every_effect_somewhere() {
+    let outputs = ["total_power_w", "axis_current_a", "thermal_error_um", "feed_override_pct", "cutting_force_n"];
+    let scenes: Vec<Scene> = outputs.iter().map(|output| rich(output)).collect();
+    scenes.iter().for_each(check_scene);
+    let offered = |effect: &&&dyn Effect| scenes.iter().any(|scene| !effect.forms(scene).is_empty());
+    let silent: BTreeSet<&str> =
+        CATALOGUE.iter().filter(|effect| !offered(effect)).map(|effect| effect.doc().kind).collect();
+    assert_eq!(silent, BTreeSet::from(WITHOUT_FORMS));
+}
+
+#[test]
+fn no_effect_panics_on_a_poor_recording() {
+    for rows in [1, 2, 7] {
+        let mut recording = Recording::new("poor", vec![0.0; rows], None);
+        set(&mut recording, "spindle_power_w", |_| 1.0);
+        check_scene(&scene(&recording, "spindle_power_w"));
+        for name in
+            ["spindle_speed_rpm", "feed_mm_min", "engaged", "depth_of_cut_mm", "diameter_mm", "axis_velocity_mm_min"]
+        {
+            set(&mut recording, name, |_| 0.0);
+            check_scene(&scene(&recording, "spindle_power_w"));
+        }
+        set_words(&mut recording, "run", |row| row.to_string());
+        check_scene(&scene(&recording, "spindle_power_w"));
+    }
+}
+
+fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
+    effect(kind).expect("known").columns(scene, form).expect("makes columns").swap_remove(0).1
+}
+
+#[test]
+fn the_published_cutting_power() {
+    let mut recording = Recording::new("published", vec![0.0], None);
+    for (name, value) in [("depth_of_cut_mm", 2.0), ("feed_per_rev_mm", 0.25), ("cutting_speed_m_min", 120.0)] {
+        set(&mut recording, name, |_| value);
+    }
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::of(&[("mc", 0.0)]));
+    assert!((2000.0 * power[0] - 2000.0 * 2.0 * 0.25 * 120.0 / 60.0).abs() < 1e-9, "kc ap f vc / 60 W");
+}
+
+#[test]
+fn drilling_is_milling_with_the_whole_diameter() {
+    let mut recording = Recording::new("drill", vec![0.0], None);
+    for (name, value) in [("diameter_mm", 10.0), ("feed_mm_min", 200.0), ("spindle_speed_rpm", 1000.0)] {
+        set(&mut recording, name, |_| value);
+    }
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    let form = Form { name: "drilling", ..Form::of(&[("mc", 0.25)]) };
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
+    let rate_cm3_min = std::f64::consts::PI * 100.0 / 4.0 * 200.0 / 1000.0;
+    assert!((power[0] - 0.1_f64.powf(-0.25) * rate_cm3_min / 60.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_running_mean_and_a_lag_settle_to_the_input() {
+    let mut recording = Recording::new("step", (0..200).map(|row| 0.1 * f64::from(row)).collect(), None);
+    set(&mut recording, "spindle_power_w", |row| if row < 50 { 100.0 } else { 300.0 });
+    let mut scene = scene(&recording, "spindle_power_w");
+    scene.set_simulated(Some(scene.recorded().to_vec()));
+    for name in ["mean", "lag"] {
+        let form = Form { name, ..Form::of(&[("window_s", 1.0)]) };
+        let smear = column("meter_window", &scene, &form);
+        assert!(smear[..49].iter().all(|value| value.abs() < 1e-9), "{name}: nothing before the edge");
+        assert!(smear[50..58].iter().all(|value| *value < -10.0), "{name}: behind after the edge");
+        assert!(smear[199].abs() < 1e-3, "{name}: settled");
+    }
+}
+
+#[test]
+fn inertia_is_the_rate_of_kinetic_energy() {
+    let mut recording = Recording::new("ramp", (0..100).map(|row| 0.1 * f64::from(row)).collect(), None);
+    set(&mut recording, "spindle_speed_rpm", |row| 20.0 * row as f64);
+    set(&mut recording, "spindle_power_w", |_| 0.0);
+    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::plain());
+    let energy_j: f64 = power[1..99].iter().map(|power| 0.1 * power).sum();
+    let top = 1970.0 * std::f64::consts::PI / 30.0;
+    assert!((energy_j / (0.5 * top * top) - 1.0).abs() < 0.01, "{energy_j}");
+}
+
+#[test]
+fn run_out_needs_more_than_two_samples_per_turn() {
+    let turning = |period_s: f64| {
+        let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
+        for (name, value) in [("spindle_speed_rpm", 600.0), ("engaged", 1.0), ("depth_of_cut_mm", 1.0)] {
+            set(&mut recording, name, |_| value);
+        }
+        set(&mut recording, "spindle_power_w", |_| 500.0);
+        scene(&recording, "spindle_power_w")
+    };
+    let runout = effect("runout").expect("known");
+    assert!(runout.forms(&turning(0.06)).is_empty());
+    let fast = turning(0.01);
+    let cosine = column("runout", &fast, &runout.forms(&fast)[0]);
+    assert!((cosine[0] - cosine[10]).abs() < 1e-6, "ten turns a second, a hundred samples");
+}

@@ -1,0 +1,66 @@
+//! Air drag on spindle, chuck and fan: grows with the cube of speed.
+
+use crate::physics::drive::{driven_krpm, speed_to_the};
+use crate::physics::excitation::varies;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+
+/// Air drag of what turns.
+#[derive(Debug, Clone, Copy)]
+pub struct Windage;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "windage",
+    family: "spindle",
+    law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
+    parameters: &[
+        ParameterDoc {
+            name: "level",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "drag at 1000 rpm",
+            zh: "1000 rpm时的风阻",
+        },
+        ParameterDoc {
+            name: "p",
+            unit: "1",
+            entry: Entry::Shape,
+            range: (2.5, 3.2),
+            en: "exponent of speed",
+            zh: "转速指数",
+        },
+    ],
+    needs: &["speed"],
+    source: "turbulent drag on a rotating body: exponent 2.6 (smooth) to 3 (chuck, fan)",
+    experiment_minutes: 5.0,
+    rivals: &["no_load_power", "viscous_friction", "iron_loss", "field_weakening"],
+    en: Texts {
+        name: "windage",
+        statement: "Air drag on chuck, tool and fan, growing with the cube of speed",
+        absence: "idle at the highest speeds takes more than simulated, in the middle less, cold or warm alike",
+        confused_with: "viscous friction and the no-load polynomial (absorb it unless the speeds span a wide range), warm-up (fades with time)",
+        experiment: "run idle at five speeds, the highest at least two and a half times the lowest",
+    },
+    zh: Texts {
+        name: "风阻",
+        statement: "卡盘、刀具和风扇的空气阻力，随转速三次方增长",
+        absence: "最高转速空转时实测偏大，中速偏小，冷态热态相同",
+        confused_with: "粘性摩擦和空载多项式（转速范围窄时会吸收它）、热机过程（随时间消退）",
+        experiment: "空转五档转速，最高至少为最低的两倍半",
+    },
+};
+
+impl Effect for Windage {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
+        if turns { vec![Form::of(&[("p", 3.0)]), Form::of(&[("p", 2.6)])] } else { Vec::new() }
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(3.0))?)])
+    }
+}

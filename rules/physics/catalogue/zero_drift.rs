@@ -1,0 +1,129 @@
+//! The zero of the meter creeps, with cabinet temperature or age.
+
+use crate::physics::excitation::{recording_elapsed_s, recording_share};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use std::f64::consts::PI;
+
+/// Zero of the meter that creeps.
+#[derive(Debug, Clone, Copy)]
+pub struct ZeroDrift;
+
+static DOC: EffectDoc = EffectDoc {
+    kind: "zero_drift",
+    family: "measurement",
+    law: "linear: y = drift * (share of the recording - 1/2); settling: y = settled * (1 - exp(-t/tau)); wander: y = sum of c_k cos(k pi share)",
+    parameters: &[
+        ParameterDoc {
+            name: "drift",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "change over the recording",
+            zh: "整个记录期间的变化量",
+        },
+        ParameterDoc {
+            name: "settled",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "change once settled",
+            zh: "稳定后的变化量",
+        },
+        ParameterDoc {
+            name: "c1",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "wander with 1 half waves over the recording",
+            zh: "整个记录内1个半波的缓变",
+        },
+        ParameterDoc {
+            name: "c2",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "wander with 2 half waves over the recording",
+            zh: "整个记录内2个半波的缓变",
+        },
+        ParameterDoc {
+            name: "c3",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "wander with 3 half waves over the recording",
+            zh: "整个记录内3个半波的缓变",
+        },
+        ParameterDoc {
+            name: "c4",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "wander with 4 half waves over the recording",
+            zh: "整个记录内4个半波的缓变",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (60.0, 14400.0),
+            en: "time constant of settling",
+            zh: "稳定时间常数",
+        },
+    ],
+    needs: &[],
+    source: "meter electronics: 5-40 W over 10-60 min with cabinet temperature",
+    experiment_minutes: 30.0,
+    rivals: &["offset", "bearing_warm_up", "sensor_gain", "ambient_drift"],
+    en: Texts {
+        name: "zero drift",
+        statement: "The zero of the meter creeps over minutes to hours",
+        absence: "the residual wanders slowly and is the same at standstill, idle and in the cut",
+        confused_with: "bearing warm-up (scales with speed, absent at standstill), a gain that drifts (scales with the output), a constant offset",
+        experiment: "record half an hour at standstill with the drives on",
+    },
+    zh: Texts {
+        name: "零点漂移",
+        statement: "仪表零点在数分钟到数小时内缓慢变化",
+        absence: "残差缓慢漂移，静止、空转和切削时相同",
+        confused_with: "轴承热机（随转速变化，静止时没有）、增益漂移（与输出成比例）、常量偏差",
+        experiment: "驱动使能、静止状态下记录半小时",
+    },
+};
+
+impl Effect for ZeroDrift {
+    fn doc(&self) -> &'static EffectDoc {
+        &DOC
+    }
+
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        if scene.rows() < 20 {
+            return Vec::new();
+        }
+        let whole_s = recording_elapsed_s(scene).last().copied().unwrap_or(0.0);
+        let mut forms = vec![Form { name: "linear", ..Form::plain() }];
+        let grid = [600.0, 1200.0, 2400.0, 4800.0].into_iter().filter(|tau_s| *tau_s < 0.5 * whole_s);
+        forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::of(&[("tau_s", tau_s)]) }));
+        forms.push(Form { name: "wander", ..Form::plain() });
+        forms
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        let share = recording_share(scene);
+        match form.name {
+            "settling" => {
+                let tau_s = form.value("tau_s").unwrap_or(1200.0);
+                let elapsed_s = recording_elapsed_s(scene);
+                Some(vec![("settled", elapsed_s.iter().map(|t| 1.0 - (-t / tau_s).exp()).collect())])
+            }
+            "wander" => {
+                let wave = |k: f64| share.iter().map(|share| (k * PI * share).cos()).collect();
+                Some(vec![("c1", wave(1.0)), ("c2", wave(2.0)), ("c3", wave(3.0)), ("c4", wave(4.0))])
+            }
+            _ => Some(vec![("drift", share.iter().map(|share| share - 0.5).collect())]),
+        }
+    }
+
+    fn has_hidden_state(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,43 @@
+//! The cut as effects see it.
+
+use super::{OutputKind, Role, Scene};
+
+/// Tool in the work, 0 to 1; 1 everywhere when no channel tells (then depth and feed must tell).
+pub(crate) fn engaged(scene: &Scene) -> Vec<f64> {
+    scene.role(Role::Engaged).map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec)
+}
+
+/// How hard the cut is: the load, or else the tool being in the work. `None` for displacements and without both.
+pub(crate) fn cut(scene: &Scene) -> Option<&[f64]> {
+    if scene.output_kind() == OutputKind::Displacement {
+        return None;
+    }
+    scene.load().or_else(|| scene.role(Role::Engaged))
+}
+
+/// Rows in which the tool cuts.
+pub(crate) fn cutting_rows(scene: &Scene) -> Vec<bool> {
+    match scene.role(Role::Engaged) {
+        Some(engaged) => engaged.iter().map(|engaged| *engaged > 0.5).collect(),
+        None => cut(scene).map_or_else(|| vec![false; scene.rows()], |cut| cut.iter().map(|cut| *cut > 0.0).collect()),
+    }
+}
+
+/// Cut times a factor of the row.
+pub(crate) fn cut_times(scene: &Scene, factor: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
+    Some(cut(scene)?.iter().enumerate().map(|(row, cut)| cut * factor(row)).collect())
+}
+
+/// What a force in the cut means in the output: `area` is in mm2, or mm for a force along an edge.
+/// A power takes `area * vc / 60`, a torque `area * D / 2000`, a force `area` itself.
+pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
+    let name = scene.output();
+    let lever = if name.contains("force") {
+        return Some(area.to_vec());
+    } else if name.contains("torque") {
+        scene.column("diameter_mm")?.iter().map(|diameter| diameter / 2000.0).collect::<Vec<_>>()
+    } else {
+        scene.column("cutting_speed_m_min")?.iter().map(|speed| speed / 60.0).collect()
+    };
+    Some(area.iter().zip(lever).map(|(area, lever)| area * lever).collect())
+}

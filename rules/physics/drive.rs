@@ -1,0 +1,122 @@
+//! Which drive an output belongs to, and how that drive moves, in SI units or thousands of revolutions.
+
+use super::{OutputKind, Role, Scene};
+use std::f64::consts::PI;
+
+/// Radians per second of one revolution per minute.
+pub(crate) const RAD_PER_S_OF_RPM: f64 = PI / 30.0;
+
+/// Slowest speed, in thousands of rpm, at which a load still counts as a torque.
+const CREEP_KRPM: f64 = 0.05;
+
+/// Does the output belong to a feed axis rather than to the spindle or the whole machine?
+pub(crate) fn is_axis_output(scene: &Scene) -> bool {
+    let name = scene.output();
+    name.contains("axis") || (!name.contains("spindle") && !name.contains("total") && scene.role(Role::Speed).is_none())
+}
+
+/// Is the output a power, or something that adds up like one?
+pub(crate) fn is_power(scene: &Scene) -> bool {
+    matches!(scene.output_kind(), OutputKind::Power | OutputKind::Other)
+}
+
+/// Is the output a displacement?
+pub(crate) fn is_displacement(scene: &Scene) -> bool {
+    scene.output_kind() == OutputKind::Displacement
+}
+
+/// Spindle speed without its sign, in thousands of rpm.
+pub(crate) fn krpm(scene: &Scene) -> Option<Vec<f64>> {
+    Some(scene.role(Role::Speed)?.iter().map(|rpm| rpm.abs() / 1000.0).collect())
+}
+
+/// The same, where the output is a power or torque of the spindle or of the whole machine.
+pub(crate) fn driven_krpm(scene: &Scene) -> Option<Vec<f64>> {
+    (!is_displacement(scene) && !is_axis_output(scene)).then(|| krpm(scene))?
+}
+
+/// `(n / 1000 rpm)^exponent` in a power; one exponent less, with the sign of rotation, in a torque, current or load.
+pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
+    let krpm = driven_krpm(scene)?;
+    if scene.output_kind() != OutputKind::Force {
+        return Some(krpm.iter().map(|n| n.powf(exponent)).collect());
+    }
+    let signed = is_signed(scene);
+    let speed = scene.role(Role::Speed)?;
+    let law = |(n, rpm): (&f64, &f64)| if *n > 0.0 { n.powf(exponent - 1.0) * side(*rpm, signed) } else { 0.0 };
+    Some(krpm.iter().zip(speed).map(law).collect())
+}
+
+/// Does the output change its sign with the direction of motion? A true rms current does not.
+pub(crate) fn is_signed(scene: &Scene) -> bool {
+    scene.recorded().iter().zip(scene.usable()).any(|(value, usable)| *usable && *value < 0.0)
+}
+
+fn side(motion: f64, signed: bool) -> f64 {
+    if signed && motion < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The load over the speed in thousands of rpm: the torque of the cut, in the output's unit at 1000 rpm.
+pub(crate) fn torque_at_1000_rpm(scene: &Scene) -> Option<Vec<f64>> {
+    let krpm = driven_krpm(scene)?;
+    Some(scene.load()?.iter().zip(&krpm).map(|(load, n)| load / n.max(CREEP_KRPM)).collect())
+}
+
+/// How the drive of the output moves: axis velocity in m/s, or spindle speed in rad/s, with its sign.
+pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
+    if is_displacement(scene) {
+        return None;
+    }
+    let of_spindle = scene.output().contains("spindle");
+    let role = if of_spindle || scene.role(Role::Velocity).is_none() { Role::Speed } else { Role::Velocity };
+    in_si(scene, scene.role_name(role)?)
+}
+
+/// Does the drive of the output turn (rad/s) rather than slide (m/s)?
+pub(crate) fn in_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
+    let scale = match column {
+        name if name.ends_with("_mm_min") => 1.0 / 60_000.0,
+        name if name.ends_with("_mm_s") || name.ends_with("_mm_s2") => 1e-3,
+        name if name.ends_with("_rpm") => RAD_PER_S_OF_RPM,
+        _ => 1.0,
+    };
+    Some(scene.column(column)?.iter().map(|value| value * scale).collect())
+}
+
+/// Velocities of the feed axes in m/s: of every axis, else of the one axis, else the feed along the path.
+pub(crate) fn axis_velocities(scene: &Scene) -> Vec<Vec<f64>> {
+    let named = ["x_axis_velocity_mm_min", "y_axis_velocity_mm_min", "z_axis_velocity_mm_min"];
+    let axes: Vec<_> = named.iter().filter_map(|name| in_si(scene, name)).collect();
+    if !axes.is_empty() {
+        return axes;
+    }
+    let one = scene.role_name(Role::Velocity).and_then(|name| in_si(scene, name));
+    one.or_else(|| in_si(scene, "feed_mm_min")).into_iter().collect()
+}
+
+/// Rate of change per second: central difference within a run, one-sided at its ends.
+pub(crate) fn rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
+    let mut rates = vec![0.0; values.len()];
+    for run in scene.runs() {
+        for row in run.clone() {
+            let before = row.saturating_sub(1).max(run.start);
+            let after = (row + 1).min(run.end - 1);
+            let dt_s = scene.time_s()[after] - scene.time_s()[before];
+            rates[row] = if dt_s > 0.0 { (values[after] - values[before]) / dt_s } else { 0.0 };
+        }
+    }
+    rates
+}
+
+/// Both directions are visited, each in at least a fiftieth of the rows.
+pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
+    let least = motion.len().div_ceil(50);
+    let forward = motion.iter().filter(|v| **v > 0.0).count();
+    let backward = motion.iter().filter(|v| **v < 0.0).count();
+    forward.min(backward) >= least.max(2)
+}
+
+/// A sign that passes smoothly through zero within `width`.
+pub(crate) fn soft_sign(value: f64, width: f64) -> f64 {
+    (value / width.max(f64::MIN_POSITIVE)).tanh()
+}

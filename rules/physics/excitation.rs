@@ -1,0 +1,147 @@
+//! What a recording excites: levels, visits, boundaries and the grids of shapes worth trying in it.
+
+use super::{Form, Scene};
+use std::collections::BTreeSet;
+
+/// Greatest magnitude; at least the smallest positive number, so that it can divide.
+pub(crate) fn greatest(values: &[f64]) -> f64 {
+    values.iter().fold(f64::MIN_POSITIVE, |top, value| top.max(value.abs()))
+}
+
+/// Do the values differ by more than a thousandth of the greatest?
+pub(crate) fn varies(values: &[f64]) -> bool {
+    spread(values) > 1e-3 * greatest(values)
+}
+
+/// The value below which this share of the values lies.
+pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    values.get(((last as f64) * share).round() as usize).copied()
+}
+
+/// Separate stretches of rows in which `holds`; a new run starts a new stretch.
+pub(crate) fn visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
+    scene
+        .runs()
+        .iter()
+        .map(|run| run.clone().filter(|row| holds(*row) && (*row == run.start || !holds(*row - 1))).count())
+        .sum()
+}
+
+/// Speeds in rpm half-way between the levels at which the spindle stays, at most `most` of them.
+pub(crate) fn between_speeds(scene: &Scene, most: usize) -> Vec<f64> {
+    let Some(speeds) = steady_speeds_rpm(scene) else { return Vec::new() };
+    let gap = 0.03 * greatest(&speeds);
+    let between: Vec<f64> =
+        speeds.windows(2).filter(|pair| pair[1] - pair[0] > gap).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    thinned(&between, most)
+}
+
+/// At most `most` of the values, evenly spread.
+fn thinned(values: &[f64], most: usize) -> Vec<f64> {
+    if values.len() <= most {
+        return values.to_vec();
+    }
+    (0..most).map(|index| values[(2 * index + 1) * values.len() / (2 * most)]).collect()
+}
+
+/// Speeds of the rows in which the spindle turns and hardly accelerates, in rising order.
+fn steady_speeds_rpm(scene: &Scene) -> Option<Vec<f64>> {
+    let speed = scene.role(super::Role::Speed)?;
+    let rates = super::drive::rate(scene, speed);
+    let slow = 0.02 * greatest(speed);
+    let mut steady: Vec<f64> =
+        speed.iter().zip(&rates).filter(|(n, rate)| n.abs() > 1.0 && rate.abs() < slow).map(|(n, _)| n.abs()).collect();
+    steady.sort_by(f64::total_cmp);
+    Some(steady)
+}
+
+/// The time constants of the grid that this recording can tell: two periods to half of its longest stretch.
+pub(crate) fn time_constants(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
+    let longest_s = super::state::elapsed_s(scene).into_iter().fold(0.0, f64::max);
+    grid_s.iter().copied().filter(|tau_s| (2.0 * scene.period_s()..=0.5 * longest_s).contains(tau_s)).collect()
+}
+
+/// One form per time constant that this recording can tell.
+pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<Form> {
+    let form = |tau_s| Form { name, ..Form::of(&[("tau_s", tau_s)]) };
+    time_constants(scene, grid_s).into_iter().map(form).collect()
+}
+
+/// Delays worth trying, in seconds: none below a quarter of the sampling period.
+pub(crate) fn delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
+    let mut delays: Vec<f64> = grid_s.iter().map(|delay| delay.max(0.25 * scene.period_s())).collect();
+    delays.dedup();
+    delays
+}
+
+/// Forms that step at the start of a run and stay, with at least two runs on either side.
+pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
+    let mut seen = BTreeSet::new();
+    let first_of_name: Vec<bool> = scene.run_names().iter().map(|run| seen.insert(run.clone())).collect();
+    let last = scene.runs().len().saturating_sub(2);
+    let starts: Vec<&String> =
+        (2..=last).filter(|run| first_of_name[*run]).map(|run| &scene.run_names()[run]).collect();
+    let ln_choices = ln_count(starts.len());
+    let form =
+        |run: &&String| Form { name, place: Some(("run".to_owned(), (*run).clone())), ln_choices, ..Form::default() };
+    starts.iter().map(form).collect()
+}
+
+/// One from the first row of the run on, zero before; `None` when there is no such run.
+pub(crate) fn since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> {
+    let index = scene.run_names().iter().position(|name| name == run)?;
+    let start = scene.runs()[index].start;
+    Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
+}
+
+/// One form per word of a text column, where it has `2..=most` words.
+pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
+    let Some(words) = scene.words(column) else { return Vec::new() };
+    let words = words.words();
+    if !(2..=most).contains(&words.len()) {
+        return Vec::new();
+    }
+    let ln_choices = ln_count(words.len());
+    let form =
+        |word: &String| Form { name, place: Some((column.to_owned(), word.clone())), ln_choices, ..Form::default() };
+    words.iter().map(form).collect()
+}
+
+/// One in the rows where the text column holds the word.
+pub(crate) fn where_word(scene: &Scene, column: &str, word: &str) -> Option<Vec<f64>> {
+    let words = scene.words(column)?;
+    Some((0..scene.rows()).map(|row| if words.get(row) == Some(word) { 1.0 } else { 0.0 }).collect())
+}
+
+/// Natural logarithm of a number of alternatives; zero for none or one.
+pub(crate) fn ln_count(count: usize) -> f64 {
+    (count.max(1) as f64).ln()
+}
+
+/// Share of the recording that is over, 0 to 1; a pause of unknown length counts as one period.
+pub(crate) fn recording_share(scene: &Scene) -> Vec<f64> {
+    let elapsed_s = recording_elapsed_s(scene);
+    let whole_s = elapsed_s.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    elapsed_s.iter().map(|elapsed_s| elapsed_s / whole_s).collect()
+}
+
+/// Seconds since the first row; a pause of unknown length counts as one period.
+pub(crate) fn recording_elapsed_s(scene: &Scene) -> Vec<f64> {
+    let mut elapsed_s = vec![0.0; scene.rows()];
+    for row in 1..scene.rows() {
+        let step_s = scene.time_s()[row] - scene.time_s()[row - 1];
+        let restarts = scene.restarts().binary_search(&row).is_ok();
+        elapsed_s[row] = elapsed_s[row - 1] + if restarts { scene.period_s() } else { step_s.max(0.0) };
+    }
+    elapsed_s
+}
+
+/// Difference of the greatest and the least value.
+pub(crate) fn spread(values: &[f64]) -> f64 {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (high - low).max(0.0)
+}
