@@ -15,10 +15,12 @@ pub mod channel;
 pub mod clock;
 pub mod driver;
 pub mod merge;
+pub mod open;
 pub mod reading;
 pub mod recording;
 pub mod replay;
 pub mod sample;
+pub mod simulated;
 pub mod units;
 pub mod worker;
 

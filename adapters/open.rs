@@ -1,0 +1,208 @@
+//! From an address to something that can be read.
+
+use crate::address::{Address, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
+use crate::clock::TimeNs;
+use crate::driver::{Actuator, Pull, Source};
+use crate::recording::{RecordingError, RowProblem, read_path};
+use crate::replay::{LiveReplay, Replay};
+use crate::simulated::{Simulated, SimulatedSettings};
+use thiserror::Error;
+
+/// Why an address could not be opened.
+#[derive(Debug, Error)]
+pub enum OpenError {
+    /// This build has no driver for the scheme.
+    #[error("{address}: {what} is not built yet; today there are simulated://lathe, simulated://mill and replay:FILE")]
+    NotBuilt {
+        /// The address.
+        address: String,
+        /// What is missing.
+        what: &'static str,
+    },
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The address needs another way of running.
+    #[error("{address}: {what}")]
+    Unsuitable {
+        /// The address.
+        address: String,
+        /// Why, and what to do.
+        what: &'static str,
+    },
+}
+
+/// What an address opens: sources that live by the clock.
+pub struct Opened {
+    /// In the order of precedence.
+    pub sources: Vec<Box<dyn Source>>,
+    /// The way to the feed override, where there is one. Only the gate may hold it.
+    pub actuator: Option<Box<dyn Actuator>>,
+    /// The built-in machine, for serving it and for scoring.
+    pub simulated: Option<Simulated>,
+    /// Refused rows of a recording.
+    pub refused: Refused,
+}
+
+/// What an address opens for a run as fast as possible.
+pub struct OpenedPull {
+    /// In the order of precedence.
+    pub sources: Vec<Box<dyn Pull>>,
+    /// The way to the feed override, where there is one.
+    pub actuator: Option<Box<dyn Actuator>>,
+    /// The built-in machine, for scoring.
+    pub simulated: Option<Simulated>,
+    /// Refused rows of a recording.
+    pub refused: Refused,
+    /// Rows of the recordings, for a progress bar; 0 for the built-in machine, which never ends.
+    pub rows: u64,
+    /// Columns of the recording that are no channel of the gateway.
+    pub ignored: Vec<String>,
+}
+
+/// Rows of a recording that could not be used.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Refused {
+    /// How many.
+    pub rows: u64,
+    /// At most a hundred of them, with line, column and reason.
+    pub problems: Vec<RowProblem>,
+}
+
+/// Opens an address for a live run. `now_ns` is where the built-in machine begins its day. A recording is replayed at
+/// its speed from the first poll on.
+///
+/// # Errors
+/// See [`OpenError`]; a recording at `speed=max` cannot live by a clock.
+pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+    match address.target() {
+        Target::Simulated(target) => Ok(simulated(address, target, now_ns)),
+        Target::Replay(target) => replay(address, target, now_ns),
+        other => Err(not_built(address, other)),
+    }
+}
+
+/// Opens an address for a run as fast as possible, where a recording without dates and the built-in machine begin at
+/// `origin_ns`.
+///
+/// # Errors
+/// See [`OpenError`]; a real device cannot be read faster than it lives.
+pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, OpenError> {
+    match address.target() {
+        Target::Simulated(target) => Ok(simulated_pull(address, target, origin_ns)),
+        Target::Replay(target) => {
+            let (replay, refused) = read(address, target, origin_ns)?;
+            let (rows, ignored) = (u64::try_from(replay.rows()).unwrap_or(u64::MAX), replay.ignored().to_vec());
+            let sources: Vec<Box<dyn Pull>> = vec![Box::new(replay)];
+            Ok(OpenedPull { sources, actuator: None, simulated: None, refused, rows, ignored })
+        }
+        other => Err(not_built(address, other)),
+    }
+}
+
+fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Opened {
+    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), now_ns);
+    let mut sources: Vec<Box<dyn Source>> = Vec::new();
+    if target.device != SimulatedDevice::Meter {
+        sources.push(Box::new(machine.controller()));
+    }
+    if target.device != SimulatedDevice::Controller {
+        sources.push(Box::new(machine.meter()));
+    }
+    let actuator = actuator(&machine, target);
+    Opened { sources, actuator, simulated: Some(machine), refused: Refused::default() }
+}
+
+fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs) -> OpenedPull {
+    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), origin_ns);
+    let mut sources: Vec<Box<dyn Pull>> = Vec::new();
+    if target.device != SimulatedDevice::Meter {
+        sources.push(Box::new(machine.controller()));
+    }
+    if target.device != SimulatedDevice::Controller {
+        sources.push(Box::new(machine.meter()));
+    }
+    OpenedPull {
+        sources,
+        actuator: actuator(&machine, target),
+        simulated: Some(machine),
+        refused: Refused::default(),
+        rows: 0,
+        ignored: Vec::new(),
+    }
+}
+
+fn actuator(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn Actuator>> {
+    (target.device != SimulatedDevice::Meter).then(|| Box::new(machine.feed_override()) as Box<dyn Actuator>)
+}
+
+fn replay(address: &Address, target: &ReplayTarget, now_ns: TimeNs) -> Result<Opened, OpenError> {
+    let Speed::Times(speed) = target.speed else {
+        let what = "speed=max needs the replay command; give a factor here, for example speed=10";
+        return Err(OpenError::Unsuitable { address: address.text().to_owned(), what });
+    };
+    let (replay, refused) = read(address, target, now_ns)?;
+    let sources: Vec<Box<dyn Source>> = vec![Box::new(LiveReplay::new(replay, speed))];
+    Ok(Opened { sources, actuator: None, simulated: None, refused })
+}
+
+fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(Replay, Refused), RecordingError> {
+    let read = read_path(&target.file)?;
+    let replay = Replay::new(address.text(), &read.recording, origin_ns);
+    Ok((replay, Refused { rows: read.refused, problems: read.problems }))
+}
+
+fn not_built(address: &Address, target: &Target) -> OpenError {
+    let what = match target {
+        Target::Simulated(_) | Target::Replay(_) => "this way of running",
+        Target::Fanuc { .. } => "the FANUC driver (FOCAS2)",
+        Target::NcLink { .. } => "the Huazhong driver (NC-Link)",
+        Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",
+        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "the Modbus meter driver",
+        Target::Eda9033a { .. } => "the EDA9033A meter driver",
+        Target::Waveform { .. } => "the waveform receiver",
+    };
+    OpenError::NotBuilt { address: address.text().to_owned(), what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn address(text: &str) -> Address {
+        text.parse().expect("usable")
+    }
+
+    fn file(text: &str) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+        file.write_all(text.as_bytes()).expect("writable");
+        file
+    }
+
+    #[test]
+    fn the_simulated_machine_opens_as_two_sources_and_an_actuator() {
+        let opened = open(&address("simulated://mill?seed=3"), 0).expect("opens");
+        let names: Vec<&str> = opened.sources.iter().map(|source| source.name()).collect();
+        assert_eq!(names, ["simulated://mill?seed=3&device=controller", "simulated://mill?seed=3&device=meter"]);
+        assert!(opened.actuator.is_some() && opened.simulated.is_some());
+        let meter = open_pull(&address("simulated://lathe?device=meter"), 0).expect("opens");
+        assert!(meter.sources.len() == 1 && meter.actuator.is_none());
+    }
+
+    #[test]
+    fn a_recording_opens_with_its_refused_rows() {
+        let file = file("time_s,spindle_speed_rpm,odd_v\n0,1,1\n1,x,1\n2,3,1\n");
+        let address = address(&format!("replay:{}?speed=max", file.path().display()));
+        let opened = open_pull(&address, 0).expect("opens");
+        assert_eq!((opened.rows, opened.refused.rows, opened.ignored), (2, 1, vec!["odd_v".to_owned()]));
+        assert!(open(&address, 0).is_err_and(|error| error.to_string().contains("speed=10")));
+    }
+
+    #[test]
+    fn what_is_not_built_says_so() {
+        let error = open(&address("fanuc://cnc"), 0).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("fanuc://cnc") && error.contains("not built yet"), "{error}");
+        assert!(open_pull(&address("replay:/does/not/exist.csv"), 0).is_err());
+    }
+}

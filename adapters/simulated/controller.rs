@@ -1,0 +1,215 @@
+//! The controller of the simulated machine as a source.
+
+use super::Simulated;
+use super::device::{Device, nanoseconds};
+use super::moment::{Moment, Panel};
+use super::noise::{Purpose, normal};
+use crate::address::SimulatedMachine;
+use crate::channel::ChannelId;
+use crate::clock::{Clock, TimeNs};
+use crate::driver::{Pull, Source, SourceError};
+use crate::reading::{Reading, Stamp};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What the value of a channel is taken from.
+#[derive(Clone, Copy)]
+enum Get {
+    Number(fn(&Moment) -> f64),
+    /// The actual speed, with the unrest of its encoder.
+    Speed,
+    Text(fn(&Panel) -> Word),
+}
+
+/// A word that is made into text only when it changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Word {
+    Plain(&'static str),
+    Numbered(char, u16),
+    Edge(u8, u16),
+}
+
+impl Word {
+    fn text(self) -> Arc<str> {
+        match self {
+            Self::Plain(word) => Arc::from(word),
+            Self::Numbered(letter, number) => Arc::from(format!("{letter}{number}")),
+            Self::Edge(tool, 0) => Arc::from(format!("T{tool}")),
+            Self::Edge(tool, edge) => Arc::from(format!("T{tool}-{}", edge + 1)),
+        }
+    }
+}
+
+type Entry = (&'static str, Get);
+
+const COMMON: [Entry; 24] = [
+    ("spindle_programmed_rpm", Get::Number(|moment| moment.panel.spindle_programmed_rpm)),
+    ("spindle_speed_rpm", Get::Speed),
+    ("feed_programmed_mm_min", Get::Number(|moment| moment.panel.feed_programmed_mm_min.round())),
+    ("feed_mm_min", Get::Number(|moment| tenth(moment.panel.feed_mm_min))),
+    ("feed_override_pct", Get::Number(|moment| f64::from(moment.panel.feed_override_pct))),
+    ("spindle_override_pct", Get::Number(|_| 100.0)),
+    ("spindle_load_pct", Get::Number(|moment| moment.electric.spindle_load_pct.round())),
+    ("motor_temperature_c", Get::Number(|moment| moment.electric.motor_temperature_c.round())),
+    ("x_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[0]))),
+    ("z_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[2]))),
+    ("x_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[0]))),
+    ("z_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[2]))),
+    ("gear_stage", Get::Number(|moment| f64::from(moment.panel.gear_stage))),
+    ("rapid", Get::Number(|moment| f64::from(u8::from(moment.panel.rapid)))),
+    ("coolant_on", Get::Number(|moment| f64::from(u8::from(moment.panel.coolant_on)))),
+    ("hydraulics_on", Get::Number(|moment| f64::from(u8::from(moment.panel.hydraulics_on)))),
+    ("drive_on", Get::Number(|moment| f64::from(u8::from(moment.panel.drives_on)))),
+    ("part_count", Get::Number(|moment| f64::from(moment.panel.part_count))),
+    ("mode", Get::Text(|panel| Word::Plain(panel.mode))),
+    ("execution", Get::Text(|panel| Word::Plain(panel.execution))),
+    ("program", Get::Text(|panel| Word::Numbered('O', panel.program))),
+    ("block", Get::Text(|panel| Word::Numbered('N', panel.block))),
+    ("tool", Get::Text(|panel| Word::Edge(panel.tool, panel.edge))),
+    ("alarm", Get::Text(|panel| Word::Plain(panel.alarm))),
+];
+
+const ANNOTATIONS: [Entry; 3] = [
+    ("operation", Get::Text(|panel| Word::Plain(panel.operation))),
+    ("depth_of_cut_mm", Get::Number(|moment| moment.panel.depth_of_cut_mm)),
+    ("diameter_mm", Get::Number(|moment| tenth(moment.panel.diameter_mm))),
+];
+
+const MILL_POSITION: [Entry; 2] = [
+    ("y_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[1]))),
+    ("y_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[1]))),
+];
+
+const MILL_ANNOTATIONS: [Entry; 2] = [
+    ("width_of_cut_mm", Get::Number(|moment| moment.panel.width_of_cut_mm)),
+    ("teeth", Get::Number(|moment| moment.panel.teeth)),
+];
+
+fn tenth(number: f64) -> f64 {
+    (number * 10.0).round() / 10.0
+}
+
+fn thousandth(number: f64) -> f64 {
+    (number * 1000.0).round() / 1000.0
+}
+
+/// A channel, where its value comes from, and the last text it had.
+struct Output {
+    channel: ChannelId,
+    get: Get,
+    last: Option<(Word, Arc<str>)>,
+}
+
+/// The controller of the simulated machine.
+pub struct SimulatedController {
+    name: String,
+    machine: Simulated,
+    device: Device,
+    channels: Vec<ChannelId>,
+    outputs: Vec<Output>,
+    seed: u64,
+}
+
+impl SimulatedController {
+    pub(super) fn new(name: String, machine: Simulated) -> Self {
+        let settings = *machine.settings();
+        let device = Device::new(settings.controller, settings.seed, machine.origin_ns());
+        let mill = settings.machine == SimulatedMachine::Mill;
+        let mut entries = COMMON.to_vec();
+        let optional: [(bool, &[Entry]); 3] = [
+            (settings.annotations, &ANNOTATIONS),
+            (mill, &MILL_POSITION),
+            (mill && settings.annotations, &MILL_ANNOTATIONS),
+        ];
+        optional.iter().filter(|(wanted, _)| *wanted).for_each(|(_, more)| entries.extend_from_slice(more));
+        let output = |(name, get): Entry| Some(Output { channel: ChannelId::of(name)?, get, last: None });
+        let outputs: Vec<Output> = entries.into_iter().filter_map(output).collect();
+        let channels = outputs.iter().map(|output| output.channel).collect();
+        Self { name, machine, device, channels, outputs, seed: settings.seed }
+    }
+
+    /// What the controller answers to a request of this stamp.
+    fn answer(&mut self, stamp: Stamp, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let beat = self.device.newest_beat(stamp.mid_ns);
+        let moment = self.machine.moment(self.device.beat_ns(beat));
+        if !moment.panel.booted {
+            return Err(SourceError::Off { source_name: self.name.clone() });
+        }
+        let unrest_rpm = 0.6 * normal(self.seed, Purpose::Speed, beat);
+        out.extend(self.outputs.iter_mut().map(|output| output.reading(&moment, unrest_rpm, stamp)));
+        Ok(())
+    }
+}
+
+impl Output {
+    fn reading(&mut self, moment: &Moment, unrest_rpm: f64, stamp: Stamp) -> Reading {
+        match self.get {
+            Get::Number(get) => Reading::number(self.channel, stamp, get(moment)),
+            Get::Speed => Reading::number(self.channel, stamp, encoder(moment.panel.spindle_speed_rpm, unrest_rpm)),
+            Get::Text(get) => Reading::text(self.channel, stamp, self.text(get(&moment.panel))),
+        }
+    }
+
+    fn text(&mut self, word: Word) -> Arc<str> {
+        match &self.last {
+            Some((last, text)) if *last == word => text.clone(),
+            _ => {
+                let text = word.text();
+                self.last = Some((word, text.clone()));
+                text
+            }
+        }
+    }
+}
+
+/// Whole turns per minute; a standing spindle shows exactly zero.
+fn encoder(speed_rpm: f64, unrest_rpm: f64) -> f64 {
+    if speed_rpm == 0.0 { 0.0 } else { (speed_rpm + unrest_rpm).round() }
+}
+
+impl Source for SimulatedController {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        self.device.period()
+    }
+
+    fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let began_ns = clock.now_ns();
+        clock.sleep_until(began_ns + self.device.round_trip_ns());
+        let stamp = Stamp::of_request(began_ns, clock.now_ns());
+        self.device.polled(clock.now_ns());
+        self.answer(stamp, out)
+    }
+}
+
+impl Pull for SimulatedController {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        self.device.period()
+    }
+
+    fn next_ns(&self) -> Option<TimeNs> {
+        Some(self.device.next_begin_ns() + self.device.round_trip_ns())
+    }
+
+    fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let began_ns = self.device.next_begin_ns();
+        let stamp = Stamp::of_request(began_ns, began_ns + self.device.round_trip_ns());
+        self.device.polled(began_ns + nanoseconds(self.device.period()));
+        self.answer(stamp, out)
+    }
+}

@@ -1,0 +1,308 @@
+//! The simulated machine as a whole: one step after the other from its origin, whatever is asked of it and when.
+
+use super::cutting::{self, Circumstances, Load};
+use super::frame::Frame;
+use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
+use super::plant::{Plant, Spin};
+use super::program::{Control, Cut, Motion, Planner};
+use super::settings::SimulatedSettings;
+use crate::address::SimulatedMachine;
+use crate::clock::{SECOND_NS, TimeNs};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+/// One step of the physics.
+const STEP_NS: i64 = 5_000_000;
+const STEP_S: f64 = 0.005;
+
+/// Heat and supply move on every so many steps.
+const DRIFT_STEPS: i64 = 20;
+
+/// So many steps are remembered: four seconds.
+const REMEMBERED: usize = 800;
+
+/// At most so many overrides wait for their time.
+const OVERRIDES_MAX: usize = 1024;
+
+pub(super) struct Machine {
+    settings: SimulatedSettings,
+    frame: &'static Frame,
+    origin_ns: TimeNs,
+    /// Steps made so far; the newest moment is that of step `steps - 1`.
+    steps: i64,
+    remembered: VecDeque<Moment>,
+    plant: Plant,
+    control: Control,
+    overrides: VecDeque<(TimeNs, u8)>,
+    override_pct: u8,
+    cut: Cut,
+    diameter_mm: f64,
+    engaged: f64,
+    load: Load,
+    spindle_w: f64,
+    total_w: f64,
+    current_a: f64,
+    integrals: Integrals,
+}
+
+impl Machine {
+    pub(super) fn new(settings: SimulatedSettings, origin_ns: TimeNs) -> Self {
+        let frame = Frame::of(settings.machine);
+        let rng = |stream: u64| Pcg64Mcg::seed_from_u64(settings.seed.wrapping_mul(31).wrapping_add(stream));
+        let planner = Planner::new(settings, rng(1));
+        let lathe = settings.machine == SimulatedMachine::Lathe;
+        let mut machine = Self {
+            settings,
+            frame,
+            origin_ns,
+            steps: 0,
+            remembered: VecDeque::with_capacity(REMEMBERED),
+            plant: Plant::new(frame, settings.tau_s, settings.start_peak_w, rng(2)),
+            control: Control::new(planner, rng(3), lathe, frame.rapid_mm_min),
+            overrides: VecDeque::new(),
+            override_pct: 100,
+            cut: Cut::default(),
+            diameter_mm: 0.0,
+            engaged: 0.0,
+            load: Load::default(),
+            spindle_w: 0.0,
+            total_w: 0.0,
+            current_a: 0.0,
+            integrals: Integrals::default(),
+        };
+        machine.step();
+        machine
+    }
+
+    /// The override register gets this value at `at_ns`, or at once when the machine is already further.
+    pub(super) fn write_override(&mut self, at_ns: TimeNs, percent: u8) {
+        if self.overrides.len() < OVERRIDES_MAX {
+            self.overrides.push_back((at_ns, percent));
+        }
+    }
+
+    /// The override register as it will be when everything written has taken effect.
+    pub(super) fn written_override(&self) -> u8 {
+        self.overrides.back().map_or(self.override_pct, |(_, percent)| *percent)
+    }
+
+    fn time_of(&self, step: i64) -> TimeNs {
+        self.origin_ns + step * STEP_NS
+    }
+
+    /// Makes every step up to and including the one after `at_ns`.
+    fn advance_beyond(&mut self, at_ns: TimeNs) {
+        while self.time_of(self.steps - 1) <= at_ns {
+            self.step();
+        }
+    }
+
+    /// The machine at `at_ns`. Before its origin it is as at its origin; more than four seconds before the furthest
+    /// time ever asked for it is as then.
+    pub(super) fn at(&mut self, at_ns: TimeNs) -> Moment {
+        self.advance_beyond(at_ns);
+        let step = (at_ns - self.origin_ns).max(0) / STEP_NS;
+        self.remembered_step(step)
+    }
+
+    fn remembered_step(&self, step: i64) -> Moment {
+        let first = self.steps - i64::try_from(self.remembered.len()).unwrap_or(0);
+        let index = usize::try_from(step - first).unwrap_or(0).min(self.remembered.len() - 1);
+        self.remembered[index]
+    }
+
+    /// The running integrals at exactly `at_ns`.
+    pub(super) fn integrals_at(&mut self, at_ns: TimeNs) -> Integrals {
+        self.advance_beyond(at_ns);
+        let since_ns = (at_ns - self.origin_ns).max(0);
+        let (step, rest_ns) = (since_ns / STEP_NS, since_ns % STEP_NS);
+        let (a, b) = (self.remembered_step(step).integrals, self.remembered_step(step + 1).integrals);
+        let share = f64::from(i32::try_from(rest_ns).unwrap_or(0)) / (STEP_S * 1e9);
+        let mix = |a: f64, b: f64| a + (b - a) * share;
+        Integrals {
+            spindle_j: mix(a.spindle_j, b.spindle_j),
+            total_j: mix(a.total_j, b.total_j),
+            current_squared_a2s: mix(a.current_squared_a2s, b.current_squared_a2s),
+            mains_rad: mix(a.mains_rad, b.mains_rad),
+        }
+    }
+
+    fn step(&mut self) {
+        let at_ns = self.time_of(self.steps);
+        while self.overrides.front().is_some_and(|(due_ns, _)| *due_ns <= at_ns) {
+            self.override_pct = self.overrides.pop_front().map_or(100, |(_, percent)| percent);
+        }
+        let since_s = seconds(at_ns - self.origin_ns);
+        self.control.step(&self.plant, self.override_pct, since_s, STEP_S);
+        self.plant.spin(&self.control.demand, STEP_S);
+        self.engage();
+        self.power(since_s);
+        if self.steps % DRIFT_STEPS == 0 {
+            let dt_s = STEP_S * 20.0;
+            self.plant.drift(dt_s, since_s, self.spindle_w, self.total_w, self.load.load_loss_w);
+        }
+        self.remember(at_ns);
+        self.steps += 1;
+    }
+
+    /// The tool enters and leaves the work within about a turn of the spindle.
+    fn engage(&mut self) {
+        let contact = self.control.contact();
+        if let Some((cut, share)) = contact {
+            self.cut = cut;
+            self.diameter_mm = cut.diameter_from_mm + (cut.diameter_to_mm - cut.diameter_from_mm) * share;
+        }
+        let turn_s = 60.0 / self.plant.speed_rpm.abs().max(30.0);
+        let towards = if contact.is_some() { 1.0 } else { 0.0 };
+        self.engaged += (towards - self.engaged) * (1.0 - (-STEP_S / (0.4 * turn_s)).exp());
+        if towards == 0.0 && self.engaged < 0.01 {
+            self.engaged = 0.0;
+        }
+        let now = self.circumstances();
+        let stage = self.frame.stage(self.control.demand.gear_stage);
+        self.load = cutting::load(self.frame, stage, &self.cut, &now, self.settings.cut);
+        let lathe = self.settings.machine == SimulatedMachine::Lathe;
+        let tool = self.control.tool_index();
+        self.control.wear_mm[tool] += STEP_S * cutting::wear_rate_mm_s(lathe, &now);
+    }
+
+    fn circumstances(&self) -> Circumstances {
+        Circumstances {
+            speed_rad_s: self.plant.speed_rpm.abs() * TAU / 60.0,
+            feed_mm_min: if self.control.holding { 0.0 } else { self.cutting_feed() },
+            diameter_mm: self.diameter_mm,
+            engaged: self.engaged,
+            wear_mm: self.control.wear_mm[self.control.tool_index()],
+            hardness: self.control.hardness * (1.0 + 0.02 * self.plant.cut_unrest),
+            no_load_w: self.plant.no_load_w,
+        }
+    }
+
+    fn cutting_feed(&self) -> f64 {
+        if matches!(self.control.motion, Motion::Feed { .. }) { self.control.feed_mm_min } else { 0.0 }
+    }
+
+    fn power(&mut self, since_s: f64) {
+        let demand = self.control.demand;
+        let running = demand.powered && demand.drives_on;
+        let spindle_w =
+            self.plant.no_load_w + self.plant.transient_w() + self.load.cutting_power_w + self.load.load_loss_w;
+        self.spindle_w = if running { spindle_w } else { 0.0 };
+        self.total_w = self.plant.auxiliary_w(&demand, since_s) + self.spindle_w;
+        self.current_a = self.plant.current_a(self.spindle_w, running);
+        self.integrals.spindle_j += self.spindle_w * STEP_S;
+        self.integrals.total_j += self.total_w * STEP_S;
+        self.integrals.current_squared_a2s += self.current_a * self.current_a * STEP_S;
+        self.integrals.mains_rad += TAU * self.plant.mains_hz * STEP_S;
+    }
+
+    fn remember(&mut self, at_ns: TimeNs) {
+        if self.remembered.len() >= REMEMBERED {
+            self.remembered.pop_front();
+        }
+        let moment = Moment {
+            panel: self.panel(),
+            electric: self.electric(),
+            truth: self.truth(at_ns),
+            integrals: self.integrals,
+        };
+        self.remembered.push_back(moment);
+    }
+
+    fn state(&self) -> TrueState {
+        match self.plant.spin {
+            _ if !self.control.demand.powered => TrueState::Off,
+            _ if self.load.cutting_power_w > 0.0 && self.engaged > 0.1 => TrueState::Cutting,
+            Spin::Still => TrueState::Standby,
+            Spin::Starting => TrueState::SpindleStart,
+            Spin::Changing => TrueState::SpeedChange,
+            Spin::Steady if self.control.motion == Motion::Rapid => TrueState::Rapid,
+            Spin::Steady => TrueState::Idle,
+        }
+    }
+
+    fn truth(&self, at_ns: TimeNs) -> Truth {
+        Truth {
+            at_ns,
+            state: self.state(),
+            spindle_speed_rpm: self.plant.speed_rpm,
+            spindle_power_w: self.spindle_w,
+            total_power_w: self.total_w,
+            no_load_power_w: self.plant.no_load_w,
+            cutting_power_w: self.load.cutting_power_w,
+            load_loss_w: self.load.load_loss_w,
+            transient_power_w: self.plant.transient_w(),
+            engaged: self.engaged,
+            flank_wear_mm: self.control.wear_mm[self.control.tool_index()],
+            cutting_force_n: self.load.force_n,
+            thermal_error_um: self.plant.thermal_error_um(),
+            hardness: self.control.hardness,
+        }
+    }
+
+    fn electric(&self) -> Electric {
+        Electric {
+            supply_voltage_v: self.plant.supply_v,
+            spindle_current_a: self.current_a,
+            bearing_temperature_c: self.plant.bearing_c,
+            motor_temperature_c: self.plant.motor_c,
+            ambient_temperature_c: self.plant.ambient_c,
+            spindle_load_pct: self.plant.load_display_pct(),
+        }
+    }
+
+    fn panel(&self) -> Panel {
+        let control = &self.control;
+        let block = control.block.as_ref();
+        let (cut, locked, programmed) = match control.motion {
+            Motion::Feed { cut, locked, programmed_mm_min } => (cut, locked, programmed_mm_min),
+            Motion::Rapid | Motion::None => (None, false, 0.0),
+        };
+        let execution = if control.holding { "FEED_HOLD" } else { block.map_or("READY", |block| block.execution) };
+        Panel {
+            booted: control.booted(),
+            drives_on: control.demand.drives_on,
+            mode: block.map_or("MANUAL", |block| block.mode),
+            execution,
+            program: block.map_or(0, |block| block.program),
+            block: block.map_or(0, |block| block.number),
+            operation: block.map_or("", |block| block.operation),
+            tool: control.tool,
+            edge: control.edges[control.tool_index()],
+            part_count: control.part_count,
+            alarm: control.alarm,
+            spindle_programmed_rpm: control.demand.spindle_rpm,
+            spindle_speed_rpm: self.plant.speed_rpm,
+            feed_programmed_mm_min: programmed,
+            feed_mm_min: control.feed_mm_min,
+            feed_override_pct: self.override_pct,
+            rapid: control.motion == Motion::Rapid,
+            override_locked: locked,
+            gear_stage: control.demand.gear_stage,
+            coolant_on: control.demand.coolant_on,
+            hydraulics_on: control.demand.hydraulics_on,
+            position_mm: control.position_mm,
+            velocity_mm_min: control.velocity_mm_min,
+            depth_of_cut_mm: cut.map_or(0.0, |cut| cut.depth_mm),
+            width_of_cut_mm: cut.map_or(0.0, |cut| cut.width_mm),
+            diameter_mm: self.planned_diameter(cut),
+            teeth: cut.map_or(0.0, |cut| cut.teeth),
+        }
+    }
+
+    /// What the program says, which follows the tool also before it meets the work.
+    fn planned_diameter(&self, cut: Option<Cut>) -> f64 {
+        match cut {
+            Some(_) if self.engaged > 0.0 => self.diameter_mm,
+            Some(cut) => cut.diameter_from_mm,
+            None => self.diameter_mm,
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a double counts nanoseconds exactly for 104 days")]
+fn seconds(ns: i64) -> f64 {
+    ns as f64 / SECOND_NS as f64
+}

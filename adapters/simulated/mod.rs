@@ -1,0 +1,118 @@
+//! The built-in machine: one physical model behind a controller and a meter that are two sources with their own clocks.
+//!
+//! The model has its own forms of the laws; an estimator that finds them has found them. A part programme runs for
+//! hours: power-up, standby, warm-up, facing, roughing and finishing of two diameters, tool changes, wear, thermal
+//! growth, pauses, small trouble, the night. The machine obeys the feed override except in threading and tapping.
+//!
+//! Everything is a function of the seed, the time and the overrides written: asking more often, or not at all for a
+//! while, changes nothing. The same machine runs against the clock ([`Source`](crate::Source)) or as fast as possible
+//! ([`Pull`](crate::Pull)).
+//!
+//! [`Simulated::truth`] is for scoring an estimate, never for making one.
+
+mod actuator;
+mod controller;
+mod cutting;
+mod device;
+mod frame;
+mod machine;
+mod meter;
+mod moment;
+mod noise;
+mod plant;
+mod program;
+mod settings;
+
+#[cfg(test)]
+mod tests;
+
+pub use actuator::SimulatedOverride;
+pub use controller::SimulatedController;
+pub use meter::{MeterValues, SimulatedMeter};
+pub use moment::{Electric, Moment, Panel, TrueState, Truth};
+pub use settings::{CutLevel, DaySettings, DeviceSettings, MeterSettings, SimulatedSettings};
+
+use crate::clock::TimeNs;
+use machine::Machine;
+use moment::Integrals;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A handle on the simulated machine; clones are handles on the same machine.
+#[derive(Clone)]
+pub struct Simulated {
+    name: Arc<str>,
+    settings: SimulatedSettings,
+    origin_ns: TimeNs,
+    machine: Arc<Mutex<Machine>>,
+}
+
+impl Simulated {
+    /// A machine whose day begins at `origin_ns`. `name` is the address.
+    #[must_use]
+    pub fn new(name: &str, settings: SimulatedSettings, origin_ns: TimeNs) -> Self {
+        let machine = Arc::new(Mutex::new(Machine::new(settings, origin_ns)));
+        Self { name: Arc::from(name), settings, origin_ns, machine }
+    }
+
+    /// How it was set up.
+    #[must_use]
+    pub fn settings(&self) -> &SimulatedSettings {
+        &self.settings
+    }
+
+    /// When its day began.
+    #[must_use]
+    pub fn origin_ns(&self) -> TimeNs {
+        self.origin_ns
+    }
+
+    /// Its controller as a source.
+    #[must_use]
+    pub fn controller(&self) -> SimulatedController {
+        SimulatedController::new(self.device_name("controller"), self.clone())
+    }
+
+    /// Its meter as a source.
+    #[must_use]
+    pub fn meter(&self) -> SimulatedMeter {
+        SimulatedMeter::new(self.device_name("meter"), self.clone())
+    }
+
+    /// The way to its feed override.
+    #[must_use]
+    pub fn feed_override(&self) -> SimulatedOverride {
+        SimulatedOverride::new(self.device_name("controller"), self.clone())
+    }
+
+    /// The machine at `at_ns`, for a partner that serves it over a real protocol. The last four seconds before the
+    /// furthest time asked for are remembered exactly.
+    #[must_use]
+    pub fn moment(&self, at_ns: TimeNs) -> Moment {
+        self.locked().at(at_ns)
+    }
+
+    /// What is true at `at_ns`: only for scoring.
+    #[must_use]
+    pub fn truth(&self, at_ns: TimeNs) -> Truth {
+        self.moment(at_ns).truth
+    }
+
+    /// The running integrals at two times, and the machine at the second one.
+    fn between(&self, from_ns: TimeNs, to_ns: TimeNs) -> (Integrals, Integrals, Moment) {
+        let mut machine = self.locked();
+        // The later one first would lose nothing: it is within the four seconds that are remembered.
+        (machine.integrals_at(from_ns), machine.integrals_at(to_ns), machine.at(to_ns))
+    }
+
+    fn locked(&self) -> MutexGuard<'_, Machine> {
+        self.machine.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn device_name(&self, device: &str) -> String {
+        let joint = if self.name.contains('?') { '&' } else { '?' };
+        if self.name.contains("device=") {
+            return self.name.to_string();
+        }
+        format!("{}{joint}device={device}", self.name)
+    }
+}

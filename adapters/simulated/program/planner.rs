@@ -1,0 +1,138 @@
+//! What the day holds: power-up, warm-up, parts in lots, pauses, small trouble, worn edges, the night.
+
+use super::super::settings::SimulatedSettings;
+use super::{Action, Block, Writer, lathe, mill};
+use crate::address::SimulatedMachine;
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+use std::collections::VecDeque;
+
+/// An edge with more wear than this is changed before the next part.
+const WORN_MM: f64 = 0.30;
+
+/// Writes the next piece of the day whenever the control has nothing left to do.
+pub(in super::super) struct Planner {
+    settings: SimulatedSettings,
+    rng: Pcg64Mcg,
+    parts: u32,
+    day: u32,
+    up_since_s: Option<f64>,
+    lunch_taken: bool,
+}
+
+impl Planner {
+    pub(in super::super) fn new(settings: SimulatedSettings, rng: Pcg64Mcg) -> Self {
+        Self { settings, rng, parts: 0, day: 0, up_since_s: None, lunch_taken: false }
+    }
+
+    /// Appends the next piece of the day. `wear_mm` is that of the worst edge, with its tool.
+    pub(in super::super) fn refill(&mut self, blocks: &mut VecDeque<Block>, since_s: f64, worst: Option<(u8, f64)>) {
+        let mut out = Writer::new(blocks, 0);
+        let Some(up_since_s) = self.up_since_s else {
+            self.up_since_s = Some(since_s);
+            self.morning(&mut out);
+            return;
+        };
+        let worked_s = since_s - up_since_s;
+        if worked_s > self.settings.day.shift_s {
+            return self.night(&mut out);
+        }
+        if worked_s > self.settings.day.shift_s / 2.0 && !self.lunch_taken {
+            self.lunch_taken = true;
+            return pause(&mut out, self.settings.day.lunch_s);
+        }
+        if let Some((tool, _)) = worst.filter(|(_, wear_mm)| *wear_mm > WORN_MM) {
+            return self.new_edge(&mut out, tool);
+        }
+        if self.parts > 0 && self.parts.is_multiple_of(self.settings.day.parts_per_pause) {
+            pause(&mut out, self.settings.day.pause_s);
+        }
+        self.part(&mut out);
+    }
+
+    fn morning(&mut self, out: &mut Writer<'_>) {
+        let first = self.day == 0;
+        self.day += 1;
+        self.lunch_taken = false;
+        (out.mode, out.execution) = ("MANUAL", "READY");
+        out.put(Action::Wait(if first { 8.0 } else { 0.5 })).put(Action::Mains(true));
+        out.put(Action::Wait(if first { 26.0 } else { 90.0 }));
+        out.put(Action::Hydraulics(true)).put(Action::Drives(true)).put(Action::Wait(4.0));
+        out.put(Action::Rapid([200.0, 0.0, 160.0]));
+        (out.mode, out.execution, out.program) = ("AUTOMATIC", "ACTIVE", 9000);
+        out.operation = "warm-up";
+        self.warm_up(out, if first { 11.0 } else { 150.0 });
+        out.operation = "";
+        out.put(Action::Stop);
+        out.aside("AUTOMATIC", "PROGRAM_COMPLETED", Action::Wait(6.0));
+    }
+
+    fn warm_up(&self, out: &mut Writer<'_>, dwell_s: f64) {
+        let lathe = self.settings.machine == SimulatedMachine::Lathe;
+        let speeds: &[(f64, u8)] = if lathe {
+            &[(300.0, 1), (600.0, 1), (900.0, 1), (1200.0, 2), (1600.0, 2)]
+        } else {
+            &[(500.0, 1), (1200.0, 1), (2500.0, 1), (4000.0, 1), (6000.0, 1)]
+        };
+        let mut last = speeds[0].1;
+        for &(speed_rpm, stage) in speeds {
+            if stage != last {
+                out.put(Action::Stop);
+            }
+            last = stage;
+            out.put(Action::Spindle(speed_rpm, stage)).put(Action::Wait(dwell_s));
+        }
+    }
+
+    /// Unloading and loading, then the program, sometimes with trouble.
+    fn part(&mut self, out: &mut Writer<'_>) {
+        let lot = self.parts / self.settings.day.parts_per_lot.max(1);
+        if self.parts.is_multiple_of(self.settings.day.parts_per_lot.max(1)) {
+            let hardness = if lot == 0 { 1.0 } else { self.rng.random_range(0.93..1.08) };
+            out.put(Action::Hardness(hardness));
+        }
+        let load_s = self.rng.random_range(9.0..18.0);
+        out.aside("AUTOMATIC", "PROGRAM_COMPLETED", Action::Wait(load_s));
+        if self.parts > 2 && self.rng.random_bool(0.05) {
+            alarm(out);
+        }
+        let rng = &mut self.rng;
+        let changes = self.settings.speed_changes;
+        let mut vary = || if changes { rng.random_range(0.8..1.2) } else { 1.0 };
+        let lot = usize::try_from(lot).unwrap_or(0);
+        match self.settings.machine {
+            SimulatedMachine::Lathe => lathe::part(out, lot, &mut vary),
+            SimulatedMachine::Mill => mill::part(out, lot, &mut vary),
+        }
+        out.put(Action::PartDone);
+        self.parts += 1;
+    }
+
+    fn new_edge(&mut self, out: &mut Writer<'_>, tool: u8) {
+        let fetch_s = self.rng.random_range(60.0..120.0);
+        (out.mode, out.execution) = ("MANUAL", "READY");
+        out.put(Action::ToolChange(tool)).put(Action::Wait(fetch_s)).put(Action::NewEdge);
+    }
+
+    fn night(&mut self, out: &mut Writer<'_>) {
+        self.up_since_s = None;
+        (out.mode, out.execution) = ("MANUAL_DATA_INPUT", "ACTIVE");
+        // Chips are spun off and the coolant is drained.
+        out.put(Action::Spindle(500.0, 1)).put(Action::Wait(20.0)).put(Action::Stop);
+        (out.mode, out.execution) = ("MANUAL", "READY");
+        out.put(Action::Wait(120.0)).put(Action::Drives(false)).put(Action::Hydraulics(false));
+        out.put(Action::Wait(15.0)).put(Action::Mains(false)).put(Action::Wait(self.settings.day.night_s));
+    }
+}
+
+fn pause(out: &mut Writer<'_>, seconds: f64) {
+    out.aside("AUTOMATIC", "READY", Action::Hydraulics(false));
+    out.aside("AUTOMATIC", "READY", Action::Wait(seconds));
+    out.aside("AUTOMATIC", "READY", Action::Hydraulics(true));
+}
+
+fn alarm(out: &mut Writer<'_>) {
+    out.aside("AUTOMATIC", "STOPPED", Action::Alarm("1005 CHUCK PRESSURE LOW"));
+    out.aside("AUTOMATIC", "STOPPED", Action::Wait(25.0));
+    out.aside("AUTOMATIC", "READY", Action::Alarm(""));
+}

@@ -1,0 +1,184 @@
+//! How the simulated machine and its two devices are set up.
+
+use crate::address::{SimulatedMachine, SimulatedTarget};
+use std::time::Duration;
+
+/// How heavy the cuts are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CutLevel {
+    /// The planned cutting forces times this factor; 1 is the plan.
+    Planned(f64),
+    /// Every cut adds this share of the no-load power of the moment (cutting power and load loss together); 0.05 is a
+    /// light cut. For scoring.
+    OfNoLoad(f64),
+}
+
+/// A device's own clock, and how it answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceSettings {
+    /// Pace at which it is polled.
+    pub period: Duration,
+    /// Its values are refreshed this often, on its own clock. For the meter this is the averaging window.
+    pub refresh: Duration,
+    /// Age of a value at the moment it is published inside the device.
+    pub latency: Duration,
+    /// Shortest duration of a request.
+    pub round_trip: Duration,
+    /// Typical excess of a request over the shortest one; one in a hundred takes five times this.
+    pub jitter: Duration,
+    /// Its clock minus the gateway's at the start, s.
+    pub clock_offset_s: f64,
+    /// Its clock runs fast by so many parts per million.
+    pub clock_drift_ppm: f64,
+}
+
+/// What the meter adds to the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeterSettings {
+    /// Clock, window and line.
+    pub device: DeviceSettings,
+    /// Noise, standard deviation as a share of the reading.
+    pub noise_share: f64,
+    /// Noise floor, standard deviation, W.
+    pub noise_floor_w: f64,
+    /// Amplitude of the ripple at twice the mains frequency before averaging, share of the reading.
+    pub ripple_share: f64,
+    /// Probability of a pulse in a window.
+    pub pulse_probability: f64,
+    /// Largest pulse, W; either sign.
+    pub pulse_w: f64,
+    /// Amplitude of the slow drift of the zero point, W.
+    pub zero_drift_w: f64,
+    /// Stretches without an answer, per hour.
+    pub dropouts_per_h: f64,
+    /// Longest such stretch, s; the shortest is a twentieth.
+    pub dropout_s: f64,
+}
+
+/// The working day.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DaySettings {
+    /// From power-up to the end of work, s.
+    pub shift_s: f64,
+    /// Pause after half of the shift, s.
+    pub lunch_s: f64,
+    /// From the end of work to the next power-up, s.
+    pub night_s: f64,
+    /// Parts between two short pauses.
+    pub parts_per_pause: u32,
+    /// Length of a short pause, s.
+    pub pause_s: f64,
+    /// Parts of one program and lot.
+    pub parts_per_lot: u32,
+}
+
+/// The simulated machine with its controller and meter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimulatedSettings {
+    /// Lathe or mill.
+    pub machine: SimulatedMachine,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Time constant with which the power settles after a spindle start, s.
+    pub tau_s: f64,
+    /// Peak above the no-load power at the start of the spindle, W.
+    pub start_peak_w: f64,
+    /// How heavy the cuts are.
+    pub cut: CutLevel,
+    /// Change the spindle speed between passes of one operation.
+    pub speed_changes: bool,
+    /// Does the controller deliver what the program is annotated with?
+    pub annotations: bool,
+    /// The controller's clock and line.
+    pub controller: DeviceSettings,
+    /// The meter.
+    pub meter: MeterSettings,
+    /// The working day.
+    pub day: DaySettings,
+}
+
+impl Default for SimulatedSettings {
+    fn default() -> Self {
+        Self {
+            machine: SimulatedMachine::Lathe,
+            seed: 1,
+            tau_s: 0.6,
+            start_peak_w: 3000.0,
+            cut: CutLevel::Planned(1.0),
+            speed_changes: false,
+            annotations: true,
+            controller: DeviceSettings {
+                period: Duration::from_millis(100),
+                refresh: Duration::from_millis(8),
+                latency: Duration::from_millis(12),
+                round_trip: Duration::from_millis(6),
+                jitter: Duration::from_millis(4),
+                clock_offset_s: 1.7,
+                clock_drift_ppm: -11.0,
+            },
+            meter: MeterSettings::default(),
+            day: DaySettings {
+                shift_s: 8.0 * 3600.0,
+                lunch_s: 1800.0,
+                night_s: 15.0 * 3600.0,
+                parts_per_pause: 10,
+                pause_s: 240.0,
+                parts_per_lot: 8,
+            },
+        }
+    }
+}
+
+impl Default for MeterSettings {
+    fn default() -> Self {
+        Self {
+            device: DeviceSettings {
+                period: Duration::from_millis(100),
+                refresh: Duration::from_millis(64),
+                latency: Duration::from_millis(30),
+                round_trip: Duration::from_millis(11),
+                jitter: Duration::from_millis(6),
+                clock_offset_s: -42.0,
+                clock_drift_ppm: 37.0,
+            },
+            noise_share: 0.01,
+            noise_floor_w: 1.5,
+            ripple_share: 0.25,
+            pulse_probability: 0.002,
+            pulse_w: 2500.0,
+            zero_drift_w: 4.0,
+            dropouts_per_h: 1.0,
+            dropout_s: 4.0,
+        }
+    }
+}
+
+impl SimulatedSettings {
+    /// The settings an address asks for.
+    #[must_use]
+    pub fn of(target: &SimulatedTarget) -> Self {
+        let base = Self::default();
+        let noise_share = target.noise_pct / 100.0;
+        Self {
+            machine: target.machine,
+            seed: target.seed,
+            tau_s: target.tau_s,
+            cut: CutLevel::Planned(target.cut_pct / 100.0),
+            annotations: target.annotations,
+            meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
+            ..base
+        }
+    }
+
+    /// A meter without noise, ripple, pulses, drift and dropouts.
+    #[must_use]
+    pub fn with_ideal_meter(mut self) -> Self {
+        self.meter.noise_share = 0.0;
+        self.meter.noise_floor_w = 0.0;
+        self.meter.ripple_share = 0.0;
+        self.meter.pulse_probability = 0.0;
+        self.meter.zero_drift_w = 0.0;
+        self.meter.dropouts_per_h = 0.0;
+        self
+    }
+}
