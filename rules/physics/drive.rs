@@ -47,9 +47,10 @@ pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
     Some(krpm.iter().zip(speed).map(law).collect())
 }
 
-/// Does the output change its sign with the direction of motion? A true rms current does not.
+/// Does the output change its sign with the direction of motion? A true rms current of the spindle does not.
 pub(crate) fn is_signed(scene: &Scene) -> bool {
-    scene.recorded().iter().zip(scene.usable()).any(|(value, usable)| *usable && *value < 0.0)
+    !scene.output().contains("spindle")
+        || scene.recorded().iter().zip(scene.usable()).any(|(value, usable)| *usable && *value < 0.0)
 }
 
 fn side(motion: f64, signed: bool) -> f64 {
@@ -67,12 +68,18 @@ pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
     if is_displacement(scene) {
         return None;
     }
-    let of_spindle = scene.output().contains("spindle");
-    let role = if of_spindle || scene.role(Role::Velocity).is_none() { Role::Speed } else { Role::Velocity };
-    in_si(scene, scene.role_name(role)?)
+    let role = if turns(scene) { Role::Speed } else { Role::Velocity };
+    let motion = in_si(scene, scene.role_name(role)?)?;
+    let unsigned = scene.output_kind() == OutputKind::Force && !is_signed(scene);
+    Some(if unsigned { motion.iter().map(|v| v.abs()).collect() } else { motion })
 }
 
 /// Does the drive of the output turn (rad/s) rather than slide (m/s)?
+pub(crate) fn turns(scene: &Scene) -> bool {
+    scene.output().contains("spindle") || scene.role(Role::Velocity).is_none()
+}
+
+/// A quantity in m, m/s, m/s2 or rad/s, by the unit at the end of its name.
 pub(crate) fn in_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
     let scale = match column {
         name if name.ends_with("_mm_min") => 1.0 / 60_000.0,

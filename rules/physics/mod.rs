@@ -8,11 +8,14 @@ pub mod catalogue;
 mod cut;
 mod drive;
 mod excitation;
+pub mod explain;
 mod scene;
 pub mod state;
+mod unit;
 
 pub use catalogue::{CATALOGUE, effect};
 pub use scene::{OutputKind, Role, Scene, SceneError};
+pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +31,8 @@ pub enum Entry {
 pub struct ParameterDoc {
     /// Name in model files and reports.
     pub name: &'static str,
-    /// Unit; `output` stands for the unit of the simulated output.
+    /// Unit; `output` stands for the unit of the simulated output, `velocity` for m/s or, of a spindle, rad/s.
+    /// [`unit_in`] replaces them.
     pub unit: &'static str,
     /// Proportional or shaping.
     pub entry: Entry,

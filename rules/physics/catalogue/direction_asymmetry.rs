@@ -23,7 +23,7 @@ static DOC: EffectDoc = EffectDoc {
         },
         ParameterDoc {
             name: "slope",
-            unit: "output/(m/s)",
+            unit: "output/velocity",
             entry: Entry::Linear,
             range: (f64::NEG_INFINITY, f64::INFINITY),
             en: "half the difference per speed; of a spindle per rad/s",

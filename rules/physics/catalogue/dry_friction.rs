@@ -1,6 +1,8 @@
 //! Coulomb friction: a level with the sign of motion in a force, proportional to speed in a power.
 
-use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
+use crate::physics::excitation::greatest;
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
 #[derive(Debug, Clone, Copy)]
@@ -9,15 +11,15 @@ pub struct DryFriction;
 static DOC: EffectDoc = EffectDoc {
     kind: "dry_friction",
     family: "axis",
-    law: "F = level * tanh(v / v0); in a power: P = level * |v| / vmax",
+    law: "F = level * tanh(v / v0); in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
     parameters: &[
         ParameterDoc {
             name: "level",
             unit: "output",
             entry: Entry::Linear,
             range: (0.0, f64::INFINITY),
-            en: "friction level",
-            zh: "摩擦力大小",
+            en: "friction level; in a power its loss at 1 m/s or 1000 rpm",
+            zh: "摩擦力大小；功率输出时为1 m/s或1000 rpm下的损耗",
         },
         ParameterDoc {
             name: "reversal_share",
@@ -54,7 +56,7 @@ impl Effect for DryFriction {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(velocity) = moving(scene) else { return Vec::new() };
+        let Some(velocity) = motion(scene) else { return Vec::new() };
         if velocity.iter().all(|v| *v == 0.0) {
             return Vec::new();
         }
@@ -65,18 +67,14 @@ impl Effect for DryFriction {
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let velocity = moving(scene)?;
-        let top = velocity.iter().fold(0.0_f64, |top, v| top.max(v.abs()));
+        let velocity = motion(scene)?;
+        let top = greatest(&velocity);
+        let reference = if turns(scene) { 1000.0 * RAD_PER_S_OF_RPM } else { 1.0 };
         let share = form.value("reversal_share").unwrap_or(0.01);
         let law = |v: &f64| match scene.output_kind() {
-            OutputKind::Power => v.abs() / top.max(f64::MIN_POSITIVE),
-            _ => (v / (share * top).max(f64::MIN_POSITIVE)).tanh(),
+            OutputKind::Power => v.abs() / reference,
+            _ => soft_sign(*v, share * top),
         };
         Some(vec![("level", velocity.iter().map(law).collect())])
     }
-}
-
-/// Velocity of the axis, or else speed of the spindle.
-fn moving(scene: &Scene) -> Option<&[f64]> {
-    scene.role(Role::Velocity).or_else(|| scene.role(Role::Speed))
 }

@@ -38,7 +38,7 @@ static DOC: EffectDoc = EffectDoc {
             zh: "切入切出持续时间",
         },
     ],
-    needs: &["load", "engaged"],
+    needs: &["engaged"],
     source: "the engagement ramps over (ap / tan kappa) / (f n); first and last 1-3 s of a pass",
     experiment_minutes: 2.0,
     rivals: &["clock_lag", "engagement_timing", "meter_window", "depth_taper"],

@@ -1,5 +1,6 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
+use crate::physics::drive::is_displacement;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Friction between a worn flank and the work.
@@ -54,7 +55,7 @@ impl Effect for FlankWear {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if scene.role(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
+        if is_displacement(scene) || scene.role(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
             return Vec::new();
         }
         [1.0, 0.5, 1.5, 2.5].iter().map(|p| Form::of(&[("p", *p)])).collect()

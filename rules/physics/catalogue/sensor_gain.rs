@@ -62,8 +62,4 @@ impl Effect for SensorGain {
         };
         Some(vec![("gain", simulated.iter().zip(&factor).map(|(value, factor)| value * factor).collect())])
     }
-
-    fn has_hidden_state(&self) -> bool {
-        true
-    }
 }

@@ -1,7 +1,7 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, rate};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::{greatest, visits};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.
@@ -50,14 +50,19 @@ static DOC: EffectDoc = EffectDoc {
     },
 };
 
+/// Rates below this share of the top speed per second are no ramp but the noise of the speed.
+const RAMP_PER_S: f64 = 0.01;
+
 impl Effect for SpindleInertia {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+        let Some(speed) = scene.role(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
+        let rates = rate(scene, speed);
+        let ramps = visits(scene, |row| rates[row].abs() > RAMP_PER_S * greatest(speed));
+        if ramps >= 2 { vec![Form::plain()] } else { Vec::new() }
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {

@@ -11,7 +11,7 @@ pub struct Stribeck;
 static DOC: EffectDoc = EffectDoc {
     kind: "stribeck",
     family: "axis",
-    law: "F = level * sign(v) * exp(-(v / vs)^2); in a power: P = level * |v| / vs * exp(-(v / vs)^2); v in m/s, of a spindle in rad/s",
+    law: "F = level * sign(v) * exp(-(v / vs)^2), vs = stribeck_speed; in a power: P = level * |v| / vs * exp(-(v / vs)^2); v in m/s, of a spindle in rad/s",
     parameters: &[
         ParameterDoc {
             name: "level",
@@ -23,7 +23,7 @@ static DOC: EffectDoc = EffectDoc {
         },
         ParameterDoc {
             name: "stribeck_speed",
-            unit: "m/s",
+            unit: "velocity",
             entry: Entry::Shape,
             range: (1e-06, 1000.0),
             en: "speed at which the film carries; of a spindle in rad/s",

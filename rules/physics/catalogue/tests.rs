@@ -266,3 +266,10 @@ fn run_out_needs_more_than_two_samples_per_turn() {
     let cosine = column("runout", &fast, &runout.forms(&fast)[0]);
     assert!((cosine[0] - cosine[10]).abs() < 1e-6, "ten turns a second, a hundred samples");
 }
+
+#[test]
+fn families_stand_together() {
+    let mut families: Vec<&str> = CATALOGUE.iter().map(|effect| effect.doc().family).collect();
+    families.dedup();
+    assert_eq!(families.iter().collect::<BTreeSet<_>>().len(), families.len(), "{families:?}");
+}

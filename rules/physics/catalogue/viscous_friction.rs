@@ -14,7 +14,7 @@ static DOC: EffectDoc = EffectDoc {
     law: "F = coefficient * v; in a power: P = coefficient * v^2; v in m/s, of a spindle in rad/s",
     parameters: &[ParameterDoc {
         name: "coefficient",
-        unit: "output/(m/s)",
+        unit: "friction/velocity",
         entry: Entry::Linear,
         range: (0.0, f64::INFINITY),
         en: "friction per speed; of a spindle per rad/s; in a power per squared speed",

@@ -1,0 +1,259 @@
+//! The catalogue in words and as JSON: what `effects list` and `effects show` print.
+
+use super::{CATALOGUE, EffectDoc, Entry, ParameterDoc, Texts, effect};
+use adapters::channel::nearest;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use thiserror::Error;
+
+/// Language of texts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Language {
+    /// English.
+    #[default]
+    En,
+    /// Chinese.
+    Zh,
+}
+
+/// An effect that the catalogue does not hold.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("there is no effect {kind}. {hint}")]
+pub struct UnknownEffect {
+    /// The name asked for.
+    pub kind: String,
+    /// What to do.
+    pub hint: String,
+}
+
+impl EffectDoc {
+    /// The texts in this language.
+    #[must_use]
+    pub fn texts(&self, language: Language) -> &Texts {
+        match language {
+            Language::En => &self.en,
+            Language::Zh => &self.zh,
+        }
+    }
+}
+
+/// The texts of the effect of this kind.
+///
+/// # Errors
+/// [`UnknownEffect`] with the nearest name.
+pub fn find(kind: &str) -> Result<&'static EffectDoc, UnknownEffect> {
+    let kinds = || CATALOGUE.iter().map(|effect| effect.doc().kind);
+    let near = || nearest(kind, kinds()).map(|near| format!("Did you mean {near}? "));
+    effect(kind).map(|effect| effect.doc()).ok_or_else(|| UnknownEffect {
+        kind: kind.to_owned(),
+        hint: format!("{}`effects list` names all {}.", near().unwrap_or_default(), CATALOGUE.len()),
+    })
+}
+
+/// One line per effect: kind, name and statement.
+#[must_use]
+pub fn list(language: Language) -> String {
+    let widest = CATALOGUE.iter().map(|effect| effect.doc().kind.len()).max().unwrap_or(0);
+    let mut lines = String::new();
+    let mut family = "";
+    for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
+        if family != doc.family {
+            family = doc.family;
+            let _ = writeln!(lines, "{}", family_name(family, language));
+        }
+        let texts = doc.texts(language);
+        let _ = writeln!(lines, "  {:widest$}  {}", doc.kind, texts.statement);
+    }
+    lines
+}
+
+fn family_name(family: &'static str, language: Language) -> &'static str {
+    if language == Language::En {
+        return family;
+    }
+    match family {
+        "model" => "基本模型",
+        "drive" => "电机与驱动",
+        "spindle" => "主轴",
+        "cutting" => "切削",
+        "axis" => "进给轴",
+        "auxiliary" => "辅助设备",
+        "thermal" => "热误差",
+        "measurement" => "测量",
+        "control" => "控制",
+        other => other,
+    }
+}
+
+/// Everything about one effect, in plain text.
+///
+/// # Errors
+/// [`UnknownEffect`] with the nearest name.
+pub fn explain(kind: &str, language: Language) -> Result<String, UnknownEffect> {
+    let doc = find(kind)?;
+    let texts = doc.texts(language);
+    let words = labels(language);
+    let mut text = format!("{} - {}\n{}\n\n", doc.kind, texts.name, texts.statement);
+    let _ = writeln!(text, "{}\n  {}", words.law, doc.law);
+    if !doc.parameters.is_empty() {
+        let _ = writeln!(text, "{}", words.parameters);
+        doc.parameters.iter().for_each(|parameter| text.push_str(&parameter_line(parameter, language)));
+    }
+    let minutes = format!("{} ({} min)", texts.experiment, doc.experiment_minutes);
+    let needs = if doc.needs.is_empty() { "-".to_owned() } else { doc.needs.join("; ") };
+    for (label, value) in [
+        (words.needs, needs.as_str()),
+        (words.absence, texts.absence),
+        (words.confused, texts.confused_with),
+        (words.experiment, minutes.as_str()),
+        (words.rivals, doc.rivals.join(", ").as_str()),
+        (words.source, doc.source),
+    ] {
+        let _ = writeln!(text, "{label}\n  {value}");
+    }
+    Ok(text)
+}
+
+struct Labels {
+    law: &'static str,
+    parameters: &'static str,
+    needs: &'static str,
+    absence: &'static str,
+    confused: &'static str,
+    experiment: &'static str,
+    rivals: &'static str,
+    source: &'static str,
+    shape: &'static str,
+}
+
+fn labels(language: Language) -> &'static Labels {
+    match language {
+        Language::En => &Labels {
+            law: "Law",
+            parameters: "Parameters",
+            needs: "Needs",
+            absence: "When the simulation lacks it",
+            confused: "Confused with",
+            experiment: "Experiment that tells them apart",
+            rivals: "Rivals",
+            source: "Source",
+            shape: "shape",
+        },
+        Language::Zh => &Labels {
+            law: "公式",
+            parameters: "参数",
+            needs: "所需通道",
+            absence: "仿真缺少它时",
+            confused: "易混淆的原因",
+            experiment: "区分试验",
+            rivals: "竞争假设",
+            source: "来源",
+            shape: "形状参数",
+        },
+    }
+}
+
+fn parameter_line(parameter: &ParameterDoc, language: Language) -> String {
+    let shape = match parameter.entry {
+        Entry::Linear => String::new(),
+        Entry::Shape => format!(" ({})", labels(language).shape),
+    };
+    let meaning = if language == Language::En { parameter.en } else { parameter.zh };
+    format!("  {} [{}] {}{shape}: {meaning}\n", parameter.name, parameter.unit, range(parameter.range))
+}
+
+fn range((low, high): (f64, f64)) -> String {
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) => format!("{low} .. {high}"),
+        (true, false) => format!(">= {low}"),
+        (false, true) => format!("<= {high}"),
+        (false, false) => "any".to_owned(),
+    }
+}
+
+/// Everything about one effect as JSON; a range without an end has `null` there.
+///
+/// # Errors
+/// [`UnknownEffect`] with the nearest name.
+pub fn explain_json(kind: &str) -> Result<Value, UnknownEffect> {
+    find(kind).map(doc_json)
+}
+
+/// The whole catalogue as JSON.
+#[must_use]
+pub fn list_json() -> Value {
+    Value::Array(CATALOGUE.iter().map(|effect| doc_json(effect.doc())).collect())
+}
+
+fn doc_json(doc: &EffectDoc) -> Value {
+    json!({
+        "kind": doc.kind,
+        "family": doc.family,
+        "law": doc.law,
+        "parameters": doc.parameters.iter().map(parameter_json).collect::<Vec<_>>(),
+        "needs": doc.needs,
+        "rivals": doc.rivals,
+        "experiment_minutes": doc.experiment_minutes,
+        "source": doc.source,
+        "en": texts_json(&doc.en),
+        "zh": texts_json(&doc.zh),
+    })
+}
+
+fn parameter_json(parameter: &ParameterDoc) -> Value {
+    let end = |value: f64| value.is_finite().then_some(value);
+    json!({
+        "name": parameter.name,
+        "unit": parameter.unit,
+        "entry": match parameter.entry { Entry::Linear => "linear", Entry::Shape => "shape" },
+        "min": end(parameter.range.0),
+        "max": end(parameter.range.1),
+        "en": parameter.en,
+        "zh": parameter.zh,
+    })
+}
+
+fn texts_json(texts: &Texts) -> Value {
+    json!({
+        "name": texts.name,
+        "statement": texts.statement,
+        "absence": texts.absence,
+        "confused_with": texts.confused_with,
+        "experiment": texts.experiment,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_is_explained_in_both_languages() {
+        for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
+            for language in [Language::En, Language::Zh] {
+                let text = explain(doc.kind, language).expect("known");
+                let texts = doc.texts(language);
+                for part in [doc.law, doc.source, texts.statement, texts.absence, texts.experiment] {
+                    assert!(text.contains(part), "{} lacks {part}", doc.kind);
+                }
+                doc.parameters.iter().for_each(|parameter| assert!(text.contains(parameter.name)));
+                assert!(list(language).contains(texts.statement));
+            }
+        }
+    }
+
+    #[test]
+    fn the_json_names_units_and_open_ranges() {
+        let json = explain_json("flank_wear").expect("known");
+        assert_eq!(json["parameters"][0]["name"], "k");
+        assert_eq!(json["parameters"][0]["min"], 0.0);
+        assert!(json["parameters"][0]["max"].is_null());
+        assert_eq!(list_json().as_array().map(Vec::len), Some(CATALOGUE.len()));
+    }
+
+    #[test]
+    fn a_misspelt_effect_finds_its_neighbour() {
+        let error = explain("flank_ware", Language::En).expect_err("unknown");
+        assert!(error.to_string().contains("Did you mean flank_wear?"), "{error}");
+    }
+}
