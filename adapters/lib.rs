@@ -22,6 +22,7 @@ pub mod replay;
 pub mod sample;
 pub mod simulated;
 pub mod units;
+pub mod words;
 pub mod worker;
 
 pub use address::Address;

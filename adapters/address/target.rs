@@ -53,6 +53,8 @@ pub struct SimulatedTarget {
     pub noise_pct: f64,
     /// Meter dropouts per hour.
     pub dropouts_per_h: f64,
+    /// Does the spindle change its speed between the passes of one operation?
+    pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with (depth of cut, diameter, operation)?
     pub annotations: bool,
 }
@@ -218,6 +220,7 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         cut_pct: keys.number("cut_pct", 100.0, 0.0, 300.0),
         noise_pct: keys.number("noise_pct", 1.0, 0.0, 50.0),
         dropouts_per_h: keys.number("dropouts_per_h", 1.0, 0.0, 3600.0),
+        speed_changes: keys.choice("speed_changes", &[("no", false), ("yes", true)]),
         annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),
     };
     match body.strip_prefix("//").unwrap_or(body) {

@@ -77,6 +77,7 @@ pub const GAP_PERIODS: i64 = 2;
 
 struct SourceState {
     pace: Pace,
+    newest_ns: TimeNs,
     failure: Option<Failure>,
     counts: MergeCounts,
 }
@@ -84,14 +85,16 @@ struct SourceState {
 /// A stretch in which whole polls of a source failed.
 #[derive(Debug, Clone, Copy)]
 struct Failure {
+    /// Stamp of the newest reading before it: what goes stale after this does so because of the failure.
+    after_ns: TimeNs,
     since_ns: TimeNs,
     until_ns: Option<TimeNs>,
     reason: Absence,
 }
 
 impl Failure {
-    fn holds_at(&self, at_ns: TimeNs) -> bool {
-        self.since_ns <= at_ns && self.until_ns.is_none_or(|until_ns| at_ns < until_ns)
+    fn ended_by(&self, at_ns: TimeNs) -> bool {
+        self.until_ns.is_some_and(|until_ns| until_ns <= at_ns)
     }
 }
 
@@ -125,7 +128,12 @@ impl Merge {
         let mut merge = Self {
             sources: plans
                 .iter()
-                .map(|plan| SourceState { pace: pace(plan), failure: None, counts: MergeCounts::default() })
+                .map(|plan| SourceState {
+                    pace: pace(plan),
+                    newest_ns: TimeNs::MIN,
+                    failure: None,
+                    counts: MergeCounts::default(),
+                })
                 .collect(),
             lanes: Vec::new(),
             tracks: Vec::new(),
@@ -175,6 +183,7 @@ impl Merge {
         if let Some(failure) = state.failure.as_mut().filter(|failure| failure.since_ns < mid_ns) {
             failure.until_ns.get_or_insert(mid_ns);
         }
+        state.newest_ns = state.newest_ns.max(mid_ns);
         let late = mid_ns <= self.last_tick_ns;
         let put = track.put(mid_ns, reading.value, self.last_tick_ns, &state.pace);
         state.counts.count(put, late);
@@ -190,11 +199,9 @@ impl Merge {
     pub fn fail(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
         state.counts.failures += 1;
-        let since_ns = match state.failure {
-            Some(Failure { since_ns, until_ns: None, .. }) => since_ns.min(at_ns),
-            _ => at_ns,
-        };
-        state.failure = Some(Failure { since_ns, until_ns: None, reason: error.absence() });
+        let new = Failure { after_ns: state.newest_ns, since_ns: at_ns, until_ns: None, reason: error.absence() };
+        let going_on = state.failure.filter(|failure| failure.until_ns.is_none());
+        state.failure = Some(going_on.map_or(new, |failure| Failure { reason: new.reason, ..failure }));
     }
 
     /// Writes every announced channel at `at_ns` into `sample` (from [`Sample::empty`]); other slots are left alone.
@@ -248,10 +255,12 @@ fn best(tracks: &mut [Track], sources: &mut [SourceState], at_ns: TimeNs) -> Slo
 
 /// Replaces "stale" and "not yet read" by what the source itself said; a machine that is off has no fresh values.
 fn explained(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
-    let Some(failure) = failure.filter(|failure| failure.holds_at(at_ns)) else { return slot };
+    let Some(failure) = failure.filter(|failure| !failure.ended_by(at_ns)) else { return slot };
     match slot.value {
-        Err(Absence::Stale | Absence::NotYetRead) => Slot { value: Err(failure.reason), age_ns: slot.age_ns },
-        Ok(_) if failure.reason == Absence::MachineOff => {
+        Err(Absence::Stale | Absence::NotYetRead) if failure.after_ns <= at_ns => {
+            Slot { value: Err(failure.reason), age_ns: slot.age_ns }
+        }
+        Ok(_) if failure.reason == Absence::MachineOff && failure.since_ns <= at_ns => {
             Slot { value: Err(Absence::MachineOff), age_ns: at_ns - failure.since_ns }
         }
         _ => slot,

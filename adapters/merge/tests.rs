@@ -73,8 +73,9 @@ fn nothing_bridges_a_gap_of_more_than_two_periods() {
 fn the_sources_own_reason_stands_once_the_value_is_too_old() {
     let mut merge = one();
     merge.push(SourceId(0), number("spindle_speed_rpm", 0, 100.0));
-    merge.fail(SourceId(0), 100 * MS, &line_error());
+    merge.fail(SourceId(0), 290 * MS, &line_error());
     assert_eq!(speed(&mut merge, 150), Ok(100.0));
+    assert_eq!(speed(&mut merge, 250), Err(Absence::Disconnected), "the poll that failed began before its end");
     assert_eq!(speed(&mut merge, 300), Err(Absence::Disconnected));
     merge.push(SourceId(0), number("spindle_speed_rpm", 400, 50.0));
     assert_eq!(speed(&mut merge, 400), Ok(50.0));

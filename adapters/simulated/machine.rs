@@ -8,6 +8,7 @@ use super::program::{Control, Cut, Motion, Planner};
 use super::settings::SimulatedSettings;
 use crate::address::SimulatedMachine;
 use crate::clock::{SECOND_NS, TimeNs};
+use crate::words::{execution, mode};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;
@@ -260,11 +261,15 @@ impl Machine {
             Motion::Feed { cut, locked, programmed_mm_min } => (cut, locked, programmed_mm_min),
             Motion::Rapid | Motion::None => (None, false, 0.0),
         };
-        let execution = if control.holding { "FEED_HOLD" } else { block.map_or("READY", |block| block.execution) };
+        let execution = if control.holding {
+            execution::FEED_HOLD
+        } else {
+            block.map_or(execution::READY, |block| block.execution)
+        };
         Panel {
             booted: control.booted(),
             drives_on: control.demand.drives_on,
-            mode: block.map_or("MANUAL", |block| block.mode),
+            mode: block.map_or(mode::MANUAL, |block| block.mode),
             execution,
             program: block.map_or(0, |block| block.program),
             block: block.map_or(0, |block| block.number),

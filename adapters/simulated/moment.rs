@@ -48,9 +48,9 @@ pub struct Panel {
     pub booted: bool,
     /// Drives ready.
     pub drives_on: bool,
-    /// `AUTOMATIC`, `MANUAL` or `MANUAL_DATA_INPUT`.
+    /// One of [`words::mode`](crate::words::mode).
     pub mode: &'static str,
-    /// `READY`, `ACTIVE`, `FEED_HOLD`, `STOPPED` or `PROGRAM_COMPLETED`.
+    /// One of [`words::execution`](crate::words::execution).
     pub execution: &'static str,
     /// Number after the O.
     pub program: u16,

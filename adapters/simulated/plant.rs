@@ -180,7 +180,7 @@ impl Plant {
         approach(&mut self.bearing_c, self.housing_c + 0.042 * friction_w, dt_s, 420.0);
         approach(&mut self.housing_c, self.ambient_c + 0.021 * friction_w + 0.01 * load_loss_w, dt_s, 4200.0);
         let motor_w = 0.2 * spindle_w.abs() + load_loss_w;
-        approach(&mut self.motor_c, self.ambient_c + 0.11 * motor_w, dt_s, 900.0);
+        approach(&mut self.motor_c, self.ambient_c + 0.07 * motor_w, dt_s, 900.0);
         self.wander(dt_s);
         self.supply_v = 400.0 + 2.6 * self.supply_unrest - 0.45e-3 * total_w;
         self.mains_hz = 50.0 + 0.015 * self.frequency_unrest;

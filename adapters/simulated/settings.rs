@@ -32,6 +32,14 @@ pub struct DeviceSettings {
     pub clock_drift_ppm: f64,
 }
 
+impl DeviceSettings {
+    /// How old a value is on average when it is asked for: its latency and half of the time to the next refresh.
+    #[must_use]
+    pub fn mean_age(&self) -> Duration {
+        self.latency + self.refresh / 2
+    }
+}
+
 /// What the meter adds to the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeterSettings {
@@ -129,6 +137,16 @@ impl Default for SimulatedSettings {
     }
 }
 
+impl MeterSettings {
+    /// How far the meter's averages lie behind the stamps of its readings: the age of the window's end and half the
+    /// window. The true answer to the question for the lag between controller and meter is this minus the controller's
+    /// [`DeviceSettings::mean_age`].
+    #[must_use]
+    pub fn mean_lag(&self) -> Duration {
+        self.device.mean_age() + self.device.refresh / 2
+    }
+}
+
 impl Default for MeterSettings {
     fn default() -> Self {
         Self {
@@ -164,6 +182,7 @@ impl SimulatedSettings {
             seed: target.seed,
             tau_s: target.tau_s,
             cut: CutLevel::Planned(target.cut_pct / 100.0),
+            speed_changes: target.speed_changes,
             annotations: target.annotations,
             meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
             ..base

@@ -2,6 +2,7 @@
 
 use super::super::plant::{Demand, Plant};
 use super::{Action, Block, Cut, Planner, Rate};
+use crate::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;
@@ -119,8 +120,8 @@ impl Control {
             self.planner.refill(&mut self.blocks, since_s, worst);
         }
         let idle = Block {
-            mode: "MANUAL",
-            execution: "READY",
+            mode: mode::MANUAL,
+            execution: execution::READY,
             program: 0,
             number: 0,
             operation: "",

@@ -1,6 +1,7 @@
 //! Turned parts: facing, roughing and finishing of two diameters, and a thread on some.
 
 use super::{Action, Cut, Rate, Writer};
+use crate::words::operation;
 
 /// A turned part. Diameters and lengths in mm, speeds in rpm.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +88,7 @@ pub(super) fn part(out: &mut Writer<'_>, lot: usize, vary: &mut dyn FnMut() -> f
     out.put(Action::ToolChange(FINISHER));
     finish(out, part, vary);
     if let Some(pitch_mm) = part.thread_pitch_mm {
-        out.operation = "threading";
+        out.operation = operation::THREADING;
         thread(out, part, pitch_mm);
     }
     out.operation = "";

@@ -1,6 +1,7 @@
 //! Milled parts: face milling, roughing and finishing of a pocket, drilled and tapped holes.
 
 use super::{Action, Cut, Rate, Writer};
+use crate::words::operation;
 
 /// A milling tool and its data.
 #[derive(Debug, Clone, Copy)]
@@ -79,7 +80,7 @@ pub(super) fn part(out: &mut Writer<'_>, lot: usize, vary: &mut dyn FnMut() -> f
     out.operation = "drilling";
     take(out, &DRILL, vary);
     (0..holes).for_each(|hole| drill(out, hole));
-    out.operation = "tapping";
+    out.operation = operation::TAPPING;
     (0..holes).for_each(|hole| tap(out, hole));
     out.operation = "";
     out.put(Action::Coolant(false)).put(Action::Stop);

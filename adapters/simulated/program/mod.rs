@@ -8,6 +8,8 @@ mod planner;
 pub(super) use control::{Control, Motion};
 pub(super) use planner::Planner;
 
+use crate::words::{execution, mode};
+
 /// Feed of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Rate {
@@ -87,7 +89,7 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     pub(super) fn new(blocks: &'a mut std::collections::VecDeque<Block>, program: u16) -> Self {
-        Self { blocks, mode: "AUTOMATIC", execution: "ACTIVE", program, operation: "", number: 0 }
+        Self { blocks, mode: mode::AUTOMATIC, execution: execution::ACTIVE, program, operation: "", number: 0 }
     }
 
     /// Appends an action; the block number grows by ten.

@@ -3,6 +3,7 @@
 use super::super::settings::SimulatedSettings;
 use super::{Action, Block, Writer, lathe, mill};
 use crate::address::SimulatedMachine;
+use crate::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;
@@ -54,17 +55,17 @@ impl Planner {
         let first = self.day == 0;
         self.day += 1;
         self.lunch_taken = false;
-        (out.mode, out.execution) = ("MANUAL", "READY");
+        (out.mode, out.execution) = (mode::MANUAL, execution::READY);
         out.put(Action::Wait(if first { 8.0 } else { 0.5 })).put(Action::Mains(true));
         out.put(Action::Wait(if first { 26.0 } else { 90.0 }));
         out.put(Action::Hydraulics(true)).put(Action::Drives(true)).put(Action::Wait(4.0));
         out.put(Action::Rapid([200.0, 0.0, 160.0]));
-        (out.mode, out.execution, out.program) = ("AUTOMATIC", "ACTIVE", 9000);
+        (out.mode, out.execution, out.program) = (mode::AUTOMATIC, execution::ACTIVE, 9000);
         out.operation = "warm-up";
         self.warm_up(out, if first { 11.0 } else { 150.0 });
         out.operation = "";
         out.put(Action::Stop);
-        out.aside("AUTOMATIC", "PROGRAM_COMPLETED", Action::Wait(6.0));
+        out.aside(mode::AUTOMATIC, execution::PROGRAM_COMPLETED, Action::Wait(6.0));
     }
 
     fn warm_up(&self, out: &mut Writer<'_>, dwell_s: f64) {
@@ -92,7 +93,7 @@ impl Planner {
             out.put(Action::Hardness(hardness));
         }
         let load_s = self.rng.random_range(9.0..18.0);
-        out.aside("AUTOMATIC", "PROGRAM_COMPLETED", Action::Wait(load_s));
+        out.aside(mode::AUTOMATIC, execution::PROGRAM_COMPLETED, Action::Wait(load_s));
         if self.parts > 2 && self.rng.random_bool(0.05) {
             alarm(out);
         }
@@ -110,29 +111,29 @@ impl Planner {
 
     fn new_edge(&mut self, out: &mut Writer<'_>, tool: u8) {
         let fetch_s = self.rng.random_range(60.0..120.0);
-        (out.mode, out.execution) = ("MANUAL", "READY");
+        (out.mode, out.execution) = (mode::MANUAL, execution::READY);
         out.put(Action::ToolChange(tool)).put(Action::Wait(fetch_s)).put(Action::NewEdge);
     }
 
     fn night(&mut self, out: &mut Writer<'_>) {
         self.up_since_s = None;
-        (out.mode, out.execution) = ("MANUAL_DATA_INPUT", "ACTIVE");
+        (out.mode, out.execution) = (mode::MANUAL_DATA_INPUT, execution::ACTIVE);
         // Chips are spun off and the coolant is drained.
         out.put(Action::Spindle(500.0, 1)).put(Action::Wait(20.0)).put(Action::Stop);
-        (out.mode, out.execution) = ("MANUAL", "READY");
+        (out.mode, out.execution) = (mode::MANUAL, execution::READY);
         out.put(Action::Wait(120.0)).put(Action::Drives(false)).put(Action::Hydraulics(false));
         out.put(Action::Wait(15.0)).put(Action::Mains(false)).put(Action::Wait(self.settings.day.night_s));
     }
 }
 
 fn pause(out: &mut Writer<'_>, seconds: f64) {
-    out.aside("AUTOMATIC", "READY", Action::Hydraulics(false));
-    out.aside("AUTOMATIC", "READY", Action::Wait(seconds));
-    out.aside("AUTOMATIC", "READY", Action::Hydraulics(true));
+    out.aside(mode::AUTOMATIC, execution::READY, Action::Hydraulics(false));
+    out.aside(mode::AUTOMATIC, execution::READY, Action::Wait(seconds));
+    out.aside(mode::AUTOMATIC, execution::READY, Action::Hydraulics(true));
 }
 
 fn alarm(out: &mut Writer<'_>) {
-    out.aside("AUTOMATIC", "STOPPED", Action::Alarm("1005 CHUCK PRESSURE LOW"));
-    out.aside("AUTOMATIC", "STOPPED", Action::Wait(25.0));
-    out.aside("AUTOMATIC", "READY", Action::Alarm(""));
+    out.aside(mode::AUTOMATIC, execution::STOPPED, Action::Alarm("1005 CHUCK PRESSURE LOW"));
+    out.aside(mode::AUTOMATIC, execution::STOPPED, Action::Wait(25.0));
+    out.aside(mode::AUTOMATIC, execution::READY, Action::Alarm(""));
 }
