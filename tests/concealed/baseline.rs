@@ -143,4 +143,13 @@ impl Refit {
         columns.push(cut);
         Basis::of(&columns)
     }
+
+    /// The model's tangent at `mc`: what a small change of any parameter can take away.
+    pub(crate) fn tangent(&self, mc: f64) -> Vec<Vec<f64>> {
+        let cut: Vec<f64> = self.chips.iter().map(|c| c.volume * (-mc * c.ln_thickness).exp()).collect();
+        let slope = self.chips.iter().zip(&cut).map(|(c, p)| c.ln_thickness * p).collect();
+        let mut columns = self.fixed.clone();
+        columns.extend([cut, slope]);
+        columns
+    }
 }

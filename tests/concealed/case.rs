@@ -2,6 +2,8 @@
 
 use serde_json::{Value, json};
 
+use crate::nearest::Rival;
+
 /// A column of a recording.
 #[derive(Clone)]
 pub(crate) enum Column {
@@ -128,6 +130,10 @@ pub(crate) struct Case {
     pub(crate) clean: Vec<f64>,
     /// Rows with a spike or a dropout.
     pub(crate) faults: Vec<usize>,
+    /// Columns that span what the nominal model can take away by changing its parameters a little.
+    pub(crate) tangent: Vec<Vec<f64>>,
+    /// Other laws that come closest to a hidden effect.
+    pub(crate) rivals: Vec<Rival>,
 }
 
 impl Case {
@@ -154,8 +160,13 @@ impl Case {
                 })
             })
             .collect();
+        let rivals: Vec<Value> = self
+            .rivals
+            .iter()
+            .map(|r| json!({ "effect": r.name, "form": r.form, "share": r.share, "evidence": r.evidence }))
+            .collect();
         json!({
-            "schema": "truth/1", "group": self.group, "case": self.name, "seed": self.seed,
+            "schema": "truth/1", "rivals": rivals, "group": self.group, "case": self.name, "seed": self.seed,
             "expect": self.expect.name(), "noise": self.noise, "noise_sd": self.noise_sd,
             "faulty_rows": self.faults, "hidden": hidden, "clean": rounded(&self.clean),
         })

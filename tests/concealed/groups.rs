@@ -6,18 +6,26 @@ use crate::dice::Dice;
 use crate::law::Entry;
 use crate::laws;
 use crate::noise::Noise;
+use crate::real::inject;
 use crate::schedule::{Mode, Needs};
 use crate::spindle_case::Wish;
+use crate::{drive, thermal};
 
 /// A case that can be built.
 pub(crate) enum Order {
     Spindle(Box<Wish>),
+    Drive(drive::Order),
+    Thermal(thermal::Order),
+    Injected(inject::Order),
 }
 
 impl Order {
     pub(crate) fn build(&self) -> Option<Case> {
         match self {
             Self::Spindle(wish) => wish.build(),
+            Self::Drive(order) => drive::build(order),
+            Self::Thermal(order) => thermal::build(order),
+            Self::Injected(order) => order.build(),
         }
     }
 
@@ -25,12 +33,18 @@ impl Order {
     pub(crate) fn label(&self) -> String {
         match self {
             Self::Spindle(wish) => format!("{}/{}", wish.group, wish.name),
+            Self::Drive(order) => format!("{}/{}", order.group, order.name),
+            Self::Thermal(order) => format!("{}/{}", order.group, order.name),
+            Self::Injected(order) => format!("{}/{}", order.group(), order.name()),
         }
     }
 
-    pub(crate) fn group(&self) -> &str {
+    pub(crate) fn group(&self) -> String {
         match self {
-            Self::Spindle(wish) => &wish.group,
+            Self::Spindle(wish) => wish.group.clone(),
+            Self::Drive(order) => order.group.clone(),
+            Self::Thermal(order) => order.group.clone(),
+            Self::Injected(order) => order.group(),
         }
     }
 }
@@ -43,7 +57,11 @@ pub(crate) fn orders(seed: u64) -> Vec<Order> {
     list.extend(nothing(seed));
     list.extend(alike(seed));
     list.extend(faulty(seed));
-    list.into_iter().map(|w| Order::Spindle(Box::new(w))).collect()
+    let mut orders: Vec<Order> = list.into_iter().map(|w| Order::Spindle(Box::new(w))).collect();
+    orders.extend(drive::orders(seed).into_iter().map(Order::Drive));
+    orders.extend(thermal::orders(seed).into_iter().map(Order::Thermal));
+    orders.extend(inject::orders(seed).into_iter().map(Order::Injected));
+    orders
 }
 
 fn wish(group: String, name: String, seed: u64, mode: Mode, entries: Vec<Entry>, rho: f64) -> Wish {
@@ -209,7 +227,7 @@ fn alike(seed: u64) -> Vec<Wish> {
     ];
     let mut list = Vec::new();
     for (name, why, mode, needs) in kinds {
-        let mut wish = wish("alike".into(), format!("{name}-{why}"), seed, mode, vec![form(name, seed)], 1.0);
+        let mut wish = wish("alike-by-plan".into(), format!("{name}-{why}"), seed, mode, vec![form(name, seed)], 1.0);
         (wish.needs, wish.expect) = (needs, Expect::Class);
         list.push(wish);
     }

@@ -1,17 +1,25 @@
 //! Recordings whose missing physics is known to this suite and to nobody else.
 
 mod baseline;
+mod bench;
 mod case;
 mod dice;
+mod drive;
+mod floors;
 mod groups;
 mod law;
 mod laws;
 mod least_squares;
 mod motion;
+mod nearest;
 mod noise;
+mod passes;
+mod real;
 mod schedule;
+mod score;
 mod spindle_case;
 mod spindle_record;
+mod thermal;
 mod tick;
 mod world;
 
@@ -88,4 +96,28 @@ fn effects_have_the_wished_size() {
             assert!(effect.contribution.iter().all(|c| c.is_finite()), "{}", order.label());
         }
     }
+}
+
+/// The whole table. `CONCEALED_SEEDS` (default 10), `CONCEALED_FILTER`, `CONCEALED_THREADS` (default 2).
+#[test]
+#[ignore = "minutes to hours; run with --ignored --nocapture campaign"]
+fn campaign() {
+    let threads = std::env::var("CONCEALED_THREADS").ok().and_then(|t| t.parse().ok()).unwrap_or(2);
+    let outcomes = score::run(&wanted("10"), threads);
+    println!("{}", score::tally::table(&outcomes));
+    println!("{}", score::tally::by_effect(&outcomes));
+    println!("{}", real::table());
+    println!("not right, kept below {}:", score::tool::workshop().0.display());
+    println!("{}", score::tally::failures(&outcomes));
+}
+
+/// Floors that every build must reach on a few cases of every kind.
+#[test]
+#[ignore = "a minute or two; it joins the normal run as soon as `diagnose` is part of the binary"]
+fn short() {
+    let outcomes = score::run(&floors::sample(), 2);
+    println!("{}", score::tally::table(&outcomes));
+    println!("{}", score::tally::failures(&outcomes));
+    let low = floors::missed(&outcomes);
+    assert!(low.is_empty(), "below the floor:\n{}", low.join("\n"));
 }

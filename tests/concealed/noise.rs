@@ -102,7 +102,8 @@ pub(crate) fn spoil(kind: Noise, moments: &[Moment], sd: f64, dice: &mut Dice) -
     Spoiled { values, faults }
 }
 
-fn unit_noise(kind: Noise, moments: &[Moment], dice: &mut Dice) -> Vec<f64> {
+/// Noise of unit variance of the given kind, without faults.
+pub(crate) fn unit_noise(kind: Noise, moments: &[Moment], dice: &mut Dice) -> Vec<f64> {
     let seconds = |phi: f64| -1.0 / phi.ln();
     let white_share = dice.uniform(0.2, 0.6_f64);
     let mut under_white = |tau_s: f64, white: f64| {

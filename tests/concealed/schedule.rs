@@ -1,9 +1,8 @@
 //! What the shop does that day: parts, passes, edges and lots, by kind of production.
 
-use std::f64::consts::PI;
-
 use crate::baseline::Process;
 use crate::dice::Dice;
+use crate::passes;
 
 /// How varied the production is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -28,9 +27,6 @@ impl Mode {
         }
     }
 }
-
-/// Most that the spindle can turn against, Nm.
-const TORQUE_NM: f64 = 95.0;
 
 /// Labels of the operations; `Pass::operation` indexes them.
 pub(crate) const OPERATIONS: [&str; 5] = ["face", "rough", "semi", "finish", "creep"];
@@ -264,9 +260,9 @@ impl Shop {
 
     fn draw_pass(&self, operation: usize, dice: &mut Dice) -> Pass {
         let pass = match self.process {
-            Process::Turning => self.turning_pass(operation, dice),
-            Process::Milling => milling_pass(operation, dice),
-            Process::Drilling => drilling_pass(operation, dice),
+            Process::Turning => passes::turning(operation, self.needs, dice),
+            Process::Milling => passes::milling(operation, dice),
+            Process::Drilling => passes::drilling(operation, dice),
         };
         self.restrict(pass)
     }
@@ -280,89 +276,6 @@ impl Shop {
         }
         pass
     }
-
-    fn turning_pass(&self, operation: usize, dice: &mut Dice) -> Pass {
-        let diameter = dice.uniform(28.0, 130.0);
-        let slow = self.needs.low_cutting_speed && dice.chance(0.45);
-        let cutting_speed = if slow { dice.uniform(14.0, 75.0) } else { dice.log_uniform(60.0, 270.0) };
-        let (feed, depth, inner) = match operation {
-            0 => (dice.uniform(0.10, 0.26), dice.uniform(0.4, 1.6), dice.uniform(0.35, 0.6)),
-            1 | 4 => (dice.uniform(0.20, 0.45), dice.uniform(1.2, 3.8), 1.0),
-            2 => (dice.uniform(0.14, 0.30), dice.uniform(0.6, 2.0), 1.0),
-            _ => (dice.uniform(0.07, 0.20), dice.uniform(0.25, 0.9), 1.0),
-        };
-        let depth = if self.needs.shallow && dice.chance(0.5) { dice.uniform(0.12, 0.7) } else { depth };
-        let speed = (1000.0 * cutting_speed / (PI * diameter)).clamp(70.0, 3600.0).round();
-        let (feed, depth, diameter) = (grid(feed, 0.005), grid(depth, 0.05), grid(diameter, 0.1));
-        let allowed_w = f64::min(5200.0, TORQUE_NM * speed * PI / 30.0);
-        let strongest = allowed_w / (2000.0 * feed.powf(0.77) * PI * diameter * speed / 60_000.0);
-        Pass {
-            speed_rpm: speed,
-            feed_mm_rev: feed,
-            depth_mm: grid(depth.min(strongest), 0.05).max(0.1),
-            diameter_mm: diameter,
-            end_diameter_mm: grid(diameter * inner, 0.1),
-            teeth: 1.0,
-            cut_s: dice.uniform(14.0, 34.0),
-            ..blank_pass(operation, dice)
-        }
-    }
-}
-
-fn blank_pass(operation: usize, dice: &mut Dice) -> Pass {
-    Pass {
-        operation,
-        speed_rpm: 0.0,
-        feed_mm_rev: 0.0,
-        depth_mm: 0.0,
-        width_mm: 0.0,
-        diameter_mm: 0.0,
-        end_diameter_mm: 0.0,
-        teeth: 1.0,
-        cut_s: 0.0,
-        air_s: dice.uniform(3.0, 8.0),
-        coolant: true,
-        tool: 0,
-        override_at_s: 0.0,
-        override_to: 1.0,
-    }
-}
-
-fn milling_pass(operation: usize, dice: &mut Dice) -> Pass {
-    let diameter = *dice.pick(&[16.0, 20.0, 32.0, 50.0, 63.0]);
-    let teeth = *dice.pick(&[2.0, 3.0, 4.0, 5.0]);
-    let speed = (1000.0 * dice.uniform(90.0, 260.0) / (PI * diameter)).clamp(300.0, 7800.0).round();
-    Pass {
-        speed_rpm: speed,
-        feed_mm_rev: grid(teeth * dice.uniform(0.05, 0.2), 0.005),
-        depth_mm: grid(dice.uniform(0.4, 3.0) * if operation == 3 { 0.4 } else { 1.0 }, 0.05),
-        width_mm: grid(diameter * dice.uniform(0.15, 0.9), 0.5),
-        diameter_mm: diameter,
-        end_diameter_mm: diameter,
-        teeth,
-        cut_s: dice.uniform(14.0, 34.0),
-        ..blank_pass(operation, dice)
-    }
-}
-
-fn drilling_pass(operation: usize, dice: &mut Dice) -> Pass {
-    let diameter = *dice.pick(&[10.0, 12.0, 14.0, 18.0, 22.0, 26.0]);
-    let speed = (1000.0 * dice.uniform(50.0, 130.0) / (PI * diameter)).round();
-    Pass {
-        speed_rpm: speed,
-        feed_mm_rev: grid(dice.uniform(0.08, 0.32), 0.005),
-        depth_mm: diameter / 2.0,
-        width_mm: diameter,
-        diameter_mm: diameter,
-        end_diameter_mm: diameter,
-        teeth: 2.0,
-        cut_s: dice.uniform(10.0, 24.0),
-        ..blank_pass(operation, dice)
-    }
-}
-
-fn grid(value: f64, step: f64) -> f64 {
-    (value / step).round() * step
 }
 
 impl Needs {

@@ -7,6 +7,7 @@ use crate::law::Entry;
 use crate::laws::KNOWN_INERTIA_KG_M2;
 use crate::least_squares::{mean, rms};
 use crate::motion;
+use crate::nearest::{Court, ENOUGH};
 use crate::noise::{Moment, Noise, spoil};
 use crate::schedule::{Mode, Needs, Plan};
 use crate::spindle_record::{Style, model, table, write_current};
@@ -64,20 +65,21 @@ impl Wish {
 
     fn attempt(&self, attempt: u64) -> Option<Case> {
         let label = self.label(attempt);
-        let stage = self.stage(&label);
-        let mut dice = Dice::seeded(&format!("{label}/laws"), self.seed);
-        let laws: Vec<Seeded> = self
-            .entries
-            .iter()
-            .map(|entry| Seeded {
-                entry: entry.clone(),
-                seed: self.seed ^ (dice.whole(0, 1 << 40) as u64),
-                strength: 1.0,
-            })
-            .collect();
-        let (laws, sd) = self.balance(&stage, laws, &mut dice)?;
+        let (stage, laws, sd) = self.plant(&label)?;
         let day = stage.play(&laws);
         Some(self.record(&stage, &laws, &day, sd, &label))
+    }
+
+    fn plant(&self, label: &str) -> Option<(Stage, Vec<Seeded>, f64)> {
+        let stage = self.stage(label);
+        let mut dice = Dice::seeded(&format!("{label}/laws"), self.seed);
+        let mut seeded = |entry: &Entry| {
+            let seed = self.seed ^ (dice.whole(0, 1 << 40) as u64);
+            Seeded { entry: entry.clone(), seed, strength: 1.0 }
+        };
+        let laws: Vec<Seeded> = self.entries.iter().map(&mut seeded).collect();
+        let (laws, sd) = self.balance(&stage, laws, &mut dice)?;
+        Some((stage, laws, sd))
     }
 
     /// Strengths and a noise level so that each effect leaves the wished remainder.
@@ -129,7 +131,7 @@ impl Wish {
         let record: Vec<Tick> = rows.iter().map(|&i| day.record[i]).collect();
         let clean = pick(&day.power_w, &rows);
         let refit = Refit::new(&stage.baseline, &record);
-        let hidden = (0..laws.len())
+        let hidden: Vec<Hiding> = (0..laws.len())
             .map(|i| hiding(stage, &refit, &record, &laws[i], pick(&day.contributions_w[i], &rows), sd))
             .collect();
         let moments = moments(self.process, &record, &clean);
@@ -139,24 +141,44 @@ impl Wish {
             *value = value.map(|v| v + day.jitter_w[i] * unrest.normal());
         }
         let style = Style::draw(self, &mut dice("style"));
-        Case {
+        let mut table = table(self, &style, stage, &record, &spoiled.values);
+        if self.current {
+            write_current(&mut table, &record, &pick(&day.machine_w, &rows), &mut dice("current"));
+        }
+        let mut case = Case {
             group: self.group.clone(),
             name: self.name.clone(),
             seed: self.seed,
             expect: self.expect,
             noise: self.noise.name().into(),
             noise_sd: sd,
-            table: {
-                let mut table = table(self, &style, stage, &record, &spoiled.values);
-                if self.current {
-                    write_current(&mut table, &record, &pick(&day.machine_w, &rows), &mut dice("current"));
-                }
-                table
-            },
+            table,
             model: model(self, &style, stage, &mut dice("model")),
             hidden,
             clean,
             faults: spoiled.faults,
+            tangent: refit.tangent(stage.baseline.mc),
+            rivals: Vec::new(),
+        };
+        self.compare(&mut case, stage, laws, day, &rows, &moments);
+        case
+    }
+
+    /// Where another law of the generator follows the effect as closely as the noise allows, only a class is right.
+    fn compare(&self, case: &mut Case, stage: &Stage, laws: &[Seeded], day: &Day, rows: &[usize], moments: &[Moment]) {
+        if self.expect != Expect::Named {
+            return;
+        }
+        for (i, one) in case.hidden.iter().enumerate() {
+            let others = case.hidden.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, h)| h.contribution.clone());
+            let span = case.tangent.iter().cloned().chain(others).collect();
+            let (sd, noise, record) = (case.noise_sd, self.noise, day.record.as_slice());
+            let court = Court { stage, laws, record, rows, span, remainder: &one.remainder, sd, noise, moments };
+            case.rivals.extend(court.rivals().into_iter().take(3));
+        }
+        if case.rivals.iter().any(|rival| rival.evidence < ENOUGH) {
+            case.expect = Expect::Class;
+            case.group = format!("alike-{}", case.group);
         }
     }
 }

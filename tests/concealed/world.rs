@@ -69,6 +69,22 @@ impl Stage {
         Day { record, power_w, machine_w, jitter_w, contributions_w }
     }
 
+    /// What `law` alone adds to the power over given instants; `bare` is the power without it.
+    pub(crate) fn added(&self, law: &Seeded, record: &[Tick], bare: &[f64]) -> Vec<f64> {
+        let difference = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
+        if let Hidden::Clerk(mut clerk) = law.plant(&self.plan).hidden {
+            let (mut world, mut written) = (record.to_vec(), record.to_vec());
+            clerk(&mut world, &mut written);
+            return difference(&self.power(&world, &[], None).0, &self.power(&written, &[], None).0);
+        }
+        difference(&self.power(record, std::slice::from_ref(law), None).0, bare)
+    }
+
+    /// Power without any hidden law.
+    pub(crate) fn bare(&self, record: &[Tick]) -> Vec<f64> {
+        self.power(record, &[], None).0
+    }
+
     fn power(&self, ticks: &[Tick], laws: &[Seeded], without: Option<usize>) -> (Vec<f64>, Vec<f64>) {
         Chain::assemble(&self.plan, laws, without).run(&self.baseline, ticks)
     }
