@@ -68,4 +68,6 @@ pub fn effect(kind: &str) -> Option<&'static dyn Effect> {
 }
 
 #[cfg(test)]
+mod law_tests;
+#[cfg(test)]
 mod tests;

@@ -61,7 +61,8 @@ impl Effect for SpindleInertia {
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(speed) = scene.role(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
         let rates = rate(scene, speed);
-        let ramps = visits(scene, |row| rates[row].abs() > RAMP_PER_S * greatest(speed));
+        let least = RAMP_PER_S * greatest(speed);
+        let ramps = visits(scene, |row| rates[row].abs() > least);
         if ramps >= 2 { vec![Form::plain()] } else { Vec::new() }
     }
 

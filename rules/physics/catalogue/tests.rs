@@ -1,6 +1,6 @@
 //! Every effect of the catalogue: told completely, finite on a rich recording, silent on a poor one.
 
-use super::{CATALOGUE, effect};
+use super::CATALOGUE;
 use crate::physics::{Columns, Effect, Entry, Form, Role, Scene, Texts};
 use adapters::recording::{Cells, Numbers, Recording, Words};
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,12 +16,12 @@ const PUBLIC: &str = "no_load_power cutting_power load_loss offset copper_loss i
 /// Kinds whose forms another part finds (the scatter, a search over frequencies) or that need more than 1 Hz.
 const WITHOUT_FORMS: [&str; 3] = ["chatter", "ripple_alias", "runout"];
 
-fn set(recording: &mut Recording, name: &str, law: impl Fn(usize) -> f64) {
+pub(super) fn set(recording: &mut Recording, name: &str, law: impl Fn(usize) -> f64) {
     let values = (0..recording.rows()).map(law).collect();
     recording.set_column(name, Cells::Numbers(Numbers::full(values)));
 }
 
-fn set_words(recording: &mut Recording, name: &str, law: impl Fn(usize) -> String) {
+pub(super) fn set_words(recording: &mut Recording, name: &str, law: impl Fn(usize) -> String) {
     let words: Vec<String> = (0..recording.rows()).map(law).collect();
     recording.set_column(name, Cells::Words(words.iter().map(String::as_str).collect::<Words>()));
 }
@@ -64,7 +64,7 @@ fn rich(output: &str) -> Scene {
 }
 
 /// A scene as a model would show it: with a load, a simulation and a vertical axis.
-fn scene(recording: &Recording, output: &str) -> Scene {
+pub(super) fn scene(recording: &Recording, output: &str) -> Scene {
     let roles = BTreeMap::from([(Role::Vertical, "z".to_owned())]);
     let mut scene = Scene::new(recording, output, &roles).expect("the output is recorded");
     let depth = |row: usize| scene.column("depth_of_cut_mm").map_or(1.0, |depth| depth[row]);
@@ -194,77 +194,6 @@ fn no_effect_panics_on_a_poor_recording() {
         set_words(&mut recording, "run", |row| row.to_string());
         check_scene(&scene(&recording, "spindle_power_w"));
     }
-}
-
-fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
-    effect(kind).expect("known").columns(scene, form).expect("makes columns").swap_remove(0).1
-}
-
-#[test]
-fn the_published_cutting_power() {
-    let mut recording = Recording::new("published", vec![0.0], None);
-    for (name, value) in [("depth_of_cut_mm", 2.0), ("feed_per_rev_mm", 0.25), ("cutting_speed_m_min", 120.0)] {
-        set(&mut recording, name, |_| value);
-    }
-    set(&mut recording, "spindle_power_w", |_| 1.0);
-    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::of(&[("mc", 0.0)]));
-    assert!((2000.0 * power[0] - 2000.0 * 2.0 * 0.25 * 120.0 / 60.0).abs() < 1e-9, "kc ap f vc / 60 W");
-}
-
-#[test]
-fn drilling_is_milling_with_the_whole_diameter() {
-    let mut recording = Recording::new("drill", vec![0.0], None);
-    for (name, value) in [("diameter_mm", 10.0), ("feed_mm_min", 200.0), ("spindle_speed_rpm", 1000.0)] {
-        set(&mut recording, name, |_| value);
-    }
-    set(&mut recording, "spindle_power_w", |_| 1.0);
-    let form = Form { name: "drilling", ..Form::of(&[("mc", 0.25)]) };
-    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
-    let rate_cm3_min = std::f64::consts::PI * 100.0 / 4.0 * 200.0 / 1000.0;
-    assert!((power[0] - 0.1_f64.powf(-0.25) * rate_cm3_min / 60.0).abs() < 1e-9);
-}
-
-#[test]
-fn a_running_mean_and_a_lag_settle_to_the_input() {
-    let mut recording = Recording::new("step", (0..200).map(|row| 0.1 * f64::from(row)).collect(), None);
-    set(&mut recording, "spindle_power_w", |row| if row < 50 { 100.0 } else { 300.0 });
-    let mut scene = scene(&recording, "spindle_power_w");
-    scene.set_simulated(Some(scene.recorded().to_vec()));
-    for name in ["mean", "lag"] {
-        let form = Form { name, ..Form::of(&[("window_s", 1.0)]) };
-        let smear = column("meter_window", &scene, &form);
-        assert!(smear[..49].iter().all(|value| value.abs() < 1e-9), "{name}: nothing before the edge");
-        assert!(smear[50..58].iter().all(|value| *value < -10.0), "{name}: behind after the edge");
-        assert!(smear[199].abs() < 1e-3, "{name}: settled");
-    }
-}
-
-#[test]
-fn inertia_is_the_rate_of_kinetic_energy() {
-    let mut recording = Recording::new("ramp", (0..100).map(|row| 0.1 * f64::from(row)).collect(), None);
-    set(&mut recording, "spindle_speed_rpm", |row| 20.0 * row as f64);
-    set(&mut recording, "spindle_power_w", |_| 0.0);
-    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::plain());
-    let energy_j: f64 = power[1..99].iter().map(|power| 0.1 * power).sum();
-    let top = 1970.0 * std::f64::consts::PI / 30.0;
-    assert!((energy_j / (0.5 * top * top) - 1.0).abs() < 0.01, "{energy_j}");
-}
-
-#[test]
-fn run_out_needs_more_than_two_samples_per_turn() {
-    let turning = |period_s: f64| {
-        let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
-        for (name, value) in [("spindle_speed_rpm", 600.0), ("engaged", 1.0), ("depth_of_cut_mm", 1.0)] {
-            set(&mut recording, name, |_| value);
-        }
-        set(&mut recording, "spindle_power_w", |_| 500.0);
-        scene(&recording, "spindle_power_w")
-    };
-    let runout = effect("runout").expect("known");
-    assert!(runout.forms(&turning(0.06)).is_empty());
-    let fast = turning(0.01);
-    let cosine = column("runout", &fast, &runout.forms(&fast)[0]);
-    assert!((cosine[0] - cosine[10]).abs() < 1e-6, "ten turns a second, a hundred samples");
 }
 
 #[test]

@@ -1,0 +1,214 @@
+//! What single laws say: magnitudes, signs, and when they have nothing to say.
+
+use super::effect;
+use super::tests::{scene, set, set_words};
+use crate::physics::{Form, Scene};
+use adapters::recording::Recording;
+
+fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
+    effect(kind).expect("known").columns(scene, form).expect("makes columns").swap_remove(0).1
+}
+
+#[test]
+fn the_published_cutting_power() {
+    let mut recording = Recording::new("published", vec![0.0], None);
+    for (name, value) in [("depth_of_cut_mm", 2.0), ("feed_per_rev_mm", 0.25), ("cutting_speed_m_min", 120.0)] {
+        set(&mut recording, name, |_| value);
+    }
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::of(&[("mc", 0.0)]));
+    assert!((2000.0 * power[0] - 2000.0 * 2.0 * 0.25 * 120.0 / 60.0).abs() < 1e-9, "kc ap f vc / 60 W");
+}
+
+#[test]
+fn drilling_is_milling_with_the_whole_diameter() {
+    let mut recording = Recording::new("drill", vec![0.0], None);
+    for (name, value) in [("diameter_mm", 10.0), ("feed_mm_min", 200.0), ("spindle_speed_rpm", 1000.0)] {
+        set(&mut recording, name, |_| value);
+    }
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    let form = Form { name: "drilling", ..Form::of(&[("mc", 0.25)]) };
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
+    let rate_cm3_min = std::f64::consts::PI * 100.0 / 4.0 * 200.0 / 1000.0;
+    assert!((power[0] - 0.1_f64.powf(-0.25) * rate_cm3_min / 60.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_running_mean_and_a_lag_settle_to_the_input() {
+    let mut recording = Recording::new("step", (0..200).map(|row| 0.1 * f64::from(row)).collect(), None);
+    set(&mut recording, "spindle_power_w", |row| if row < 50 { 100.0 } else { 300.0 });
+    let mut scene = scene(&recording, "spindle_power_w");
+    scene.set_simulated(Some(scene.recorded().to_vec()));
+    for name in ["mean", "lag"] {
+        let form = Form { name, ..Form::of(&[("window_s", 1.0)]) };
+        let smear = column("meter_window", &scene, &form);
+        assert!(smear[..49].iter().all(|value| value.abs() < 1e-9), "{name}: nothing before the edge");
+        assert!(smear[50..58].iter().all(|value| *value < -10.0), "{name}: behind after the edge");
+        assert!(smear[199].abs() < 1e-3, "{name}: settled");
+    }
+}
+
+#[test]
+fn inertia_is_the_rate_of_kinetic_energy() {
+    let mut recording = Recording::new("ramp", (0..100).map(|row| 0.1 * f64::from(row)).collect(), None);
+    set(&mut recording, "spindle_speed_rpm", |row| 20.0 * row as f64);
+    set(&mut recording, "spindle_power_w", |_| 0.0);
+    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::plain());
+    let energy_j: f64 = power[1..99].iter().map(|power| 0.1 * power).sum();
+    let top = 1970.0 * std::f64::consts::PI / 30.0;
+    assert!((energy_j / (0.5 * top * top) - 1.0).abs() < 0.01, "{energy_j}");
+}
+
+#[test]
+fn run_out_needs_more_than_two_samples_per_turn() {
+    let turning = |period_s: f64| {
+        let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
+        for (name, value) in [("spindle_speed_rpm", 600.0), ("engaged", 1.0), ("depth_of_cut_mm", 1.0)] {
+            set(&mut recording, name, |_| value);
+        }
+        set(&mut recording, "spindle_power_w", |_| 500.0);
+        scene(&recording, "spindle_power_w")
+    };
+    let runout = effect("runout").expect("known");
+    assert!(runout.forms(&turning(0.06)).is_empty());
+    let fast = turning(0.01);
+    let cosine = column("runout", &fast, &runout.forms(&fast)[0]);
+    assert!((cosine[0] - cosine[10]).abs() < 1e-6, "ten turns a second, a hundred samples");
+}
+
+/// Rows at this period with these inputs and an output of one.
+fn with_inputs(rows: u32, period_s: f64, output: &str, inputs: &[(&str, &dyn Fn(usize) -> f64)]) -> Scene {
+    let mut recording = Recording::new("inputs", (0..rows).map(|row| period_s * f64::from(row)).collect(), None);
+    inputs.iter().for_each(|(name, law)| set(&mut recording, name, law));
+    set(&mut recording, output, |_| 1.0);
+    scene(&recording, output)
+}
+
+fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
+    effect(kind).expect("known").forms(scene)
+}
+
+#[test]
+fn warm_up_lowers_and_preload_raises_idle_power() {
+    let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);
+    let warm_up = column("bearing_warm_up", &idle, &Form { name: "lag", ..Form::of(&[("tau_s", 600.0)]) });
+    let warm = 2.0_f64.powf(10.0 / 3.0);
+    assert!(warm_up[0] == 0.0 && (warm_up[3599] / -warm - 1.0).abs() < 0.01, "{}", warm_up[3599]);
+    let gradient = Form { name: "gradient", ..Form::of(&[("tau_s", 120.0), ("slow_tau_s", 720.0)]) };
+    let preload = column("preload_growth", &idle, &gradient);
+    let peak = preload.iter().copied().fold(0.0, f64::max);
+    assert!(peak > 5.0 * preload[3599] && preload[3599] > 0.0, "rises, then falls as the housing follows");
+}
+
+#[test]
+fn a_state_needs_a_recording_that_can_tell_it() {
+    let short = with_inputs(60, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);
+    assert!(forms("bearing_warm_up", &short).is_empty());
+    assert!(forms("preload_growth", &short).is_empty());
+}
+
+#[test]
+fn stribeck_needs_visits_at_creep() {
+    let fast = |row: usize| if row % 20 < 10 { 0.5 } else { -0.5 };
+    assert!(forms("stribeck", &with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &fast)])).is_empty());
+    let creeping = |row: usize| 0.5 * (row as f64 / 30.0).sin();
+    let creep = with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &creeping)]);
+    assert!(!forms("stribeck", &creep).is_empty());
+}
+
+#[test]
+fn directions_differ_only_where_both_are_visited() {
+    let one_way = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| 0.1 + row as f64 / 100.0)]);
+    assert!(forms("direction_asymmetry", &one_way).is_empty());
+    let both = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| (row as f64 / 5.0).sin())]);
+    let level = column("direction_asymmetry", &both, &Form::plain());
+    assert!(level.iter().all(|level| (0.0..=1.0).contains(level)));
+}
+
+#[test]
+fn weight_needs_an_axis_declared_vertical() {
+    let mut recording = Recording::new("axis", vec![0.0, 1.0], None);
+    set(&mut recording, "z_axis_velocity_mm_min", |row| 6000.0 * row as f64);
+    set(&mut recording, "total_power_w", |_| 1.0);
+    let undeclared = Scene::new(&recording, "total_power_w", &std::collections::BTreeMap::new()).expect("recorded");
+    assert!(forms("gravity_axis", &undeclared).is_empty());
+    assert_eq!(column("gravity_axis", &scene(&recording, "total_power_w"), &Form::plain()), vec![0.0, 0.1]);
+}
+
+#[test]
+fn a_late_meter_lies_below_a_rising_edge() {
+    let mut late = with_inputs(20, 1.0, "spindle_power_w", &[]);
+    late.set_simulated(Some((0..20).map(|row| if row < 10 { 100.0 } else { 500.0 }).collect()));
+    let delay = |delay_s| Form { name: "delay", ..Form::of(&[("delay_s", delay_s)]) };
+    let column_of = |delay_s| column("clock_lag", &late, &delay(delay_s));
+    assert_eq!(column_of(2.0)[10..13], [-400.0, -400.0, 0.0]);
+    assert_eq!(column_of(-1.0)[9..11], [400.0, 0.0]);
+    assert_eq!(column_of(0.5)[10], -200.0, "half-way between two rows");
+}
+
+#[test]
+fn a_late_flag_moves_the_whole_step_of_the_cut() {
+    let engaged = |row: usize| f64::from(u8::from((5..10).contains(&(row % 20))));
+    let flagged = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged)]);
+    let column = column("engagement_timing", &flagged, &Form::of(&[("delay_s", 1.0)]));
+    assert_eq!((column[5], column[10]), (-800.0, 800.0));
+    assert!(column.iter().enumerate().all(|(row, value)| *value == 0.0 || row % 20 == 5 || row % 20 == 10));
+}
+
+#[test]
+fn taper_starts_again_in_every_pass_and_turns_with_the_direction() {
+    let engaged = |row: usize| f64::from(u8::from(row % 20 < 11));
+    let place = |row: usize| if row < 20 { (row % 20) as f64 } else { -((row % 20) as f64) };
+    let passes = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged), ("axis_position_mm", &place)]);
+    let slope = column("depth_taper", &passes, &Form::plain());
+    assert_eq!((slope[0], slope[10]), (-400.0, 400.0));
+    assert_eq!((slope[20], slope[30], slope[15]), (400.0, -400.0, 0.0));
+}
+
+#[test]
+fn a_batch_steps_at_a_run_with_two_runs_on_either_side() {
+    let mut recording = Recording::new("runs", (0..60).map(f64::from).collect(), None);
+    set(&mut recording, "engaged", |_| 1.0);
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    set_words(&mut recording, "run", |row| (row / 10).to_string());
+    let runs = scene(&recording, "spindle_power_w");
+    let steps = forms("hardness_batch", &runs);
+    let starts: Vec<&str> = steps.iter().filter_map(|form| Some(form.place.as_ref()?.1.as_str())).collect();
+    assert_eq!(starts, ["2", "3", "4"]);
+    assert!((steps[0].ln_choices - 3.0_f64.ln()).abs() < 1e-12);
+    let step = column("hardness_batch", &runs, &steps[1]);
+    assert_eq!((step[29], step[30]), (0.0, 800.0));
+}
+
+#[test]
+fn gear_stages_are_taken_from_their_channel() {
+    let stage = |row: usize| if row < 50 { 1.0 } else { 2.0 };
+    let inputs: [(&str, &dyn Fn(usize) -> f64); 2] = [("gear_stage", &stage), ("spindle_speed_rpm", &|_| 500.0)];
+    let geared = with_inputs(100, 1.0, "spindle_power_w", &inputs);
+    let forms = forms("gear_stage", &geared);
+    assert_eq!(forms.len(), 1);
+    assert_eq!(forms[0].place, Some(("gear_stage".to_owned(), "2".to_owned())));
+    let step = column("gear_stage", &geared, &forms[0]);
+    assert_eq!((step[0], step[99]), (0.0, 1.0));
+}
+
+#[test]
+fn a_ceiling_is_where_the_recording_piles_up() {
+    let mut recording = Recording::new("ceiling", (0..100).map(f64::from).collect(), None);
+    set(&mut recording, "spindle_power_w", |row| (10.0 * row as f64).min(800.0));
+    let forms = forms("saturation", &scene(&recording, "spindle_power_w"));
+    assert_eq!(forms.iter().filter_map(|form| form.value("ceiling")).collect::<Vec<_>>(), [800.0]);
+    set(&mut recording, "spindle_power_w", |row| 10.0 * row as f64);
+    assert!(effect("saturation").expect("known").forms(&scene(&recording, "spindle_power_w")).is_empty());
+}
+
+#[test]
+fn thermal_effects_speak_of_displacements_only() {
+    let speed: (&str, &dyn Fn(usize) -> f64) = ("spindle_speed_rpm", &|row| 1000.0 + row as f64);
+    let displaced = with_inputs(3600, 1.0, "thermal_error_um", &[speed, ("engaged", &|_| 1.0)]);
+    let powered = with_inputs(3600, 1.0, "spindle_power_w", &[speed]);
+    assert!(!forms("spindle_growth", &displaced).is_empty() && forms("spindle_growth", &powered).is_empty());
+    for kind in ["windage", "load_loss", "hardness_batch", "bearing_warm_up", "dry_friction", "flank_wear"] {
+        assert!(forms(kind, &displaced).is_empty(), "{kind}");
+    }
+}
