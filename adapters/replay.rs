@@ -252,8 +252,10 @@ fn median_period(times_ns: &[TimeNs]) -> Duration {
 mod tests {
     use super::*;
     use crate::clock::ManualClock;
+    use crate::merge::{Delay, Lockstep};
     use crate::reading::Value;
     use crate::recording::read_csv;
+    use crate::sample::Sample;
 
     fn value_of(readings: &[Reading], name: &str) -> Option<Result<Value, Absence>> {
         let channel = ChannelId::of(name)?;
@@ -298,6 +300,38 @@ mod tests {
         let replay = Replay::new("r", &recording("time_s,run,engaged\n0,a,1\n1,a,1\n0,b,1\n1,b,1\n"), 0);
         let times: Vec<_> = (0..4).filter_map(|row| replay.time_ns(row)).collect();
         assert_eq!(times, [0, SECOND_NS, 61 * SECOND_NS, 62 * SECOND_NS]);
+    }
+
+    /// The folder of real recordings: `CNC_GATEWAY_SHARED`, or beside the checkout.
+    fn real(path: &str) -> Option<std::path::PathBuf> {
+        let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared").to_owned();
+        let shared = std::env::var("CNC_GATEWAY_SHARED").unwrap_or(beside);
+        let path = std::path::Path::new(&shared).join("data").join(path);
+        path.exists().then_some(path)
+    }
+
+    #[test]
+    fn every_cell_of_a_real_recording_reaches_its_sample() {
+        let Some(path) = real("milling/recording.csv.gz") else {
+            return eprintln!("SKIPPED: no real recordings; set CNC_GATEWAY_SHARED to their folder");
+        };
+        let recording = crate::recording::read_path(&path).expect("readable").recording;
+        let replay = Replay::new("replay:milling", &recording, 0);
+        let channels = Pull::channels(&replay).to_vec();
+        let mut lockstep = Lockstep::new(vec![Box::new(replay)], Delay::Fixed(Duration::ZERO));
+        let (mut sample, mut row) = (Sample::empty(0), 0);
+        while let Some(at_ns) = lockstep.next_ns() {
+            lockstep.sample_into(&mut sample, at_ns);
+            for channel in &channels {
+                let recorded = recording.numbers(channel.name()).and_then(|numbers| numbers.get(row));
+                assert_eq!(sample.number(*channel).ok(), recorded, "{channel} in row {row}");
+                let word = recording.words(channel.name()).and_then(|words| words.get(row));
+                assert_eq!(sample.text(*channel), word, "{channel} in row {row}");
+                assert_eq!(sample.slot(*channel).age_ns, 0);
+            }
+            row += 1;
+        }
+        assert_eq!((row, recording.rows()), (13_757, 13_757));
     }
 
     #[test]

@@ -149,7 +149,8 @@ impl Worker {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Stops and waits until the thread has ended, which takes as long as the poll it is in.
+    /// Stops and waits until the thread has ended, which takes as long as the poll it is in (and, on a clock that stands
+    /// still, until that clock is moved).
     pub fn join(mut self) {
         self.stop();
         if let Some(thread) = self.thread.take() {
@@ -213,7 +214,7 @@ impl Poller {
         let period_ns = nanoseconds(self.source.period()).max(1);
         self.failures = if error.is_some() { self.failures.saturating_add(1) } else { 0 };
         match error {
-            Some(SourceError::Off { .. }) => return ended_ns + nanoseconds(self.settings.off_pause),
+            Some(SourceError::Off { .. }) => return ended_ns + nanoseconds(self.settings.off_pause).max(period_ns),
             Some(_) if self.failures > 1 => return ended_ns + self.backoff_ns().max(period_ns),
             _ => {}
         }

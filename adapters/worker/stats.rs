@@ -82,7 +82,7 @@ pub struct WorkerStats {
     pub dropped: u64,
     /// The last error, also after it has passed.
     pub last_error: Option<SourceError>,
-    /// When the last error was first seen in a row.
+    /// Since when every poll has failed with it, or had until it passed.
     pub last_error_since_ns: Option<TimeNs>,
 }
 
@@ -176,10 +176,10 @@ impl Ledger {
             self.intervals.add(began_ns - last_ns);
         }
         self.last_began_ns = error.is_none().then_some(began_ns);
-        self.enter(state_after(error), ended_ns);
         if let Some(error) = error {
             self.failed(error, ended_ns);
         }
+        self.enter(state_after(error), ended_ns);
         if self.polls.is_multiple_of(PACE_POLLS) {
             self.look_at_pace();
         }
@@ -190,7 +190,7 @@ impl Ledger {
             return;
         }
         self.failures += 1;
-        if self.last_error.as_ref() != Some(error) {
+        if self.state != WorkerState::Failing || self.last_error.as_ref() != Some(error) {
             self.last_error = Some(error.clone());
             self.last_error_since_ns = Some(ended_ns);
         }

@@ -2,9 +2,11 @@
 
 use super::*;
 use crate::channel::ChannelId;
-use crate::clock::SystemClock;
+use crate::clock::{ScaledClock, SystemClock};
 use crate::merge::{Delay, SourcePlan};
 use crate::reading::{Absence, Stamp};
+use crate::recording::read_csv;
+use crate::replay::{LiveReplay, Replay};
 use crate::sample::Sample;
 use std::sync::atomic::AtomicU32;
 
@@ -174,6 +176,36 @@ fn the_end_of_a_recording_ends_the_thread() {
     let (worker, _, clock) = start(quick(), Box::new(move |poll| if poll == 2 { Err(end()) } else { Ok(()) }));
     wait_until(|| worker.is_finished());
     assert_eq!(worker.stats(clock.now_ns()).state, WorkerState::Ended);
+}
+
+#[test]
+fn the_same_error_after_a_good_poll_is_a_new_one() {
+    let (worker, polls, clock) = start(quick(), Box::new(|poll| if poll % 20 == 3 { Err(line()) } else { Ok(()) }));
+    wait_for(&polls, 6);
+    let first = worker.stats(clock.now_ns()).last_error_since_ns;
+    wait_for(&polls, 26);
+    let second = worker.stats(clock.now_ns()).last_error_since_ns;
+    assert!(first.is_some() && second > first, "{first:?} {second:?}");
+    worker.join();
+}
+
+#[test]
+fn a_recording_replayed_by_the_clock_arrives_in_full() {
+    let rows: String = (0..200).map(|row| format!("{},{row}\n", f64::from(row) / 10.0)).collect();
+    let read = read_csv(format!("time_s,part_count\n{rows}").as_bytes(), "test.csv").expect("readable");
+    let replay = LiveReplay::new(Replay::new("replay:test.csv", &read.recording, 0), 1.0);
+    let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(100.0));
+    let plans = [SourcePlan::of(&replay)];
+    let worker = Worker::start(Box::new(replay), clock.clone(), WorkerSettings::default()).expect("a thread");
+    let (mut merge, mut sample, mut seen) = (Merge::new(&plans, Delay::default()), Sample::empty(0), Vec::new());
+    while !worker.is_finished() {
+        worker.drain_into(&mut merge, SourceId(0));
+        merge.sample_into(&mut sample, clock.now_ns() - merge.delay_ns());
+        seen.extend(sample.number(part_count()));
+    }
+    worker.drain_into(&mut merge, SourceId(0));
+    assert_eq!(merge.counts(SourceId(0)).readings, 200);
+    assert!(!seen.is_empty() && seen.is_sorted());
 }
 
 #[test]
