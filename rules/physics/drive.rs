@@ -12,7 +12,10 @@ const CREEP_KRPM: f64 = 0.05;
 /// Does the output belong to a feed axis rather than to the spindle or the whole machine?
 pub(crate) fn is_axis_output(scene: &Scene) -> bool {
     let name = scene.output();
-    name.contains("axis") || (!name.contains("spindle") && !name.contains("total") && scene.role(Role::Speed).is_none())
+    let lettered = ["x_", "y_", "z_"].iter().any(|letter| name.starts_with(letter));
+    name.contains("axis")
+        || lettered
+        || (!name.contains("spindle") && !name.contains("total") && scene.role(Role::Speed).is_none())
 }
 
 /// Is the output a power, or something that adds up like one?

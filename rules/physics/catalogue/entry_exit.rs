@@ -33,7 +33,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "length_s",
             unit: "s",
             entry: Entry::Shape,
-            range: (0.05, 30.0),
+            range: (0.05, 120.0),
             en: "how long entry and exit last",
             zh: "切入切出持续时间",
         },
@@ -69,7 +69,7 @@ impl Effect for EntryExit {
         }
         let longest_s = scene.passes().iter().map(|pass| length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
-        [1.0, 3.0].into_iter().filter(told).map(|length_s| Form::of(&[("length_s", length_s)])).collect()
+        [1.0, 3.0, 10.0, 30.0].into_iter().filter(told).map(|length_s| Form::of(&[("length_s", length_s)])).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
