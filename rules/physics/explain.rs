@@ -98,6 +98,7 @@ pub fn explain(kind: &str, language: Language) -> Result<String, UnknownEffect> 
     if !doc.parameters.is_empty() {
         let _ = writeln!(text, "{}", words.parameters);
         doc.parameters.iter().for_each(|parameter| text.push_str(&parameter_line(parameter, language)));
+        placeholders(doc, language).for_each(|note| text.push_str(&format!("  {note}\n")));
     }
     let minutes = format!("{} ({} min)", texts.experiment, doc.experiment_minutes);
     let needs = if doc.needs.is_empty() { "-".to_owned() } else { doc.needs.join("; ") };
@@ -151,6 +152,22 @@ fn labels(language: Language) -> &'static Labels {
             shape: "形状参数",
         },
     }
+}
+
+/// What the words that stand for a unit mean, where the effect's parameters use them.
+fn placeholders(doc: &EffectDoc, language: Language) -> impl Iterator<Item = &'static str> {
+    let notes = [
+        ("output", "output: the unit of the simulated output", "output：仿真输出的单位"),
+        ("velocity", "velocity: m/s, of a spindle rad/s", "velocity：m/s，主轴为rad/s"),
+        (
+            "friction",
+            "friction: the unit of the output, over a velocity where the output is a power",
+            "friction：输出的单位；输出为功率时再除以速度",
+        ),
+    ];
+    let used = |word: &str| doc.parameters.iter().any(|parameter| parameter.unit.contains(word));
+    let note = move |(_, en, zh): (&str, &'static str, &'static str)| if language == Language::En { en } else { zh };
+    notes.into_iter().filter(move |(word, _, _)| used(word)).map(note)
 }
 
 fn parameter_line(parameter: &ParameterDoc, language: Language) -> String {
@@ -237,6 +254,9 @@ mod tests {
                     assert!(text.contains(part), "{} lacks {part}", doc.kind);
                 }
                 doc.parameters.iter().for_each(|parameter| assert!(text.contains(parameter.name)));
+                let stands_in = doc.parameters.iter().any(|parameter| parameter.unit.contains("output"));
+                let note = if language == Language::En { "output: " } else { "output：" };
+                assert_eq!(text.contains(note), stands_in, "{}", doc.kind);
                 assert!(list(language).contains(texts.statement));
             }
         }
