@@ -70,6 +70,21 @@ fn run(steps: &[Step]) -> Vec<Tick> {
     ticks
 }
 
+/// The merge of a continuous channel in one sentence of code, for readings in order.
+fn defined(given: &[(TimeNs, Option<f64>)], at_ns: TimeNs) -> Result<f64, Absence> {
+    let (before_ns, before) = *given.iter().rfind(|(ns, _)| *ns <= at_ns).ok_or(Absence::NotYetRead)?;
+    let after = given.iter().find(|(ns, _)| *ns > at_ns && *ns - before_ns <= GAP_NS);
+    match (before, after) {
+        (Some(from), Some((after_ns, Some(to)))) if at_ns > before_ns => {
+            let share = (at_ns - before_ns) as f64 / (after_ns - before_ns) as f64;
+            Ok(from + (to - from) * share)
+        }
+        _ if at_ns - before_ns > GAP_NS => Err(Absence::Stale),
+        (Some(from), _) => Ok(from),
+        (None, _) => Err(Absence::Refused),
+    }
+}
+
 proptest! {
     #[test]
     fn a_value_is_always_supported_by_readings_within_two_periods(steps in prop::collection::vec(step(), 1..80)) {
@@ -87,6 +102,33 @@ proptest! {
             let greatest = near.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             prop_assert!(value >= least - 1e-9 && value <= greatest + 1e-9, "{value} outside {least}..{greatest}");
             prop_assert!(slot.age_ns >= 0 && slot.age_ns <= GAP_NS);
+        }
+    }
+
+    #[test]
+    fn sources_in_order_agree_with_the_plain_definition(
+        steps in prop::collection::vec((PERIOD_NS / 2..GAP_NS * 2, proptest::option::weighted(0.9, -1000.0..1000.0)), 1..60),
+        pauses in prop::collection::vec(0..PERIOD_NS, 1..200),
+    ) {
+        let (mut merge, channel) = merge();
+        let (mut read_ns, mut tick_ns, mut given) = (0_i64, 0_i64, Vec::new());
+        let mut steps = steps.into_iter();
+        let mut sample = Sample::empty(0);
+        for pause_ns in pauses {
+            tick_ns += pause_ns;
+            // Everything read by the time of the tick has arrived; the tick looks back by the delay.
+            while read_ns <= tick_ns + merge.delay_ns() {
+                let Some((step_ns, value)) = steps.next() else { break };
+                read_ns += step_ns;
+                given.push((read_ns, value));
+                let stamp = Stamp::exact(read_ns);
+                merge.push(SourceId(0), match value {
+                    Some(number) => Reading::number(channel, stamp, number),
+                    None => Reading::absent(channel, stamp, Absence::Refused),
+                });
+            }
+            merge.sample_into(&mut sample, tick_ns);
+            prop_assert_eq!(sample.number(channel), defined(&given, tick_ns));
         }
     }
 

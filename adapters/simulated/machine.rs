@@ -77,11 +77,14 @@ impl Machine {
         machine
     }
 
-    /// The override register gets this value at `at_ns`, or at once when the machine is already further.
+    /// The override register gets this value at `at_ns`, or at once when the machine is already further. Writes take
+    /// effect in the order in which they came; when too many wait for their time, the newest replaces the one before.
     pub(super) fn write_override(&mut self, at_ns: TimeNs, percent: u8) {
-        if self.overrides.len() < OVERRIDES_MAX {
-            self.overrides.push_back((at_ns, percent));
+        if self.overrides.len() >= OVERRIDES_MAX {
+            self.overrides.pop_back();
         }
+        let earliest_ns = self.overrides.back().map_or(at_ns, |(due_ns, _)| *due_ns);
+        self.overrides.push_back((at_ns.max(earliest_ns), percent));
     }
 
     /// The override register as it will be when everything written has taken effect.
