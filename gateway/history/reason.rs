@@ -28,6 +28,11 @@ pub struct Reasons {
 }
 
 impl Reasons {
+    /// No own words yet.
+    pub(crate) const fn none() -> Self {
+        Self { own: Vec::new() }
+    }
+
     /// The code of `word`, learned when it is new.
     pub(crate) fn code(&mut self, word: &str) -> u8 {
         if let Some(position) = self.own.iter().position(|known| &**known == word) {

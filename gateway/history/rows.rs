@@ -162,6 +162,15 @@ impl Rows {
         Self { at_ns: Vec::new(), columns: series.iter().map(|series| Column::new(series.kind)).collect() }
     }
 
+    /// No rows yet of the same series.
+    pub(crate) fn empty_like(&self) -> Self {
+        let columns = self.columns.iter().map(|column| match column {
+            Column::Numbers { .. } => Column::Numbers { values: Vec::new(), missing: Vec::new() },
+            Column::Words(_) => Column::Words(Vec::new()),
+        });
+        Self { at_ns: Vec::new(), columns: columns.collect() }
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.at_ns.len()
     }

@@ -1,0 +1,154 @@
+//! Nightly compaction: the minute blocks of ten minutes become one, compressed harder. A third of the bytes goes.
+
+use super::block::{Block, Cells, Decoder, Directory, Encoder, LEVEL_COMPACT, NumberCells, WordCells};
+use super::commit::put_block;
+use super::error::{Doing, HistoryError};
+use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
+use super::rows::{Column, Rows, Word};
+use super::schema::known_series;
+use super::series::Series;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rusqlite::{Connection, OptionalExtension, params};
+
+/// Length of a compacted block.
+pub(crate) const COMPACT_NS: i64 = 600 * SECOND_NS;
+/// More rows than this are not put together: bounds memory at high rates.
+const ROWS_MAX: i64 = 20_000;
+/// At most this many blocks are looked at in one step.
+const LOOK_AHEAD: i64 = 64;
+
+struct Stored {
+    segment: i64,
+    first_row: i64,
+    rows: i64,
+    start_ns: TimeNs,
+    directory: Vec<u8>,
+    columns: Vec<u8>,
+}
+
+/// Compacts the next ten minutes; false when there is nothing left that is complete.
+pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
+    let cursor = cursor(db)?;
+    let stored = load(db, cursor)?;
+    let Some(first) = stored.first() else { return Ok(false) };
+    let mut end_row = first.first_row;
+    let mut rows = 0;
+    let belongs = |block: &&Stored| {
+        let follows = block.first_row == end_row && rows + block.rows <= ROWS_MAX.max(block.rows);
+        end_row = block.first_row + block.rows;
+        rows += block.rows;
+        follows
+            && block.segment == first.segment
+            && block.start_ns.div_euclid(COMPACT_NS) == first.start_ns.div_euclid(COMPACT_NS)
+    };
+    let together = stored.iter().take_while(belongs).count().max(1);
+    if together == stored.len() {
+        // The block after these is not there yet, so these may not be complete.
+        return Ok(false);
+    }
+    let group = &stored[..together];
+    let merged = if together > 1 { Some(merge(db, group)?) } else { None };
+    replace(db, group, merged.as_ref(), stored[together].first_row)?;
+    Ok(true)
+}
+
+fn cursor(db: &Connection) -> Result<i64, HistoryError> {
+    let cursor: Option<i64> = db
+        .query_row("SELECT value FROM meta WHERE key = 'compacted_row'", [], |row| row.get(0))
+        .optional()
+        .doing("looking up what is compacted")?;
+    Ok(cursor.unwrap_or(0))
+}
+
+fn load(db: &Connection, cursor: i64) -> Result<Vec<Stored>, HistoryError> {
+    let mut statement = db
+        .prepare_cached(
+            "SELECT segment, first_row, rows, start_ns, directory, columns FROM blocks
+             WHERE first_row >= ?1 ORDER BY first_row LIMIT ?2",
+        )
+        .doing("reading blocks")?;
+    let blocks = statement.query_map([cursor, LOOK_AHEAD], |row| {
+        Ok(Stored {
+            segment: row.get(0)?,
+            first_row: row.get(1)?,
+            rows: row.get(2)?,
+            start_ns: row.get(3)?,
+            directory: row.get(4)?,
+            columns: row.get(5)?,
+        })
+    });
+    blocks.and_then(Iterator::collect).doing("reading blocks")
+}
+
+fn merge(db: &Connection, group: &[Stored]) -> Result<Block, HistoryError> {
+    let mut series = known_series(db)?;
+    // What is stored has been rounded already.
+    series.iter_mut().for_each(|series| series.decimals = None);
+    let zstd = |error| HistoryError::Io { path: "zstd".into(), error };
+    let mut decoder = Decoder::new().map_err(zstd)?;
+    let mut reasons = Reasons::default();
+    let mut rows = Rows::of(&series);
+    for stored in group {
+        let damaged = HistoryError::Damaged { first_row: stored.first_row, what: "the block does not decode" };
+        let more = rows_of(stored, &series, &mut decoder, &mut reasons).ok_or(damaged)?;
+        let count = more.len();
+        rows.append(&more, 0..count);
+    }
+    let mut encoder = Encoder::new(LEVEL_COMPACT).map_err(zstd)?;
+    Ok(encoder.encode(&rows, &series, &reasons, group[0].segment, group[0].first_row))
+}
+
+fn rows_of(stored: &Stored, series: &[Series], decoder: &mut Decoder, reasons: &mut Reasons) -> Option<Rows> {
+    let directory = Directory::parse(&stored.directory)?;
+    let mut rows = Rows::of(series);
+    rows.at_ns = decoder.times(&directory, &stored.columns)?;
+    let codes = own_codes(&directory, reasons);
+    for (series, column) in series.iter().zip(&mut rows.columns) {
+        if let Some(entry) = directory.entry(series.id) {
+            *column = column_of(decoder.cells(&directory, entry, &stored.columns)?, &codes);
+        }
+    }
+    Some(rows)
+}
+
+/// From the codes of a block to the codes of `reasons`.
+pub(crate) fn own_codes(directory: &Directory, reasons: &mut Reasons) -> [u8; 256] {
+    let mut codes: [u8; 256] = std::array::from_fn(|code| u8::try_from(code).unwrap_or(NOT_PROVIDED));
+    for (code, word) in &directory.words {
+        codes[usize::from(*code)] = reasons.code(word);
+    }
+    codes
+}
+
+fn column_of(cells: Cells, codes: &[u8; 256]) -> Column {
+    match cells {
+        Cells::Numbers(NumberCells { values, mut missing }) => {
+            missing.iter_mut().for_each(|code| *code = codes[usize::from(*code)]);
+            Column::Numbers { values, missing }
+        }
+        Cells::Words(WordCells { words, codes: which, missing }) => {
+            let word = |(code, missing): (&u32, &u8)| match *missing {
+                PRESENT => words.get(*code as usize).map_or(Word::Missing(NOT_PROVIDED), |word| Word::Is(word.clone())),
+                reason => Word::Missing(codes[usize::from(reason)]),
+            };
+            let mut changes: Vec<(u32, Word)> = (0u32..).zip(which.iter().zip(&missing).map(word)).collect();
+            changes.dedup_by(|later, earlier| later.1 == earlier.1);
+            Column::Words(changes)
+        }
+    }
+}
+
+fn replace(db: &mut Connection, group: &[Stored], merged: Option<&Block>, next_row: i64) -> Result<(), HistoryError> {
+    let replacing = db.transaction().doing("beginning to compact")?;
+    if let Some(merged) = merged {
+        let last_row = group.last().map_or(merged.first_row, |last| last.first_row);
+        replacing
+            .execute("DELETE FROM blocks WHERE first_row BETWEEN ?1 AND ?2", [merged.first_row, last_row])
+            .and_then(|_| put_block(&replacing, merged))
+            .doing("replacing blocks by one")?;
+    }
+    replacing
+        .execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('compacted_row', ?1)", params![next_row])
+        .doing("noting what is compacted")?;
+    replacing.commit().doing("compacting")
+}

@@ -1,0 +1,159 @@
+//! Keeping the file in order: the size it may have, a full disk, compaction and ages.
+
+use super::compact;
+use super::error::{Doing, HistoryError};
+use super::options::Retention;
+use super::retention::{remove_aged, remove_oldest, used_bytes};
+use super::space::{Reserve, disk_room};
+use adapters::clock::TimeNs;
+use rusqlite::Connection;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How often the free room on disk is looked at.
+const LOOK_EVERY: Duration = Duration::from_secs(5);
+/// Steps of deleting in one go; each is a transaction of a few milliseconds.
+const STEPS_MAX: usize = 8;
+/// Free pages are given back to the disk in steps of this many.
+const VACUUM_PAGES: u32 = 256;
+
+/// The housekeeper of one history.
+#[derive(Debug)]
+pub(crate) struct House {
+    path: PathBuf,
+    retention: Retention,
+    reserve: Reserve,
+    /// While the disk is short of room: the size at which that was noticed.
+    ceiling: Option<u64>,
+    looked: Option<Instant>,
+    task: Option<(TimeNs, Task)>,
+    /// Raw samples removed since opening.
+    pub(crate) retired: u64,
+}
+
+/// The stages of maintenance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Task {
+    Compact,
+    Age,
+    Shrink,
+}
+
+impl House {
+    pub(crate) fn new(path: &Path, retention: Retention, reserve_bytes: u64) -> Self {
+        let mut reserve = Reserve::beside(path, reserve_bytes);
+        reserve.keep();
+        Self { path: path.to_owned(), retention, reserve, ceiling: None, looked: None, task: None, retired: 0 }
+    }
+
+    /// After a commit: looks at the disk now and then, and keeps the file below what it may have. Returns its size.
+    pub(crate) fn after_commit(&mut self, db: &mut Connection) -> Result<u64, HistoryError> {
+        let mut used = used_bytes(db)?;
+        if self.looked.is_none_or(|looked| looked.elapsed() >= LOOK_EVERY) {
+            self.looked = Some(Instant::now());
+            self.look(used);
+        }
+        let because = if self.ceiling.is_some() { "the disk is full" } else { "the size limit" };
+        for _ in 0..STEPS_MAX {
+            if used <= self.limit() || !self.remove(db, because)? {
+                break;
+            }
+            used = used_bytes(db)?;
+        }
+        Ok(used)
+    }
+
+    fn limit(&self) -> u64 {
+        self.ceiling.unwrap_or(u64::MAX).min(self.retention.max_bytes)
+    }
+
+    fn look(&mut self, used: u64) {
+        let Some(room) = disk_room(&self.path) else { return };
+        let keep = self.retention.keep_free_bytes.min(room.total / 10);
+        if room.free < keep {
+            self.ceiling.get_or_insert(used);
+        } else if room.free > keep + keep / 4 {
+            self.ceiling = None;
+            self.reserve.keep();
+        }
+    }
+
+    fn remove(&mut self, db: &mut Connection, because: &str) -> Result<bool, HistoryError> {
+        let removed = remove_oldest(db, because)?;
+        self.retired += removed.samples;
+        Ok(removed.any)
+    }
+
+    /// The disk took nothing any more: gives the reserve back, copies the log into the file, and makes room in it.
+    pub(crate) fn make_room(&mut self, db: &mut Connection, wanted: u64) -> Result<(), HistoryError> {
+        self.reserve.release();
+        checkpoint(db)?;
+        let used = used_bytes(db)?;
+        let target = used.saturating_sub(wanted.max(used / 50));
+        self.ceiling = Some(used);
+        for _ in 0..STEPS_MAX {
+            if used_bytes(db)? <= target || !self.remove(db, "the disk is full")? {
+                break;
+            }
+        }
+        checkpoint(db)
+    }
+
+    /// Begins maintenance as of `now_ns`.
+    pub(crate) fn begin(&mut self, now_ns: TimeNs) {
+        self.task = Some((now_ns, Task::Compact));
+    }
+
+    /// Does a bounded piece of maintenance; false when there is none left.
+    pub(crate) fn step(&mut self, db: &mut Connection) -> Result<bool, HistoryError> {
+        let Some((now_ns, task)) = self.task else { return Ok(false) };
+        let next = match task {
+            Task::Compact => (!compact::step(db)?).then_some(Task::Age),
+            Task::Age => {
+                let removed = remove_aged(db, &self.retention, now_ns)?;
+                self.retired += removed.samples;
+                (!removed.any).then_some(Task::Shrink)
+            }
+            Task::Shrink => {
+                if !shrink(db)? {
+                    self.task = None;
+                }
+                None
+            }
+        };
+        if let Some(next) = next {
+            self.task = Some((now_ns, next));
+        }
+        Ok(self.task.is_some())
+    }
+
+    /// Gives maintenance up until it is asked for again.
+    pub(crate) fn abandon(&mut self) {
+        self.task = None;
+    }
+
+    pub(crate) fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+}
+
+fn checkpoint(db: &Connection) -> Result<(), HistoryError> {
+    // Without TRUNCATE the log keeps its room on disk, which is what the next deletion writes into.
+    db.query_row("PRAGMA wal_checkpoint(RESTART)", [], |_| Ok(())).doing("copying the log into the database")
+}
+
+/// Gives free pages beyond an eighth of the file back to the disk; false when there are none.
+fn shrink(db: &Connection) -> Result<bool, HistoryError> {
+    let pragma = |name: &str| {
+        db.query_row(&format!("PRAGMA {name}"), [], |row| row.get::<_, u32>(0)).doing("measuring the database")
+    };
+    let (pages, free) = (pragma("page_count")?, pragma("freelist_count")?);
+    if free <= pages / 8 {
+        return Ok(false);
+    }
+    let mut statement =
+        db.prepare(&format!("PRAGMA incremental_vacuum({VACUUM_PAGES})")).doing("shrinking the database")?;
+    let mut rows = statement.query([]).doing("shrinking the database")?;
+    while rows.next().doing("shrinking the database")?.is_some() {}
+    Ok(pragma("freelist_count")? < free)
+}

@@ -1,0 +1,170 @@
+//! What the writer thread holds in memory: the rows of the running minute, and what is sealed but not yet durable.
+
+use super::block::{Block, Encoder, LEVEL_FRESH};
+use super::error::HistoryError;
+use super::pyramid::MINUTE_NS;
+use super::reason::Reasons;
+use super::record::{Event, Record};
+use super::rows::Rows;
+use super::series::Series;
+use adapters::clock::{SECOND_NS, TimeNs};
+use std::collections::VecDeque;
+
+/// A block is sealed at this many rows even within its minute: bounds memory at 100 Hz and beyond.
+const BLOCK_ROWS_MAX: usize = 6_000;
+/// Blocks that may wait for the disk; beyond that the oldest is dropped and counted. An hour at one block a minute.
+const PENDING_MAX: usize = 64;
+
+/// A stretch of increasing time, to be written before its first row.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Segment {
+    pub(crate) id: i64,
+    pub(crate) first_row: i64,
+    pub(crate) start_ns: TimeNs,
+    pub(crate) reason: &'static str,
+}
+
+/// Where the file ended when it was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct End {
+    pub(crate) segment: i64,
+    pub(crate) next_row: i64,
+    pub(crate) last_ns: Option<TimeNs>,
+}
+
+/// Rows and records that are not durable yet.
+pub(crate) struct Keeper {
+    pub(crate) series: Vec<Series>,
+    pub(crate) reasons: Reasons,
+    encoder: Encoder,
+    /// Rows of the running minute.
+    pub(crate) open: Rows,
+    /// How many of them the crash tail already holds.
+    pub(crate) in_tail: usize,
+    pub(crate) segments: VecDeque<Segment>,
+    pub(crate) blocks: VecDeque<Block>,
+    pub(crate) records: VecDeque<Record>,
+    pub(crate) segment: i64,
+    /// Number of the first row after opening.
+    pub(crate) opened_row: i64,
+    /// Number of the next row that arrives.
+    pub(crate) next_row: i64,
+    last_ns: Option<TimeNs>,
+    fresh: bool,
+    /// Rows dropped because the disk took nothing for too long.
+    pub(crate) lost_rows: u64,
+}
+
+impl Keeper {
+    pub(crate) fn new(series: Vec<Series>, end: End) -> Result<Self, HistoryError> {
+        let encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
+        let open = Rows::of(&series);
+        Ok(Self {
+            series,
+            reasons: Reasons::default(),
+            encoder,
+            open,
+            in_tail: 0,
+            segments: VecDeque::new(),
+            blocks: VecDeque::new(),
+            records: VecDeque::new(),
+            segment: end.segment,
+            opened_row: end.next_row,
+            next_row: end.next_row,
+            last_ns: end.last_ns,
+            fresh: true,
+            lost_rows: 0,
+        })
+    }
+
+    /// No more blocks should be taken on before some are durable.
+    pub(crate) fn is_full(&self) -> bool {
+        self.blocks.len() >= PENDING_MAX
+    }
+
+    /// Is there anything that a commit would make durable?
+    pub(crate) fn is_dirty(&self) -> bool {
+        !self.blocks.is_empty() || !self.records.is_empty() || self.in_tail < self.open.len()
+    }
+
+    /// Number of the first row of the running minute.
+    pub(crate) fn open_row(&self) -> i64 {
+        self.next_row - self.open.len() as i64
+    }
+
+    /// The time of the newest row.
+    pub(crate) fn newest_ns(&self) -> Option<TimeNs> {
+        self.open.at_ns.last().copied().or(self.blocks.back().map(|block| block.end_ns)).or(self.last_ns)
+    }
+
+    /// Takes a batch on: rows of the same minute gather, a new minute or a clock that went back seals what is there.
+    pub(crate) fn ingest(&mut self, batch: &Rows) {
+        let mut from = 0;
+        while from < batch.len() {
+            self.begin(batch.at_ns[from]);
+            let minute = batch.at_ns[from].div_euclid(MINUTE_NS);
+            let room = BLOCK_ROWS_MAX - self.open.len();
+            let mut to = from + 1;
+            while to < batch.len()
+                && to - from < room
+                && batch.at_ns[to] >= batch.at_ns[to - 1]
+                && batch.at_ns[to].div_euclid(MINUTE_NS) == minute
+            {
+                to += 1;
+            }
+            self.open.append(batch, from..to);
+            self.next_row += (to - from) as i64;
+            self.last_ns = Some(batch.at_ns[to - 1]);
+            from = to;
+        }
+    }
+
+    /// Makes the open rows ready for one at `at_ns`.
+    fn begin(&mut self, at_ns: TimeNs) {
+        let went_back = self.last_ns.filter(|last_ns| at_ns < *last_ns);
+        if let Some(last_ns) = went_back {
+            self.note_step(last_ns, at_ns);
+        }
+        if self.fresh || went_back.is_some() {
+            self.seal();
+            self.segment += 1;
+            let reason = if self.fresh { "start" } else { "clock_went_back" };
+            self.fresh = false;
+            self.segments.push_back(Segment { id: self.segment, first_row: self.next_row, start_ns: at_ns, reason });
+        }
+        let other_minute = self
+            .open
+            .at_ns
+            .first()
+            .is_some_and(|first_ns| first_ns.div_euclid(MINUTE_NS) != at_ns.div_euclid(MINUTE_NS));
+        if other_minute || self.open.len() >= BLOCK_ROWS_MAX {
+            self.seal();
+        }
+    }
+
+    fn note_step(&mut self, last_ns: TimeNs, at_ns: TimeNs) {
+        let back_s = (last_ns - at_ns) as f64 / SECOND_NS as f64;
+        self.records.push_back(Record::Event(Event {
+            at_ns,
+            kind: "clock_went_back".to_owned(),
+            source: "history".to_owned(),
+            text: format!("The clock went back by {back_s:.3} s. Samples continue in a new segment."),
+            detail: format!("{{\"before_ns\":{last_ns},\"after_ns\":{at_ns}}}"),
+        }));
+    }
+
+    /// Turns the open rows into a block.
+    pub(crate) fn seal(&mut self) {
+        if self.open.is_empty() {
+            return;
+        }
+        let first_row = self.open_row();
+        let block = self.encoder.encode(&self.open, &self.series, &self.reasons, self.segment, first_row);
+        self.open.clear();
+        self.in_tail = 0;
+        if self.is_full() {
+            self.lost_rows += self.blocks.pop_front().map_or(0, |oldest| oldest.rows as u64);
+        }
+        self.blocks.push_back(block);
+    }
+}

@@ -1,0 +1,270 @@
+//! Between the threads that hand samples in and the one that writes them: bounded, and locked only for moments.
+
+use super::options::{ExtraValue, Options, WhenFull};
+use super::reason::Reasons;
+use super::record::Record;
+use super::rows::Rows;
+use super::series::Series;
+use adapters::Sample;
+use adapters::clock::TimeNs;
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Rows that travel together.
+pub(crate) const BATCH_ROWS: usize = 256;
+/// Emptied batches kept for reuse.
+const FREE_MAX: usize = 8;
+
+/// Something the writer is asked to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Job {
+    /// Make everything handed in so far durable.
+    Flush,
+    /// Compact and retire as of this time.
+    Maintain(TimeNs),
+}
+
+#[derive(Debug)]
+struct Post {
+    current: Rows,
+    full: VecDeque<Rows>,
+    free: Vec<Rows>,
+    queued_rows: usize,
+    records: VecDeque<Record>,
+    /// Records handed in so far; the number of the newest is its ticket.
+    last_ticket: u64,
+    /// Records that the writer holds but has not made durable.
+    held_records: usize,
+    reasons: Reasons,
+    dropped_samples: u64,
+    dropped_records: u64,
+    jobs: VecDeque<(u64, Job)>,
+    last_job: u64,
+    finished_job: u64,
+    closing: bool,
+    stopped: bool,
+}
+
+/// What the writer takes out in one go.
+pub(crate) struct Delivery {
+    pub(crate) batches: VecDeque<Rows>,
+    pub(crate) records: VecDeque<Record>,
+    pub(crate) last_ticket: u64,
+    pub(crate) reasons: Reasons,
+    pub(crate) job: Option<(u64, Job)>,
+    pub(crate) closing: bool,
+}
+
+/// Waiting room of one history.
+#[derive(Debug)]
+pub(crate) struct Mailbox {
+    post: Mutex<Post>,
+    /// Something has arrived for the writer.
+    arrived: Condvar,
+    /// The writer has taken something, or has finished a job.
+    progressed: Condvar,
+    queue_rows: usize,
+    queue_records: usize,
+    when_full: WhenFull,
+}
+
+/// Figures of the waiting room.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Waiting {
+    pub(crate) rows: usize,
+    pub(crate) records: usize,
+    pub(crate) dropped_samples: u64,
+    pub(crate) dropped_records: u64,
+}
+
+impl Mailbox {
+    pub(crate) fn new(series: &[Series], options: &Options) -> Self {
+        let post = Post {
+            current: Rows::of(series),
+            full: VecDeque::new(),
+            free: Vec::new(),
+            queued_rows: 0,
+            records: VecDeque::new(),
+            last_ticket: 0,
+            held_records: 0,
+            reasons: Reasons::default(),
+            dropped_samples: 0,
+            dropped_records: 0,
+            jobs: VecDeque::new(),
+            last_job: 0,
+            finished_job: 0,
+            closing: false,
+            stopped: false,
+        };
+        Self {
+            post: Mutex::new(post),
+            arrived: Condvar::new(),
+            progressed: Condvar::new(),
+            queue_rows: options.queue_rows.max(1),
+            queue_records: options.queue_records.max(1),
+            when_full: options.when_full,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Post> {
+        // Nothing in here is left half done by a panic: every push is completed before the lock is released.
+        self.post.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, post: MutexGuard<'a, Post>) -> MutexGuard<'a, Post> {
+        self.progressed.wait(post).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Queues one tick; the samples dropped so far.
+    pub(crate) fn sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
+        let mut post = self.lock();
+        while post.queued_rows >= self.queue_rows && self.when_full == WhenFull::Wait && !post.stopped {
+            self.arrived.notify_one();
+            post = self.wait(post);
+        }
+        if post.queued_rows >= self.queue_rows || post.stopped {
+            post.dropped_samples += 1;
+            return post.dropped_samples;
+        }
+        let Post { current, reasons, .. } = &mut *post;
+        current.push(sample, extras, reasons);
+        post.queued_rows += 1;
+        if post.current.len() >= BATCH_ROWS.min(self.queue_rows) {
+            post.close_batch();
+            self.arrived.notify_one();
+        }
+        post.dropped_samples
+    }
+
+    /// Queues one record; its ticket, or `None` when the queue is full.
+    pub(crate) fn record(&self, record: Record) -> Option<u64> {
+        let mut post = self.lock();
+        while post.waiting_records() >= self.queue_records && self.when_full == WhenFull::Wait && !post.stopped {
+            self.arrived.notify_one();
+            post = self.wait(post);
+        }
+        if post.waiting_records() >= self.queue_records || post.stopped {
+            post.dropped_records += 1;
+            return None;
+        }
+        post.records.push_back(record);
+        post.last_ticket += 1;
+        Some(post.last_ticket)
+    }
+
+    /// Asks for a job and returns its number.
+    pub(crate) fn ask(&self, job: Job) -> u64 {
+        let mut post = self.lock();
+        post.last_job += 1;
+        let number = post.last_job;
+        post.jobs.push_back((number, job));
+        self.arrived.notify_one();
+        number
+    }
+
+    /// Waits until job `number` is finished; false when it was not within `limit` or the writer has stopped.
+    pub(crate) fn await_job(&self, number: u64, limit: Duration) -> bool {
+        let until = Instant::now() + limit;
+        let mut post = self.lock();
+        while post.finished_job < number && !post.stopped {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            post = self.progressed.wait_timeout(post, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        post.finished_job >= number
+    }
+
+    /// Asks the writer to finish.
+    pub(crate) fn close(&self) {
+        self.lock().closing = true;
+        self.arrived.notify_one();
+    }
+
+    /// The writer's side: waits until there is a full batch, a job or `limit` has passed, then takes what is there.
+    /// `rows_too` false leaves the samples where they are.
+    pub(crate) fn take(&self, limit: Duration, rows_too: bool, job_too: bool) -> Delivery {
+        let mut post = self.lock();
+        let ready =
+            |post: &Post| (rows_too && !post.full.is_empty()) || (job_too && !post.jobs.is_empty()) || post.closing;
+        if !ready(&post) && !limit.is_zero() {
+            let waited = self.arrived.wait_timeout_while(post, limit, |post| !ready(post));
+            post = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        let delivery = post.deliver(rows_too, job_too);
+        self.progressed.notify_all();
+        delivery
+    }
+
+    /// The writer's side: an emptied batch, and how many records it still holds.
+    pub(crate) fn recycle(&self, mut batch: Rows) {
+        batch.clear();
+        let mut post = self.lock();
+        if post.free.len() < FREE_MAX {
+            post.free.push(batch);
+        }
+    }
+
+    /// The writer's side: how many records it holds that are not durable yet.
+    pub(crate) fn hold_records(&self, count: usize) {
+        self.lock().held_records = count;
+        self.progressed.notify_all();
+    }
+
+    /// The writer's side: job `number` is done.
+    pub(crate) fn finish(&self, number: u64) {
+        self.lock().finished_job = number;
+        self.progressed.notify_all();
+    }
+
+    /// The writer's side: there is nobody to write any more.
+    pub(crate) fn stop(&self) {
+        self.lock().stopped = true;
+        self.progressed.notify_all();
+    }
+
+    pub(crate) fn waiting(&self) -> Waiting {
+        let post = self.lock();
+        Waiting {
+            rows: post.queued_rows,
+            records: post.waiting_records(),
+            dropped_samples: post.dropped_samples,
+            dropped_records: post.dropped_records,
+        }
+    }
+}
+
+impl Post {
+    fn waiting_records(&self) -> usize {
+        self.records.len() + self.held_records
+    }
+
+    fn close_batch(&mut self) {
+        let empty = self.free.pop().unwrap_or_else(|| self.current.empty_like());
+        let full = std::mem::replace(&mut self.current, empty);
+        self.full.push_back(full);
+    }
+
+    fn deliver(&mut self, rows_too: bool, job_too: bool) -> Delivery {
+        let mut batches = VecDeque::new();
+        if rows_too {
+            if !self.current.is_empty() {
+                self.close_batch();
+            }
+            batches = std::mem::take(&mut self.full);
+            self.queued_rows = 0;
+        }
+        let records = std::mem::take(&mut self.records);
+        self.held_records += records.len();
+        Delivery {
+            batches,
+            records,
+            last_ticket: self.last_ticket,
+            reasons: self.reasons.clone(),
+            job: if job_too { self.jobs.pop_front() } else { None },
+            closing: self.closing,
+        }
+    }
+}

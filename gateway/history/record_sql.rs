@@ -1,0 +1,168 @@
+//! Records into their tables.
+
+use super::record::{Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, Record, StateChange};
+use adapters::clock::{SECOND_NS, TimeNs};
+use rusqlite::{Connection, OptionalExtension, params};
+
+/// Longest interval that is spread over `state_hours`: beyond a year the clock was set, not the machine used.
+const SPREAD_HOURS_MAX: i64 = 9_000;
+const HOUR_NS: i64 = 3_600 * SECOND_NS;
+
+/// Empty text as NULL.
+fn some(text: &str) -> Option<&str> {
+    (!text.is_empty()).then_some(text)
+}
+
+/// Stores one record.
+pub(crate) fn store(db: &Connection, record: &Record) -> Result<(), rusqlite::Error> {
+    match record {
+        Record::Event(event) => store_event(db, event),
+        Record::Alarm(alarm) => raise(db, alarm),
+        Record::AlarmClear(clear) => clear_alarm(db, clear),
+        Record::State(change) => change_state(db, change),
+        Record::Part(part) => store_part(db, part),
+        Record::Decision(decision) => store_decision(db, decision),
+        Record::Command(command) => store_command(db, command),
+        Record::Model(model) => store_model(db, model),
+        Record::Diagnosis(diagnosis) => store_diagnosis(db, diagnosis),
+    }
+}
+
+fn store_event(db: &Connection, event: &Event) -> Result<(), rusqlite::Error> {
+    db.prepare_cached("INSERT INTO events (at_ns, kind, source, text, detail) VALUES (?1, ?2, ?3, ?4, ?5)")?
+        .execute(params![event.at_ns, event.kind, event.source, event.text, some(&event.detail)])
+        .map(drop)
+}
+
+fn raise(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO alarms (code, source, severity, raised_ns, count, en, zh) VALUES (?1, ?2, ?3, ?4, 1, ?5, ?6)
+         ON CONFLICT (source, code) WHERE cleared_ns IS NULL DO UPDATE SET count = count + 1",
+    )?
+    .execute(params![alarm.code, alarm.source, alarm.severity, alarm.at_ns, alarm.en, alarm.zh])
+    .map(drop)
+}
+
+fn clear_alarm(db: &Connection, clear: &AlarmClear) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "UPDATE alarms SET cleared_ns = max(?1, raised_ns) WHERE source = ?2 AND code = ?3 AND cleared_ns IS NULL",
+    )?
+    .execute(params![clear.at_ns, clear.source, clear.code])
+    .map(drop)
+}
+
+fn change_state(db: &Connection, change: &StateChange) -> Result<(), rusqlite::Error> {
+    close_state(db, change.at_ns, "change")?;
+    db.prepare_cached("INSERT INTO states (state, since_ns, program, tool) VALUES (?1, ?2, ?3, ?4)")?
+        .execute(params![change.state, change.at_ns, some(&change.program), some(&change.tool)])
+        .map(drop)
+}
+
+/// Ends the state the machine is in, if any, and counts its time by the hour.
+pub(crate) fn close_state(db: &Connection, until_ns: TimeNs, ended_by: &str) -> Result<(), rusqlite::Error> {
+    let open: Option<(i64, String, TimeNs)> = db
+        .prepare_cached("SELECT id, state, since_ns FROM states WHERE until_ns IS NULL")?
+        .query_row([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+        .optional()?;
+    let Some((id, state, since_ns)) = open else { return Ok(()) };
+    let until_ns = until_ns.max(since_ns);
+    db.prepare_cached("UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3")?
+        .execute(params![until_ns, ended_by, id])?;
+    spread(db, &state, since_ns, until_ns)
+}
+
+fn spread(db: &Connection, state: &str, since_ns: TimeNs, until_ns: TimeNs) -> Result<(), rusqlite::Error> {
+    let mut add = db.prepare_cached(
+        "INSERT INTO state_hours (hour, state, seconds) VALUES (?1, ?2, ?3)
+         ON CONFLICT DO UPDATE SET seconds = seconds + excluded.seconds",
+    )?;
+    let first = since_ns.div_euclid(HOUR_NS);
+    let last = until_ns.div_euclid(HOUR_NS).min(first + SPREAD_HOURS_MAX);
+    for hour in first..=last {
+        let from_ns = since_ns.max(hour.saturating_mul(HOUR_NS));
+        let to_ns = until_ns.min((hour + 1).saturating_mul(HOUR_NS));
+        if to_ns > from_ns {
+            add.execute(params![hour, state, (to_ns - from_ns) as f64 / SECOND_NS as f64])?;
+        }
+    }
+    Ok(())
+}
+
+fn store_part(db: &Connection, part: &Part) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO parts (began_ns, ended_ns, part, program, count, cutting_s, energy_j, detail)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+    )?
+    .execute(params![
+        part.began_ns,
+        part.ended_ns,
+        some(&part.part),
+        some(&part.program),
+        part.count,
+        part.cutting_s,
+        part.energy_j,
+        some(&part.detail)
+    ])
+    .map(drop)
+}
+
+fn store_decision(db: &Connection, decision: &Decision) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO decisions (at_ns, script, script_version, wanted, value, unit, reason, outcome, outcome_reason)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+    )?
+    .execute(params![
+        decision.at_ns,
+        decision.script,
+        decision.script_version,
+        decision.wanted,
+        decision.value,
+        decision.unit,
+        decision.reason,
+        decision.outcome,
+        decision.outcome_reason
+    ])
+    .map(drop)
+}
+
+fn store_command(db: &Connection, command: &Command) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO commands (at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+    )?
+    .execute(params![
+        command.at_ns,
+        command.command,
+        command.target,
+        command.before,
+        command.asked,
+        command.after,
+        command.unit,
+        command.outcome,
+        command.reason,
+        some(&command.script),
+        some(&command.script_version)
+    ])
+    .map(drop)
+}
+
+fn store_model(db: &Connection, model: &Model) -> Result<(), rusqlite::Error> {
+    db.prepare_cached("INSERT INTO models (at_ns, name, origin, toml) VALUES (?1, ?2, ?3, ?4)")?
+        .execute(params![model.at_ns, model.name, model.origin, model.toml])
+        .map(drop)
+}
+
+fn store_diagnosis(db: &Connection, diagnosis: &Diagnosis) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO diagnoses (at_ns, from_ns, to_ns, verdict, summary, json) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+    )?
+    .execute(params![
+        diagnosis.at_ns,
+        diagnosis.from_ns,
+        diagnosis.to_ns,
+        diagnosis.verdict,
+        diagnosis.summary,
+        diagnosis.json
+    ])
+    .map(drop)
+}

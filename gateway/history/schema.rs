@@ -1,0 +1,181 @@
+//! Opening the file: what it must be, and the tables it gets when it is new.
+
+use super::error::{Doing, HistoryError};
+use super::options::SeriesKind;
+use super::series::Series;
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
+use std::path::Path;
+
+/// Newest schema this version knows; stored as `user_version`.
+pub(crate) const SCHEMA: i64 = 1;
+/// `cncg`, stored as `application_id`.
+const APPLICATION: i64 = 0x636e_6367;
+const TABLES: &str = include_str!("schema.sql");
+/// Pages in the write-ahead log before it is copied back: 1 MB, which also bounds what a full disk must still hold.
+const CHECKPOINT_PAGES: u32 = 256;
+
+/// Opens the file for writing and creates the tables in a new one.
+pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> {
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let db = Connection::open_with_flags(path, flags).map_err(|error| explain(path, error))?;
+    db.busy_timeout(std::time::Duration::from_secs(2)).doing("setting the time to wait for locks")?;
+    let new = check(path, &db)?;
+    if new {
+        // Freed pages go back to the disk in small steps; must be set before the first table.
+        db.pragma_update(None, "auto_vacuum", "INCREMENTAL").map_err(|error| explain(path, error))?;
+    }
+    db.pragma_update(None, "journal_mode", "WAL").map_err(|error| explain(path, error))?;
+    db.pragma_update(None, "synchronous", "FULL").doing("choosing durable commits")?;
+    db.pragma_update(None, "wal_autocheckpoint", CHECKPOINT_PAGES).doing("bounding the write-ahead log")?;
+    if new {
+        create(&db).map_err(|error| explain(path, error))?;
+    }
+    Ok(db)
+}
+
+fn create(db: &Connection) -> Result<(), rusqlite::Error> {
+    db.execute_batch(&format!(
+        "BEGIN IMMEDIATE; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
+    ))
+}
+
+/// Opens the file for reading while a gateway may be writing it.
+pub(crate) fn open_for_reading(path: &Path) -> Result<Connection, HistoryError> {
+    if !path.is_file() {
+        return Err(HistoryError::Missing { path: path.to_owned() });
+    }
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let db = Connection::open_with_flags(path, flags).map_err(|error| explain(path, error))?;
+    db.busy_timeout(std::time::Duration::from_secs(5)).doing("setting the time to wait for locks")?;
+    if matches!(version(&db), Err(error) if error.sqlite_error_code() == Some(ErrorCode::CannotOpen)) {
+        return open_on_read_only_disk(path);
+    }
+    refuse_empty(path, check(path, &db)?)?;
+    Ok(db)
+}
+
+/// A write-ahead log needs a writable directory even to read; on a read-only disk nobody can be writing either.
+fn open_on_read_only_disk(path: &Path) -> Result<Connection, HistoryError> {
+    let name: String = path.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let db =
+        Connection::open_with_flags(format!("file:{name}?immutable=1"), flags).map_err(|error| explain(path, error))?;
+    refuse_empty(path, check(path, &db)?)?;
+    Ok(db)
+}
+
+fn refuse_empty(path: &Path, empty: bool) -> Result<(), HistoryError> {
+    let what = "it is empty".to_owned();
+    if empty { Err(HistoryError::NotAHistory { path: path.to_owned(), what }) } else { Ok(()) }
+}
+
+fn version(db: &Connection) -> Result<i64, rusqlite::Error> {
+    db.query_row("PRAGMA user_version", [], |row| row.get(0))
+}
+
+/// True for an empty file.
+fn check(path: &Path, db: &Connection) -> Result<bool, HistoryError> {
+    let application: i64 =
+        db.query_row("PRAGMA application_id", [], |row| row.get(0)).map_err(|error| explain(path, error))?;
+    let found = version(db).map_err(|error| explain(path, error))?;
+    let tables: i64 = db
+        .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+        .map_err(|error| explain(path, error))?;
+    match (application, found, tables) {
+        (0, 0, 0) => Ok(true),
+        (APPLICATION, found, _) if found > SCHEMA => {
+            Err(HistoryError::NewerSchema { path: path.to_owned(), found, known: SCHEMA })
+        }
+        (APPLICATION, SCHEMA, _) => Ok(false),
+        _ => Err(HistoryError::NotAHistory { path: path.to_owned(), what: "another SQLite database".to_owned() }),
+    }
+}
+
+fn explain(path: &Path, error: rusqlite::Error) -> HistoryError {
+    let read_only = || HistoryError::ReadOnly {
+        path: path.to_owned(),
+        place: path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned(),
+        error: error.to_string(),
+    };
+    match error.sqlite_error_code() {
+        Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => read_only(),
+        Some(ErrorCode::NotADatabase) => {
+            HistoryError::NotAHistory { path: path.to_owned(), what: "not a SQLite database".to_owned() }
+        }
+        _ => HistoryError::Sqlite { doing: "opening the file", error },
+    }
+}
+
+/// Gives every series its number, creating what is new.
+pub(crate) fn register(db: &mut Connection, series: &mut [Series]) -> Result<(), HistoryError> {
+    let registering = db.transaction().doing("registering the series")?;
+    for one in series.iter_mut() {
+        one.id = register_one(&registering, one)?;
+    }
+    registering.commit().doing("registering the series")
+}
+
+fn register_one(db: &Connection, series: &Series) -> Result<i64, HistoryError> {
+    let known: Option<(i64, String)> = db
+        .query_row("SELECT id, kind FROM series WHERE name = ?1", [&*series.name], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()
+        .doing("looking up a series")?;
+    let kind = kind_word(series.kind);
+    match known {
+        Some((_, stored)) if stored != kind => Err(HistoryError::Question(format!(
+            "the series {} was stored as {stored} and is now {kind}; give it another name",
+            series.name
+        ))),
+        Some((id, _)) => {
+            refresh(db, id, series).doing("refreshing a series")?;
+            Ok(id)
+        }
+        None => {
+            db.execute(
+                "INSERT INTO series (name, unit, kind, decimals, en, zh, estimated) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                params![&*series.name, &*series.unit, kind, series.decimals, &*series.en, &*series.zh, series.estimated],
+            )
+            .doing("registering a series")?;
+            Ok(db.last_insert_rowid())
+        }
+    }
+}
+
+/// Descriptions may be improved and resolutions changed; blocks carry their own scale.
+fn refresh(db: &Connection, id: i64, series: &Series) -> Result<(), rusqlite::Error> {
+    db.execute(
+        "UPDATE series SET unit = ?2, decimals = ?3, en = ?4, zh = ?5 WHERE id = ?1
+         AND (unit, en, zh) IS NOT (?2, ?4, ?5) OR id = ?1 AND decimals IS NOT ?3",
+        params![id, &*series.unit, series.decimals, &*series.en, &*series.zh],
+    )
+    .map(drop)
+}
+
+fn kind_word(kind: SeriesKind) -> &'static str {
+    match kind {
+        SeriesKind::Number => "number",
+        SeriesKind::Text => "text",
+    }
+}
+
+/// Every series the file knows, in the order of their numbers.
+pub(crate) fn known_series(db: &Connection) -> Result<Vec<Series>, HistoryError> {
+    let text = |row: &rusqlite::Row<'_>, column: usize| row.get::<_, String>(column).map(Into::into);
+    let mut statement = db
+        .prepare("SELECT id, name, unit, kind, decimals, en, zh, estimated FROM series ORDER BY id")
+        .doing("reading the series")?;
+    let rows = statement.query_map([], |row| {
+        let kind = if row.get::<_, String>(3)? == "text" { SeriesKind::Text } else { SeriesKind::Number };
+        Ok(Series {
+            id: row.get(0)?,
+            name: text(row, 1)?,
+            unit: text(row, 2)?,
+            kind,
+            decimals: row.get(4)?,
+            en: text(row, 5)?,
+            zh: text(row, 6)?,
+            estimated: row.get(7)?,
+        })
+    });
+    rows.and_then(Iterator::collect).doing("reading the series")
+}

@@ -1,0 +1,114 @@
+//! How the writer is doing, for the page, metrics and the health check.
+
+use adapters::clock::TimeNs;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// A moment's figures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Status {
+    /// Samples up to and including this time survive a power cut; `None` before the first commit.
+    pub acknowledged_through_ns: Option<TimeNs>,
+    /// Records up to this ticket survive a power cut.
+    pub acknowledged_record: u64,
+    /// Samples made durable since opening.
+    pub rows: u64,
+    /// Pages in use in the database, bytes.
+    pub bytes: u64,
+    /// Samples waiting for the writer.
+    pub queued_samples: usize,
+    /// Records waiting to become durable.
+    pub queued_records: usize,
+    /// Samples refused because the queue was full.
+    pub dropped_samples: u64,
+    /// Records refused because the queue was full.
+    pub dropped_records: u64,
+    /// Samples that waited too long for a disk that took nothing, oldest first.
+    pub lost_samples: u64,
+    /// Samples removed by age or size since opening.
+    pub retired_samples: u64,
+    /// Commits since opening.
+    pub commits: u64,
+    /// Duration of the last commit, fsync included, milliseconds.
+    pub last_commit_ms: f64,
+    /// Why nothing is becoming durable at the moment, in words; `None` when all is well.
+    pub degraded: Option<String>,
+    /// The last error, also when it is over.
+    pub last_error: Option<String>,
+}
+
+/// The figures as the writer thread keeps them.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) acknowledged_ns: AtomicI64,
+    pub(crate) acknowledged_record: AtomicU64,
+    pub(crate) rows: AtomicU64,
+    pub(crate) bytes: AtomicU64,
+    pub(crate) lost: AtomicU64,
+    pub(crate) retired: AtomicU64,
+    pub(crate) commits: AtomicU64,
+    pub(crate) commit_us: AtomicU64,
+    words: Mutex<Words>,
+}
+
+#[derive(Debug, Default)]
+struct Words {
+    degraded: Option<String>,
+    last_error: Option<String>,
+}
+
+/// No row is durable yet.
+pub(crate) const NOTHING_NS: i64 = i64::MIN;
+
+impl Default for Shared {
+    fn default() -> Self {
+        Self {
+            acknowledged_ns: AtomicI64::new(NOTHING_NS),
+            acknowledged_record: AtomicU64::new(0),
+            rows: AtomicU64::new(0),
+            bytes: AtomicU64::new(0),
+            lost: AtomicU64::new(0),
+            retired: AtomicU64::new(0),
+            commits: AtomicU64::new(0),
+            commit_us: AtomicU64::new(0),
+            words: Mutex::new(Words::default()),
+        }
+    }
+}
+
+impl Shared {
+    pub(crate) fn acknowledged_ns(&self) -> Option<TimeNs> {
+        let at_ns = self.acknowledged_ns.load(Ordering::Acquire);
+        (at_ns != NOTHING_NS).then_some(at_ns)
+    }
+
+    /// All is well again.
+    pub(crate) fn recovered(&self) {
+        self.words.lock().unwrap_or_else(PoisonError::into_inner).degraded = None;
+    }
+
+    /// Nothing is becoming durable, because of `error`.
+    pub(crate) fn degraded(&self, error: &str) {
+        let mut words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        words.degraded = Some(error.to_owned());
+        words.last_error = Some(error.to_owned());
+    }
+
+    /// Everything but the queue.
+    pub(crate) fn status(&self) -> Status {
+        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        Status {
+            acknowledged_through_ns: self.acknowledged_ns(),
+            acknowledged_record: self.acknowledged_record.load(Ordering::Acquire),
+            rows: self.rows.load(Ordering::Relaxed),
+            bytes: self.bytes.load(Ordering::Relaxed),
+            lost_samples: self.lost.load(Ordering::Relaxed),
+            retired_samples: self.retired.load(Ordering::Relaxed),
+            commits: self.commits.load(Ordering::Relaxed),
+            last_commit_ms: self.commit_us.load(Ordering::Relaxed) as f64 / 1000.0,
+            degraded: words.degraded.clone(),
+            last_error: words.last_error.clone(),
+            ..Status::default()
+        }
+    }
+}

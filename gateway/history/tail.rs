@@ -1,0 +1,179 @@
+//! The crash tail: the rows of the running minute, one small JSON text per commit, so that any SQLite client can read
+//! them (view `recent_samples`) and the next start can put them into a block.
+//!
+//! Form: `{"t":[times],"s":{"<series>":[cells] or cell}}`; a cell alone holds for every row. A cell is a number, a text,
+//! or `{"m":"reason"}`.
+
+use super::options::SeriesKind;
+use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
+use super::rounding::rounded;
+use super::rows::{Column, Rows, Word};
+use super::series::Series;
+use serde_json::Value as Json;
+use std::fmt::Write;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The text of rows `range`.
+pub(crate) fn to_text(rows: &Rows, range: Range<usize>, series: &[Series], reasons: &Reasons) -> String {
+    let mut out = String::from("{\"t\":[");
+    for (index, at_ns) in rows.at_ns[range.clone()].iter().enumerate() {
+        comma(&mut out, index);
+        // Writing to a string cannot fail, here and below.
+        let _ = write!(out, "{at_ns}");
+    }
+    out.push_str("],\"s\":{");
+    let used = series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused());
+    for (index, (series, column)) in used.enumerate() {
+        comma(&mut out, index);
+        let _ = write!(out, "\"{}\":", series.id);
+        match column {
+            Column::Numbers { values, missing } => {
+                put_numbers(&mut out, &values[range.clone()], &missing[range.clone()], series.decimals, reasons);
+            }
+            Column::Words(changes) => put_words(&mut out, changes, &range, reasons),
+        }
+    }
+    out.push_str("}}");
+    out
+}
+
+fn comma(out: &mut String, index: usize) {
+    if index > 0 {
+        out.push(',');
+    }
+}
+
+fn put_numbers(out: &mut String, values: &[f64], missing: &[u8], decimals: Option<u8>, reasons: &Reasons) {
+    let cell = |out: &mut String, row: usize| match missing[row] {
+        PRESENT => put_number(out, decimals.map_or(values[row], |decimals| rounded(values[row], decimals))),
+        code => put_missing(out, code, reasons),
+    };
+    let same = (1..values.len()).all(|row| missing[row] == missing[0] && values[row].to_bits() == values[0].to_bits());
+    if same {
+        return cell(out, 0);
+    }
+    out.push('[');
+    for row in 0..values.len() {
+        comma(out, row);
+        cell(out, row);
+    }
+    out.push(']');
+}
+
+fn put_number(out: &mut String, number: f64) {
+    // Both forms are the shortest text that reads back to the same number; this one spares the ".0".
+    let _ =
+        if number.fract() == 0.0 && number.abs() < 1e15 { write!(out, "{number}") } else { write!(out, "{number:?}") };
+}
+
+fn put_missing(out: &mut String, code: u8, reasons: &Reasons) {
+    let _ = write!(out, "{{\"m\":{}}}", Json::from(reasons.word(code)));
+}
+
+fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, reasons: &Reasons) {
+    let cell = |out: &mut String, word: Option<&Word>| match word {
+        Some(Word::Is(text)) => {
+            let _ = write!(out, "{}", Json::from(&**text));
+        }
+        Some(Word::Missing(code)) => put_missing(out, *code, reasons),
+        None => put_missing(out, NOT_PROVIDED, reasons),
+    };
+    let at = |row: usize| changes.partition_point(|(from, _)| *from as usize <= row).checked_sub(1);
+    if at(range.start) == at(range.end.saturating_sub(1)) {
+        return cell(out, at(range.start).map(|index| &changes[index].1));
+    }
+    out.push('[');
+    for (index, row) in range.clone().enumerate() {
+        comma(out, index);
+        cell(out, at(row).map(|index| &changes[index].1));
+    }
+    out.push(']');
+}
+
+/// Appends the rows of `text` to `rows`; `None`, and nothing appended, when it is not what [`to_text`] writes.
+pub(crate) fn append(text: &str, rows: &mut Rows, series: &[Series], reasons: &mut Reasons) -> Option<()> {
+    let body: Json = serde_json::from_str(text).ok()?;
+    let times: Vec<i64> = body.get("t")?.as_array()?.iter().map(Json::as_i64).collect::<Option<_>>()?;
+    let cells = body.get("s")?.as_object()?;
+    let mut more = rows.empty_like();
+    more.at_ns = times;
+    for (series, column) in series.iter().zip(&mut more.columns) {
+        if let Some(cell) = cells.get(&series.id.to_string()) {
+            *column = column_of(cell, more.at_ns.len(), series.kind, reasons);
+        }
+    }
+    let count = more.len();
+    rows.append(&more, 0..count);
+    Some(())
+}
+
+fn column_of(cell: &Json, count: usize, kind: SeriesKind, reasons: &mut Reasons) -> Column {
+    let cells: Vec<&Json> = match cell {
+        Json::Array(cells) => cells.iter().take(count).collect(),
+        alone => vec![alone; count],
+    };
+    let mut reason = |cell: &Json| cell.get("m").and_then(Json::as_str).map_or(NOT_PROVIDED, |word| reasons.code(word));
+    match kind {
+        SeriesKind::Number => Column::Numbers {
+            values: cells.iter().map(|cell| cell.as_f64().unwrap_or(0.0)).collect(),
+            missing: cells.iter().map(|cell| if cell.is_number() { PRESENT } else { reason(cell) }).collect(),
+        },
+        SeriesKind::Text => {
+            let word = |cell: &&Json| match cell {
+                Json::String(text) => Word::Is(Arc::from(text.as_str())),
+                other => Word::Missing(reason(other)),
+            };
+            let mut changes: Vec<(u32, Word)> = (0u32..).zip(cells.iter().map(word)).collect();
+            changes.dedup_by(|later, earlier| later.1 == earlier.1);
+            Column::Words(changes)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::options::{ExtraSeries, ExtraValue, Options};
+    use super::super::series::stored_series;
+    use super::*;
+    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+
+    #[test]
+    fn the_tail_gives_back_every_row() {
+        let extras = vec![ExtraSeries::number("a_w", "W", "", ""), ExtraSeries::text("state", "", "")];
+        let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
+        (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
+        let mut reasons = Reasons::default();
+        let mut rows = Rows::of(&series);
+        let channel = |name| ChannelId::of(name).expect("in the table");
+        for row in 0..30 {
+            let mut sample = Sample::empty(1_700_000_000_000_000_000 + row);
+            sample.set(channel("spindle_power_w"), Slot { value: Ok(Value::Number(row as f64 * 0.1)), age_ns: 0 });
+            sample.set(channel("program"), Slot { value: Ok(Value::Text("O1 \"a\"".into())), age_ns: 0 });
+            sample.set(channel("total_power_w"), Slot::absent(Absence::Stale));
+            let state = if row % 4 == 0 { "idle" } else { "cutting" };
+            rows.push(&sample, &[ExtraValue::Missing("not_learned"), ExtraValue::Text(state)], &mut reasons);
+        }
+        let mut back = rows.empty_like();
+        for part in [0..7, 7..8, 8..30] {
+            let text = to_text(&rows, part, &series, &reasons);
+            append(&text, &mut back, &series, &mut reasons).expect("readable");
+        }
+        let exact: Vec<f64> = (0..30).map(|row| rounded(f64::from(row) * 0.1, 1)).collect();
+        let power = series.iter().position(|series| &*series.name == "spindle_power_w").expect("there");
+        assert!(matches!(&back.columns[power], Column::Numbers { values, .. } if *values == exact));
+        for (index, (back, rows)) in back.columns.iter().zip(&rows.columns).enumerate() {
+            assert!(index == power || back == rows, "{}", series[index].name);
+        }
+    }
+
+    #[test]
+    fn a_damaged_tail_is_refused() {
+        let series = stored_series(&Options::default()).expect("fine");
+        for text in ["", "{}", "{\"t\":[1.5],\"s\":{}}", "{\"t\":[1],\"s\":3}"] {
+            let mut rows = Rows::of(&series);
+            assert_eq!(append(text, &mut rows, &series, &mut Reasons::default()), None, "{text}");
+            assert!(rows.is_empty());
+        }
+    }
+}

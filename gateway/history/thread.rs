@@ -1,0 +1,204 @@
+//! The writer thread: takes what has gathered, seals minutes, commits at its own pace, and keeps going whatever the
+//! disk says.
+
+use super::commit::{TailSlots, commit};
+use super::error::HistoryError;
+use super::house::House;
+use super::keeper::Keeper;
+use super::mailbox::{Delivery, Job, Mailbox};
+use super::options::{Options, WhenFull};
+use super::status::Shared;
+use rusqlite::Connection;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// This many sealed blocks are committed without waiting for the next regular commit.
+const BLOCKS_PRESSING: usize = 32;
+/// At least this long between attempts while the disk refuses.
+const RETRY: Duration = Duration::from_millis(250);
+/// When asked to finish and the disk refuses: this many attempts.
+const LAST_ATTEMPTS: usize = 8;
+
+pub(crate) struct Thread {
+    pub(crate) db: Connection,
+    pub(crate) keeper: Keeper,
+    pub(crate) slots: TailSlots,
+    pub(crate) house: House,
+    pub(crate) mailbox: Arc<Mailbox>,
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) options: Options,
+    pub(crate) pace: Pace,
+}
+
+/// When to commit, and what is being waited for.
+#[derive(Debug)]
+pub(crate) struct Pace {
+    next_commit: Instant,
+    failures: usize,
+    last_ticket: u64,
+    flushing: Option<u64>,
+    maintaining: Option<u64>,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { next_commit: Instant::now(), failures: 0, last_ticket: 0, flushing: None, maintaining: None }
+    }
+}
+
+/// Tells everybody who waits that nobody writes any more, also when the thread panics.
+struct StopGuard(Arc<Mailbox>);
+
+impl Drop for StopGuard {
+    fn drop(&mut self) {
+        self.0.stop();
+    }
+}
+
+impl Thread {
+    pub(crate) fn run(mut self) {
+        let _guard = StopGuard(self.mailbox.clone());
+        loop {
+            let delivery = self.take();
+            let closing = delivery.closing && delivery.batches.is_empty();
+            self.accept(delivery);
+            self.commit_if_due(closing);
+            self.maintain();
+            if closing && (!self.keeper.is_dirty() || self.pace.failures >= LAST_ATTEMPTS) {
+                return self.finish();
+            }
+        }
+    }
+
+    fn take(&mut self) -> Delivery {
+        let until_commit = self.pace.next_commit.saturating_duration_since(Instant::now());
+        let limit = if self.house.is_busy() { Duration::ZERO } else { until_commit };
+        let rows_too = !(self.keeper.is_full() && self.options.when_full == WhenFull::Wait);
+        let job_too = self.pace.flushing.is_none() && self.pace.maintaining.is_none();
+        self.mailbox.take(limit, rows_too, job_too)
+    }
+
+    fn accept(&mut self, delivery: Delivery) {
+        self.keeper.reasons = delivery.reasons;
+        for batch in delivery.batches {
+            self.keeper.ingest(&batch);
+            self.mailbox.recycle(batch);
+            if self.keeper.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
+                self.commit();
+            }
+        }
+        self.keeper.records.extend(delivery.records);
+        self.pace.last_ticket = delivery.last_ticket;
+        match delivery.job {
+            Some((number, Job::Flush)) => self.pace.flushing = Some(number),
+            Some((number, Job::Maintain(now_ns))) => {
+                self.pace.maintaining = Some(number);
+                self.house.begin(now_ns);
+            }
+            None => {}
+        }
+    }
+
+    fn commit_if_due(&mut self, closing: bool) {
+        let urgent = self.pace.failures == 0 && (closing || self.pace.flushing.is_some());
+        if urgent || Instant::now() >= self.pace.next_commit {
+            self.commit();
+        } else if closing {
+            std::thread::sleep(self.pace.next_commit.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    fn commit(&mut self) {
+        let began = Instant::now();
+        let wait = self.options.group_commit;
+        if !self.keeper.is_dirty() {
+            self.pace.next_commit = began + wait;
+            return self.acknowledge();
+        }
+        match self.attempt() {
+            Ok(()) => {
+                let took = u64::try_from(began.elapsed().as_micros()).unwrap_or(u64::MAX);
+                self.shared.commit_us.store(took, Ordering::Relaxed);
+                self.shared.commits.fetch_add(1, Ordering::Relaxed);
+                self.pace.failures = 0;
+                self.pace.next_commit = began + wait;
+                self.shared.recovered();
+                self.acknowledge();
+                self.tidy();
+            }
+            Err(error) => {
+                self.pace.failures += 1;
+                self.pace.next_commit = Instant::now() + wait.max(RETRY);
+                self.shared.degraded(&degraded_text(&error));
+            }
+        }
+        self.shared.lost.store(self.keeper.lost_rows, Ordering::Relaxed);
+        self.mailbox.hold_records(self.keeper.records.len());
+    }
+
+    /// One commit; on a full disk a second one after making room.
+    fn attempt(&mut self) -> Result<(), HistoryError> {
+        let Self { db, keeper, slots, options, house, .. } = self;
+        let Err(first) = commit(db, keeper, slots, &options.origin) else { return Ok(()) };
+        if !first.is_full() {
+            return Err(first);
+        }
+        let wanted = 2 * keeper.blocks.iter().map(|block| block.bytes() as u64).sum::<u64>() + 65_536;
+        house.make_room(db, wanted)?;
+        commit(db, keeper, slots, &options.origin)
+    }
+
+    fn acknowledge(&mut self) {
+        if let Some(newest_ns) = self.keeper.newest_ns() {
+            self.shared.acknowledged_ns.store(newest_ns, Ordering::Release);
+        }
+        let rows = u64::try_from(self.keeper.next_row - self.keeper.opened_row).unwrap_or(0);
+        self.shared.rows.store(rows.saturating_sub(self.keeper.lost_rows), Ordering::Relaxed);
+        self.shared.acknowledged_record.store(self.pace.last_ticket, Ordering::Release);
+        if let Some(number) = self.pace.flushing.take() {
+            self.mailbox.finish(number);
+        }
+    }
+
+    fn tidy(&mut self) {
+        match self.house.after_commit(&mut self.db) {
+            Ok(used) => self.shared.bytes.store(used, Ordering::Relaxed),
+            Err(error) => self.shared.degraded(&degraded_text(&error)),
+        }
+        self.shared.retired.store(self.house.retired, Ordering::Relaxed);
+    }
+
+    fn maintain(&mut self) {
+        if !self.house.is_busy() {
+            return;
+        }
+        let more = self.house.step(&mut self.db).unwrap_or_else(|error| {
+            // Maintenance can wait; what is being recorded cannot.
+            self.shared.degraded(&degraded_text(&error));
+            self.house.abandon();
+            false
+        });
+        self.shared.retired.store(self.house.retired, Ordering::Relaxed);
+        if let Some(number) = self.pace.maintaining.take_if(|_| !more) {
+            self.mailbox.finish(number);
+        }
+    }
+
+    fn finish(self) {
+        if let Some(number) = self.pace.maintaining {
+            self.mailbox.finish(number);
+        }
+        // What is committed is in the log already; a failing last checkpoint loses nothing.
+        let _ = self.db.close();
+    }
+}
+
+fn degraded_text(error: &HistoryError) -> String {
+    if error.is_full() {
+        return "The disk is full: the newest samples wait in memory, the oldest raw samples are given up. Free some \
+                room on the disk of the history."
+            .to_owned();
+    }
+    error.to_string()
+}

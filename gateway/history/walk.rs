@@ -1,0 +1,265 @@
+//! Stretch by stretch through a time range: the blocks, then what the crash tail holds beyond them.
+
+use super::block::{Cells, Decoder, Directory, NumberCells, WordCells};
+use super::compact::{COMPACT_NS, own_codes};
+use super::error::{Doing, HistoryError};
+use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
+use super::recover::unsealed;
+use super::rows::{Column, Rows, Word};
+use super::series::Series;
+use super::tail;
+use adapters::clock::TimeNs;
+use rusqlite::{Connection, OptionalExtension, params};
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Consecutive rows of one segment, series decoded when they are asked for.
+pub(crate) struct Stretch {
+    pub(crate) segment: i64,
+    pub(crate) first_row: i64,
+    pub(crate) at_ns: Vec<TimeNs>,
+    form: Form,
+}
+
+enum Form {
+    Block { directory: Directory, columns: Vec<u8>, codes: Box<[u8; 256]> },
+    Tail(Rows),
+}
+
+/// Where to go on, and what is needed on the way.
+pub(crate) struct Walk {
+    blocks: VecDeque<i64>,
+    tail_from: Option<i64>,
+    tail: VecDeque<Stretch>,
+    range: Range<TimeNs>,
+    series: Arc<[Series]>,
+    decoder: Decoder,
+    pub(crate) reasons: Reasons,
+}
+
+/// The keys of the blocks that may have rows in `range`, in the order of recording.
+pub(crate) fn blocks_in(db: &Connection, range: &Range<TimeNs>) -> Result<VecDeque<i64>, HistoryError> {
+    let mut statement = db
+        .prepare_cached(
+            "SELECT first_row FROM blocks WHERE start_ns >= ?1 AND start_ns < ?2 AND end_ns >= ?3 ORDER BY first_row",
+        )
+        .doing("looking for blocks")?;
+    // No block is longer than a compacted one, so an earlier start cannot reach into the range.
+    let earliest_ns = range.start.saturating_sub(COMPACT_NS);
+    let keys = statement.query_map(params![earliest_ns, range.end, range.start], |row| row.get(0));
+    keys.and_then(Iterator::collect).doing("looking for blocks")
+}
+
+impl Walk {
+    /// Through the rows at or after `range.start` and before `range.end`. `series` are all the file knows. Call inside a
+    /// read transaction, so that a block sealed meanwhile is not seen twice.
+    pub(crate) fn new(db: &Connection, range: Range<TimeNs>, series: Arc<[Series]>) -> Result<Self, HistoryError> {
+        let blocks = blocks_in(db, &range)?;
+        let sealed: Option<i64> = db
+            .query_row("SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1", [], |row| row.get(0))
+            .optional()
+            .doing("looking for the last block")?;
+        let decoder = Decoder::new().map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
+        let tail_from = Some(sealed.unwrap_or(0));
+        Ok(Self { blocks, tail_from, tail: VecDeque::new(), range, series, decoder, reasons: Reasons::default() })
+    }
+
+    /// Through what no block holds yet.
+    pub(crate) fn of_tail(db: &Connection, range: Range<TimeNs>, series: Arc<[Series]>) -> Result<Self, HistoryError> {
+        let nothing = TimeNs::MAX..TimeNs::MAX;
+        Ok(Self { range, ..Self::new(db, nothing, series)? })
+    }
+
+    /// The next stretch that has a row in the range.
+    pub(crate) fn next(&mut self, db: &Connection) -> Result<Option<Stretch>, HistoryError> {
+        while let Some(first_row) = self.blocks.pop_front() {
+            let stretch = self.load(db, first_row)?;
+            if !self.rows_of(&stretch).is_empty() {
+                return Ok(Some(stretch));
+            }
+        }
+        if let Some(from_row) = self.tail_from.take() {
+            self.tail = self.load_tail(db, from_row)?;
+        }
+        while let Some(stretch) = self.tail.pop_front() {
+            if !self.rows_of(&stretch).is_empty() {
+                return Ok(Some(stretch));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The rows of `stretch` that lie in the range. Time never decreases within a stretch.
+    pub(crate) fn rows_of(&self, stretch: &Stretch) -> Range<usize> {
+        let from = stretch.at_ns.partition_point(|at_ns| *at_ns < self.range.start);
+        let to = stretch.at_ns.partition_point(|at_ns| *at_ns < self.range.end);
+        from..to.max(from)
+    }
+
+    /// The cells of one series in all rows of `stretch`; `None` when nothing delivered it there.
+    pub(crate) fn cells(&mut self, stretch: &Stretch, series: i64) -> Result<Option<Cells>, HistoryError> {
+        match &stretch.form {
+            Form::Block { directory, columns, codes } => {
+                let Some(entry) = directory.entry(series) else { return Ok(None) };
+                let damaged = damaged(stretch.first_row);
+                let mut cells = self.decoder.cells(directory, entry, columns).ok_or(damaged)?;
+                if entry.any_missing && !directory.words.is_empty() {
+                    let missing = cells.missing_mut();
+                    missing.iter_mut().for_each(|code| *code = codes[usize::from(*code)]);
+                }
+                Ok(Some(cells))
+            }
+            Form::Tail(rows) => {
+                let index = self.series.iter().position(|known| known.id == series);
+                let column = index.and_then(|index| rows.columns.get(index));
+                Ok(column.filter(|column| !column.is_unused()).map(|column| cells_of(column, rows.len())))
+            }
+        }
+    }
+
+    fn load(&mut self, db: &Connection, first_row: i64) -> Result<Stretch, HistoryError> {
+        let (segment, directory, columns): (i64, Vec<u8>, Vec<u8>) = db
+            .prepare_cached("SELECT segment, directory, columns FROM blocks WHERE first_row = ?1")
+            .and_then(|mut statement| {
+                statement.query_row([first_row], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+            })
+            .doing("reading a block")?;
+        let directory = Directory::parse(&directory).ok_or(damaged(first_row))?;
+        let at_ns = self.decoder.times(&directory, &columns).ok_or(damaged(first_row))?;
+        let codes = Box::new(own_codes(&directory, &mut self.reasons));
+        Ok(Stretch { segment, first_row, at_ns, form: Form::Block { directory, columns, codes } })
+    }
+
+    fn load_tail(&mut self, db: &Connection, from_row: i64) -> Result<VecDeque<Stretch>, HistoryError> {
+        let mut stretches = VecDeque::new();
+        let entries = unsealed(db, from_row)?;
+        for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
+            let mut rows = Rows::of(&self.series);
+            for entry in group {
+                tail::append(&entry.body, &mut rows, &self.series, &mut self.reasons)
+                    .ok_or(damaged(entry.first_row))?;
+            }
+            let (segment, first_row) = (group[0].segment, group[0].first_row);
+            stretches.push_back(Stretch { segment, first_row, at_ns: rows.at_ns.clone(), form: Form::Tail(rows) });
+        }
+        Ok(stretches)
+    }
+}
+
+fn damaged(first_row: i64) -> HistoryError {
+    HistoryError::Damaged { first_row, what: "the block does not decode" }
+}
+
+impl Stretch {
+    /// The series delivered here, and whether a value of it is missing anywhere.
+    pub(crate) fn delivered(&self, series: &[Series]) -> Vec<(i64, bool)> {
+        match &self.form {
+            Form::Block { directory, .. } => {
+                directory.entries.iter().map(|entry| (entry.series, entry.any_missing)).collect()
+            }
+            Form::Tail(rows) => {
+                let used = series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused());
+                used.map(|(series, column)| (series.id, any_missing(column))).collect()
+            }
+        }
+    }
+}
+
+fn any_missing(column: &Column) -> bool {
+    match column {
+        Column::Numbers { missing, .. } => missing.iter().any(|code| *code != PRESENT),
+        Column::Words(changes) => changes.iter().any(|(_, word)| matches!(word, Word::Missing(_))),
+    }
+}
+
+fn cells_of(column: &Column, rows: usize) -> Cells {
+    match column {
+        Column::Numbers { values, missing } => {
+            Cells::Numbers(NumberCells { values: values.clone(), missing: missing.clone() })
+        }
+        Column::Words(changes) => {
+            let mut cells = WordCells::default();
+            for (index, (row, word)) in changes.iter().enumerate() {
+                let end = changes.get(index + 1).map_or(rows, |(next, _)| *next as usize);
+                cells.push_run(end.saturating_sub(*row as usize), word);
+            }
+            Cells::Words(cells)
+        }
+    }
+}
+
+impl WordCells {
+    fn push_run(&mut self, count: usize, word: &Word) {
+        let (code, missing) = match word {
+            Word::Missing(code) => (0, *code),
+            Word::Is(text) => {
+                let position = self.words.iter().position(|known| known == text).unwrap_or_else(|| {
+                    self.words.push(text.clone());
+                    self.words.len() - 1
+                });
+                (u32::try_from(position).unwrap_or(0), PRESENT)
+            }
+        };
+        self.codes.resize(self.codes.len() + count, code);
+        self.missing.resize(self.missing.len() + count, missing);
+    }
+}
+
+impl Cells {
+    /// Cells of a series that nothing delivered.
+    pub(crate) fn not_provided(rows: usize) -> Self {
+        Self::Numbers(NumberCells { values: vec![0.0; rows], missing: vec![NOT_PROVIDED; rows] })
+    }
+
+    fn missing_mut(&mut self) -> &mut [u8] {
+        match self {
+            Self::Numbers(cells) => &mut cells.missing,
+            Self::Words(cells) => &mut cells.missing,
+        }
+    }
+
+    /// The code of the reason in `row`, 0 when there is a value.
+    #[must_use]
+    pub fn missing(&self, row: usize) -> u8 {
+        match self {
+            Self::Numbers(cells) => cells.missing[row],
+            Self::Words(cells) => cells.missing[row],
+        }
+    }
+
+    /// The number in `row`; `None` when it is missing or the series is text.
+    #[must_use]
+    pub fn number(&self, row: usize) -> Option<f64> {
+        match self {
+            Self::Numbers(cells) if cells.missing[row] == PRESENT => Some(cells.values[row]),
+            _ => None,
+        }
+    }
+
+    /// The word in `row`; `None` when it is missing or the series is a quantity.
+    #[must_use]
+    pub fn word(&self, row: usize) -> Option<&str> {
+        match self {
+            Self::Words(cells) if cells.missing[row] == PRESENT => {
+                cells.words.get(cells.codes[row] as usize).map(|word| &**word)
+            }
+            _ => None,
+        }
+    }
+
+    /// Only these rows, in order.
+    pub(crate) fn keep(&self, rows: &[usize]) -> Self {
+        match self {
+            Self::Numbers(cells) => Self::Numbers(NumberCells {
+                values: rows.iter().map(|row| cells.values[*row]).collect(),
+                missing: rows.iter().map(|row| cells.missing[*row]).collect(),
+            }),
+            Self::Words(cells) => Self::Words(WordCells {
+                words: cells.words.clone(),
+                codes: rows.iter().map(|row| cells.codes[*row]).collect(),
+                missing: rows.iter().map(|row| cells.missing[*row]).collect(),
+            }),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! The handle through which the box writes its history.
+
+use super::commit::TailSlots;
+use super::error::{HistoryError, at};
+use super::house::House;
+use super::keeper::Keeper;
+use super::lock::Lock;
+use super::mailbox::{Job, Mailbox};
+use super::options::{ExtraValue, Options};
+use super::record::Record;
+use super::recover::recover;
+use super::schema;
+use super::series::stored_series;
+use super::status::{Shared, Status};
+use super::thread::{Pace, Thread};
+use adapters::Sample;
+use adapters::clock::TimeNs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long a flush waits when nobody says otherwise.
+const FLUSH_LIMIT: Duration = Duration::from_secs(30);
+
+/// Writes one history. All methods take `&self` and may be called from any thread; dropping the handle makes what was
+/// handed in durable and ends the writer thread.
+#[derive(Debug)]
+pub struct Writer {
+    path: PathBuf,
+    mailbox: Arc<Mailbox>,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    _lock: Lock,
+}
+
+impl Writer {
+    /// Opens or creates the history at `path` and starts its writer thread. What a crash left in the tail is brought
+    /// into order first.
+    ///
+    /// # Errors
+    /// [`HistoryError::InUse`] when another process writes it, [`HistoryError::NewerSchema`],
+    /// [`HistoryError::NotAHistory`], [`HistoryError::ReadOnly`], or what `SQLite` says.
+    pub fn open(path: &Path, options: Options) -> Result<Self, HistoryError> {
+        if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            std::fs::create_dir_all(parent).map_err(at(parent))?;
+        }
+        let lock = Lock::take(path)?;
+        let mut db = schema::open_for_writing(path)?;
+        let mut series = stored_series(&options)?;
+        schema::register(&mut db, &mut series)?;
+        let end = recover(&mut db)?;
+        let mailbox = Arc::new(Mailbox::new(&series, &options));
+        let shared = Arc::new(Shared::default());
+        let thread = Thread {
+            keeper: Keeper::new(series, end)?,
+            slots: TailSlots::load(&db)?,
+            house: House::new(path, options.retention, options.reserve_bytes),
+            db,
+            mailbox: mailbox.clone(),
+            shared: shared.clone(),
+            options,
+            pace: Pace::default(),
+        };
+        let thread = std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(at(path))?;
+        Ok(Self { path: path.to_owned(), mailbox, shared, thread: Some(thread), _lock: lock })
+    }
+
+    /// Hands in one tick: the channels of `sample`, and the values of the registered extras in their order. Takes well
+    /// under a microsecond and never waits for the disk (unless [`WhenFull::Wait`](super::WhenFull::Wait) was chosen).
+    /// Returns how many samples have been dropped so far because the queue was full.
+    pub fn sample(&self, sample: &Sample, extras: &[ExtraValue<'_>]) -> u64 {
+        self.mailbox.sample(sample, extras)
+    }
+
+    /// Hands in an event, alarm, state, part, decision, command, model or diagnosis. Returns its ticket, which is durable
+    /// once [`Self::acknowledged_record`] reaches it; `None` when the queue was full and it was dropped.
+    pub fn record(&self, record: impl Into<Record>) -> Option<u64> {
+        self.mailbox.record(record.into())
+    }
+
+    /// Samples up to and including this time survive a power cut. `None` before the first commit.
+    #[must_use]
+    pub fn acknowledged_through_ns(&self) -> Option<TimeNs> {
+        self.shared.acknowledged_ns()
+    }
+
+    /// Records up to this ticket survive a power cut.
+    #[must_use]
+    pub fn acknowledged_record(&self) -> u64 {
+        self.shared.acknowledged_record.load(std::sync::atomic::Ordering::Acquire)
+    }
+
+    /// Returns when everything handed in so far is durable.
+    ///
+    /// # Errors
+    /// [`HistoryError::NotDurable`] with the reason, after 30 s.
+    pub fn flush(&self) -> Result<(), HistoryError> {
+        self.await_job(Job::Flush, FLUSH_LIMIT)
+    }
+
+    /// Begins compaction and removal by age as of `now_ns`, piece by piece between commits. Call it once a night.
+    pub fn maintain(&self, now_ns: TimeNs) {
+        self.mailbox.ask(Job::Maintain(now_ns));
+    }
+
+    /// As [`Self::maintain`], and waits at most `limit` for the end of it.
+    ///
+    /// # Errors
+    /// [`HistoryError::NotDurable`] with the reason.
+    pub fn maintain_and_wait(&self, now_ns: TimeNs, limit: Duration) -> Result<(), HistoryError> {
+        self.await_job(Job::Maintain(now_ns), limit)
+    }
+
+    fn await_job(&self, job: Job, limit: Duration) -> Result<(), HistoryError> {
+        let number = self.mailbox.ask(job);
+        if self.mailbox.await_job(number, limit) {
+            return Ok(());
+        }
+        if self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
+            return Err(HistoryError::Stopped);
+        }
+        let reason = self.shared.status().degraded.unwrap_or_else(|| "the writer is still busy".to_owned());
+        Err(HistoryError::NotDurable { seconds: limit.as_secs_f64(), reason })
+    }
+
+    /// How the writer is doing.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        let waiting = self.mailbox.waiting();
+        Status {
+            queued_samples: waiting.rows,
+            queued_records: waiting.records,
+            dropped_samples: waiting.dropped_samples,
+            dropped_records: waiting.dropped_records,
+            ..self.shared.status()
+        }
+    }
+
+    /// The database.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes everything durable, ends the writer thread and returns the last figures. `degraded` tells when something
+    /// could not be made durable.
+    #[must_use]
+    pub fn close(mut self) -> Status {
+        self.join();
+        self.status()
+    }
+
+    fn join(&mut self) {
+        self.mailbox.close();
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been printed by then; there is nobody left to tell.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Writer {
+    fn drop(&mut self) {
+        self.join();
+    }
+}

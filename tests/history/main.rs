@@ -1,0 +1,4 @@
+//! The history of the box: what goes in comes out, whatever happens in between.
+
+mod machine;
+mod round_trip;

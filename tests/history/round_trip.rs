@@ -1,0 +1,88 @@
+//! Exactly what went in comes out: through the running minute, through blocks, after compaction, after opening again.
+
+use crate::machine::{Machine, QUANTITIES, extra_values, extras};
+use adapters::Sample;
+use gateway::history::{Chunk, Options, Query, Reader, WhenFull, Writer};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+/// Options of a test: nothing is dropped.
+pub(crate) fn options() -> Options {
+    Options { extras: extras(), when_full: WhenFull::Wait, ..Options::default() }
+}
+
+/// Writes rows `from..to` of `machine`.
+pub(crate) fn write(writer: &Writer, machine: &Machine, rows: std::ops::Range<i64>) {
+    let mut sample = Sample::empty(0);
+    for row in rows {
+        machine.fill(row, &mut sample);
+        writer.sample(&sample, &extra_values(row));
+    }
+}
+
+/// Every row in the file is one of `machine`, they follow each other without a hole from `first`; how many there are.
+pub(crate) fn verify(path: &Path, machine: &Machine, first: i64) -> i64 {
+    let reader = Reader::open(path).expect("opens");
+    let names: Vec<&str> = QUANTITIES.iter().map(|(name, _)| *name).collect();
+    let query = Query::default().of(names.into_iter().chain(["program", "tool", "machine_state", "cutting_power_w"]));
+    let mut next = first;
+    reader
+        .samples(&query, |chunk| {
+            for row in 0..chunk.at_ns.len() {
+                verify_row(machine, chunk, row, next);
+                next += 1;
+            }
+            ControlFlow::Continue(())
+        })
+        .expect("reads");
+    next - first
+}
+
+fn verify_row(machine: &Machine, chunk: &Chunk<'_>, row: usize, expected: i64) {
+    assert_eq!(chunk.at_ns[row], Machine::at_ns(expected), "time of row {expected}");
+    for (index, (name, _)) in QUANTITIES.iter().enumerate() {
+        let missing = machine.missing(expected, index);
+        assert_eq!(chunk.missing(index, row), missing.map(|absence| absence.word()), "{name} in row {expected}");
+        let number = missing.is_none().then(|| machine.quantity(expected, index));
+        assert_eq!(chunk.columns[index].number(row), number, "{name} in row {expected}");
+    }
+    for index in 0..2 {
+        let word = machine.word(expected, index).map(|word| &**word);
+        assert_eq!(chunk.columns[20 + index].word(row), word, "row {expected}");
+    }
+    let expect_state = if expected.rem_euclid(600) < 420 { "cutting" } else { "idle" };
+    assert_eq!(chunk.columns[22].word(row), Some(expect_state));
+    let learned = expected.rem_euclid(3000) >= 100;
+    assert_eq!(chunk.missing(23, row), if learned { None } else { Some("not_learned") });
+}
+
+#[test]
+fn what_goes_in_comes_out() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let path = dir.path().join("deep/er/h.db");
+    let machine = Machine::new().with_gaps();
+    let writer = Writer::open(&path, options()).expect("opens");
+    write(&writer, &machine, 0..250);
+    writer.flush().expect("durable");
+    assert_eq!(verify(&path, &machine, 0), 250, "all in the crash tail");
+    write(&writer, &machine, 250..12_345);
+    writer.flush().expect("durable");
+    assert_eq!(writer.acknowledged_through_ns(), Some(Machine::at_ns(12_344)));
+    assert_eq!(verify(&path, &machine, 0), 12_345, "blocks and tail");
+    let status = writer.close();
+    assert_eq!((status.rows, status.dropped_samples, status.degraded), (12_345, 0, None));
+
+    let writer = Writer::open(&path, options()).expect("opens again");
+    assert_eq!(verify(&path, &machine, 0), 12_345, "after opening again");
+    write(&writer, &machine, 12_345..20_000);
+    writer.flush().expect("durable");
+    writer.maintain_and_wait(Machine::at_ns(20_000), Duration::from_secs(20)).expect("compacts");
+    drop(writer);
+    assert_eq!(verify(&path, &machine, 0), 20_000, "compacted");
+    let blocks: i64 = rusqlite::Connection::open(&path)
+        .and_then(|db| db.query_row("SELECT count(*) FROM blocks", [], |row| row.get(0)))
+        .expect("counts");
+    assert!(blocks < 12, "{blocks} blocks instead of 36");
+    assert_eq!(Reader::open(&path).and_then(|reader| reader.check()).expect("checks"), Vec::<String>::new());
+}
