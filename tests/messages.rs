@@ -3,7 +3,10 @@
 //! The expected texts stand beside the files in `tests/data/messages`; `UPDATE_MESSAGES=1 cargo test --test messages`
 //! writes them anew, and the change is then read in review.
 
+use adapters::Sample;
 use gateway::config::{self, Problem};
+use rules::estimators::Estimates;
+use rules::script::{self, Host, ScriptFile, compile};
 use std::path::{Path, PathBuf};
 
 fn data(name: &str) -> PathBuf {
@@ -112,4 +115,50 @@ proptest::proptest! {
     ) {
         let _ = parse(&text, &[]);
     }
+}
+
+fn script(name: &str) -> ScriptFile {
+    ScriptFile { name: name.to_owned(), text: std::fs::read_to_string(data(name)).expect("the file is there") }
+}
+
+#[test]
+fn a_set_of_scripts_is_refused_with_everything_that_is_wrong() {
+    let names = ["broken.rhai", "misspelt.rhai", "print.rhai", "settings.rhai", "settings2.rhai", "unclosed.rhai"];
+    let files: Vec<ScriptFile> = names.into_iter().map(script).collect();
+    let Err(problems) = compile(&files) else { panic!("it compiles") };
+    golden("scripts.txt", &problems.iter().map(|problem| format!("{problem}\n")).collect::<String>());
+}
+
+#[test]
+fn a_script_that_fails_while_it_runs_says_where_and_what_to_do() {
+    let failing = [
+        "loop {}",
+        "fn f(x) { f(x) }\nf(1);",
+        "let a = [1, 2];\na[5] = 1;",
+        "let x = \"text\";\nlet y = x * 2.0;",
+        "let x = 5 / 0;",
+        "throw \"the recipe is missing\";",
+        "fn f(x) { x.speed + 1.0 }\nf(3);",
+        "request_feed_override(\"fast\", \"why\");",
+        "alarm_above(\"a\", 5.0, 10.0, 20.0, 0.0, \"text\");",
+        "let s = \"x\"; loop { s += s; }",
+        "let i = 0;\nloop { alarm(`a${i}`, \"\"); i += 1; }",
+        "let x = spindle_power_w / total_power_w;",
+    ];
+    let mut text = String::new();
+    for source in failing {
+        let mut host = Host::new();
+        host.load(&[ScriptFile { name: "rule.rhai".to_owned(), text: source.to_owned() }]).expect(source);
+        host.tick(&Sample::empty(0), &Estimates::none(0));
+        let status = host.status();
+        let problem = status.scripts[0].condition.problem().expect(source);
+        text += &format!("{source}\n=> {}: {problem}\n\n", status.scripts[0].condition.word());
+    }
+    golden("running.txt", &text);
+}
+
+#[test]
+fn the_vocabulary_is_what_the_page_shows() {
+    golden("vocabulary.md", &script::vocabulary(false));
+    assert!(script::vocabulary(true).contains("主轴实际转速"));
 }

@@ -1,0 +1,164 @@
+//! The interpreter: what a script may use, and the limits on everything it does.
+
+use super::collect::{Collected, Outcome};
+use super::problem::spoken;
+use rhai::packages::{
+    ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage, BasicMathPackage,
+    BasicStringPackage, LanguageCorePackage, LogicPackage, MoreStringPackage, Package,
+};
+use rhai::{Dynamic, Engine, EvalAltResult, ImmutableString, OptimizationLevel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Operations in one run: a shipped script takes about a hundred; the worst that can be done with these takes 50 ms.
+pub const OPERATIONS_MAX: u64 = 25_000;
+/// Bytes of one script file.
+pub const TEXT_MAX: usize = 64 * 1024;
+/// Bytes of one string, also of all strings in one map or array together.
+const STRING_MAX: usize = 2048;
+/// Elements of one array or map.
+const ELEMENTS_MAX: usize = 256;
+const VARIABLES_MAX: usize = 256;
+const FUNCTIONS_MAX: usize = 64;
+const CALLS_MAX: usize = 32;
+const DEPTH_MAX: usize = 48;
+
+/// Words of the language that a script has no use for: output, and evaluating text.
+const DISABLED: [&str; 3] = ["print", "debug", "eval"];
+/// Functions of the language that a script may not call, not even by their name as text.
+const FORBIDDEN: [&str; 6] = ["sleep", "get_fn_metadata_list", "parse_json", "Fn", "call", "curry"];
+
+/// What the running script leaves behind; one script runs at a time.
+#[derive(Clone, Default)]
+pub(super) struct Shared(Arc<Mutex<Collected>>);
+
+impl Shared {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Collected> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// An interpreter whose functions leave their effects in `shared`.
+pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
+    let mut engine = Engine::new_raw();
+    packages(&mut engine);
+    limits(&mut engine);
+    for word in DISABLED {
+        engine.disable_symbol(word);
+    }
+    engine.set_optimization_level(if optimize { OptimizationLevel::Simple } else { OptimizationLevel::None });
+    functions(&mut engine, shared);
+    // Registered functions go before those of the language.
+    let asleep = || -> Outcome<()> { Err("a script may not sleep".into()) };
+    engine.register_fn("sleep", move |_: i64| asleep());
+    engine.register_fn("sleep", move |_: f64| asleep());
+    engine
+}
+
+fn packages(engine: &mut Engine) {
+    LanguageCorePackage::new().register_into_engine(engine);
+    ArithmeticPackage::new().register_into_engine(engine);
+    LogicPackage::new().register_into_engine(engine);
+    BasicMathPackage::new().register_into_engine(engine);
+    BasicStringPackage::new().register_into_engine(engine);
+    MoreStringPackage::new().register_into_engine(engine);
+    BasicArrayPackage::new().register_into_engine(engine);
+    BasicMapPackage::new().register_into_engine(engine);
+    BasicIteratorPackage::new().register_into_engine(engine);
+    BasicFnPackage::new().register_into_engine(engine);
+}
+
+fn limits(engine: &mut Engine) {
+    engine.set_max_operations(OPERATIONS_MAX);
+    engine.set_max_call_levels(CALLS_MAX);
+    engine.set_max_expr_depths(DEPTH_MAX, DEPTH_MAX);
+    engine.set_max_string_size(STRING_MAX);
+    engine.set_max_array_size(ELEMENTS_MAX);
+    engine.set_max_map_size(ELEMENTS_MAX);
+    engine.set_max_variables(VARIABLES_MAX);
+    engine.set_max_functions(FUNCTIONS_MAX);
+}
+
+fn functions(engine: &mut Engine, shared: &Shared) {
+    engine.register_fn("has", |value: Dynamic| !value.is_unit());
+    engine.register_fn("clamp", |value: Dynamic, least: Dynamic, greatest: Dynamic| -> Outcome<f64> {
+        let (least, greatest) = (number("clamp", &least)?, number("clamp", &greatest)?);
+        Ok(number("clamp", &value)?.max(least).min(greatest))
+    });
+    let to = shared.clone();
+    engine.register_fn("note", move |text: ImmutableString| to.lock().note(text));
+    let to = shared.clone();
+    engine.register_fn("held_s", move |name: ImmutableString, condition: bool| to.lock().held_s(&name, condition));
+    let to = shared.clone();
+    engine.register_fn("changed", move |name: ImmutableString, value: Dynamic| to.lock().changed(&name, value));
+    let to = shared.clone();
+    engine.register_fn("request_feed_override", move |pct: Dynamic, reason: ImmutableString| -> Outcome<()> {
+        let pct = number("request_feed_override", &pct)?;
+        to.lock().request = Some((pct, reason));
+        Ok(())
+    });
+    alarms(engine, shared);
+}
+
+fn alarms(engine: &mut Engine, shared: &Shared) {
+    let to = shared.clone();
+    engine.register_fn("alarm", move |name: ImmutableString, text: ImmutableString| to.lock().alarm(name, text));
+    let to = shared.clone();
+    engine.register_fn(
+        "alarm_when",
+        move |name: ImmutableString, condition: bool, hold_s: Dynamic, text: ImmutableString| -> Outcome<()> {
+            let hold_s = number("alarm_when", &hold_s)?;
+            to.lock().alarm_turning(name, Some(condition), hold_s, text)
+        },
+    );
+    threshold(engine, shared, "alarm_above", 1.0);
+    threshold(engine, shared, "alarm_below", -1.0);
+}
+
+/// `alarm_above` with sign 1, `alarm_below` with sign -1.
+fn threshold(engine: &mut Engine, shared: &Shared, function: &'static str, sign: f64) {
+    let to = shared.clone();
+    let run = move |name: ImmutableString,
+                    value: Dynamic,
+                    on: Dynamic,
+                    off: Dynamic,
+                    hold_s: Dynamic,
+                    text: ImmutableString|
+          -> Outcome<()> {
+        let (on, off, hold_s) = (number(function, &on)?, number(function, &off)?, number(function, &hold_s)?);
+        if sign * off > sign * on {
+            return Err(
+                format!("{function}: `off` = {off} lies beyond `on` = {on}; the alarm would never be quiet").into()
+            );
+        }
+        let mut collected = to.lock();
+        let beyond = if collected.alarm_active(&name) { off } else { on };
+        let wanted = if value.is_unit() { None } else { Some(sign * number(function, &value)? > sign * beyond) };
+        collected.alarm_turning(name, wanted, hold_s, text)
+    };
+    engine.register_fn(function, run);
+}
+
+/// A number; the absence of one is told apart from a wrong type.
+fn number(function: &str, value: &Dynamic) -> Outcome<f64> {
+    if let Ok(number) = value.as_float() {
+        return Ok(number);
+    }
+    if let Ok(whole) = value.as_int() {
+        return Ok(whole as f64);
+    }
+    if value.is_unit() {
+        return Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::UNIT, rhai::Position::NONE)));
+    }
+    Err(format!("{function} needs a number, not {}", spoken(value)).into())
+}
+
+/// Every function that can be called, by name and number of arguments.
+pub(super) fn callable(engine: &Engine) -> Vec<(String, usize)> {
+    let pair = |it: rhai::FuncInfo<'_>| Some((it.metadata.name.to_string(), it.metadata.num_params));
+    let mut known = engine.collect_fn_metadata(None, pair, true);
+    known.retain(|(name, _)| !FORBIDDEN.contains(&name.as_str()));
+    known.push(("type_of".to_owned(), 1));
+    known.sort();
+    known.dedup();
+    known
+}

@@ -1,0 +1,17 @@
+//! The scripts that come with the gateway: examples that run, are tested, and are meant to be edited.
+
+use super::compile::ScriptFile;
+
+const SHIPPED: [(&str, &str); 5] = [
+    ("alarms.rhai", include_str!("../scripts/alarms.rhai")),
+    ("constant_load.rhai", include_str!("../scripts/constant_load.rhai")),
+    ("energy.rhai", include_str!("../scripts/energy.rhai")),
+    ("state.rhai", include_str!("../scripts/state.rhai")),
+    ("tool_wear.rhai", include_str!("../scripts/tool_wear.rhai")),
+];
+
+/// Every script that comes with the gateway.
+#[must_use]
+pub fn shipped() -> Vec<ScriptFile> {
+    SHIPPED.iter().map(|(name, text)| ScriptFile { name: (*name).to_owned(), text: (*text).to_owned() }).collect()
+}

@@ -1,0 +1,340 @@
+//! What a script sees: one table, made from the table of channels and from the estimates.
+
+use crate::estimators::{Estimated, Estimates, SETTINGS};
+use adapters::clock::SECOND_NS;
+use adapters::{ChannelId, Sample};
+use std::sync::LazyLock;
+
+/// What kind of value a word has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WordKind {
+    /// A number in the unit of the word, or no value.
+    Number,
+    /// Text, or no value.
+    Text,
+    /// An object map of the script's own.
+    Map,
+}
+
+/// One word a script can use as a variable.
+#[derive(Debug, Clone, Copy)]
+pub struct Word {
+    /// Name in the script.
+    pub name: &'static str,
+    /// Unit symbol; `1` for pure numbers, empty for text.
+    pub unit: &'static str,
+    /// Number, text or map.
+    pub kind: WordKind,
+    /// What it is, in English.
+    pub en: &'static str,
+    /// What it is, in Chinese.
+    pub zh: &'static str,
+    source: Source,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    Channel(ChannelId),
+    Quantity(fn(&Estimates) -> Estimated),
+    Deviation(fn(&Estimates) -> Estimated),
+    Number(fn(&View<'_>) -> f64),
+    Text(fn(&Estimates) -> &'static str),
+    Memory,
+}
+
+/// What is looked at in one run.
+pub(super) struct View<'a> {
+    pub(super) sample: &'a Sample,
+    pub(super) estimates: &'a Estimates,
+    pub(super) dt_s: f64,
+}
+
+/// A word's value in one run.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Seen<'a> {
+    Number(f64),
+    Text(&'a str),
+    Absent,
+}
+
+impl Word {
+    /// The value in this run.
+    pub(super) fn see<'a>(&self, view: &View<'a>) -> Seen<'a> {
+        match self.source {
+            Source::Channel(id) => channel(view.sample, id),
+            Source::Quantity(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.value)),
+            Source::Deviation(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.sd)),
+            Source::Number(read) => Seen::Number(read(view)),
+            Source::Text(read) => Seen::Text(read(view.estimates)),
+            Source::Memory => Seen::Absent,
+        }
+    }
+
+    /// Why there is no value, for the operator; `None` when there is one.
+    pub(super) fn why_absent(&self, view: &View<'_>) -> Option<String> {
+        match self.source {
+            Source::Channel(id) => view.sample.slot(id).value.as_ref().err().map(ToString::to_string),
+            Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|why| why.to_string()),
+            Source::Number(_) | Source::Text(_) | Source::Memory => None,
+        }
+    }
+
+    /// May a script write to it?
+    pub(super) fn writable(&self) -> bool {
+        matches!(self.source, Source::Memory)
+    }
+}
+
+fn channel(sample: &Sample, id: ChannelId) -> Seen<'_> {
+    match &sample.slot(id).value {
+        Ok(value) => value.as_number().map(Seen::Number).or(value.as_text().map(Seen::Text)).unwrap_or(Seen::Absent),
+        Err(_) => Seen::Absent,
+    }
+}
+
+type Quantity = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
+
+/// The estimated quantities: name, name of the standard deviation, unit, texts, value.
+const QUANTITIES: [Quantity; 5] = [
+    (
+        "filtered_power_w",
+        "filtered_power_sd_w",
+        "W",
+        "Spindle power after the anti-pulse moving average",
+        "滤波后的主轴功率",
+        |it| it.filtered_power_w,
+    ),
+    (
+        "no_load_power_w",
+        "no_load_power_sd_w",
+        "W",
+        "Power the spindle would take at this speed without cutting",
+        "当前转速下的空载功率",
+        |it| it.no_load_power_w,
+    ),
+    ("cutting_power_w", "cutting_power_sd_w", "W", "Power that removes material", "切削功率", |it| {
+        it.cutting_power_w
+    }),
+    (
+        "load_loss_w",
+        "load_loss_sd_w",
+        "W",
+        "Additional loss that exists only under load",
+        "附加载荷损耗功率",
+        |it| it.load_loss_w,
+    ),
+    (
+        "visible_cutting_power_w",
+        "visible_cutting_power_sd_w",
+        "W",
+        "Least cutting power that stands out of no-load power and noise",
+        "可分辨的最小切削功率",
+        |it| it.visible_cutting_power_w,
+    ),
+];
+
+const fn word(
+    name: &'static str,
+    unit: &'static str,
+    kind: WordKind,
+    texts: (&'static str, &'static str),
+    source: Source,
+) -> Word {
+    Word { name, unit, kind, en: texts.0, zh: texts.1, source }
+}
+
+/// Words that are neither channels nor quantities.
+const OWN: [Word; 7] = [
+    word(
+        "state",
+        "",
+        WordKind::Text,
+        ("State of the machine: off, standby, spindle_start, idle, cutting, speed_change, rapid, unknown", "机床状态"),
+        Source::Text(|it| it.state.word()),
+    ),
+    word(
+        "state_s",
+        "s",
+        WordKind::Number,
+        ("How long the machine has been in this state", "当前状态持续时间"),
+        Source::Number(|view| since_s(view.sample.at_ns, view.estimates.since_ns)),
+    ),
+    word(
+        "visibility",
+        "",
+        WordKind::Text,
+        ("Can cutting be seen in the power: not_asked, visible, below_visibility, no_reference", "切削是否可分辨"),
+        Source::Text(|it| it.visibility.word()),
+    ),
+    word(
+        "no_load_origin",
+        "",
+        WordKind::Text,
+        (
+            "Where the no-load power comes from: none, measured, interpolated, extrapolated, upper_bound",
+            "空载功率的来源",
+        ),
+        Source::Text(|it| it.no_load_origin.word()),
+    ),
+    word(
+        "now_s",
+        "s",
+        WordKind::Number,
+        ("Time of this tick, seconds since 1970", "当前时间"),
+        Source::Number(|view| since_s(view.sample.at_ns, 0)),
+    ),
+    word(
+        "dt_s",
+        "s",
+        WordKind::Number,
+        ("Time since this script ran last; 0 at the first run and after a pause", "距上次运行的时间"),
+        Source::Number(|view| view.dt_s),
+    ),
+    word(
+        "memory",
+        "",
+        WordKind::Map,
+        (
+            "What this script remembers between runs: memory.count = 1; empty after the file was changed",
+            "脚本自身的存储",
+        ),
+        Source::Memory,
+    ),
+];
+
+fn since_s(now_ns: i64, then_ns: i64) -> f64 {
+    now_ns.saturating_sub(then_ns) as f64 / SECOND_NS as f64
+}
+
+static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
+    let mut words = OWN.to_vec();
+    for (name, deviation, unit, en, zh, read) in QUANTITIES {
+        words.push(word(name, unit, WordKind::Number, (en, zh), Source::Quantity(read)));
+        let texts = ("One standard deviation of the quantity of this name", "标准不确定度");
+        words.push(word(deviation, unit, WordKind::Number, texts, Source::Deviation(read)));
+    }
+    for id in ChannelId::all() {
+        let row = id.channel();
+        let kind = if row.kind == adapters::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
+        words.push(word(row.name, row.unit, kind, (row.en, row.zh), Source::Channel(id)));
+    }
+    words
+});
+
+/// Every word a script can use as a variable: its own, the estimates, the channels.
+#[must_use]
+pub fn words() -> &'static [Word] {
+    &WORDS
+}
+
+/// The word of this name.
+pub(super) fn find(name: &str) -> Option<&'static Word> {
+    WORDS.iter().find(|word| word.name == name)
+}
+
+/// A function a script can call, besides those of the language.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Function {
+    /// How it is written.
+    pub signature: &'static str,
+    /// What it does, in English.
+    pub en: &'static str,
+    /// What it does, in Chinese.
+    pub zh: &'static str,
+}
+
+const fn function(signature: &'static str, en: &'static str, zh: &'static str) -> Function {
+    Function { signature, en, zh }
+}
+
+/// The functions of the host.
+pub const FUNCTIONS: &[Function] = &[
+    function("has(x)", "true when x has a value in this run", "x 当前有值"),
+    function("x ?? y", "x, or y where x has no value", "x 无值时取 y"),
+    function(
+        "alarm(name, text)",
+        "The alarm stands for as long as this line is reached at every run",
+        "每次运行到此行时报警有效",
+    ),
+    function(
+        "alarm_when(name, condition, hold_s, text)",
+        "Alarm after the condition has held for hold_s, cleared after it has been false for hold_s",
+        "条件持续 hold_s 秒后报警或解除",
+    ),
+    function(
+        "alarm_above(name, x, on, off, hold_s, text)",
+        "Alarm after x has been above `on` for hold_s, cleared after it has been below `off` for hold_s; without a value it stays",
+        "x 高于 on 报警，低于 off 解除",
+    ),
+    function(
+        "alarm_below(name, x, on, off, hold_s, text)",
+        "Alarm after x has been below `on` for hold_s, cleared after it has been above `off` for hold_s; without a value it stays",
+        "x 低于 on 报警，高于 off 解除",
+    ),
+    function(
+        "note(text)",
+        "A line in the history; the same text not twice in a minute, at most 20 a minute",
+        "写入历史记录",
+    ),
+    function(
+        "request_feed_override(pct, reason)",
+        "Ask the gate for a feed override in percent; without a request it is 100 %; of several requests the least counts",
+        "请求进给倍率（由闸门决定）",
+    ),
+    function(
+        "held_s(name, condition)",
+        "For how many seconds the condition has been true without interruption",
+        "条件持续为真的秒数",
+    ),
+    function(
+        "changed(name, x)",
+        "true when x has another value than the one remembered under this name; the first value is no change",
+        "x 的值是否改变",
+    ),
+    function("clamp(x, least, greatest)", "x, but not outside the two limits", "限幅"),
+];
+
+/// The whole vocabulary as Markdown, in English or Chinese: what `check --vocabulary` prints.
+#[must_use]
+pub fn vocabulary(chinese: bool) -> String {
+    let pick = |en: &'static str, zh: &'static str| if chinese { zh } else { en };
+    let mut text = String::from("## Variables\n\n| name | unit | what |\n|---|---|---|\n");
+    for word in words() {
+        text += &format!("| `{}` | {} | {} |\n", word.name, word.unit, pick(word.en, word.zh));
+    }
+    text += "\n## Functions\n\n| function | what |\n|---|---|\n";
+    for function in FUNCTIONS {
+        text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
+    }
+    text +=
+        "\n## Settings\n\nReturned by `fn settings() { #{ name: value } }`, read once when the script is loaded.\n\n";
+    text += "| name | unit | default | range | what |\n|---|---|---|---|---|\n";
+    for row in SETTINGS {
+        let (least, greatest) = row.range;
+        text += &format!("| `{}` | {} | {} | {least} to {greatest} | {} |\n", row.name, row.unit, row.default, row.en);
+    }
+    text += "| `no_load_stage_N` | rpm, W | none | at most 16 points | No-load powers of gear stage N known beforehand: [[rpm, W], ...] |\n";
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_quantity_of_the_estimates_is_a_word() {
+        let estimates = Estimates::none(0);
+        let names: Vec<&str> = QUANTITIES.iter().map(|quantity| quantity.0).collect();
+        let expected: Vec<&str> = estimates.quantities().iter().map(|quantity| quantity.0).collect();
+        assert_eq!(names, expected);
+    }
+
+    #[test]
+    fn no_name_means_two_things_and_every_text_is_there() {
+        let names: BTreeSet<_> = words().iter().map(|word| word.name).collect();
+        assert_eq!(names.len(), words().len());
+        assert!(words().iter().all(|word| !word.en.is_empty() && !word.zh.is_empty()));
+        assert_eq!(words().len(), ChannelId::count() + OWN.len() + 2 * QUANTITIES.len());
+    }
+}
