@@ -391,7 +391,7 @@ fn the_same_samples_give_the_same_decisions() {
                 ("total_power_w", 3000.0 * random),
                 ("part_count", f64::from(tick / 500)),
             ];
-            let provided = if seed % 7 == 0 { &values[1..] } else { &values[..] };
+            let provided = if seed.is_multiple_of(7) { &values[1..] } else { &values[..] };
             text += &format!("{:?}\n", host.tick(&sample(at_s, provided), &cutting(at_s, 900.0 * random)));
         }
         text
