@@ -36,6 +36,8 @@ pub enum NoEstimate {
     SpindleStopped,
     /// The spindle starts or changes speed; its power also accelerates masses.
     SpeedChanging,
+    /// The inputs contradict each other: the meter sees no power while the controller sees the spindle turn.
+    Contradiction,
     /// Too few samples since the last change or gap.
     NotSettled,
     /// No no-load power is known near this speed in this gear stage.
@@ -61,6 +63,7 @@ impl NoEstimate {
             Self::MachineOff => "machine_off",
             Self::SpindleStopped => "spindle_stopped",
             Self::SpeedChanging => "speed_changing",
+            Self::Contradiction => "contradiction",
             Self::NotSettled => "not_settled",
             Self::NotLearned => "not_learned",
             Self::Extrapolated { .. } => "extrapolated",
@@ -78,6 +81,9 @@ impl fmt::Display for NoEstimate {
             Self::MachineOff => f.write_str("the machine is off"),
             Self::SpindleStopped => f.write_str("the spindle stands still"),
             Self::SpeedChanging => f.write_str("the spindle is changing speed"),
+            Self::Contradiction => {
+                f.write_str("the meter sees no power while the controller sees the spindle turn; check the meter")
+            }
             Self::NotSettled => f.write_str("too few samples since the last change"),
             Self::NotLearned => f.write_str(
                 "no-load power at this speed and gear stage is not known; let the spindle run there without feed",

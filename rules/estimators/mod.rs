@@ -8,16 +8,30 @@
 //! | `settings` | the one table of tolerances and lengths |
 //! | `state`, `estimate` | the words and numbers that come out |
 //! | `filter` | anti-pulse moving average |
-//! | `no_load` | no-load power over speed, per gear stage |
+//! | `inputs`, `signals`, `noise` | what is needed of a sample, its recent past, how noisy it is |
+//! | `window` | has the power settled: two stationary windows that agree |
+//! | `evidence` | a small lasting step in noise |
+//! | `detector` | the states and every transition between them |
+//! | `no_load`, `learning` | no-load power over speed, per gear stage, learned from idle |
 //! | `cutting` | power balance: cutting power and load loss |
 
 mod cutting;
+mod detector;
 mod estimate;
+mod evidence;
 mod filter;
+mod inputs;
+mod learning;
 mod no_load;
+mod noise;
 mod pipeline;
 mod settings;
+mod signals;
 mod state;
+mod window;
+
+pub use evidence::Evidence;
+pub use window::{Means, Window, stationary};
 
 pub use cutting::{Balance, balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};

@@ -1,13 +1,23 @@
 //! From a sample to estimates.
 
-use super::estimate::{Estimate, Estimates, NoEstimate};
-use super::filter::AntiPulse;
-use super::no_load::NoLoadTable;
+use super::cutting::balance;
+use super::detector::{Detector, Tick, Verdict, visible_excess_w};
+use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
+use super::inputs::{Channels, Inputs};
+use super::learning::{IdleTick, Learner};
+use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 use super::settings::Settings;
+use super::signals::{Feed, Signals};
 use super::state::State;
-use adapters::{Absence, ChannelId, Sample};
+use adapters::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+/// Power this many standard deviations below no-load power is no cutting power of zero but a contradiction.
+const BELOW_NO_LOAD_SD: f64 = 3.0;
+
+/// Weight of a new sample in the standby power.
+const STANDBY_WEIGHT: f64 = 0.1;
 
 /// Why a snapshot cannot be used; start anew then.
 #[derive(Debug, Error)]
@@ -18,6 +28,7 @@ pub struct RestoreError(#[from] serde_json::Error);
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     settings: Settings,
+    channels: Channels,
     memory: Memory,
     estimates: Estimates,
 }
@@ -25,38 +36,261 @@ pub struct Pipeline {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Memory {
-    filter: AntiPulse,
+    signals: Signals,
     no_load: NoLoadTable,
+    learner: Learner,
+    detector: Detector,
+    /// The level right after a start with the axes already moving.
+    upper_bound: Option<NoLoadPoint>,
+    standby_w: Option<f64>,
+}
+
+impl Memory {
+    fn new(settings: &Settings) -> Self {
+        Self {
+            signals: Signals::new(settings),
+            no_load: NoLoadTable::new(settings),
+            learner: Learner::new(settings),
+            detector: Detector::new(),
+            upper_bound: None,
+            standby_w: None,
+        }
+    }
 }
 
 impl Pipeline {
-    /// A pipeline that knows nothing but its settings.
+    /// A pipeline that knows nothing but its settings. Where settings contradict each other (see
+    /// [`Settings::contradictions`]) the stricter one holds.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        let memory =
-            Memory { filter: AntiPulse::new(settings.filter_samples as usize), no_load: NoLoadTable::new(&settings) };
-        Self { settings, memory, estimates: Estimates::none(0) }
+        let memory = Memory::new(&settings);
+        Self { settings, channels: Channels::new(), memory, estimates: Estimates::none(0) }
     }
 
     /// Takes one sample; samples come in the order of time.
     pub fn infer(&mut self, sample: &Sample) -> &Estimates {
-        let number = |name: &str| ChannelId::of(name).map_or(Err(Absence::NotProvided), |id| sample.number(id));
-        let state = match (number("total_power_w"), number("spindle_speed_rpm")) {
-            (Ok(total), _) if total < self.settings.off_power_w => State::Off,
-            (_, Err(Absence::MachineOff)) => State::Off,
-            (_, Ok(speed)) if speed.abs() < self.settings.spindle_min_rpm => State::Standby,
-            _ => State::Unknown,
-        };
-        let filtered = number("spindle_power_w").ok().and_then(|power| self.memory.filter.push(power));
-        let gain = self.memory.filter.noise_gain();
-        let since_ns = if state == self.estimates.state { self.estimates.since_ns } else { sample.at_ns };
-        self.estimates = Estimates::none(sample.at_ns);
-        self.estimates.state = state;
-        self.estimates.since_ns = since_ns;
-        self.estimates.filtered_power_w = filtered
-            .map(|value| Estimate { value, sd: gain * self.settings.power_noise * value.abs() })
-            .ok_or(NoEstimate::NotSettled);
+        let inputs = self.channels.read(sample, self.memory.standby_w, &self.settings);
+        let broken = self.memory.signals.push(&inputs, &self.settings);
+        if broken.gap {
+            self.memory.detector.interrupt();
+        }
+        if broken.stage {
+            self.memory.detector.unsettle(inputs.at_ns);
+        }
+        if broken.gap || broken.stage {
+            self.memory.learner.stop();
+        }
+        let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power));
+        let mut no_load = self.reference(&inputs);
+        let tick =
+            Tick { inputs: &inputs, signals: &self.memory.signals, settings: &self.settings, filtered_w, no_load };
+        let feed = self.memory.signals.feed(&inputs, &self.settings);
+        let verdict = self.memory.detector.step(&tick);
+        if let Some(power_w) = verdict.settled_at_w {
+            self.settled_at(power_w, feed, &inputs);
+            no_load = self.reference(&inputs);
+        }
+        self.follow(&inputs, filtered_w, no_load, &verdict);
+        self.estimates = self.estimate(&inputs, filtered_w, no_load, &verdict);
         &self.estimates
+    }
+
+    /// No-load power at the speed of this tick: learned, or else an upper bound at this very speed.
+    fn reference(&self, inputs: &Inputs) -> Result<NoLoad, NoEstimate> {
+        let speed_rpm = inputs.speed.map_err(|absence| self.input(self.channels.speed, absence))?.abs();
+        if speed_rpm < self.settings.spindle_min_rpm {
+            return Err(NoEstimate::SpindleStopped);
+        }
+        let (signals, settings) = (&self.memory.signals, &self.settings);
+        let known = self.memory.no_load.at(signals.stage(), speed_rpm, inputs.at_ns, settings);
+        known.or_else(|reason| {
+            let bound = self.memory.upper_bound.filter(|bound| {
+                let near = (bound.speed_rpm - speed_rpm).abs() <= settings.speed_tolerance * speed_rpm;
+                near && bound.stage == signals.stage()
+            });
+            let sd_w = |bound: NoLoadPoint| 0.5 * settings.c2_on * bound.power_w;
+            bound
+                .map(|bound| NoLoad {
+                    power_w: bound.power_w,
+                    sd_w: sd_w(bound),
+                    noise_gain: 1.0,
+                    origin: NoLoadOrigin::UpperBound,
+                })
+                .ok_or(reason)
+        })
+    }
+
+    fn input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
+        channel.map_or(NoEstimate::NotYet, |channel| NoEstimate::Input { channel, absence })
+    }
+
+    /// The power has settled at a speed without a known no-load power.
+    fn settled_at(&mut self, power_w: f64, feed: Feed, inputs: &Inputs) {
+        let Ok(speed) = inputs.speed else { return };
+        let point = NoLoadPoint { stage: self.memory.signals.stage(), speed_rpm: speed.abs(), power_w };
+        if feed == Feed::Off {
+            let sd_w = power_w * self.settings.c2_on.hypot(self.memory.signals.noise.sd()) / 2.0;
+            self.memory.no_load.learn(point, sd_w, inputs.at_ns, &self.settings);
+        } else {
+            self.memory.upper_bound = Some(point);
+        }
+    }
+
+    /// Noise, standby power, upper bound and idle learning follow the state.
+    fn follow(
+        &mut self,
+        inputs: &Inputs,
+        filtered_w: Option<f64>,
+        no_load: Result<NoLoad, NoEstimate>,
+        verdict: &Verdict,
+    ) {
+        let memory = &mut self.memory;
+        if let (State::Standby, Ok(total)) = (verdict.state, inputs.total) {
+            let standby = memory.standby_w.get_or_insert(total);
+            *standby += STANDBY_WEIGHT * (total - *standby);
+        }
+        let turning = verdict.state.spindle_on() == Some(true) || verdict.because == Some(NoEstimate::NotLearned);
+        match (inputs.power, filtered_w) {
+            (Ok(power_w), Some(level_w)) if turning && verdict.state != State::Cutting => {
+                memory.signals.noise.push(power_w, level_w);
+            }
+            _ => memory.signals.noise.interrupt(),
+        }
+        if !turning {
+            memory.signals.forget_power();
+        }
+        if no_load.is_ok_and(|known| known.origin == NoLoadOrigin::UpperBound) {
+            self.lower_bound(filtered_w);
+        }
+        self.learn(inputs, no_load, verdict);
+    }
+
+    /// A stationary level visibly below the upper bound is a better one.
+    fn lower_bound(&mut self, filtered_w: Option<f64>) {
+        let (signals, settings) = (&self.memory.signals, &self.settings);
+        let (Some(bound), Some(level_w)) = (&mut self.memory.upper_bound, filtered_w) else { return };
+        let agreement_w = signals.agreement_w(level_w, settings);
+        if let Some(means) = signals.window.stationary(agreement_w, settings) {
+            let level_w = means.older_w.max(means.newer_w);
+            if level_w < bound.power_w * (1.0 - settings.c2_off) {
+                bound.power_w = level_w;
+            }
+        }
+    }
+
+    fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) {
+        let memory = &mut self.memory;
+        let rested = memory.signals.fed_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
+        let (Ok(power_w), Ok(speed_rpm), State::Idle, true) = (inputs.power, inputs.speed, verdict.state, rested)
+        else {
+            memory.learner.stop();
+            return;
+        };
+        let tick = IdleTick { at_ns: inputs.at_ns, power_w, speed_rpm, stage: memory.signals.stage() };
+        let known = no_load.ok().filter(|known| known.origin != NoLoadOrigin::UpperBound);
+        let seen = memory.learner.step(tick, known, &mut memory.signals.noise, &self.settings);
+        if let Some(seen) = seen {
+            memory.no_load.learn(seen.point, seen.sd_w, seen.at_ns, &self.settings);
+        }
+    }
+
+    fn estimate(
+        &self,
+        inputs: &Inputs,
+        filtered_w: Option<f64>,
+        no_load: Result<NoLoad, NoEstimate>,
+        verdict: &Verdict,
+    ) -> Estimates {
+        let detector = &self.memory.detector;
+        let steady = self.steady(inputs, verdict);
+        let power = inputs.power.map_err(|absence| self.input(self.channels.power, absence));
+        let filtered = power.and(filtered_w.ok_or(NoEstimate::NotSettled)).map(|value| Estimate {
+            value,
+            sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
+        });
+        let reference = steady.and(no_load);
+        let (cutting_power_w, load_loss_w) = self.split(filtered, reference);
+        Estimates {
+            at_ns: inputs.at_ns,
+            state: verdict.state,
+            since_ns: detector.since_ns,
+            unknown_because: verdict.because,
+            filtered_power_w: filtered,
+            no_load_power_w: reference.map(|known| Estimate { value: known.power_w, sd: known.sd_w }),
+            cutting_power_w,
+            load_loss_w,
+            visible_cutting_power_w: self.least_visible(reference),
+            no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
+            noise_gain: reference.map_or(0.0, |known| known.noise_gain),
+            visibility: self.visibility(inputs, no_load, verdict),
+            gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
+        }
+    }
+
+    /// Does the balance of a steady spindle hold at this tick?
+    fn steady(&self, inputs: &Inputs, verdict: &Verdict) -> Result<(), NoEstimate> {
+        match verdict.state {
+            State::Off => Err(NoEstimate::MachineOff),
+            State::Standby => Err(NoEstimate::SpindleStopped),
+            State::SpindleStart | State::SpeedChange => Err(NoEstimate::SpeedChanging),
+            State::Unknown => Err(verdict.because.unwrap_or(NoEstimate::NotSettled)),
+            State::Idle | State::Cutting | State::Rapid => {
+                inputs.power.map(|_| ()).map_err(|absence| self.input(self.channels.power, absence))
+            }
+        }
+    }
+
+    fn split(&self, filtered: Estimated, no_load: Result<NoLoad, NoEstimate>) -> (Estimated, Estimated) {
+        match no_load.and_then(|known| Ok((known, filtered?))) {
+            Err(reason) => (Err(reason), Err(reason)),
+            Ok((known, filtered)) => self.split_known(filtered, known),
+        }
+    }
+
+    fn split_known(&self, filtered: Estimate, known: NoLoad) -> (Estimated, Estimated) {
+        let (linear, quadratic) = self.settings.load_loss(self.memory.signals.stage());
+        let excess_w = filtered.value - known.power_w;
+        let excess_sd_w = filtered.sd.hypot(known.sd_w);
+        if excess_w < -BELOW_NO_LOAD_SD * excess_sd_w {
+            return (Err(NoEstimate::BelowNoLoad), Err(NoEstimate::BelowNoLoad));
+        }
+        // Noise below no-load power is no negative cutting power.
+        let Some(split) = balance(excess_w.max(0.0), linear, quadratic) else {
+            return (Err(NoEstimate::Imbalance), Err(NoEstimate::Imbalance));
+        };
+        let by_linear_w = split.slope * split.cutting_power_w * self.settings.load_loss_sd;
+        let cutting_sd_w = (split.slope * excess_sd_w).hypot(by_linear_w);
+        let loss_sd_w = ((1.0 - split.slope) * excess_sd_w).hypot(by_linear_w);
+        (
+            Ok(Estimate { value: split.cutting_power_w, sd: cutting_sd_w }),
+            Ok(Estimate { value: split.load_loss_w, sd: loss_sd_w }),
+        )
+    }
+
+    /// Cutting power that would be noticed within one window.
+    fn least_visible(&self, no_load: Result<NoLoad, NoEstimate>) -> Estimated {
+        let known = no_load?;
+        let signals = &self.memory.signals;
+        let (linear, quadratic) = self.settings.load_loss(signals.stage());
+        let noise_w = signals.noise.sd() * known.power_w;
+        let excess_w = visible_excess_w(known, signals, &self.settings)
+            + self.settings.cutting_evidence * noise_w / self.settings.window_samples;
+        let split = balance(excess_w, linear, quadratic).ok_or(NoEstimate::Imbalance)?;
+        Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
+    }
+
+    fn visibility(&self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) -> Visibility {
+        let fed = self.memory.signals.feed(inputs, &self.settings) == Feed::On;
+        match verdict.state {
+            State::Cutting => Visibility::Visible,
+            State::Idle if fed && no_load.is_ok() => Visibility::BelowVisibility,
+            State::Idle | State::Unknown
+                if fed && inputs.speed.is_ok_and(|n| n.abs() >= self.settings.spindle_min_rpm) =>
+            {
+                Visibility::NoReference
+            }
+            _ => Visibility::NotAsked,
+        }
     }
 
     /// The estimates of the last sample.
@@ -77,11 +311,27 @@ impl Pipeline {
         &self.settings
     }
 
-    /// Takes new settings and keeps what was learned.
+    /// Takes new settings and keeps what was learned; the recent past begins anew where a length changed. No-load
+    /// powers that the settings newly give replace what was learned at their speeds.
     pub fn reconfigure(&mut self, settings: Settings) {
-        let no_load = self.memory.no_load.clone();
-        *self = Self::new(settings);
-        self.memory.no_load = no_load;
+        let lengths = |settings: &Settings| (settings.filter_samples, settings.window_samples);
+        if lengths(&settings) != lengths(&self.settings) {
+            let noise = self.memory.signals.noise;
+            self.memory.signals = Signals::new(&settings);
+            self.memory.signals.noise = noise;
+            self.memory.learner = Learner::new(&settings);
+            self.memory.detector.interrupt();
+        }
+        if settings.no_load_table != self.settings.no_load_table {
+            self.memory.no_load = NoLoadTable::new(&settings);
+        }
+        self.settings = settings;
+    }
+
+    /// Forgets the learned no-load powers, as after work on the spindle; those of the settings stay.
+    pub fn forget_no_load(&mut self) {
+        self.memory.no_load = NoLoadTable::new(&self.settings);
+        self.memory.upper_bound = None;
     }
 
     /// Everything remembered, to be stored and given to [`Pipeline::restore`] after a restart.
@@ -90,12 +340,13 @@ impl Pipeline {
         serde_json::to_value(&self.memory).unwrap_or(serde_json::Value::Null)
     }
 
-    /// Continues where a snapshot was taken.
+    /// Continues where a snapshot was taken. A pause longer than `gap_s` makes the detector begin anew, with the
+    /// learned no-load powers.
     ///
     /// # Errors
     /// The snapshot is not one of this version.
     pub fn restore(settings: Settings, snapshot: serde_json::Value) -> Result<Self, RestoreError> {
-        let memory = serde_json::from_value(snapshot)?;
+        let memory: Memory = serde_json::from_value(snapshot)?;
         Ok(Self { memory, ..Self::new(settings) })
     }
 }

@@ -1,0 +1,313 @@
+//! The machine-state detector.
+//!
+//! The states and their forward conditions are those of the tool-wear patent's state machine; the return transitions,
+//! which its text lacks, and the states it forgets:
+//!
+//! | to | when |
+//! |---|---|
+//! | off | total power below `off_power_w` with the spindle at rest, or the controller reports the machine off and no meter contradicts |
+//! | standby | speed below `spindle_min_rpm`; with the feed on only after `reversal_s` (tapping passes zero) |
+//! | spindle_start | from rest to turning, until the power has settled |
+//! | speed_change | speed not steady, another gear stage, or slowing down; ends as spindle_start does |
+//! | idle | settled; no visible load, or the feed is off |
+//! | rapid | settled, feed on, rapid traverse |
+//! | cutting | settled, feed on, evidence for load against the no-load power; ends without feed or evidence |
+//! | unknown | an input is missing for longer than `dropout_hold_s`, inputs contradict each other, or the feed is on and no no-load power is known |
+//!
+//! Settled means: the power lies at the known no-load power, or two windows agree and are stationary. A spindle that is
+//! already under load when the gateway starts settles only against a table; otherwise cutting is not claimed.
+
+use super::estimate::NoEstimate;
+use super::evidence::Evidence;
+use super::inputs::Inputs;
+use super::no_load::NoLoad;
+use super::settings::Settings;
+use super::signals::{Feed, Signals, seconds};
+use super::state::State;
+use adapters::clock::TimeNs;
+use adapters::{Absence, ChannelId};
+use serde::{Deserialize, Serialize};
+
+/// How long a start or speed change may stay unsettled under feed before the state is called unknown, s.
+const SETTLING_LIMIT_S: f64 = 10.0;
+
+/// How the turning spindle got where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+enum Phase {
+    /// Nothing is known of the past: start of the gateway, or after a gap.
+    Fresh,
+    /// At rest.
+    Rest,
+    /// Started from rest before our eyes.
+    Starting,
+    /// Changed speed.
+    Changing,
+    /// The power has settled.
+    Settled,
+}
+
+/// Everything the detector looks at in one tick.
+pub(super) struct Tick<'a> {
+    pub(super) inputs: &'a Inputs,
+    pub(super) signals: &'a Signals,
+    pub(super) settings: &'a Settings,
+    pub(super) filtered_w: Option<f64>,
+    /// No-load power at this speed, or why there is none.
+    pub(super) no_load: Result<NoLoad, NoEstimate>,
+}
+
+/// What the tick amounts to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Verdict {
+    pub(super) state: State,
+    pub(super) because: Option<NoEstimate>,
+    /// The power settled at this tick: its level, which is no-load power if the feed is off, and an upper bound of it
+    /// otherwise.
+    pub(super) settled_at_w: Option<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Detector {
+    pub(super) state: State,
+    pub(super) since_ns: TimeNs,
+    phase: Phase,
+    phase_since_ns: TimeNs,
+    evidence: Evidence,
+    missing_since_ns: Option<TimeNs>,
+}
+
+/// What the inputs say before any estimation.
+enum Situation {
+    Off,
+    Rest,
+    Turning,
+    Missing(NoEstimate),
+}
+
+impl Tick<'_> {
+    fn feed(&self) -> Feed {
+        self.signals.feed(self.inputs, self.settings)
+    }
+
+    fn situation(&self, crossing_zero: bool) -> Situation {
+        let no_power = self.inputs.total.is_ok_and(|total| total < self.settings.off_power_w);
+        let meter_is_on = self.inputs.total.is_ok() && !no_power;
+        match self.inputs.speed {
+            Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
+            Err(Absence::MachineOff) => Situation::Off,
+            Err(_) if no_power => Situation::Off,
+            Err(absence) => missing("spindle_speed_rpm", absence),
+            Ok(speed) if speed.abs() < self.settings.spindle_min_rpm && !crossing_zero => {
+                if no_power {
+                    Situation::Off
+                } else {
+                    Situation::Rest
+                }
+            }
+            Ok(_) if no_power => Situation::Missing(NoEstimate::Contradiction),
+            Ok(_) => match (self.inputs.power, self.inputs.stage) {
+                (Err(absence), _) => missing("spindle_power_w", absence),
+                (_, Err(absence)) => missing("gear_stage", absence),
+                _ => Situation::Turning,
+            },
+        }
+    }
+
+    /// Excess over no-load power above which a load counts as visible, W.
+    pub(super) fn visible_excess_w(&self) -> Option<f64> {
+        self.no_load.ok().map(|no_load| visible_excess_w(no_load, self.signals, self.settings))
+    }
+}
+
+/// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
+pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
+    let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
+    (relative * no_load.power_w).max(2.0 * no_load.sd_w)
+}
+
+fn missing(channel: &str, absence: Absence) -> Situation {
+    let reason = |channel| NoEstimate::Input { channel, absence };
+    Situation::Missing(ChannelId::of(channel).map_or(NoEstimate::NotYet, reason))
+}
+
+impl Detector {
+    pub(super) fn new() -> Self {
+        Self {
+            state: State::Unknown,
+            since_ns: 0,
+            phase: Phase::Fresh,
+            phase_since_ns: 0,
+            evidence: Evidence::default(),
+            missing_since_ns: None,
+        }
+    }
+
+    /// Nothing is known of the past any more; what is learned elsewhere stays.
+    pub(super) fn interrupt(&mut self) {
+        self.phase = Phase::Fresh;
+        self.evidence.clear();
+        self.missing_since_ns = None;
+    }
+
+    /// The speed or the gear stage changed.
+    pub(super) fn unsettle(&mut self, now_ns: TimeNs) {
+        if self.phase == Phase::Settled {
+            self.enter(Phase::Changing, now_ns);
+        }
+        self.evidence.clear();
+    }
+
+    /// Takes a tick and tells the state.
+    pub(super) fn step(&mut self, tick: &Tick<'_>) -> Verdict {
+        let verdict = self.judge(tick);
+        if verdict.state != self.state {
+            self.state = verdict.state;
+            self.since_ns = tick.inputs.at_ns;
+        }
+        verdict
+    }
+
+    fn judge(&mut self, tick: &Tick<'_>) -> Verdict {
+        let situation = tick.situation(self.crossing_zero(tick));
+        if let Situation::Missing(reason) = situation {
+            return self.without_input(tick, reason);
+        }
+        self.missing_since_ns = None;
+        match situation {
+            Situation::Off => self.at_rest(State::Off, tick),
+            Situation::Rest => self.at_rest(State::Standby, tick),
+            _ => self.turning(tick),
+        }
+    }
+
+    /// A spindle that turned a moment ago and stands now, with the feed on, is being reversed.
+    fn crossing_zero(&self, tick: &Tick<'_>) -> bool {
+        let turned = !matches!(self.phase, Phase::Rest | Phase::Fresh);
+        let recent =
+            self.state != State::SpeedChange || seconds(self.since_ns, tick.inputs.at_ns) < tick.settings.reversal_s;
+        turned && recent && tick.inputs.feed.is_ok() && tick.feed() == Feed::On
+    }
+
+    fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Verdict {
+        let since = *self.missing_since_ns.get_or_insert(tick.inputs.at_ns);
+        if seconds(since, tick.inputs.at_ns) < tick.settings.dropout_hold_s && self.state != State::Unknown {
+            return verdict(self.state);
+        }
+        unknown(reason)
+    }
+
+    fn at_rest(&mut self, state: State, tick: &Tick<'_>) -> Verdict {
+        self.enter(Phase::Rest, tick.inputs.at_ns);
+        self.evidence.clear();
+        verdict(state)
+    }
+
+    fn enter(&mut self, phase: Phase, now_ns: TimeNs) {
+        if self.phase != phase {
+            self.phase = phase;
+            self.phase_since_ns = now_ns;
+        }
+    }
+
+    fn turning(&mut self, tick: &Tick<'_>) -> Verdict {
+        let now_ns = tick.inputs.at_ns;
+        if self.phase == Phase::Rest {
+            self.enter(Phase::Starting, now_ns);
+        }
+        let loaded = self.state == State::Cutting && tick.feed() != Feed::Off;
+        match tick.signals.steady(loaded, tick.settings) {
+            Some(true) => {}
+            Some(false) => {
+                if self.phase != Phase::Starting {
+                    self.enter(Phase::Changing, now_ns);
+                }
+                self.evidence.clear();
+                return self.pending(tick);
+            }
+            None if self.phase == Phase::Settled => {}
+            None => return self.pending(tick),
+        }
+        if self.phase == Phase::Settled { self.loaded(tick) } else { self.settle(tick) }
+    }
+
+    /// Not settled yet.
+    fn pending(&self, tick: &Tick<'_>) -> Verdict {
+        let overdue = seconds(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
+        match self.phase {
+            Phase::Starting if !overdue || tick.feed() == Feed::Off => verdict(State::SpindleStart),
+            Phase::Changing if !overdue || tick.feed() == Feed::Off => verdict(State::SpeedChange),
+            _ => unknown(tick.no_load.err().unwrap_or(NoEstimate::NotSettled)),
+        }
+    }
+
+    fn settle(&mut self, tick: &Tick<'_>) -> Verdict {
+        let Some(filtered_w) = tick.filtered_w else { return self.pending(tick) };
+        let agreement_w = tick.signals.agreement_w(filtered_w, tick.settings);
+        let means = tick.signals.window.stationary(agreement_w, tick.settings);
+        let fed = tick.feed() != Feed::Off;
+        let settled_at_w = match tick.no_load {
+            Ok(known) => {
+                let at_known = (filtered_w - known.power_w).abs() <= tick.visible_excess_w().unwrap_or(0.0);
+                // A cut can be too rough to be stationary: under feed it is enough that the start-up no longer decays.
+                let under_load = fed && tick.signals.window.falling(agreement_w) == Some(false);
+                if !(at_known || means.is_some() || under_load) {
+                    return self.pending(tick);
+                }
+                None
+            }
+            Err(_) => match means {
+                // The lower one: a start-up decays, and a cut that has just begun raises the newer one.
+                Some(means) if !fed || self.phase == Phase::Starting => Some(means.older_w.min(means.newer_w)),
+                _ => return self.pending(tick),
+            },
+        };
+        self.enter(Phase::Settled, tick.inputs.at_ns);
+        self.evidence.clear();
+        Verdict { settled_at_w, ..self.loaded(tick) }
+    }
+
+    fn loaded(&mut self, tick: &Tick<'_>) -> Verdict {
+        self.weigh(tick);
+        let full = tick.settings.cutting_evidence;
+        let rested = seconds(self.since_ns, tick.inputs.at_ns) >= tick.settings.dwell_s;
+        match tick.feed() {
+            Feed::Off => verdict(State::Idle),
+            _ if tick.inputs.rapid => verdict(State::Rapid),
+            _ => match (tick.no_load, self.state) {
+                (Err(_), State::Idle) if self.just_settled(tick) => verdict(State::Idle),
+                (Err(reason), _) => unknown(reason),
+                (Ok(_), State::Cutting) if !(rested && self.evidence.none()) => verdict(State::Cutting),
+                (Ok(_), State::Cutting) => verdict(State::Idle),
+                (Ok(_), before) if self.evidence.full(full) && (rested || before != State::Idle) => {
+                    verdict(State::Cutting)
+                }
+                _ => verdict(State::Idle),
+            },
+        }
+    }
+
+    fn just_settled(&self, tick: &Tick<'_>) -> bool {
+        self.phase_since_ns == tick.inputs.at_ns
+    }
+
+    fn weigh(&mut self, tick: &Tick<'_>) {
+        let (Ok(power_w), Ok(no_load), Some(on_w)) = (tick.inputs.power, tick.no_load, tick.visible_excess_w()) else {
+            self.evidence.clear();
+            return;
+        };
+        let settings = tick.settings;
+        let off_share = (settings.c2_off / settings.c2_on).min(1.0);
+        let reference_w = if self.state == State::Cutting { off_share * on_w } else { on_w };
+        let sd_w = tick.signals.noise.sd() * no_load.power_w;
+        self.evidence.add(power_w - no_load.power_w, reference_w, sd_w, settings.cutting_evidence);
+    }
+}
+
+fn verdict(state: State) -> Verdict {
+    Verdict { state, because: None, settled_at_w: None }
+}
+
+fn unknown(reason: NoEstimate) -> Verdict {
+    Verdict { state: State::Unknown, because: Some(reason), settled_at_w: None }
+}

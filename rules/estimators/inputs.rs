@@ -1,0 +1,86 @@
+//! What the estimators need of a sample.
+
+use super::settings::{STAGES, Settings};
+use adapters::clock::TimeNs;
+use adapters::{Absence, ChannelId, Sample};
+
+/// The channels in use, looked up once.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Channels {
+    pub(super) power: Option<ChannelId>,
+    pub(super) total: Option<ChannelId>,
+    pub(super) speed: Option<ChannelId>,
+    pub(super) feed: Option<ChannelId>,
+    rapid: Option<ChannelId>,
+    stage: Option<ChannelId>,
+}
+
+/// A number, or the reason why there is none.
+pub(super) type Input = Result<f64, Absence>;
+
+/// The inputs of one tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inputs {
+    pub(super) at_ns: TimeNs,
+    /// Spindle power, W.
+    pub(super) power: Input,
+    /// Total power, W.
+    pub(super) total: Input,
+    /// Spindle speed, rpm, signed.
+    pub(super) speed: Input,
+    /// Feed, mm/min.
+    pub(super) feed: Input,
+    /// Rapid traverse by flag or by feed.
+    pub(super) rapid: bool,
+    /// Gear stage; 0 where the machine has none.
+    pub(super) stage: Result<usize, Absence>,
+}
+
+impl Channels {
+    pub(super) fn new() -> Self {
+        Self {
+            power: ChannelId::of("spindle_power_w"),
+            total: ChannelId::of("total_power_w"),
+            speed: ChannelId::of("spindle_speed_rpm"),
+            feed: ChannelId::of("feed_mm_min"),
+            rapid: ChannelId::of("rapid"),
+            stage: ChannelId::of("gear_stage"),
+        }
+    }
+
+    /// Reads the inputs. Without a channel for spindle power, total power above its standby level stands for it.
+    pub(super) fn read(&self, sample: &Sample, standby_w: Option<f64>, settings: &Settings) -> Inputs {
+        let total = number(sample, self.total);
+        let feed = number(sample, self.feed);
+        let power = match (number(sample, self.power), total, standby_w) {
+            (Err(Absence::NotProvided), Ok(total), Some(standby_w)) => Ok(total - standby_w),
+            (power, ..) => power,
+        };
+        let flagged = number(sample, self.rapid).is_ok_and(|rapid| rapid > 0.5);
+        let fast = settings.rapid_feed_mm_min > 0.0 && feed.is_ok_and(|feed| feed > settings.rapid_feed_mm_min);
+        Inputs {
+            at_ns: sample.at_ns,
+            power,
+            total,
+            speed: number(sample, self.speed),
+            feed,
+            rapid: flagged || fast,
+            stage: stage(number(sample, self.stage)),
+        }
+    }
+}
+
+fn number(sample: &Sample, channel: Option<ChannelId>) -> Input {
+    let number = sample.number(channel.ok_or(Absence::NotProvided)?)?;
+    if number.is_finite() { Ok(number) } else { Err(Absence::OutOfRange) }
+}
+
+fn stage(number: Input) -> Result<usize, Absence> {
+    match number {
+        Err(Absence::NotProvided) => Ok(0),
+        Err(absence) => Err(absence),
+        Ok(number) => {
+            (0..STAGES).find(|stage| (number - super::filter::count(*stage)).abs() < 0.5).ok_or(Absence::OutOfRange)
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! How noisy the spindle power is, relative to its level.
+//!
+//! Two views, the larger counts: successive differences (blind to drift, but also to noise that a meter's averaging has
+//! smeared over several samples) and the difference between successive blocks of idle power (slow ripple).
+
+use super::settings::Settings;
+use serde::{Deserialize, Serialize};
+
+/// Weight of a new difference once many have been seen.
+const SLOW: f64 = 0.02;
+
+/// A single difference counts at most this many standard deviations, so that pulses and steps do not count as noise.
+const CLIP_SD: f64 = 3.0;
+
+/// Relative variances.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Noise {
+    fast: f64,
+    seen: f64,
+    slow: f64,
+    last: Option<f64>,
+}
+
+impl Noise {
+    pub(super) fn new(settings: &Settings) -> Self {
+        Self { fast: settings.power_noise * settings.power_noise, seen: 4.0, slow: 0.0, last: None }
+    }
+
+    /// Takes a power measured at a steady level.
+    pub(super) fn push(&mut self, power_w: f64, level_w: f64) {
+        if let Some(last) = self.last.replace(power_w).filter(|_| level_w > 0.0) {
+            let relative = (power_w - last) / level_w;
+            let limit = CLIP_SD * CLIP_SD * self.fast;
+            self.seen += 1.0;
+            let weight = (1.0 / self.seen).max(SLOW);
+            self.fast += weight * ((relative * relative / 2.0).min(limit) - self.fast);
+        }
+    }
+
+    /// The next value has no predecessor.
+    pub(super) fn interrupt(&mut self) {
+        self.last = None;
+    }
+
+    /// Takes the difference between two successive blocks of idle power, relative to their level.
+    pub(super) fn push_blocks(&mut self, relative: f64) {
+        let limit = CLIP_SD * CLIP_SD * (self.fast + self.slow);
+        self.slow += 0.1 * ((relative * relative / 2.0).min(limit) - self.slow);
+    }
+
+    /// Standard deviation of one sample, relative.
+    pub(super) fn sd(&self) -> f64 {
+        self.fast.max(self.slow).sqrt().max(1e-3)
+    }
+
+    /// Standard deviation of the level from block to block, relative.
+    pub(super) fn level_sd(&self) -> f64 {
+        self.slow.sqrt()
+    }
+}

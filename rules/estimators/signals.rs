@@ -1,0 +1,169 @@
+//! The recent past of the inputs: filtered power, steadiness of the speed, feed with its debounce.
+
+use super::filter::{AntiPulse, count};
+use super::inputs::Inputs;
+use super::noise::Noise;
+use super::settings::Settings;
+use super::window::Window;
+use adapters::clock::{SECOND_NS, TimeNs};
+use serde::{Deserialize, Serialize};
+
+/// Speeds remembered to judge steadiness: four samples, 0.3 s at 10 Hz.
+const SPEEDS: usize = 4;
+
+/// Speed differences below this are the resolution of the display, rpm.
+const SPEED_RESOLUTION_RPM: f64 = 3.0;
+
+/// How much faster the speed may change while cutting: constant cutting speed (G96) drives it with the diameter.
+const CUTTING_RATE: f64 = 3.0;
+
+/// Is the feed on?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Feed {
+    On,
+    Off,
+    /// The controller does not tell.
+    Unknown,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Signals {
+    pub(super) filter: AntiPulse,
+    pub(super) window: Window,
+    pub(super) noise: Noise,
+    speeds: [(TimeNs, f64); SPEEDS],
+    speeds_seen: usize,
+    stage: usize,
+    fed_ns: Option<TimeNs>,
+    last_ns: Option<TimeNs>,
+}
+
+/// What has to begin anew at this tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Break {
+    /// Time jumped, or a sample is missing for too long.
+    pub(super) gap: bool,
+    /// Another gear stage.
+    pub(super) stage: bool,
+}
+
+impl Signals {
+    pub(super) fn new(settings: &Settings) -> Self {
+        Self {
+            filter: AntiPulse::new(length(settings.filter_samples)),
+            window: Window::new(length(settings.window_samples)),
+            noise: Noise::new(settings),
+            speeds: [(0, 0.0); SPEEDS],
+            speeds_seen: 0,
+            stage: 0,
+            fed_ns: None,
+            last_ns: None,
+        }
+    }
+
+    /// Takes the inputs of a tick.
+    pub(super) fn push(&mut self, inputs: &Inputs, settings: &Settings) -> Break {
+        let gap = self.last_ns.is_some_and(|last| {
+            let pause_s = seconds(last, inputs.at_ns);
+            pause_s < 0.0 || pause_s > settings.gap_s
+        });
+        if gap {
+            self.forget();
+            self.fed_ns = None;
+        }
+        self.last_ns = Some(inputs.at_ns);
+        let stage = inputs.stage.unwrap_or(self.stage);
+        let changed = std::mem::replace(&mut self.stage, stage) != stage;
+        if changed {
+            self.forget();
+        }
+        self.push_speed(inputs);
+        if inputs.feed.is_ok_and(|feed| feed > settings.feed_min_mm_min) {
+            self.fed_ns = Some(inputs.at_ns);
+        }
+        Break { gap, stage: changed }
+    }
+
+    /// Takes the power of a tick and returns the filtered one.
+    pub(super) fn push_power(&mut self, power_w: f64) -> Option<f64> {
+        let filtered_w = self.filter.push(power_w)?;
+        self.window.push(filtered_w);
+        Some(filtered_w)
+    }
+
+    /// Forgets the recent power and speed.
+    pub(super) fn forget(&mut self) {
+        self.forget_power();
+        self.speeds_seen = 0;
+    }
+
+    /// Forgets the recent power.
+    pub(super) fn forget_power(&mut self) {
+        self.filter.clear();
+        self.window.clear();
+        self.noise.interrupt();
+    }
+
+    fn push_speed(&mut self, inputs: &Inputs) {
+        match inputs.speed {
+            Ok(speed) => {
+                self.speeds.rotate_left(1);
+                self.speeds[SPEEDS - 1] = (inputs.at_ns, speed);
+                self.speeds_seen = (self.speeds_seen + 1).min(SPEEDS);
+            }
+            Err(_) => self.speeds_seen = 0,
+        }
+    }
+
+    /// Does the spindle hold its speed? `None` until enough samples are in. `loaded` allows the drift of constant
+    /// cutting speed.
+    pub(super) fn steady(&self, loaded: bool, settings: &Settings) -> Option<bool> {
+        let known = &self.speeds[SPEEDS - self.speeds_seen..];
+        let (least, greatest) =
+            known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), (_, speed)| {
+                (least.min(*speed), greatest.max(*speed))
+            });
+        let span_s = seconds(known.first()?.0, known.last()?.0);
+        let rate = settings.speed_rate_per_s * if loaded { CUTTING_RATE } else { 1.0 };
+        let allowed_rpm = (rate * span_s * greatest.abs().max(least.abs())).max(SPEED_RESOLUTION_RPM);
+        let unsteady = greatest - least > allowed_rpm;
+        if unsteady { Some(false) } else { (self.speeds_seen == SPEEDS).then_some(true) }
+    }
+
+    /// Did the spindle turn, at the last tick but one or before?
+    pub(super) fn stage(&self) -> usize {
+        self.stage
+    }
+
+    /// How long ago the feed was on, s; infinite where it never was.
+    pub(super) fn fed_ago_s(&self, now_ns: TimeNs) -> f64 {
+        self.fed_ns.map_or(f64::INFINITY, |fed| seconds(fed, now_ns))
+    }
+
+    pub(super) fn feed(&self, inputs: &Inputs, settings: &Settings) -> Feed {
+        match inputs.feed {
+            Ok(feed) if feed > settings.feed_min_mm_min => Feed::On,
+            Ok(_) if self.fed_ago_s(inputs.at_ns) > settings.feed_debounce_s => Feed::Off,
+            Ok(_) => Feed::On,
+            Err(_) => Feed::Unknown,
+        }
+    }
+
+    /// How far the means of the two windows may lie apart, W: a third of what begins a cut, or the noise of the means.
+    pub(super) fn agreement_w(&self, level_w: f64, settings: &Settings) -> f64 {
+        let noise = 2.0 * self.noise.sd() * (2.0 / settings.window_samples).sqrt();
+        (settings.c2_on / 3.0).max(noise) * level_w.abs()
+    }
+}
+
+/// Seconds from `from_ns` to `to_ns`, negative when time runs backwards.
+#[expect(clippy::cast_precision_loss, reason = "a duration in nanoseconds; microseconds suffice beyond 104 days")]
+pub(super) fn seconds(from_ns: TimeNs, to_ns: TimeNs) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 / SECOND_NS as f64
+}
+
+/// A setting that is a count, as a count.
+pub(super) fn length(setting: f64) -> usize {
+    (1..=100).take_while(|n| count(*n) <= setting).last().unwrap_or(1)
+}

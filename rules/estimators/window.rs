@@ -1,0 +1,144 @@
+//! Has the spindle power settled? Two consecutive windows must each be stationary and agree with each other.
+//!
+//! Source: tool-wear patent, state machine, buffer G of N filtered powers. Its formula is lost and both readings are
+//! kept: (1) `(max - min) / mean <= c1`, (2) `max |g - mean| / mean <= c1`. One window alone passes while a slow
+//! start-up still decays (bias up to 83 % at tau = 2 s), hence the second one and the slope between them.
+
+use super::filter::count;
+use super::settings::Settings;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// The last 2 N filtered powers, W.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Window {
+    length: usize,
+    values: VecDeque<f64>,
+}
+
+/// Mean powers of the older and the newer window, W.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Means {
+    /// Mean of the older window.
+    pub older_w: f64,
+    /// Mean of the newer window.
+    pub newer_w: f64,
+}
+
+impl Window {
+    /// Two windows of `length` values each.
+    #[must_use]
+    pub fn new(length: usize) -> Self {
+        let length = length.max(2);
+        Self { length, values: VecDeque::with_capacity(2 * length) }
+    }
+
+    /// Takes a filtered power; one that is not finite is ignored.
+    pub fn push(&mut self, filtered_w: f64) {
+        if !filtered_w.is_finite() {
+            return;
+        }
+        if self.values.len() == 2 * self.length {
+            self.values.pop_front();
+        }
+        self.values.push_back(filtered_w);
+    }
+
+    /// Forgets every value.
+    pub fn clear(&mut self) {
+        self.values.clear();
+    }
+
+    /// The means of both windows, once both are full.
+    #[must_use]
+    pub fn means(&self) -> Option<Means> {
+        let mean = |from: usize| self.values.range(from..from + self.length).sum::<f64>() / count(self.length);
+        (self.values.len() == 2 * self.length).then(|| Means { older_w: mean(0), newer_w: mean(self.length) })
+    }
+
+    /// The means of both windows if the power is stationary: each window within c1, and the means apart by no more
+    /// than `agreement_w`, which also bounds the slope.
+    #[must_use]
+    pub fn stationary(&self, agreement_w: f64, settings: &Settings) -> Option<Means> {
+        let means = self.means()?;
+        let agree = (means.older_w - means.newer_w).abs() <= agreement_w;
+        let within = |from, mean| stationary(self.values.range(from..from + self.length).copied(), mean, settings);
+        (agree && within(0, means.older_w) && within(self.length, means.newer_w)).then_some(means)
+    }
+
+    /// Does the power still fall from the older to the newer window by more than `agreement_w`? `None` until both
+    /// windows are full.
+    #[must_use]
+    pub fn falling(&self, agreement_w: f64) -> Option<bool> {
+        self.means().map(|means| means.older_w - means.newer_w > agreement_w)
+    }
+}
+
+/// The source's test of one window, in the reading that the settings choose. A mean that is not positive fails.
+#[must_use]
+pub fn stationary(values: impl Iterator<Item = f64>, mean_w: f64, settings: &Settings) -> bool {
+    let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for value in values {
+        least = least.min(value);
+        greatest = greatest.max(value);
+    }
+    let spread_w =
+        if settings.stationarity_reading < 1.5 { greatest - least } else { (greatest - mean_w).max(mean_w - least) };
+    mean_w > 0.0 && spread_w <= settings.c1 * mean_w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(reading: f64, c1: f64) -> Settings {
+        let mut settings = Settings::default();
+        settings.set("stationarity_reading", reading).expect("in range");
+        settings.set("c1", c1).expect("in range");
+        settings
+    }
+
+    #[test]
+    fn both_readings_of_the_source() {
+        let values = [480.0, 500.0, 500.0, 520.0];
+        let passes = |reading, c1| stationary(values.into_iter(), 500.0, &settings(reading, c1));
+        assert!(passes(1.0, 0.08) && !passes(1.0, 0.079));
+        assert!(passes(2.0, 0.04) && !passes(2.0, 0.039));
+    }
+
+    #[test]
+    fn a_slow_decay_that_one_window_accepts_is_refused_by_two() {
+        let settings = settings(1.0, 0.15);
+        let power = |i: usize| 500.0 + 3000.0 * (-0.1 * count(i) / 2.0).exp();
+        let mut window = Window::new(10);
+        let (mut one, mut two) = (None, None);
+        for i in 0..200 {
+            window.push(power(i));
+            let newest = window.values.iter().rev().take(10).copied();
+            let mean = newest.clone().sum::<f64>() / 10.0;
+            if i >= 10 && one.is_none() && stationary(newest, mean, &settings) {
+                one = Some(mean / 500.0 - 1.0);
+            }
+            if two.is_none()
+                && let Some(means) = window.stationary(5.0, &settings)
+            {
+                two = Some(means.newer_w / 500.0 - 1.0);
+            }
+        }
+        let (one, two) = (one.expect("passes"), two.expect("passes"));
+        assert!(one > 0.2 && two < 0.02, "bias of one window {one}, of two {two}");
+    }
+
+    #[test]
+    fn nothing_is_stationary_before_both_windows_are_full_or_at_zero_power() {
+        let settings = Settings::default();
+        let mut window = Window::new(5);
+        for i in 0..10 {
+            assert_eq!(window.stationary(1.0, &settings), None, "{i}");
+            window.push(100.0);
+        }
+        assert!(window.stationary(1.0, &settings).is_some());
+        (0..10).for_each(|_| window.push(0.0));
+        assert_eq!(window.stationary(1.0, &settings), None);
+    }
+}
