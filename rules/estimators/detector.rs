@@ -28,8 +28,22 @@ use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId};
 use serde::{Deserialize, Serialize};
 
-/// How long a start or speed change may stay unsettled under feed before the state is called unknown, s.
+/// How long a start or speed change without a known no-load power may stay unsettled under feed before the state is
+/// called unknown, s.
 const SETTLING_LIMIT_S: f64 = 10.0;
+
+/// Relative difference of speed from one tick to the next seen one that means a change of speed.
+const HIDDEN_CHANGE: f64 = 0.1;
+
+/// Without sight of the speed for this long, the spindle may have stopped and started again, s.
+const HIDDEN_STOP_S: f64 = 5.0;
+
+/// A heavy cut has ended when less than this share of it is left: the light remainder would need longer to be told from
+/// noise.
+const CUT_ENDS: f64 = 0.15;
+
+/// Weight of a new sample in the level of the cut.
+const CUT_LEVEL_WEIGHT: f64 = 0.2;
 
 /// How the turning spindle got where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,6 +89,11 @@ pub(super) struct Detector {
     phase_since_ns: TimeNs,
     evidence: Evidence,
     missing_since_ns: Option<TimeNs>,
+    /// Speed at which the power settled or was last seen settled, and when.
+    settled_speed: Option<(TimeNs, f64)>,
+    stands_since_ns: Option<TimeNs>,
+    /// Running excess over no-load power during the cut, W.
+    cut_level_w: f64,
 }
 
 /// What the inputs say before any estimation.
@@ -91,7 +110,7 @@ impl Tick<'_> {
     }
 
     fn situation(&self, crossing_zero: bool) -> Situation {
-        let no_power = self.inputs.total.is_ok_and(|total| total < self.settings.off_power_w);
+        let no_power = self.inputs.total.is_ok_and(|total| total.abs() < self.settings.off_power_w);
         let meter_is_on = self.inputs.total.is_ok() && !no_power;
         match self.inputs.speed {
             Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
@@ -120,6 +139,14 @@ impl Tick<'_> {
     }
 }
 
+impl Tick<'_> {
+    /// Excess over no-load power below which a load has ended, W.
+    fn ending_excess_w(&self) -> Option<f64> {
+        let share = (self.settings.c2_off / self.settings.c2_on).min(1.0);
+        self.visible_excess_w().map(|excess_w| share * excess_w)
+    }
+}
+
 /// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
 pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
     let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
@@ -140,6 +167,9 @@ impl Detector {
             phase_since_ns: 0,
             evidence: Evidence::default(),
             missing_since_ns: None,
+            settled_speed: None,
+            stands_since_ns: None,
+            cut_level_w: 0.0,
         }
     }
 
@@ -161,6 +191,8 @@ impl Detector {
     /// Takes a tick and tells the state.
     pub(super) fn step(&mut self, tick: &Tick<'_>) -> Verdict {
         let verdict = self.judge(tick);
+        // Time may have been set back.
+        self.since_ns = self.since_ns.min(tick.inputs.at_ns);
         if verdict.state != self.state {
             self.state = verdict.state;
             self.since_ns = tick.inputs.at_ns;
@@ -169,6 +201,7 @@ impl Detector {
     }
 
     fn judge(&mut self, tick: &Tick<'_>) -> Verdict {
+        self.notice_hidden_change(tick);
         let situation = tick.situation(self.crossing_zero(tick));
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);
@@ -181,12 +214,18 @@ impl Detector {
         }
     }
 
-    /// A spindle that turned a moment ago and stands now, with the feed on, is being reversed.
-    fn crossing_zero(&self, tick: &Tick<'_>) -> bool {
+    /// A spindle that turned a moment ago and stands now, with the feed on, may be reversing.
+    fn crossing_zero(&mut self, tick: &Tick<'_>) -> bool {
+        let now_ns = tick.inputs.at_ns;
+        let stands = tick.inputs.speed.is_ok_and(|speed| speed.abs() < tick.settings.spindle_min_rpm);
+        if !stands {
+            self.stands_since_ns = None;
+            return false;
+        }
+        let since = *self.stands_since_ns.get_or_insert(now_ns);
         let turned = !matches!(self.phase, Phase::Rest | Phase::Fresh);
-        let recent =
-            self.state != State::SpeedChange || seconds(self.since_ns, tick.inputs.at_ns) < tick.settings.reversal_s;
-        turned && recent && tick.inputs.feed.is_ok() && tick.feed() == Feed::On
+        let fed = tick.inputs.feed.is_ok() && tick.feed() == Feed::On;
+        turned && fed && seconds(since, now_ns) < tick.settings.reversal_s
     }
 
     fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Verdict {
@@ -231,9 +270,25 @@ impl Detector {
         if self.phase == Phase::Settled { self.loaded(tick) } else { self.settle(tick) }
     }
 
+    /// While the speed was not to be seen it may have changed.
+    fn notice_hidden_change(&mut self, tick: &Tick<'_>) {
+        let (now_ns, Ok(speed)) = (tick.inputs.at_ns, tick.inputs.speed) else { return };
+        if self.phase != Phase::Settled {
+            return;
+        }
+        if let Some((then_ns, before)) = self.settled_speed.replace((now_ns, speed)) {
+            let pause_s = seconds(then_ns, now_ns);
+            let allowed_rpm = HIDDEN_CHANGE * speed.abs().max(before.abs());
+            if (speed - before).abs() > allowed_rpm || pause_s > HIDDEN_STOP_S {
+                self.enter(Phase::Changing, now_ns);
+                self.evidence.clear();
+            }
+        }
+    }
+
     /// Not settled yet.
     fn pending(&self, tick: &Tick<'_>) -> Verdict {
-        let overdue = seconds(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
+        let overdue = tick.no_load.is_err() && seconds(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
         match self.phase {
             Phase::Starting if !overdue || tick.feed() == Feed::Off => verdict(State::SpindleStart),
             Phase::Changing if !overdue || tick.feed() == Feed::Off => verdict(State::SpeedChange),
@@ -248,7 +303,7 @@ impl Detector {
         let fed = tick.feed() != Feed::Off;
         let settled_at_w = match tick.no_load {
             Ok(known) => {
-                let at_known = (filtered_w - known.power_w).abs() <= tick.visible_excess_w().unwrap_or(0.0);
+                let at_known = (filtered_w - known.power_w).abs() <= tick.ending_excess_w().unwrap_or(0.0);
                 // A cut can be too rough to be stationary: under feed it is enough that the start-up no longer decays.
                 let under_load = fed && tick.signals.window.falling(agreement_w) == Some(false);
                 if !(at_known || means.is_some() || under_load) {
@@ -263,6 +318,7 @@ impl Detector {
             },
         };
         self.enter(Phase::Settled, tick.inputs.at_ns);
+        self.settled_speed = None;
         self.evidence.clear();
         Verdict { settled_at_w, ..self.loaded(tick) }
     }
@@ -275,7 +331,7 @@ impl Detector {
             Feed::Off => verdict(State::Idle),
             _ if tick.inputs.rapid => verdict(State::Rapid),
             _ => match (tick.no_load, self.state) {
-                (Err(_), State::Idle) if self.just_settled(tick) => verdict(State::Idle),
+                (Err(_), _) if self.just_settled(tick) => verdict(State::Idle),
                 (Err(reason), _) => unknown(reason),
                 (Ok(_), State::Cutting) if !(rested && self.evidence.none()) => verdict(State::Cutting),
                 (Ok(_), State::Cutting) => verdict(State::Idle),
@@ -296,11 +352,19 @@ impl Detector {
             self.evidence.clear();
             return;
         };
-        let settings = tick.settings;
-        let off_share = (settings.c2_off / settings.c2_on).min(1.0);
-        let reference_w = if self.state == State::Cutting { off_share * on_w } else { on_w };
+        let excess_w = power_w - no_load.power_w;
+        let reference_w = if self.state == State::Cutting {
+            tick.ending_excess_w().unwrap_or(on_w).max(CUT_ENDS * self.cut_level_w)
+        } else {
+            self.cut_level_w = 0.0;
+            on_w
+        };
+        let filtered_excess_w = tick.filtered_w.unwrap_or(power_w) - no_load.power_w;
+        if filtered_excess_w > reference_w {
+            self.cut_level_w += CUT_LEVEL_WEIGHT * (filtered_excess_w - self.cut_level_w);
+        }
         let sd_w = tick.signals.noise.sd() * no_load.power_w;
-        self.evidence.add(power_w - no_load.power_w, reference_w, sd_w, settings.cutting_evidence);
+        self.evidence.add(excess_w, reference_w, sd_w, tick.settings.cutting_evidence);
     }
 }
 

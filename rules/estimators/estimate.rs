@@ -165,6 +165,8 @@ pub struct Estimates {
     pub state: State,
     /// Since when.
     pub since_ns: TimeNs,
+    /// Does the spindle turn? Known also where the state is not; `None` without a speed.
+    pub spindle_turns: Option<bool>,
     /// Why the state is unknown, where it is.
     pub unknown_because: Option<NoEstimate>,
     /// Spindle power after the anti-pulse moving average, W.
@@ -195,6 +197,7 @@ impl Estimates {
             at_ns,
             state: State::Unknown,
             since_ns: at_ns,
+            spindle_turns: None,
             unknown_because: Some(NoEstimate::NotYet),
             filtered_power_w: Err(NoEstimate::NotYet),
             no_load_power_w: Err(NoEstimate::NotYet),

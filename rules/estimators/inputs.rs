@@ -71,8 +71,9 @@ impl Channels {
 }
 
 fn number(sample: &Sample, channel: Option<ChannelId>) -> Input {
-    let number = sample.number(channel.ok_or(Absence::NotProvided)?)?;
-    if number.is_finite() { Ok(number) } else { Err(Absence::OutOfRange) }
+    let channel = channel.ok_or(Absence::NotProvided)?;
+    let number = sample.number(channel)?;
+    if channel.channel().holds(number) { Ok(number) } else { Err(Absence::OutOfRange) }
 }
 
 fn stage(number: Input) -> Result<usize, Absence> {

@@ -16,12 +16,17 @@ use serde::{Deserialize, Serialize};
 /// Variance of the mean of the middle half, relative to that of the plain mean.
 const MIDDLE_HALF: f64 = 1.2;
 
+/// Two successive blocks of a settled spindle differ by less than this, relative.
+const AGREEMENT: f64 = 0.02;
+
 /// A block's power.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Observation {
     pub(super) point: NoLoadPoint,
     pub(super) sd_w: f64,
     pub(super) at_ns: TimeNs,
+    /// Does it agree with the block before it?
+    confirmed: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,6 +36,7 @@ pub(super) struct Learner {
     block: Vec<f64>,
     speed_sum: f64,
     previous_w: Option<f64>,
+    before_w: Option<f64>,
     waiting: Option<Observation>,
     above_since_ns: Option<TimeNs>,
 }
@@ -52,6 +58,7 @@ impl Learner {
             block: Vec::with_capacity(length),
             speed_sum: 0.0,
             previous_w: None,
+            before_w: None,
             waiting: None,
             above_since_ns: None,
         }
@@ -61,6 +68,7 @@ impl Learner {
     pub(super) fn stop(&mut self) {
         self.clear_block();
         self.previous_w = None;
+        self.before_w = None;
         self.waiting = None;
         self.above_since_ns = None;
     }
@@ -98,21 +106,24 @@ impl Learner {
         let variance = MIDDLE_HALF * noise_w * noise_w / count(self.block.len())
             + settling_w.map_or(0.0, |w| w * w / 2.0)
             + 1e-6 * power_w * power_w;
-        if let Some(settling_w) = settling_w.filter(|_| power_w > 0.0) {
-            noise.push_blocks(settling_w / power_w);
+        if let (Some(before), Some(previous)) = (self.before_w, self.previous_w.filter(|previous| *previous > 0.0)) {
+            noise.push_blocks([before, previous, power_w], count(self.length));
         }
-        self.previous_w = Some(power_w);
+        self.before_w = self.previous_w.replace(power_w);
         self.clear_block();
         let point = NoLoadPoint { stage: tick.stage, speed_rpm, power_w };
-        (power_w > 0.0).then(|| Observation { point, sd_w: variance.sqrt(), at_ns: tick.at_ns })
+        let confirmed = settling_w.is_some_and(|w| w.abs() <= AGREEMENT * power_w);
+        (power_w > 0.0).then(|| Observation { point, sd_w: variance.sqrt(), at_ns: tick.at_ns, confirmed })
     }
 
-    /// Power visibly above the known one must last before it is believed.
+    /// Power visibly below the known one must be confirmed by the next block, power above it must last.
     fn plausible(&mut self, seen: &Observation, known: Option<NoLoad>, settings: &Settings) -> bool {
-        let limit_w = |known: NoLoad| known.power_w * (1.0 + settings.c2_off) + 2.0 * known.sd_w.hypot(seen.sd_w);
-        if known.is_none_or(|known| seen.point.power_w <= limit_w(known)) {
+        let Some(known) = known else { return true };
+        let limit_w = known.power_w * settings.c2_off + 2.0 * known.sd_w.hypot(seen.sd_w);
+        let above_w = seen.point.power_w - known.power_w;
+        if above_w <= limit_w {
             self.above_since_ns = None;
-            return true;
+            return above_w >= -limit_w || seen.confirmed;
         }
         let since = *self.above_since_ns.get_or_insert(seen.at_ns);
         seconds(since, seen.at_ns) >= settings.relearn_up_s

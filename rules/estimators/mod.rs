@@ -13,6 +13,7 @@
 //! | `evidence` | a small lasting step in noise |
 //! | `detector` | the states and every transition between them |
 //! | `no_load`, `learning` | no-load power over speed, per gear stage, learned from idle |
+//! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 
 mod cutting;
@@ -28,6 +29,7 @@ mod pipeline;
 mod settings;
 mod signals;
 mod state;
+mod visibility;
 mod window;
 
 pub use evidence::Evidence;
@@ -40,3 +42,4 @@ pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable, lagrange, noise_gain, triple
 pub use pipeline::{Pipeline, RestoreError};
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};
 pub use state::State;
+pub use visibility::{VisibilityTally, VisibilityVerdict};

@@ -13,7 +13,8 @@
 
 use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
-use adapters::clock::{SECOND_NS, TimeNs};
+use super::signals::seconds;
+use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// Correlation of the drift of two speeds of one stage: bearings and oil warm up together.
@@ -138,9 +139,11 @@ impl Stage {
         relative_variance * shared * self.powers_w[i] * self.powers_w[j]
     }
 
-    fn aged_variance(&self, now_ns: TimeNs, drift_per_h: f64) -> f64 {
-        let hours = self.aged_ns.map_or(0.0, |then| hours_between(then, now_ns));
-        drift_per_h * drift_per_h * hours
+    /// Relative variance that drift has added by now: grows with time and levels off at the whole drift.
+    fn aged_variance(&self, now_ns: TimeNs, settings: &Settings) -> f64 {
+        let age_s = self.aged_ns.map_or(0.0, |then| seconds(then, now_ns).max(0.0));
+        let drift = settings.no_load_drift;
+        drift * drift * -(-age_s / settings.no_load_drift_time_s).exp_m1()
     }
 
     fn inflate(&mut self, relative_variance: f64) {
@@ -152,8 +155,8 @@ impl Stage {
         }
     }
 
-    fn age(&mut self, now_ns: TimeNs, drift_per_h: f64) {
-        self.inflate(self.aged_variance(now_ns, drift_per_h));
+    fn age(&mut self, now_ns: TimeNs, settings: &Settings) {
+        self.inflate(self.aged_variance(now_ns, settings));
         self.aged_ns = Some(now_ns);
     }
 
@@ -212,8 +215,8 @@ impl Stage {
         }
     }
 
-    fn variance_w2(&self, weights: &Weights, now_ns: TimeNs, drift_per_h: f64) -> f64 {
-        let (n, aged) = (self.len(), self.aged_variance(now_ns, drift_per_h));
+    fn variance_w2(&self, weights: &Weights, now_ns: TimeNs, settings: &Settings) -> f64 {
+        let (n, aged) = (self.len(), self.aged_variance(now_ns, settings));
         let mut sum = 0.0;
         for (i, wi) in weights.at.iter().zip(weights.weight) {
             for (j, wj) in weights.at.iter().zip(weights.weight) {
@@ -288,7 +291,7 @@ impl NoLoadTable {
         else {
             return;
         };
-        stage.age(now_ns, settings.no_load_drift_per_h);
+        stage.age(now_ns, settings);
         if let Some(at) = stage.near(speed_rpm, settings.speed_tolerance) {
             let to_node = stage.speeds_rpm[at] / speed_rpm;
             stage.update(at, power_w * to_node, sd_w * sd_w);
@@ -304,11 +307,11 @@ impl NoLoadTable {
     /// # Errors
     /// [`NoEstimate::NotLearned`] or [`NoEstimate::Extrapolated`].
     pub fn at(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Result<NoLoad, NoEstimate> {
-        let (n, drift) = (speed_rpm.abs(), settings.no_load_drift_per_h);
+        let n = speed_rpm.abs();
         let stage = self.stages.get(stage).ok_or(NoEstimate::NotLearned)?;
         if let Some(at) = stage.near(n, settings.speed_tolerance) {
             let weights = Weights::one(at, n / stage.speeds_rpm[at]);
-            let (power_w, sd_w) = (weights.of(&stage.powers_w), stage.variance_w2(&weights, now_ns, drift).sqrt());
+            let (power_w, sd_w) = (weights.of(&stage.powers_w), stage.variance_w2(&weights, now_ns, settings).sqrt());
             return Ok(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::Measured });
         }
         let (weights, other) = stage.forms(n).ok_or(NoEstimate::NotLearned)?;
@@ -323,13 +326,8 @@ impl NoLoadTable {
             return Err(NoEstimate::NotLearned);
         }
         let form_w = (power_w - other.of(&stage.powers_w)) / 3.0_f64.sqrt();
-        let sd_w = (stage.variance_w2(&weights, now_ns, drift) + form_w * form_w).sqrt();
+        let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w).sqrt();
         let origin = if inside { NoLoadOrigin::Interpolated } else { NoLoadOrigin::Extrapolated };
         Ok(NoLoad { power_w, sd_w, noise_gain, origin })
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "an age, not a count")]
-fn hours_between(then_ns: TimeNs, now_ns: TimeNs) -> f64 {
-    now_ns.saturating_sub(then_ns).max(0) as f64 / SECOND_NS as f64 / 3600.0
 }

@@ -1,7 +1,7 @@
 //! How noisy the spindle power is, relative to its level.
 //!
 //! Two views, the larger counts: successive differences (blind to drift, but also to noise that a meter's averaging has
-//! smeared over several samples) and the difference between successive blocks of idle power (slow ripple).
+//! smeared over several samples) and second differences of successive blocks of idle power (slow ripple).
 
 use super::settings::Settings;
 use serde::{Deserialize, Serialize};
@@ -42,10 +42,12 @@ impl Noise {
         self.last = None;
     }
 
-    /// Takes the difference between two successive blocks of idle power, relative to their level.
-    pub(super) fn push_blocks(&mut self, relative: f64) {
-        let limit = CLIP_SD * CLIP_SD * (self.fast + self.slow);
-        self.slow += 0.1 * ((relative * relative / 2.0).min(limit) - self.slow);
+    /// Takes three successive blocks of idle power, W. Their second difference is blind to a start-up that still decays.
+    pub(super) fn push_blocks(&mut self, blocks_w: [f64; 3], block_length: f64) {
+        let [first, second, third] = blocks_w;
+        let relative = (first - 2.0 * second + third) / second;
+        let limit = CLIP_SD * CLIP_SD * (self.fast / block_length + self.slow);
+        self.slow += 0.1 * ((relative * relative / 6.0).min(limit) - self.slow);
     }
 
     /// Standard deviation of one sample, relative.

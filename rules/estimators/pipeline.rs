@@ -149,7 +149,9 @@ impl Pipeline {
             let standby = memory.standby_w.get_or_insert(total);
             *standby += STANDBY_WEIGHT * (total - *standby);
         }
-        let turning = verdict.state.spindle_on() == Some(true) || verdict.because == Some(NoEstimate::NotLearned);
+        let absent =
+            matches!(verdict.because, Some(NoEstimate::Input { .. } | NoEstimate::Contradiction | NoEstimate::NotYet));
+        let turning = verdict.state.spindle_on() != Some(false) && !absent;
         match (inputs.power, filtered_w) {
             (Ok(power_w), Some(level_w)) if turning && verdict.state != State::Cutting => {
                 memory.signals.noise.push(power_w, level_w);
@@ -180,9 +182,9 @@ impl Pipeline {
 
     fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) {
         let memory = &mut self.memory;
-        let rested = memory.signals.fed_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
-        let (Ok(power_w), Ok(speed_rpm), State::Idle, true) = (inputs.power, inputs.speed, verdict.state, rested)
-        else {
+        let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
+        let idles = matches!(verdict.state, State::Idle | State::Rapid) && rested;
+        let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, idles) else {
             memory.learner.stop();
             return;
         };
@@ -208,12 +210,13 @@ impl Pipeline {
             value,
             sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
         });
-        let reference = steady.and(no_load);
-        let (cutting_power_w, load_loss_w) = self.split(filtered, reference);
+        let reference = if steady == Err(NoEstimate::MachineOff) { Err(NoEstimate::MachineOff) } else { no_load };
+        let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference));
         Estimates {
             at_ns: inputs.at_ns,
             state: verdict.state,
             since_ns: detector.since_ns,
+            spindle_turns: inputs.speed.ok().map(|speed| speed.abs() >= self.settings.spindle_min_rpm),
             unknown_because: verdict.because,
             filtered_power_w: filtered,
             no_load_power_w: reference.map(|known| Estimate { value: known.power_w, sd: known.sd_w }),

@@ -130,8 +130,8 @@ settings! {
     "Feed above this counts as rapid traverse even without the rapid flag; 0 = only the flag counts"
     off_power_w "W" 0.1 5000.0 20.0 false
     "Total power below this means the machine is off; meters never read exactly 0"
-    reversal_s "s" 0.0 10.0 1.0 false
-    "How long a spindle that passes zero speed while the feed is on (tapping, threading) is not yet standing still"
+    reversal_s "s" 0.0 10.0 0.0 false
+    "How long a spindle that passes zero speed while the feed is on (tapping) is not yet standing still; delays the end of a spindle run by as much"
     dropout_hold_s "s" 0.0 5.0 0.2 false
     "How long a missing input may last before the state becomes unknown"
     gap_s "s" 0.1 600.0 2.0 false
@@ -140,8 +140,10 @@ settings! {
     "How long the feed must have been off before, and stay off after, power that is learned as no-load power"
     relearn_up_s "s" 0.0 3600.0 10.0 false
     "How long power above the known no-load power must last with the feed off before it replaces it"
-    no_load_drift_per_h "1/h" 0.0 2.0 0.05 false
-    "How much no-load power may drift in an hour (warm-up), one standard deviation; ages what was learned"
+    no_load_drift "1" 0.0 0.5 0.04 false
+    "How far no-load power drifts as the machine warms up or cools down, one standard deviation, relative; ages what was learned"
+    no_load_drift_time_s "s" 10.0 100000.0 600.0 false
+    "How long that drift takes, time constant"
     noise_gain_limit "1" 1.0 50.0 3.0 false
     "Extrapolation of the no-load table that amplifies noise more than this is refused"
     power_noise "1" 0.001 0.5 0.02 false

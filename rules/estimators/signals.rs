@@ -35,7 +35,9 @@ pub(super) struct Signals {
     speeds: [(TimeNs, f64); SPEEDS],
     speeds_seen: usize,
     stage: usize,
+    /// When the feed was last on, and when it was last on without rapid traverse.
     fed_ns: Option<TimeNs>,
+    worked_ns: Option<TimeNs>,
     last_ns: Option<TimeNs>,
 }
 
@@ -58,6 +60,7 @@ impl Signals {
             speeds_seen: 0,
             stage: 0,
             fed_ns: None,
+            worked_ns: None,
             last_ns: None,
         }
     }
@@ -71,6 +74,7 @@ impl Signals {
         if gap {
             self.forget();
             self.fed_ns = None;
+            self.worked_ns = None;
         }
         self.last_ns = Some(inputs.at_ns);
         let stage = inputs.stage.unwrap_or(self.stage);
@@ -81,6 +85,9 @@ impl Signals {
         self.push_speed(inputs);
         if inputs.feed.is_ok_and(|feed| feed > settings.feed_min_mm_min) {
             self.fed_ns = Some(inputs.at_ns);
+            if !inputs.rapid {
+                self.worked_ns = self.fed_ns;
+            }
         }
         Break { gap, stage: changed }
     }
@@ -131,13 +138,17 @@ impl Signals {
         if unsteady { Some(false) } else { (self.speeds_seen == SPEEDS).then_some(true) }
     }
 
-    /// Did the spindle turn, at the last tick but one or before?
+    /// Gear stage in force.
     pub(super) fn stage(&self) -> usize {
         self.stage
     }
 
-    /// How long ago the feed was on, s; infinite where it never was.
-    pub(super) fn fed_ago_s(&self, now_ns: TimeNs) -> f64 {
+    /// How long ago the feed was on other than in rapid traverse, s; infinite where it never was.
+    pub(super) fn worked_ago_s(&self, now_ns: TimeNs) -> f64 {
+        self.worked_ns.map_or(f64::INFINITY, |worked| seconds(worked, now_ns))
+    }
+
+    fn fed_ago_s(&self, now_ns: TimeNs) -> f64 {
         self.fed_ns.map_or(f64::INFINITY, |fed| seconds(fed, now_ns))
     }
 

@@ -1,0 +1,128 @@
+//! Scored on the bench, side by side with the plain reading of the source:
+//! `cargo test --release --test estimators -- --nocapture score`.
+
+use crate::bench::{Course, Disturbance, Scenario, sources};
+use crate::plain_reading::PlainReading;
+use crate::scoring::{Judged, Score};
+use adapters::clock::SECOND_NS;
+use adapters::merge::{Delay, Lockstep};
+use adapters::{ChannelId, Sample};
+use rules::estimators::{Pipeline, Settings};
+use std::sync::Arc;
+
+/// Courses per scenario.
+const SEEDS: u64 = 20;
+
+const SCENARIOS: [Scenario; 8] = [
+    scenario("fast start, heavy cuts", 0.3, 0.8, false, false),
+    scenario("slow start, heavy cuts", 2.0, 0.8, false, false),
+    scenario("fast start, cuts of 5 %", 0.3, 0.05, false, false),
+    scenario("slow start, cuts of 5 %", 2.0, 0.05, false, false),
+    scenario("speed changes, fast", 0.3, 0.4, true, false),
+    scenario("speed changes, slow", 2.0, 0.4, true, false),
+    scenario("dropouts, heavy cuts", 0.3, 0.8, false, true),
+    scenario("dropouts, slow, 5 %", 2.0, 0.05, true, true),
+];
+
+const fn scenario(name: &'static str, tau_s: f64, cut_share: f64, speed_changes: bool, dropouts: bool) -> Scenario {
+    Scenario { name, tau_s, cut_share, speed_changes, dropouts }
+}
+
+/// Traces of the product and of the plain reading.
+fn run(scenario: &Scenario, seed: u64) -> (Vec<Judged>, Vec<Judged>) {
+    let course = Arc::new(Course::run(scenario, seed));
+    let sources = sources(&course, Disturbance::default(), scenario.dropouts, seed);
+    let mut merge = Lockstep::new(sources, Delay::default());
+    let (mut product, mut plain) = (Pipeline::new(Settings::default()), PlainReading::new());
+    let mut sample = Sample::empty(0);
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));
+    let mut now_ns = SECOND_NS;
+    while merge.sample_into(&mut sample, now_ns) {
+        now_ns += SECOND_NS / 10;
+        let time_s = sample.at_ns as f64 / SECOND_NS as f64;
+        let Some(moment) = course.at(time_s) else { break };
+        let missing = inputs.iter().any(|channel| sample.number(*channel).is_err());
+        let estimates = *product.infer(&sample);
+        plain.step(&sample);
+        let judged = |said, said_no_load_w| Judged {
+            time_s,
+            truth: moment.state,
+            said,
+            missing,
+            true_no_load_w: moment.no_load_power_w,
+            said_no_load_w,
+        };
+        ours.push(judged(estimates.state, estimates.no_load_power_w.ok().map(|estimate| estimate.value)));
+        theirs.push(judged(plain.state, plain.no_load_w));
+    }
+    (ours, theirs)
+}
+
+fn percent(share: f64) -> f64 {
+    100.0 * share
+}
+
+fn line(name: &str, who: &str, score: &Score) {
+    println!(
+        "| {name:<24} | {who:<7} | {:6.2} | {:6.1} | {:6.2} | {:6.2} | {:6.2} | {:6.1} | {:6.2} | {:6.2} | {:6.1} | {:6.1} |",
+        percent(score.right()),
+        percent(score.cut_seen()),
+        percent(score.false_cut()),
+        score.delay_s(0.5),
+        score.delay_s(0.95),
+        percent(score.missed()),
+        percent(score.bias(0.5)),
+        percent(score.bias(0.95)),
+        percent(score.no_reference()),
+        percent(score.right_missing()),
+    );
+}
+
+#[test]
+fn score_beats_the_plain_reading_of_the_source_everywhere() {
+    println!("{SEEDS} courses each; times in s, shares in %");
+    println!(
+        "| {:<24} | {:<7} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} | {:>6} |",
+        "scenario", "", "right", "cut", "false", "d50", "d95", "missed", "bias50", "bias95", "no ref", "absent"
+    );
+    for scenario in &SCENARIOS {
+        let (mut product, mut plain) = (Score::default(), Score::default());
+        for seed in 0..SEEDS {
+            let (ours, theirs) = run(scenario, seed);
+            product.add(&ours);
+            plain.add(&theirs);
+        }
+        line(scenario.name, "product", &product);
+        line("", "plain", &plain);
+        assert_better(scenario.name, &product, &plain);
+    }
+}
+
+/// Better in every figure, or as good where nothing is left to gain.
+fn assert_better(name: &str, product: &Score, plain: &Score) {
+    let higher = [
+        ("right", product.right(), plain.right()),
+        ("cut", product.cut_seen(), plain.cut_seen()),
+        ("absent", product.right_missing(), plain.right_missing()),
+    ];
+    let lower = [
+        ("d50", product.delay_s(0.5), plain.delay_s(0.5)),
+        ("d95", product.delay_s(0.95), plain.delay_s(0.95)),
+        ("missed", product.missed(), plain.missed()),
+        ("bias50", product.bias(0.5), plain.bias(0.5)),
+        ("bias95", product.bias(0.95), plain.bias(0.95)),
+        ("no ref", product.no_reference(), plain.no_reference()),
+    ];
+    for (figure, ours, theirs) in higher {
+        assert!(ours >= theirs, "{name}: {figure} {ours} against {theirs}");
+    }
+    for (figure, ours, theirs) in lower {
+        assert!(ours <= theirs, "{name}: {figure} {ours} against {theirs}");
+    }
+    // A detector that never sees a cut never sees a false one either.
+    if plain.cut_seen() > 0.5 {
+        let (ours, theirs) = (product.false_cut(), plain.false_cut());
+        assert!(ours <= theirs, "{name}: false {ours} against {theirs}");
+    }
+}

@@ -1,0 +1,190 @@
+//! What happens on the bench, every 10 ms, with the truth beside it.
+
+use super::Scenario;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rules::estimators::State;
+
+/// Resolution of the course, s.
+pub(crate) const STEP_S: f64 = 0.01;
+
+/// The surge at the start of the spindle, W.
+const SURGE_W: f64 = 3000.0;
+
+/// Share of no-load power below which the surge counts as over.
+const SETTLED: f64 = 0.02;
+
+/// One instruction of the programme; durations in s.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Step {
+    Off(f64),
+    Standby(f64),
+    /// Start, or change, to this speed; as long as it takes.
+    Speed(f64),
+    /// Turning without feed.
+    Dwell(f64),
+    Rapid(f64),
+    /// Feed without touching.
+    Air(f64),
+    /// Electrical power of the cut over no-load power.
+    Cut(f64, f64),
+    Stop,
+}
+
+/// The truth at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moment {
+    pub state: State,
+    pub speed_rpm: f64,
+    pub feed_mm_min: f64,
+    pub rapid: bool,
+    pub spindle_power_w: f64,
+    pub total_power_w: f64,
+    pub no_load_power_w: f64,
+}
+
+/// A programme that has run.
+pub(crate) struct Course {
+    pub moments: Vec<Moment>,
+    speed_rpm: f64,
+    target_rpm: f64,
+    started: bool,
+    surge_w: f64,
+    tau_s: f64,
+    warm_up: f64,
+}
+
+impl Course {
+    /// Runs a programme drawn from `seed` for this scenario.
+    pub(crate) fn run(scenario: &Scenario, seed: u64) -> Self {
+        let mut dice = Pcg64Mcg::seed_from_u64(seed);
+        let warm_up = dice.random_range(0.04..0.10);
+        let mut course = Self {
+            moments: Vec::new(),
+            speed_rpm: 0.0,
+            target_rpm: 0.0,
+            started: false,
+            surge_w: 0.0,
+            tau_s: scenario.tau_s,
+            warm_up,
+        };
+        for step in programme(scenario, &mut dice) {
+            course.step(step);
+        }
+        course
+    }
+
+    /// The truth at `time_s`.
+    pub(crate) fn at(&self, time_s: f64) -> Option<&Moment> {
+        self.moments.get((time_s / STEP_S).round().max(0.0) as usize)
+    }
+
+    /// Length, s.
+    pub(crate) fn length_s(&self) -> f64 {
+        self.moments.len() as f64 * STEP_S
+    }
+
+    fn step(&mut self, step: Step) {
+        match step {
+            Step::Off(s) => self.hold(s, |course| course.rest(State::Off, 0.3)),
+            Step::Standby(s) => self.hold(s, |course| course.rest(State::Standby, 350.0)),
+            Step::Speed(rpm) => self.change(rpm),
+            Step::Dwell(s) => self.hold(s, |course| course.turn(0.0, false, 0.0)),
+            Step::Rapid(s) => self.hold(s, |course| course.turn(6000.0, true, 0.0)),
+            Step::Air(s) => self.hold(s, |course| course.turn(150.0, false, 0.0)),
+            Step::Cut(s, share) => self.hold(s, |course| course.turn(150.0, false, share)),
+            Step::Stop => {
+                self.target_rpm = 0.0;
+                self.surge_w = -200.0;
+                while self.speed_rpm > 5.0 {
+                    self.turn(0.0, false, 0.0);
+                }
+                self.speed_rpm = 0.0;
+                self.started = false;
+            }
+        }
+    }
+
+    fn hold(&mut self, seconds: f64, mut tick: impl FnMut(&mut Self)) {
+        (0..(seconds / STEP_S) as usize).for_each(|_| tick(self));
+    }
+
+    /// The controller waits for the speed, not for the power, as real ones do.
+    fn change(&mut self, rpm: f64) {
+        self.surge_w = SURGE_W * (rpm - self.target_rpm) / rpm.max(self.target_rpm);
+        self.target_rpm = rpm;
+        while (self.speed_rpm - rpm).abs() > 0.01 * rpm {
+            self.turn(0.0, false, 0.0);
+        }
+    }
+
+    fn no_load_w(&self) -> f64 {
+        let n = self.speed_rpm.abs();
+        let minutes = self.moments.len() as f64 * STEP_S / 60.0;
+        let cold = 1.0 + self.warm_up * (-minutes / 3.0).exp();
+        if n < 1.0 { 0.0 } else { (90.0 + 0.3 * n + 0.006 * n.powf(1.5)) * cold }
+    }
+
+    fn rest(&mut self, state: State, total_power_w: f64) {
+        self.moments.push(Moment {
+            state,
+            speed_rpm: 0.0,
+            feed_mm_min: 0.0,
+            rapid: false,
+            spindle_power_w: 0.0,
+            total_power_w,
+            no_load_power_w: 0.0,
+        });
+    }
+
+    fn turn(&mut self, feed_mm_min: f64, rapid: bool, share: f64) {
+        self.speed_rpm += (self.target_rpm - self.speed_rpm) * STEP_S / (self.tau_s / 4.0).min(0.4);
+        self.surge_w *= (-STEP_S / self.tau_s).exp();
+        let no_load_power_w = self.no_load_w();
+        let settled = (self.speed_rpm - self.target_rpm).abs() <= 0.02 * self.target_rpm
+            && self.surge_w.abs() <= SETTLED * no_load_power_w;
+        self.started |= settled;
+        let state = match (settled, share > 0.0, rapid) {
+            (_, true, _) => State::Cutting,
+            (false, ..) if !self.started => State::SpindleStart,
+            (false, ..) => State::SpeedChange,
+            (true, _, true) => State::Rapid,
+            (true, _, false) => State::Idle,
+        };
+        let spindle_power_w = no_load_power_w * (1.0 + share) + self.surge_w;
+        self.moments.push(Moment {
+            state,
+            speed_rpm: self.speed_rpm,
+            feed_mm_min,
+            rapid,
+            spindle_power_w,
+            total_power_w: 350.0 + spindle_power_w + if feed_mm_min > 0.0 { 80.0 } else { 0.0 },
+            no_load_power_w,
+        });
+    }
+}
+
+fn programme(scenario: &Scenario, dice: &mut Pcg64Mcg) -> Vec<Step> {
+    let speeds = if scenario.speed_changes { vec![800.0, 1200.0, 600.0] } else { vec![800.0] };
+    let mut steps = vec![Step::Off(dice.random_range(4.0..8.0)), Step::Standby(dice.random_range(4.0..8.0))];
+    for part in 0..3 {
+        for (k, speed) in speeds.iter().enumerate() {
+            steps.push(Step::Speed(*speed));
+            // The first start is followed by a warm-up; later ones by whatever the programme leaves.
+            let pause = if part == 0 { 8.0 * scenario.tau_s + 8.0 } else { dice.random_range(0.5..4.0) };
+            steps.push(Step::Dwell(pause));
+            for _ in 0..if k == 0 { 3 } else { 2 } {
+                steps.push(Step::Rapid(dice.random_range(0.8..2.0)));
+                steps.push(Step::Air(dice.random_range(0.6..2.0)));
+                steps.push(Step::Cut(dice.random_range(6.0..15.0), scenario.cut_share * dice.random_range(0.9..1.1)));
+                steps.push(Step::Air(dice.random_range(0.3..1.0)));
+                steps.push(Step::Rapid(dice.random_range(0.8..2.0)));
+                steps.push(Step::Dwell(dice.random_range(0.2..3.0)));
+            }
+        }
+        steps.push(Step::Stop);
+        steps.push(Step::Standby(dice.random_range(5.0..12.0)));
+    }
+    steps.push(Step::Off(dice.random_range(3.0..6.0)));
+    steps
+}
