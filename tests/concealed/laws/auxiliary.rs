@@ -47,6 +47,36 @@ pub(crate) fn axis_friction(dice: &mut Dice, _: &Plan, strength: f64) -> Planted
     })
 }
 
+/// Guides and wipers: nearly constant force, a little more when the axis has rested.
+pub(crate) fn wipers(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (force_n, rest_share) = (dice.uniform(600.0, 1500.0), dice.uniform(0.1, 0.3));
+    let mut rested = 0.0_f64;
+    Planted::machine(move |s| {
+        let speed_m_s = s.tick.velocity_mm_min.abs() / 60_000.0;
+        rested = if speed_m_s > 0.0 { rested * 0.93 } else { (rested + 0.01).min(1.0) };
+        Terms::power(strength * force_n * (1.0 + rest_share * rested) * speed_m_s)
+    })
+}
+
+/// A consumer that somebody switches on in the middle of the day, and off and on again.
+pub(crate) fn extraction(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted {
+    let on_w = dice.uniform(120.0, 350.0);
+    let first = dice.whole(1, (plan.parts.len() / 3).max(1));
+    let mut dice = dice.clone();
+    let (mut on, mut left_s) = (false, 0.0);
+    Planted::machine(move |s| {
+        if s.tick.run < first {
+            return Terms::default();
+        }
+        left_s -= s.tick.elapsed_s();
+        if left_s <= 0.0 {
+            on = !on;
+            left_s = dice.uniform(60.0, 260.0);
+        }
+        Terms::power(if on { strength * on_w } else { 0.0 })
+    })
+}
+
 /// A ram that hangs on the screw: lifting costs, lowering gives back less.
 pub(crate) fn gravity(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (kg, returned) = (dice.uniform(70.0, 220.0), dice.uniform(0.8, 1.0));

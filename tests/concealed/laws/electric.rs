@@ -18,6 +18,17 @@ pub(crate) fn copper(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     })
 }
 
+/// Winding loss with a constant magnetising current beside the torque current.
+pub(crate) fn magnetised_copper(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (ohm, nm_per_a, idle_a) = (dice.uniform(0.06, 0.18), dice.uniform(1.0, 1.8), dice.uniform(4.0, 9.0));
+    Planted::machine(move |s| {
+        let torque_a = (s.torque_nm() / nm_per_a).min(90.0);
+        let still_a = (0.5 * s.no_load_w / s.tick.omega().max(4.0) / nm_per_a).min(90.0);
+        let loss = |a: f64| 3.0 * ohm * a * (a + 0.3 * idle_a);
+        Terms::power(if s.tick.engaged { strength * (loss(torque_a) - loss(still_a)) } else { 0.0 })
+    })
+}
+
 /// Gear and belt loss that grows faster than the power it passes on.
 pub(crate) fn load_loss(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (exponent, at_2kw) = (dice.uniform(1.8, 2.2), dice.uniform(90.0, 240.0));
@@ -41,6 +52,27 @@ pub(crate) fn field_weakening(dice: &mut Dice, _: &Plan, strength: f64) -> Plant
         let over = (s.tick.speed_rpm / base_rpm - 1.0).max(0.0);
         let torque = s.torque_nm().min(60.0);
         Terms::power(strength * (idle_w * over.powf(1.15) + per_nm2 * torque * torque * ((1.0 + over).powi(2) - 1.0)))
+    })
+}
+
+/// Above base speed the idle loss turns up like a hinge that is rounded.
+pub(crate) fn rounded_hinge(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (base_rpm, width, per_1000_w) =
+        (dice.uniform(1200.0, 1800.0), dice.uniform(80.0, 200.0), dice.uniform(90.0, 200.0));
+    Planted::machine(move |s| {
+        let over = ((s.tick.speed_rpm - base_rpm) / width).min(60.0).exp().ln_1p() * width / 1000.0;
+        Terms::power(strength * per_1000_w * over * (1.0 + 0.35 * s.cutting_w / 3000.0))
+    })
+}
+
+/// Low gear stage with an extra wheel: a fixed drag and a share of the load.
+pub(crate) fn extra_wheel(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (drag_nm, share) = (dice.uniform(0.5, 1.2), dice.uniform(0.03, 0.06));
+    Planted::machine(move |s| {
+        let low = f64::from(u8::from(s.tick.gear_stage == 1));
+        Terms::power(
+            strength * low * (drag_nm * s.tick.omega() + 30.0 * (s.tick.speed_rpm / 30.0).tanh() + share * s.cutting_w),
+        )
     })
 }
 

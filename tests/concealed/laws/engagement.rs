@@ -22,6 +22,15 @@ pub(crate) fn soft_entry(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     })
 }
 
+/// A chamfered front: the section grows in proportion, the end is sharp.
+pub(crate) fn chamfer(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let length_mm = dice.uniform(5.0, 14.0);
+    Planted::cut(move |s| {
+        let seconds = build_up_s(length_mm * strength, s.tick.feed_mm_rev * s.tick.speed_rpm);
+        Terms::gain((s.tick.since_entry_s / seconds).min(1.0) - 1.0)
+    })
+}
+
 /// The work bends away like a cantilever: the depth falls towards the free end.
 pub(crate) fn deflection(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (height, slender) = (dice.sign() * dice.uniform(0.05, 0.13), dice.uniform(0.3, 0.9));

@@ -64,12 +64,43 @@ pub(crate) fn built_up_edge(dice: &mut Dice, _: &Plan, strength: f64) -> Planted
     })
 }
 
+/// Lower force between two cutting speeds, with soft borders.
+pub(crate) fn built_up_window(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (from, to, depth) = (dice.uniform(17.0, 24.0), dice.uniform(48.0, 62.0), dice.uniform(0.10, 0.18));
+    Planted::cut(move |s| {
+        let vc = s.tick.cutting_speed_m_min();
+        let inside = 1.0 / (1.0 + ((from - vc) / 2.5).exp()) / (1.0 + ((vc - to) / 4.0).exp());
+        Terms { gain: -strength * depth * inside, power_w: 0.0, jitter_w: 0.015 * inside * s.nominal_w }
+    })
+}
+
 /// Ploughing along the whole engaged edge, nose included.
 pub(crate) fn edge_force(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (per_mm, nose_mm) = (dice.uniform(20.0, 55.0), dice.uniform(0.15, 0.4));
     Planted::cut(move |s| {
         let edge_mm = if s.tick.engaged { 1.05 * s.tick.depth_mm + nose_mm } else { 0.0 };
         Terms::power(strength * per_mm * edge_mm * s.tick.cutting_speed_m_min() / 60.0)
+    })
+}
+
+/// Ploughing that grows a little when the feed comes near the rounding of the edge.
+pub(crate) fn rounded_edge(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (per_mm, rounding_mm) = (dice.uniform(20.0, 50.0), dice.uniform(0.02, 0.05));
+    Planted::cut(move |s| {
+        let edge_mm = if s.tick.engaged { 1.15 * s.tick.depth_mm } else { 0.0 };
+        let blunt = 1.0 + 0.25 * (rounding_mm / s.tick.feed_mm_rev.max(0.01)).sqrt();
+        Terms::power(strength * per_mm * blunt * edge_mm * s.tick.cutting_speed_m_min() / 60.0)
+    })
+}
+
+/// Colwell's mean chip: section over the length of the edge in the work, nose arc included.
+pub(crate) fn mean_chip(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let radius = *dice.pick(&[0.8, 1.2, 1.6]);
+    Planted::cut(move |s| {
+        let (depth, feed) = (s.tick.depth_mm.max(0.02), s.tick.feed_mm_rev.max(0.01));
+        let arc = (1.0 - (depth / radius).min(1.0)).acos() + (feed / (2.0 * radius)).min(1.0).asin();
+        let length = radius * arc + (depth - radius).max(0.0);
+        Terms::gain(strength * ((depth / length).min(1.0).powf(-s.baseline.mc) - 1.0))
     })
 }
 
@@ -94,6 +125,27 @@ pub(crate) fn coolant(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         let target = f64::from(u8::from(s.tick.coolant));
         wet = target + (wet - target) * (-s.tick.elapsed_s() / tau_s).exp();
         Terms::gain(strength * dry * (1.0 - wet))
+    })
+}
+
+/// Coolant that helps more the slower the cut.
+pub(crate) fn coolant_at_low_speed(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (dry, slow) = (dice.uniform(0.05, 0.12), dice.uniform(0.15, 0.4));
+    Planted::cut(move |s| {
+        let more = (140.0 / s.tick.cutting_speed_m_min().max(20.0)).powf(slow);
+        Terms::gain(if s.tick.coolant { 0.0 } else { strength * dry * more })
+    })
+}
+
+/// Chatter that starts at one depth and lasts until the depth is well below it.
+pub(crate) fn chatter_with_memory(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (start_mm, height) = (dice.uniform(1.5, 2.2), dice.uniform(0.05, 0.09));
+    let mut loud = 0.0_f64;
+    Planted::cut(move |s| {
+        let beyond = s.tick.engaged && s.tick.depth_mm > start_mm * if loud > 0.5 { 0.85 } else { 1.0 };
+        loud += (f64::from(u8::from(beyond)) - loud) * 0.1;
+        let jitter_w = 0.04 * loud * strength * s.nominal_w;
+        Terms { gain: strength * height * loud * (1.0 + 0.2 * (s.tick.depth_mm - start_mm)), power_w: 0.0, jitter_w }
     })
 }
 

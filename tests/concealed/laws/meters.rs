@@ -29,6 +29,30 @@ pub(crate) fn lag(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         .with("lag_s", delay_s)
 }
 
+/// The meter's answer is always the same time old.
+pub(crate) fn constant_lag(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let delay_s = strength * dice.uniform(0.6, 2.0);
+    Planted::meter(move |ticks, power| delayed(ticks, power, |_| delay_s)).with("lag_s", delay_s)
+}
+
+/// A mean over the last seconds, as energy counters give it.
+pub(crate) fn boxcar(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let steps = ((strength * dice.uniform(1.2, 3.0) / STEP_S).round() as usize).max(2);
+    Planted::meter(move |ticks, power| {
+        let mut start = 0;
+        (0..power.len())
+            .map(|i| {
+                if ticks[i].gap_s > 0.0 {
+                    start = i;
+                }
+                let from = (i + 1).saturating_sub(steps).max(start);
+                crate::least_squares::mean(&power[from..=i])
+            })
+            .collect()
+    })
+    .with("window_s", steps as f64 * STEP_S)
+}
+
 /// Two first-order filters in a row, as in a transducer with a damped output.
 pub(crate) fn window(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (first_s, second_s) = (strength * dice.uniform(0.5, 1.6), strength * dice.uniform(0.1, 0.4));
@@ -100,6 +124,19 @@ pub(crate) fn supply(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     .with("supply_exponent", exponent)
 }
 
+/// Power that follows the mains at the fans and the drive's own supply more than in the cut.
+pub(crate) fn supply_of_idle(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let exponent = strength * dice.uniform(1.0, 1.9);
+    Planted::meter(move |ticks, power| {
+        let share = |p: f64| 0.6 + 0.4 * 900.0 / (900.0 + p.max(0.0));
+        ticks
+            .iter()
+            .zip(power)
+            .map(|(t, p)| p * (1.0 + share(*p) * ((t.supply_v / 400.0).powf(exponent) - 1.0)))
+            .collect()
+    })
+}
+
 /// Twice the mains frequency, folded by the polling into a slow line that wanders with the grid.
 pub(crate) fn ripple(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (share, offset_hz) = (dice.uniform(0.02, 0.04), dice.uniform(0.03, 0.30));
@@ -116,7 +153,28 @@ pub(crate) fn ripple(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     })
 }
 
-/// An input that bends and then stops: the ceiling lies at a quantile of the day's power.
+/// An input that bends towards its ceiling.
+pub(crate) fn soft_ceiling(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let share = (0.96 - 0.08 * strength * dice.uniform(0.5, 1.0)).clamp(0.72, 0.985);
+    Planted::meter(move |_, power| {
+        let ceiling = crate::least_squares::quantile(power, share);
+        let knee = 0.03 * ceiling;
+        let bent = |p: f64| ceiling - knee * ((ceiling - p) / knee).min(60.0).exp().ln_1p();
+        power.iter().map(|p| if ceiling - p > 40.0 * knee { *p } else { bent(*p) }).collect()
+    })
+}
+
+/// A beat of constant size, whatever the load.
+pub(crate) fn constant_ripple(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (watt, hz, phase) = (dice.uniform(15.0, 45.0), dice.uniform(0.02, 0.35), dice.uniform(0.0, 6.3));
+    let sway = dice.uniform(0.2, 0.8);
+    Planted::meter(move |ticks, power| {
+        let angle = |t: f64| std::f64::consts::TAU * hz * t + phase + sway * (t / 400.0).sin();
+        ticks.iter().zip(power).map(|(tick, p)| p + strength * watt * angle(tick.t_s).sin()).collect()
+    })
+}
+
+/// An input that stops: the ceiling lies at a quantile of the day's power.
 pub(crate) fn ceiling(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let share = (0.97 - 0.08 * strength * dice.uniform(0.5, 1.0)).clamp(0.72, 0.985);
     Planted::meter(move |_, power| {

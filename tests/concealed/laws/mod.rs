@@ -33,6 +33,10 @@ const NONE: Needs = Needs {
 
 /// Effects of the catalogue that a spindle-power recording can show.
 pub(crate) fn listed() -> Vec<Entry> {
+    [of_the_cut(), of_the_machine(), of_the_record()].concat()
+}
+
+fn of_the_cut() -> Vec<Entry> {
     let new = Entry::new;
     vec![
         new("flank_wear", "three stages by cutting minutes", wear::by_time).reach(0.35, 3.0),
@@ -43,13 +47,27 @@ pub(crate) fn listed() -> Vec<Entry> {
         new("speed_softening", "Johnson-Cook in temperature", material::softening_by_temperature).reach(0.4, 1.6),
         new("speed_softening", "smooth step in cutting speed", material::softening_by_step).reach(0.4, 1.6),
         new("built_up_edge", "bump around 35 m/min", material::built_up_edge).needs(SLOW),
+        new("built_up_edge", "window with soft borders", material::built_up_window).needs(SLOW),
         new("edge_force", "whole edge with nose", material::edge_force).reach(0.4, 1.8),
+        new("edge_force", "rounded edge", material::rounded_edge).reach(0.4, 1.8),
         new("chip_thinning", "arc of the nose radius", material::nose_radius).needs(SHALLOW).reach(0.6, 1.4),
+        new("chip_thinning", "mean chip over the edge", material::mean_chip).needs(SHALLOW).reach(0.6, 1.4),
         new("coolant_regime", "dry zone with inertia", material::coolant).reach(0.4, 1.5).columns(&["coolant_on"]),
+        new("coolant_regime", "more at low speed", material::coolant_at_low_speed)
+            .reach(0.4, 1.5)
+            .columns(&["coolant_on"]),
         new("chatter", "stability lobes", material::chatter).reach(0.5, 1.6),
+        new("chatter", "one depth, with memory", material::chatter_with_memory).reach(0.5, 1.6),
         new("entry_exit", "squared sine over a chamfer", engagement::soft_entry).reach(0.5, 1.4),
+        new("entry_exit", "chamfered front", engagement::chamfer).reach(0.5, 1.4),
         new("depth_taper", "cantilever", engagement::deflection).reach(0.3, 1.6),
         new("depth_taper", "conical and bowed blank", engagement::conical_blank).reach(0.3, 1.4),
+    ]
+}
+
+fn of_the_machine() -> Vec<Entry> {
+    let new = Entry::new;
+    vec![
         new("bearing_warm_up", "Walther, two bodies", spindle::warm_up).reach(0.4, 2.2),
         new("bearing_warm_up", "grease by revolutions", spindle::grease_run_in).reach(0.4, 2.2),
         new("preload_growth", "inner ring before housing", spindle::preload).reach(0.4, 2.2),
@@ -58,29 +76,48 @@ pub(crate) fn listed() -> Vec<Entry> {
         new("spindle_inertia", "one mass", spindle::inertia).reach(0.3, 2.0),
         new("spindle_inertia", "mass by blank", spindle::inertia_of_blanks).reach(0.3, 2.0),
         new("stribeck", "hyperbolic tangent", spindle::stribeck).needs(CREEP).reach(0.5, 1.6),
+        new("stribeck", "sticking seal", spindle::sticking_seal).needs(CREEP).reach(0.5, 1.6),
         new("copper_loss", "warming winding", electric::copper).reach(0.3, 2.0),
+        new("copper_loss", "magnetising current", electric::magnetised_copper).reach(0.3, 2.0),
         new("load_loss", "power about two", electric::load_loss).reach(0.4, 2.0),
         new("load_loss", "efficiency rises", electric::load_loss_falling).reach(0.4, 1.6),
         new("field_weakening", "field current above base speed", electric::field_weakening).reach(0.4, 2.0),
+        new("field_weakening", "rounded hinge", electric::rounded_hinge).reach(0.4, 2.0),
         new("gear_stage", "churning and mesh curve", electric::gear).reach(0.4, 1.8).columns(&["gear_stage"]),
+        new("gear_stage", "extra wheel", electric::extra_wheel).reach(0.4, 1.8).columns(&["gear_stage"]),
         new("regeneration", "chopper above a threshold", electric::regeneration).reach(0.5, 1.2),
         new("auxiliary_switch", "pump with inrush", auxiliary::pump).reach(0.3, 2.5),
         new("auxiliary_switch", "conveyor", auxiliary::conveyor).reach(0.3, 2.5),
+        new("auxiliary_switch", "extraction from some part on", auxiliary::extraction).reach(0.3, 2.5),
         new("axis_friction", "tangent and bent viscous", auxiliary::axis_friction)
             .reach(0.4, 2.0)
             .columns(&["axis_velocity_mm_min"]),
+        new("axis_friction", "wipers", auxiliary::wipers).reach(0.4, 2.0).columns(&["axis_velocity_mm_min"]),
         new("gravity_axis", "ram", auxiliary::gravity).reach(0.4, 2.5).columns(&["z_axis_velocity_mm_min"]),
+    ]
+}
+
+fn of_the_record() -> Vec<Entry> {
+    let new = Entry::new;
+    vec![
         new("clock_lag", "drifting clock", meters::lag).reach(0.35, 1.4),
+        new("clock_lag", "constant", meters::constant_lag).reach(0.35, 1.2),
         new("meter_window", "two filters", meters::window).reach(0.35, 1.6),
+        new("meter_window", "mean of the last seconds", meters::boxcar).reach(0.4, 1.3),
         new("zero_drift", "cabinet temperature", meters::zero_drift).reach(0.4, 2.0),
         new("zero_drift", "warming cabinet", meters::zero_warm_up).reach(0.3, 1.5),
         new("sensor_gain", "step", meters::gain_step).reach(0.4, 1.4),
         new("sensor_gain", "drift", meters::gain_drift).reach(0.4, 1.4),
         new("supply_voltage", "own exponent", meters::supply).reach(0.4, 1.3).columns(&["supply_voltage_v"]),
+        new("supply_voltage", "more at idle", meters::supply_of_idle).reach(0.4, 1.3).columns(&["supply_voltage_v"]),
         new("ripple_alias", "wandering line", meters::ripple).reach(0.3, 2.0),
+        new("ripple_alias", "constant size", meters::constant_ripple).reach(0.3, 2.5),
         new("saturation", "ceiling", meters::ceiling).reach(0.4, 2.5),
+        new("saturation", "soft ceiling", meters::soft_ceiling).reach(0.4, 2.5),
         new("engagement_timing", "flag late or early", record::engagement_timing).reach(0.4, 1.3),
+        new("engagement_timing", "late at the exit", record::late_exit).reach(0.4, 1.3),
         new("recipe_error", "depth of one operation", record::wrong_depth).reach(0.5, 1.6).columns(&["operation"]),
+        new("recipe_error", "edited offset", record::edited_offset).reach(0.4, 1.6).columns(&["operation"]),
         new("override_delay", "delay and lag", record::override_delay).needs(OVERRIDES).reach(0.6, 1.4),
     ]
 }

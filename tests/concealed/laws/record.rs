@@ -26,6 +26,35 @@ pub(crate) fn engagement_timing(dice: &mut Dice, _: &Plan, strength: f64) -> Pla
     .with("engagement_late_s", steps as f64 * STEP_S)
 }
 
+/// The flag is on time at the entry and stays on too long at the exit.
+pub(crate) fn late_exit(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let steps = (strength * dice.uniform(1.0, 3.0) / STEP_S).round() as usize;
+    Planted::clerk(move |world, record| {
+        let mut last: Option<usize> = None;
+        for i in 0..world.len() {
+            if world[i].engaged {
+                last = Some(i);
+            } else if let Some(end) = last.filter(|end| i - end <= steps && world[*end].run == world[i].run) {
+                record[i].engaged = true;
+                record[i].depth_mm = world[end].depth_mm;
+                record[i].feed_mm_rev = world[end].feed_mm_rev;
+                record[i].diameter_mm = world[end].diameter_mm;
+            }
+        }
+    })
+}
+
+/// The offset of one operation was edited and the recipe was not: a length is wrong, not a share.
+pub(crate) fn edited_offset(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted {
+    let operation = if plan.mode == crate::schedule::Mode::Mono { 1 } else { *dice.pick(&[0, 1, 2, 3]) };
+    let edit_mm = strength * dice.sign() * dice.uniform(0.06, 0.16);
+    Planted::clerk(move |_, record| {
+        for tick in record.iter_mut().filter(|t| t.operation == operation) {
+            tick.depth_mm = (tick.depth_mm - edit_mm * (tick.depth_mm / (tick.depth_mm + 0.3))).max(0.05);
+        }
+    })
+}
+
 /// The recipe states another depth than the offset table of the CNC makes.
 pub(crate) fn wrong_depth(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted {
     let operation = match plan.mode {

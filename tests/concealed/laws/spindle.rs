@@ -124,3 +124,12 @@ pub(crate) fn stribeck(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         Terms::power(strength * extra_nm * s.tick.omega() * (1.0 - (n / speed_rpm).tanh()))
     })
 }
+
+/// Friction that falls off like one over one plus the square of speed.
+pub(crate) fn sticking_seal(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (extra_nm, speed_rpm) = (dice.uniform(5.0, 11.0), dice.uniform(50.0, 120.0));
+    Planted::machine(move |s| {
+        let ratio = s.tick.speed_rpm / speed_rpm;
+        Terms::power(strength * extra_nm * s.tick.omega() / (1.0 + ratio * ratio))
+    })
+}
