@@ -1,1 +1,42 @@
-//! What is doubted: simulate, compare, locate, name, refit, report.
+//! What is doubted: where simulation and recording differ, which physics was left out, the model with it, and the fit
+//! that improves.
+//!
+//! The argument in one page:
+//! 1. The baseline is refitted *together* with every candidate. What a missing effect leaves in the residual of a
+//!    fitted baseline is a few percent of it with a distorted shape, so the residual itself is never explained.
+//! 2. Noise is a slow process plus a white meter, ARMA(1,1) within runs, profiled per hypothesis.
+//! 3. A gate over the whole search, by resampling blocks of innovations, says whether anything is there at all.
+//! 4. Singles, then pairs and triples on top of the leaders; signs and ranges are physics.
+//! 5. Whoever cannot be told from the best within 6 units of information is named beside it, with the experiment that
+//!    separates them. What no candidate explains is `unknown`, located, with an empirical form.
+//! 6. Every fit is shown on runs that took no part in fitting, choosing or stopping.
+
+pub mod bind;
+pub mod designs;
+pub mod diagnose;
+pub mod diagnosis;
+pub mod empirical;
+pub mod expression;
+pub mod fit;
+pub mod frame;
+pub mod gate;
+pub mod holdout;
+pub mod inputs;
+pub mod linear;
+pub mod locate;
+pub mod model;
+pub mod model_file;
+pub mod noise;
+pub mod quality;
+pub mod report;
+pub mod scan;
+pub mod search;
+pub mod table;
+pub mod term;
+pub mod verdicts;
+pub mod words;
+
+pub use diagnose::diagnose;
+pub use diagnosis::Diagnosis;
+pub use model::{Body, Model, Parameter, Part, Simulated, simulate};
+pub use model_file::{Problem, parse_hypotheses, parse_model, write_model};

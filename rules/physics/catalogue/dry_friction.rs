@@ -25,7 +25,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "reversal_share",
             unit: "1",
             entry: Entry::Shape,
-            range: (1e-4, 0.2),
+            range: (1e-5, 0.2),
             en: "speed at which the level is reached, as a share of the greatest speed",
             zh: "达到摩擦力的速度与最大速度之比",
         },
@@ -62,7 +62,7 @@ impl Effect for DryFriction {
         }
         match scene.output_kind() {
             OutputKind::Power => vec![Form::plain()],
-            _ => [0.002, 0.01, 0.04].iter().map(|share| Form::of(&[("reversal_share", *share)])).collect(),
+            _ => [1e-4, 0.002, 0.01, 0.04].iter().map(|share| Form::of(&[("reversal_share", *share)])).collect(),
         }
     }
 

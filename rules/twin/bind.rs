@@ -1,0 +1,91 @@
+//! Binding a model to a recording: forms and missing parameters are completed, missing inputs are named.
+
+use super::model::{Body, Model, Parameter, Part};
+use crate::physics::{Entry, Scene};
+
+/// Completes every part for this scene.
+///
+/// # Errors
+/// Every part that cannot be simulated over this recording, and what to record.
+pub fn bind(model: &Model, scene: &Scene) -> Result<Vec<Part>, Vec<String>> {
+    let mut problems = Vec::new();
+    let parts = model.parts.iter().map(|part| complete(part, scene)).collect::<Vec<_>>();
+    // Some laws need the load or the output that other parts simulate; a stand-in tells inputs from those.
+    let mut stand_in = scene.clone();
+    stand_in.set_load(Some(vec![1.0; scene.rows()]));
+    stand_in.set_simulated(Some(vec![1.0; scene.rows()]));
+    for part in &parts {
+        if part.contribution(&stand_in).is_none() {
+            problems.push(missing_input(part, scene));
+        }
+    }
+    let load_known = scene.load().is_some() || parts.iter().any(Part::is_cut);
+    for part in parts.iter().filter(|part| part.kind == "load_loss" && !load_known) {
+        problems.push(format!("{} (line {}) needs a cutting_power in the model or a role load", part.kind, part.line));
+    }
+    if problems.is_empty() { Ok(parts) } else { Err(problems) }
+}
+
+fn complete(part: &Part, scene: &Scene) -> Part {
+    let mut part = part.clone();
+    let Body::Effect(effect, form) = &mut part.body else { return part };
+    let effect = *effect;
+    let mut stand_in = scene.clone();
+    stand_in.set_load(Some(vec![1.0; scene.rows()]));
+    stand_in.set_simulated(Some(vec![1.0; scene.rows()]));
+    let default = effect.default_form(&stand_in);
+    if form.name.is_empty() {
+        form.name = default.name;
+    }
+    let known = |parameters: &[Parameter], name: &str| parameters.iter().any(|parameter| parameter.name == name);
+    for (name, value) in &default.shape {
+        if !known(&part.parameters, name) {
+            let doc = effect.doc().parameter(name);
+            part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
+        }
+    }
+    let shaped = crate::physics::Form { shape: default.shape.clone(), ..form.clone() };
+    for (name, _) in effect.columns(&stand_in, &shaped).unwrap_or_default() {
+        if !known(&part.parameters, name) {
+            let doc = effect.doc().parameter(name);
+            part.parameters.push(added(name, 0.0, Entry::Linear, doc.map(|doc| (doc.range, doc.unit))));
+        }
+    }
+    part
+}
+
+fn added(name: &str, value: f64, entry: Entry, doc: Option<((f64, f64), &str)>) -> Parameter {
+    let (range, unit) = doc.unwrap_or(((f64::NEG_INFINITY, f64::INFINITY), "output"));
+    Parameter { name: name.to_owned(), value, fixed: false, entry, range, unit: unit.to_owned() }
+}
+
+fn missing_input(part: &Part, scene: &Scene) -> String {
+    let place = format!("{} (line {})", part.label(), part.line);
+    let absent = |names: &mut dyn Iterator<Item = &str>| {
+        let missing: Vec<&str> = names.filter(|name| scene.column(name).is_none()).collect();
+        missing.join(", ")
+    };
+    match &part.body {
+        Body::Linear(terms) => {
+            format!(
+                "{place} needs the columns {}: record them",
+                absent(&mut terms.iter().filter_map(super::term::Term::input))
+            )
+        }
+        Body::Expression(expression) => {
+            let missing = absent(&mut expression.inputs().iter().map(String::as_str));
+            if missing.is_empty() {
+                format!("{place}: the expression fails on this recording (a result that is no finite number)")
+            } else {
+                format!("{place} needs {missing}: record these columns or give them as parameters")
+            }
+        }
+        Body::Empirical(form) => format!("{place} needs {}: record it", form.channel),
+        Body::Table(_) => {
+            format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")
+        }
+        Body::Effect(effect, _) => {
+            format!("{place} needs {}: record them or declare roles", effect.doc().needs.join(", "))
+        }
+    }
+}

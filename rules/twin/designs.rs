@@ -1,0 +1,97 @@
+//! The hypotheses of a search: every form of every effect the scene can excite, as columns.
+
+use super::frame::Frame;
+use super::model::{Body, Model, Part};
+use crate::physics::{CATALOGUE, Effect, Form, Scene};
+
+/// Kinds that build a model and are never a finding by themselves.
+const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
+
+/// One hypothesis: an effect in one form.
+#[derive(Clone)]
+pub struct Design {
+    /// Kind of the effect, or the name of the user's hypothesis.
+    pub kind: String,
+    /// The part it would add, its linear parameters at zero.
+    pub part: Part,
+    /// Columns per linear parameter, per group.
+    pub columns: Vec<Vec<f64>>,
+    /// Physically possible values of the linear parameters.
+    pub ranges: Vec<(f64, f64)>,
+    /// Parameters it adds, shape parameters included.
+    pub freedom: usize,
+    /// Natural logarithm of the number of alternatives of the same freedom.
+    pub ln_choices: f64,
+}
+
+/// Every hypothesis that this scene, with the load and output simulated by the baseline, can tell anything about.
+#[must_use]
+pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
+    let mut all = Vec::new();
+    for effect in CATALOGUE {
+        if wanted(*effect, model) {
+            all.extend(effect.forms(scene).iter().filter_map(|form| design(*effect, form, scene, frame)));
+        }
+    }
+    all.extend(model.hypotheses.iter().filter_map(|part| hypothesis(part, scene, frame)));
+    all
+}
+
+fn wanted(effect: &dyn Effect, model: &Model) -> bool {
+    let kind = effect.doc().kind;
+    let listed = model.only.is_empty() || model.only.iter().any(|only| only == kind);
+    let excluded = model.exclude.iter().any(|excluded| excluded == kind) || BUILDING.contains(&kind);
+    // A part whose every number is fixed may itself be wrong, so its kind stays a candidate.
+    let modelled = model.parts.iter().any(|part| part.kind == kind && !part.parameters.iter().all(|p| p.fixed));
+    listed && !excluded && !modelled
+}
+
+/// The columns of one form.
+#[must_use]
+pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &Frame) -> Option<Design> {
+    let columns = effect.columns(scene, form)?;
+    let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
+    let part = Part::candidate(effect, form, &names);
+    let ranges = names.iter().map(|name| part.parameter(name).map_or(ANY, |parameter| parameter.range)).collect();
+    let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
+    let usable = columns.iter().all(|column| column.iter().all(|x| x.is_finite()));
+    usable.then(|| Design {
+        kind: effect.doc().kind.to_owned(),
+        freedom: names.len() + form.shape.len(),
+        ln_choices: form.ln_choices,
+        part,
+        columns,
+        ranges,
+    })
+}
+
+const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
+/// A user's hypothesis: the law at its nominal parameters, and its derivatives by them, as columns.
+fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
+    let columns: Vec<Vec<f64>> = match &part.body {
+        Body::Expression(_) => {
+            (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect::<Option<_>>()?
+        }
+        _ => part.columns(scene)?.into_iter().map(|(_, column)| column).collect(),
+    };
+    let columns: Vec<Vec<f64>> = columns.iter().map(|column| frame.reduce(column)).collect();
+    let ranges = vec![ANY; columns.len()];
+    Some(Design {
+        kind: part.label().to_owned(),
+        part: part.clone(),
+        freedom: columns.len(),
+        ln_choices: 0.0,
+        columns,
+        ranges,
+    })
+}
+
+fn derivative(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {
+    let base = part.contribution(scene)?;
+    let mut moved = part.clone();
+    let step = 1e-4 * moved.parameters[index].value.abs().max(1e-3);
+    moved.parameters[index].value += step;
+    let ahead = moved.contribution(scene)?;
+    Some(ahead.iter().zip(&base).map(|(ahead, base)| (ahead - base) / step).collect())
+}

@@ -1,0 +1,296 @@
+//! The diagnosis from end to end: prepare, fit the baseline, search, judge, locate.
+
+use super::bind::bind;
+use super::designs::{Design, designs};
+use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
+use super::empirical::empirical_designs;
+use super::fit::{Data, Fit, fit};
+use super::frame::{Frame, Unit, held_out, units};
+use super::gate::p_value;
+use super::holdout::{Noise, Prediction, predict, rmse};
+use super::model::{Model, Part, simulate};
+use super::noise::{Arma, count};
+use super::quality::{Fault, clean, median};
+use super::search::{Found, Hypothesis, P_MAX, Search};
+use super::verdicts;
+use crate::physics::Scene;
+use adapters::Recording;
+use std::collections::BTreeSet;
+
+/// Rows below which nothing is claimed.
+const ROWS_MIN: usize = 60;
+/// Size, in deviations of the ordinary noise, below which an effect is not claimed.
+const SIZE_DEVIATIONS: f64 = 0.3;
+/// Size, as a share of the mean output, below which an effect is not claimed.
+const SIZE_SHARE: f64 = 0.005;
+/// What an empirical form must explain on top, as a share of what is named, before the name is withdrawn.
+const UNKNOWN_SHARE: f64 = 0.25;
+
+/// Compares a model with a recording.
+///
+/// # Errors
+/// Everything that makes the input unusable, with what to record instead.
+pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
+    let mut case = Case::new(recording, model)?;
+    if let Some(needed) = case.too_little() {
+        return Ok(verdicts::cannot_tell(&case, needed));
+    }
+    let Some(base) = case.fit_baseline() else {
+        return Ok(verdicts::cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
+    };
+    let (found, designs) = case.search(&base, seed);
+    let found = case.worth_claiming(found, &base);
+    let unknown = case.unknown(&base, &found, seed);
+    let outcome = Outcome::new(&mut case, base, found, designs, unknown);
+    Ok(verdicts::judge(&mut case, outcome))
+}
+
+/// A recording prepared for comparison with a model.
+pub struct Case<'a> {
+    /// The model as given.
+    pub model: &'a Model,
+    /// The recording as the effects see it.
+    pub scene: Scene,
+    /// The parts, complete for this recording.
+    pub parts: Vec<Part>,
+    /// Units of hold-out.
+    pub units: Vec<Unit>,
+    /// Units that take no part in fitting, choosing or stopping.
+    pub held: BTreeSet<usize>,
+    /// Rows that are fitted.
+    pub frame: Frame,
+    /// Rows that are held out.
+    pub held_frame: Frame,
+    /// The recorded output of the fitted rows.
+    pub recorded: Vec<f64>,
+    /// Faults of the recording.
+    pub faults: Vec<Fault>,
+}
+
+impl<'a> Case<'a> {
+    fn new(recording: &Recording, model: &'a Model) -> Result<Self, Vec<String>> {
+        let mut scene = Scene::new(recording, &model.output, &model.roles).map_err(|error| vec![error.to_string()])?;
+        let parts = bind(model, &scene)?;
+        let Some(nominal) = simulate(&parts, &mut scene) else {
+            return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
+        };
+        super::inputs::exclude_rows_without_inputs(&mut scene, &parts);
+        let faults = clean(&mut scene, &nominal.total);
+        let units = units(&scene);
+        let held = held_out(&units);
+        let frame = Frame::new(&scene, &units, |unit| !held.contains(&unit));
+        let held_frame = Frame::new(&scene, &units, |unit| held.contains(&unit));
+        let recorded = frame.reduce(scene.recorded());
+        Ok(Self { model, scene, parts, units, held, frame, held_frame, recorded, faults })
+    }
+
+    fn too_little(&self) -> Option<String> {
+        if self.frame.len() < ROWS_MIN {
+            return Some(format!("at least {ROWS_MIN} rows with a value of {}", self.model.output));
+        }
+        let first = self.recorded[0];
+        if self.recorded.iter().all(|x| *x == first) {
+            return Some(format!("a recording in which {} changes", self.model.output));
+        }
+        None
+    }
+
+    /// Runs `act` with the fitted rows.
+    pub fn with_data<T>(&mut self, act: impl FnOnce(&mut Data<'_>) -> T) -> T {
+        let mut data = Data { scene: &mut self.scene, frame: &self.frame, recorded: &self.recorded };
+        act(&mut data)
+    }
+
+    fn fit_baseline(&mut self) -> Option<Fit> {
+        let parts = self.parts.clone();
+        self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))
+    }
+
+    fn search(&mut self, base: &Fit, seed: u64) -> (Found, Vec<Design>) {
+        // Candidates see the load and the output that the fitted baseline simulates.
+        let _ = simulate(&base.parts, &mut self.scene);
+        let designs = designs(&self.scene, &self.frame, self.model);
+        let found = self.with_data(|data| Search::new(data, base, &designs, seed).run());
+        (found, designs)
+    }
+
+    /// Drops members whose remaining part is too small to claim, smallest first.
+    fn worth_claiming(&mut self, mut found: Found, base: &Fit) -> Found {
+        while let Some(position) = self.smallest_unclaimable(&found.best, base) {
+            let Some(less) = self.without(&found.best, position) else { break };
+            found.best = less;
+            found.p_values.remove(position.min(found.p_values.len() - 1));
+        }
+        found
+    }
+
+    fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit) -> Option<usize> {
+        let deviation = ordinary_noise(&best.fit);
+        let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len());
+        (0..best.members.len()).find(|position| {
+            let without =
+                if best.members.len() == 1 { Some(base.clone()) } else { self.without(best, *position).map(|h| h.fit) };
+            without.is_some_and(|without| {
+                let size = distance(&without.residual, &best.fit.residual);
+                size < SIZE_DEVIATIONS * deviation && size < SIZE_SHARE * mean
+            })
+        })
+    }
+
+    /// The hypothesis with one member taken out and everything else refitted.
+    pub fn without(&mut self, from: &Hypothesis, position: usize) -> Option<Hypothesis> {
+        let mut members = from.members.clone();
+        members.remove(position);
+        let first = from.fit.parts.len() - from.members.len();
+        let mut parts = from.fit.parts.clone();
+        parts.remove(first + position);
+        let fit = self.with_data(|data| fit(data, &parts, from.fit.noise))?;
+        let information = from.information - 2.0 * (from.fit.log_likelihood - fit.log_likelihood);
+        Some(Hypothesis { members, fit, information })
+    }
+
+    /// An empirical form where something real remains that the named effects do not explain.
+    fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
+        let _ = simulate(&found.best.fit.parts, &mut self.scene);
+        let designs = empirical_designs(&self.scene, &self.frame);
+        let on_top = self.best_empirical(&found.best.fit, &designs)?;
+        let needed = UNKNOWN_SHARE * found.best.information;
+        if on_top.information < needed.max(6.0) {
+            return None;
+        }
+        let innovations = on_top.fit.innovations(&self.frame);
+        let ln_rows = self.ln_rows(base);
+        let p = p_value(&found.best.fit, &self.frame, &designs, &innovations, on_top.fit.noise, ln_rows, seed);
+        let size = distance(&found.best.fit.residual, &on_top.fit.residual);
+        let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len());
+        let small = size < SIZE_DEVIATIONS * ordinary_noise(&on_top.fit) && size < SIZE_SHARE * mean;
+        if p > P_MAX || small {
+            return None;
+        }
+        let alone = if found.best.members.is_empty() { on_top } else { self.best_empirical(base, &designs)? };
+        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
+    }
+
+    /// Logarithm of the number of independent rows.
+    #[must_use]
+    pub fn ln_rows(&self, base: &Fit) -> f64 {
+        (count(self.frame.len()) / base.noise.inflation()).max(20.0).ln()
+    }
+
+    /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
+    fn best_empirical(&mut self, from: &Fit, designs: &[Design]) -> Option<Hypothesis> {
+        let ln_rows = self.ln_rows(from);
+        let scores = super::scan::scan(from, &self.frame, designs, ln_rows);
+        let best = scores
+            .iter()
+            .filter(|score| score.information.is_finite())
+            .max_by(|a, b| a.information.total_cmp(&b.information))?;
+        let mut parts = from.parts.clone();
+        parts.push(designs[best.design].part.clone());
+        let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
+        let information =
+            2.0 * (fit.log_likelihood - from.log_likelihood) - super::scan::price(&designs[best.design], ln_rows);
+        Some(Hypothesis { members: vec![best.design], fit, information })
+    }
+
+    /// Simulates every row with hidden states followed through the held-out units.
+    pub fn predict(&mut self, fit: &Fit) -> Option<Prediction> {
+        let noise = Noise { arma: fit.noise, deviation: ordinary_noise(fit) };
+        predict(&mut self.scene, &fit.parts, self.parts.len(), &self.units, &self.held, noise)
+    }
+
+    /// How well a prediction fits.
+    #[must_use]
+    pub fn quality(&self, prediction: &Prediction) -> Quality {
+        Quality {
+            rmse: rmse(&self.scene, &self.frame, &prediction.total).unwrap_or(0.0),
+            held_out_rmse: rmse(&self.scene, &self.held_frame, &prediction.total),
+        }
+    }
+}
+
+/// What remains unexplained, described.
+pub struct Unknown {
+    /// The baseline and the empirical form, fitted together.
+    pub fit: Fit,
+    /// Information over the baseline.
+    pub information: f64,
+    /// The gate's answer.
+    pub p_value: f64,
+}
+
+/// Robust standard deviation of what remains, edges and spikes left aside.
+#[must_use]
+pub fn ordinary_noise(fit: &Fit) -> f64 {
+    let middle = median(fit.residual.clone()).unwrap_or(0.0);
+    1.4826 * median(fit.residual.iter().map(|x| (x - middle).abs()).collect()).unwrap_or(0.0)
+}
+
+/// Root mean square distance.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count(a.len().max(1))).sqrt()
+}
+
+/// Everything the verdict is made from.
+pub struct Outcome {
+    /// The baseline fitted alone.
+    pub base: Fit,
+    /// What the search found.
+    pub found: Found,
+    /// Every hypothesis of the search.
+    pub designs: Vec<Design>,
+    /// What remains unexplained.
+    pub unknown: Option<Unknown>,
+    /// The fits compared.
+    pub fits: Fits,
+    /// Row by row.
+    pub rows: Rows,
+    /// Contribution of each added effect, by label.
+    pub added: Vec<(String, Vec<f64>)>,
+}
+
+impl Outcome {
+    fn new(case: &mut Case<'_>, base: Fit, found: Found, designs: Vec<Design>, unknown: Option<Unknown>) -> Self {
+        let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
+        let empty = || Prediction { total: vec![0.0; case.scene.rows()], contributions: Vec::new() };
+        let none = empty();
+        let before = case.predict(&base).unwrap_or_else(|| none.clone());
+        let after = case.predict(&last).unwrap_or(none);
+        let first = case.parts.len();
+        let labels = last.parts[first..].iter().map(|part| part.label().to_owned());
+        let added: Vec<(String, Vec<f64>)> = labels.zip(after.contributions.iter().skip(first).cloned()).collect();
+        let fits = Fits {
+            rows: case.frame.len() + case.held_frame.len(),
+            runs: case.units.len(),
+            held_out_runs: case.held.iter().map(|unit| case.units[*unit].name.clone()).collect(),
+            noise_floor: ordinary_noise(&last),
+            before: case.quality(&before),
+            after: case.quality(&after),
+        };
+        let known = super::inputs::rows_with_inputs(&case.scene, &case.parts);
+        let visible = |total: Vec<f64>| total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
+        let rows = Rows {
+            simulated_before: visible(before.total),
+            simulated_after: visible(after.total),
+            effects: added.clone(),
+        };
+        Self { base, found, designs, unknown, fits, rows, added }
+    }
+
+    /// The fit that is reported.
+    #[must_use]
+    pub fn last(&self) -> &Fit {
+        self.unknown.as_ref().map_or(&self.found.best.fit, |unknown| &unknown.fit)
+    }
+
+    /// Is nothing missing?
+    #[must_use]
+    pub fn verdict(&self, ambiguous: bool) -> Verdict {
+        match (&self.unknown, self.found.best.members.is_empty()) {
+            (Some(_), _) => Verdict::Unexplained,
+            (None, true) => Verdict::NoMismatch,
+            (None, false) if ambiguous => Verdict::Ambiguous,
+            (None, false) => Verdict::Explained,
+        }
+    }
+}

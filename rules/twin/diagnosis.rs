@@ -1,0 +1,179 @@
+//! What a diagnosis says (`diagnosis/1`), before it is written as JSON, words or a page.
+
+use super::locate::Region;
+use super::model::Model;
+use super::quality::Fault;
+
+/// The answer in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Named, and one explanation stands out.
+    Explained,
+    /// Real, but several named explanations cannot be told apart on this data.
+    Ambiguous,
+    /// Real and located; nothing in the catalogue explains it.
+    Unexplained,
+    /// Nothing beyond the noise.
+    NoMismatch,
+    /// Too little data or excitation.
+    CannotTell,
+}
+
+impl Verdict {
+    /// The word in the contract.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Explained => "explained",
+            Self::Ambiguous => "ambiguous",
+            Self::Unexplained => "unexplained",
+            Self::NoMismatch => "no_mismatch",
+            Self::CannotTell => "cannot_tell",
+        }
+    }
+}
+
+/// A fitted number with its 95 % interval.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name of the parameter.
+    pub name: String,
+    /// Fitted value.
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end of the 95 % interval.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// An effect that the model lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Missing {
+    /// Kind, hypothesis, or `unknown`.
+    pub effect: String,
+    /// One sentence.
+    pub statement: String,
+    /// The law.
+    pub equation: String,
+    /// Fitted parameters.
+    pub parameters: Vec<Estimate>,
+    /// Information lost without it.
+    pub delta_ic: f64,
+    /// Chance that noise alone does as well, over the whole search.
+    pub p_value: f64,
+    /// Root mean square error on held-out runs without it.
+    pub held_out_rmse_before: Option<f64>,
+    /// The same with it.
+    pub held_out_rmse_after: Option<f64>,
+    /// Share of its variance that the baseline had swallowed.
+    pub absorbed_share: f64,
+}
+
+/// Another explanation that this data cannot rule out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// The other kind.
+    pub effect: String,
+    /// The kind it would replace.
+    pub instead_of: String,
+    /// How much less information it explains.
+    pub delta_ic: f64,
+    /// What separates the two.
+    pub separating_experiment: String,
+}
+
+/// A parameter of the baseline that had been bent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shift {
+    /// `kind.parameter`.
+    pub parameter: String,
+    /// Refitted without the missing effect.
+    pub before: f64,
+    /// Refitted with it.
+    pub after: f64,
+}
+
+/// How well something fits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Root mean square error on the fitted runs.
+    pub rmse: f64,
+    /// Root mean square error on the held-out runs.
+    pub held_out_rmse: Option<f64>,
+}
+
+/// The fits compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fits {
+    /// Rows that took part.
+    pub rows: usize,
+    /// Runs, or stretches where there are too few runs.
+    pub runs: usize,
+    /// Names of those held out.
+    pub held_out_runs: Vec<String>,
+    /// Standard deviation of the ordinary noise.
+    pub noise_floor: f64,
+    /// The model refitted without the missing physics.
+    pub before: Quality,
+    /// With it.
+    pub after: Quality,
+}
+
+/// What to record next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// What to do.
+    pub statement: String,
+    /// How long it takes.
+    pub minutes: f64,
+    /// Information it is expected to bring between the best explanations.
+    pub expected_delta_ic: f64,
+    /// The kind whose separating experiment it is.
+    pub effect: String,
+}
+
+/// Row by row, in input order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Rows {
+    /// Refitted without the missing physics; `None` where an input is absent.
+    pub simulated_before: Vec<Option<f64>>,
+    /// With it.
+    pub simulated_after: Vec<Option<f64>>,
+    /// Contribution of each added effect.
+    pub effects: Vec<(String, Vec<f64>)>,
+}
+
+/// The whole diagnosis.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// The simulated quantity.
+    pub output: String,
+    /// Its unit.
+    pub unit: String,
+    /// The answer.
+    pub verdict: Verdict,
+    /// The answer for a machinist.
+    pub summary: String,
+    /// The fits; `None` when nothing could be fitted.
+    pub fit: Option<Fits>,
+    /// Where, largest first.
+    pub mismatch: Vec<Region>,
+    /// What is missing, most important first.
+    pub missing: Vec<Missing>,
+    /// What else it could be.
+    pub alternatives: Vec<Alternative>,
+    /// Baseline parameters that had been bent.
+    pub baseline_shift: Vec<Shift>,
+    /// Faults of the recording.
+    pub data_quality: Vec<Fault>,
+    /// What to record next.
+    pub next_experiment: Option<Experiment>,
+    /// Row by row.
+    pub rows: Rows,
+    /// The extended, refitted model.
+    pub model: Model,
+    /// The leading hypotheses of the search with their information, for engineers.
+    pub debug: String,
+}

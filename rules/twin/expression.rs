@@ -1,0 +1,126 @@
+//! A user's hypothesis as a rhai expression over columns and its own parameters.
+
+use super::model::Parameter;
+use crate::physics::Scene;
+use rhai::{AST, Engine, EvalAltResult, Scope};
+use std::fmt;
+use std::sync::Arc;
+
+/// Operations one row may cost.
+const OPERATIONS_PER_ROW_MAX: u64 = 10_000;
+
+/// A compiled expression.
+#[derive(Clone)]
+pub struct Expression {
+    text: String,
+    engine: Arc<Engine>,
+    ast: Arc<AST>,
+    inputs: Vec<String>,
+}
+
+impl fmt::Debug for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Expression({})", self.text)
+    }
+}
+
+impl Expression {
+    /// Compiles an expression; `parameters` are the names that are not columns.
+    ///
+    /// # Errors
+    /// What the compiler says, with the column of the text.
+    pub fn compile(text: &str, parameters: &[String]) -> Result<Self, String> {
+        let mut engine = Engine::new();
+        engine.set_max_operations(OPERATIONS_PER_ROW_MAX);
+        engine.set_max_expr_depths(64, 64);
+        engine.set_max_string_size(1024);
+        engine.set_max_array_size(64);
+        engine.set_max_map_size(64);
+        let ast = engine.compile_expression(text).map_err(|error| error.to_string())?;
+        let inputs = identifiers(text).into_iter().filter(|name| !parameters.contains(name)).collect();
+        Ok(Self { text: text.to_owned(), engine: Arc::new(engine), ast: Arc::new(ast), inputs })
+    }
+
+    /// As written.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The columns it reads: names that end in a unit or are words of the recording.
+    #[must_use]
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// Its value in every row; `None` when a column is missing or a row fails.
+    #[must_use]
+    pub fn evaluate(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        let inputs: Vec<(&str, &[f64])> =
+            self.inputs.iter().map(|name| Some((name.as_str(), scene.column(name)?))).collect::<Option<_>>()?;
+        let mut scope = Scope::new();
+        for parameter in parameters {
+            scope.push(parameter.name.clone(), parameter.value);
+        }
+        let base = scope.len();
+        (0..scene.rows())
+            .map(|row| {
+                scope.rewind(base);
+                for (name, values) in &inputs {
+                    scope.push((*name).to_owned(), values[row]);
+                }
+                number(self.engine.eval_ast_with_scope(&mut scope, &self.ast))
+            })
+            .collect()
+    }
+}
+
+fn number(value: Result<rhai::Dynamic, Box<EvalAltResult>>) -> Option<f64> {
+    let value = value.ok()?;
+    #[expect(clippy::cast_precision_loss, reason = "an integer result of a formula is small")]
+    let number = value.as_float().ok().or_else(|| value.as_int().ok().map(|int| int as f64))?;
+    number.is_finite().then_some(number)
+}
+
+/// Names in the text that are not called as functions and are not literals.
+fn identifiers(text: &str) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    while at < bytes.len() {
+        let start = at;
+        while at < bytes.len() && (bytes[at].is_ascii_alphanumeric() || bytes[at] == b'_') {
+            at += 1;
+        }
+        if at == start {
+            at += 1;
+            continue;
+        }
+        let word = &text[start..at];
+        let called = text[at..].trim_start().starts_with('(');
+        let method = start > 0 && bytes[start - 1] == b'.';
+        let literal = word.starts_with(|c: char| c.is_ascii_digit()) || ["true", "false", "if", "else"].contains(&word);
+        if !called && !method && !literal && !names.iter().any(|name| name == word) {
+            names.push(word.to_owned());
+        }
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_told_from_parameters_functions_and_numbers() {
+        let text = "k * abs(axis_velocity_mm_min) * (ambient_temperature_c < 15.0 ? 1.0 : 0.0)";
+        let got = Expression::compile(text, &["k".to_owned()]).expect("compiles");
+        assert_eq!(got.inputs(), ["axis_velocity_mm_min", "ambient_temperature_c"]);
+    }
+
+    #[test]
+    fn a_broken_expression_says_where() {
+        let error = Expression::compile("k * (", &["k".to_owned()]).expect_err("broken");
+        assert!(error.contains("position"), "{error}");
+    }
+}

@@ -1,0 +1,264 @@
+//! Fitting: all free parameters of all parts together, by Gauss-Newton on whitened residuals, the noise profiled.
+
+use super::frame::Frame;
+use super::linear::{Solution, dot, least_squares};
+use super::model::{Part, simulate};
+use super::noise::{Arma, count, log_likelihood, whiten};
+use crate::physics::{Entry, Scene};
+
+/// Gauss-Newton steps at most, per noise model.
+const STEPS_MAX: usize = 8;
+/// Rounds of fitting parameters and noise in turn.
+const ALTERNATIONS: usize = 2;
+/// Standard deviation of the weak prior on a baseline parameter, as a multiple of its nominal size.
+const PRIOR_SPREAD: f64 = 3.0;
+
+/// A parameter that is fitted: part and position within the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Free {
+    /// Index of the part.
+    pub part: usize,
+    /// Index of the parameter within the part.
+    pub parameter: usize,
+}
+
+/// A fitted set of parts.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The parts with fitted values.
+    pub parts: Vec<Part>,
+    /// The fitted parameters.
+    pub free: Vec<Free>,
+    /// The noise of this hypothesis.
+    pub noise: Arma,
+    /// Logarithm of the likelihood at that noise.
+    pub log_likelihood: f64,
+    /// Recorded minus simulated, per group.
+    pub residual: Vec<f64>,
+    /// Tangent columns at the solution, per group and free parameter, not whitened.
+    pub tangent: Vec<Vec<f64>>,
+}
+
+/// What is being fitted to.
+pub struct Data<'a> {
+    /// The recording.
+    pub scene: &'a mut Scene,
+    /// The groups that take part.
+    pub frame: &'a Frame,
+    /// The recorded output, per group.
+    pub recorded: &'a [f64],
+}
+
+/// Fits `parts`, starting from their present values, with the noise that makes the recording likeliest. `None` when a
+/// part lacks an input.
+///
+/// Parameters and noise can trap each other: much memory explains away what a level would explain. So the fit starts
+/// from several noises, and the likeliest end counts.
+#[must_use]
+pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
+    let mut best: Option<Fit> = None;
+    for start in [Arma { phi: 0.4, theta: 0.0 }, noise] {
+        let fitted = fit_from(data, parts, start)?;
+        if best.as_ref().is_none_or(|best| fitted.log_likelihood > best.log_likelihood) {
+            best = Some(fitted);
+        }
+    }
+    best
+}
+
+fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
+    let mut state = State::new(data, nominal.to_vec())?;
+    let mut noise = start;
+    for _ in 0..ALTERNATIONS {
+        state.descend(data, nominal, noise)?;
+        noise = super::noise::fit(&state.residual, &data.frame.stretches);
+    }
+    state.descend(data, nominal, noise)?;
+    let innovations = whiten(&state.residual, &data.frame.stretches, noise);
+    let rss = dot(&innovations, &innovations);
+    let tangent = tangent(data, &state.parts, &state.free)?;
+    Some(Fit {
+        log_likelihood: log_likelihood(rss, data.frame.len(), data.frame.stretches.len(), noise),
+        parts: state.parts,
+        free: state.free,
+        noise,
+        residual: state.residual,
+        tangent,
+    })
+}
+
+impl Fit {
+    /// The innovations at the fitted noise.
+    #[must_use]
+    pub fn innovations(&self, frame: &Frame) -> Vec<f64> {
+        whiten(&self.residual, &frame.stretches, self.noise)
+    }
+
+    /// Covariance of the free parameters, from the whitened tangent.
+    #[must_use]
+    pub fn covariance(&self, frame: &Frame) -> Vec<Vec<f64>> {
+        let columns: Vec<Vec<f64>> =
+            self.tangent.iter().map(|column| whiten(column, &frame.stretches, self.noise)).collect();
+        let innovations = self.innovations(frame);
+        let solution = least_squares(&columns, &innovations);
+        let freedom = count(frame.len().saturating_sub(self.free.len()).max(1));
+        let variance = dot(&innovations, &innovations) / freedom;
+        let scale = |row: Vec<f64>| row.into_iter().map(|x| x * variance).collect();
+        solution.inverse.into_iter().map(scale).collect()
+    }
+}
+
+/// The free parameters of parts: everything not fixed.
+#[must_use]
+pub fn free_parameters(parts: &[Part]) -> Vec<Free> {
+    let of_part = |(index, part): (usize, &Part)| -> Vec<Free> {
+        let open = part.parameters.iter().enumerate().filter(|(_, parameter)| !parameter.fixed);
+        open.map(|(parameter, _)| Free { part: index, parameter }).collect()
+    };
+    parts.iter().enumerate().flat_map(of_part).collect()
+}
+
+struct State {
+    parts: Vec<Part>,
+    free: Vec<Free>,
+    residual: Vec<f64>,
+}
+
+impl State {
+    fn new(data: &mut Data<'_>, parts: Vec<Part>) -> Option<Self> {
+        let free = free_parameters(&parts);
+        let residual = residual(data, &parts)?;
+        Some(Self { parts, free, residual })
+    }
+
+    fn descend(&mut self, data: &mut Data<'_>, nominal: &[Part], noise: Arma) -> Option<()> {
+        let mut cost = self.cost(data, noise);
+        for _ in 0..STEPS_MAX {
+            let tangent = tangent(data, &self.parts, &self.free)?;
+            let step = self.step(data, nominal, noise, &tangent);
+            let (parts, residual, new_cost) = self.try_step(data, noise, &step, cost)?;
+            let gained = cost - new_cost;
+            if gained <= 0.0 {
+                break;
+            }
+            (self.parts, self.residual, cost) = (parts, residual, new_cost);
+            if gained < 1e-7 * cost {
+                break;
+            }
+        }
+        Some(())
+    }
+
+    fn cost(&self, data: &Data<'_>, noise: Arma) -> f64 {
+        let innovations = whiten(&self.residual, &data.frame.stretches, noise);
+        dot(&innovations, &innovations)
+    }
+
+    /// Gauss-Newton step under a weak prior around the nominal values, so that a parameter the recording does not
+    /// touch stays where the file put it.
+    fn step(&self, data: &Data<'_>, nominal: &[Part], noise: Arma, tangent: &[Vec<f64>]) -> Vec<f64> {
+        let size = self.free.len();
+        let whitened = |column: &[f64]| whiten(column, &data.frame.stretches, noise);
+        let mut target = whitened(&self.residual);
+        let sigma = (dot(&target, &target) / count(target.len().max(1))).sqrt();
+        let mut columns: Vec<Vec<f64>> = tangent.iter().map(|column| whitened(column)).collect();
+        for (index, free) in self.free.iter().enumerate() {
+            let now = self.parts[free.part].parameters[free.parameter].value;
+            let start = nominal[free.part].parameters[free.parameter].value;
+            let reach = rms(data.recorded) / rms(&tangent[index]).max(f64::MIN_POSITIVE);
+            let spread = PRIOR_SPREAD * if start == 0.0 { 10.0 * reach } else { start.abs().max(1e-6 * reach) };
+            let weight = sigma / spread;
+            columns
+                .iter_mut()
+                .enumerate()
+                .for_each(|(other, column)| column.push(if other == index { weight } else { 0.0 }));
+            target.push(weight * (start - now));
+        }
+        let Solution { mut coefficients, .. } = least_squares(&columns, &target);
+        coefficients.truncate(size);
+        coefficients
+    }
+
+    fn try_step(
+        &self,
+        data: &mut Data<'_>,
+        noise: Arma,
+        step: &[f64],
+        cost: f64,
+    ) -> Option<(Vec<Part>, Vec<f64>, f64)> {
+        let mut share = 1.0;
+        loop {
+            let parts = self.moved(step, share);
+            let trial = State { residual: residual(data, &parts)?, parts, free: Vec::new() };
+            let new_cost = trial.cost(data, noise);
+            if new_cost < cost || share < 0.05 {
+                return Some((trial.parts, trial.residual, new_cost));
+            }
+            share *= 0.3;
+        }
+    }
+
+    fn moved(&self, step: &[f64], share: f64) -> Vec<Part> {
+        let mut parts = self.parts.clone();
+        for (free, delta) in self.free.iter().zip(step) {
+            let parameter = &mut parts[free.part].parameters[free.parameter];
+            let mut delta = share * delta;
+            if parameter.entry == Entry::Shape && parameter.range.0.is_finite() && parameter.range.1.is_finite() {
+                // A shape must not leap across its whole range in one linearised step.
+                let most = (0.5 * parameter.value.abs()).max(0.02 * (parameter.range.1 - parameter.range.0));
+                delta = delta.clamp(-most, most);
+            }
+            parameter.value = (parameter.value + delta).clamp(parameter.range.0, parameter.range.1);
+        }
+        parts
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (dot(values, values) / count(values.len().max(1))).sqrt()
+}
+
+/// Recorded minus simulated, per group.
+pub fn residual(data: &mut Data<'_>, parts: &[Part]) -> Option<Vec<f64>> {
+    let simulated = simulate(parts, data.scene)?;
+    let reduced = data.frame.reduce(&simulated.total);
+    Some(data.recorded.iter().zip(&reduced).map(|(recorded, simulated)| recorded - simulated).collect())
+}
+
+/// Derivatives of the simulated output by each free parameter, per group.
+pub fn tangent(data: &mut Data<'_>, parts: &[Part], free: &[Free]) -> Option<Vec<Vec<f64>>> {
+    let base = simulate(parts, data.scene)?.total;
+    let coupled = parts.iter().any(Part::acts_on_output);
+    let mut columns = Vec::with_capacity(free.len());
+    let mut known: Option<(usize, Vec<(String, Vec<f64>)>)> = None;
+    for free in free {
+        let part = &parts[free.part];
+        let parameter = &part.parameters[free.parameter];
+        let direct = parameter.entry == Entry::Linear && !part.is_cut() && (!coupled || part.acts_on_output());
+        if direct {
+            if known.as_ref().is_none_or(|(index, _)| *index != free.part) {
+                known = Some((free.part, part.columns(data.scene)?));
+            }
+            let (_, part_columns) = known.as_ref()?;
+            let column = part_columns.iter().find(|(name, _)| *name == parameter.name);
+            columns.push(column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column)));
+        } else {
+            columns.push(difference(data, parts, *free, &base)?);
+            simulate(parts, data.scene)?;
+        }
+    }
+    Some(columns)
+}
+
+fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &[f64]) -> Option<Vec<f64>> {
+    let mut parts = parts.to_vec();
+    let parameter = &mut parts[free.part].parameters[free.parameter];
+    let mut step = 1e-4 * parameter.value.abs().max(1e-3);
+    if parameter.value + step > parameter.range.1 {
+        step = -step;
+    }
+    parameter.value += step;
+    let moved = simulate(&parts, data.scene)?.total;
+    let slope: Vec<f64> = moved.iter().zip(base).map(|(moved, base)| (moved - base) / step).collect();
+    Some(data.frame.reduce(&slope))
+}

@@ -1,0 +1,129 @@
+//! The rows that take part in a comparison, as groups of neighbouring rows, in stretches of unbroken noise.
+//!
+//! A long recording is reduced by averaging groups of neighbouring rows *after* every law has been evaluated at full
+//! rate, so that edges keep their shape.
+
+use crate::physics::Scene;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+/// Groups beyond which neighbouring rows are averaged.
+const GROUPS_MAX: usize = 20_000;
+
+/// A stretch of rows that is held out, or not, as a whole.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unit {
+    /// The run's name; with a part number where one run is cut into several units.
+    pub name: String,
+    /// Its rows.
+    pub rows: Range<usize>,
+}
+
+/// Units of hold-out: the runs, or stretches of them where there are fewer than four.
+#[must_use]
+pub fn units(scene: &Scene) -> Vec<Unit> {
+    let runs = scene.runs();
+    if runs.len() >= 4 {
+        let named = runs.iter().zip(scene.run_names());
+        return named.map(|(rows, name)| Unit { name: name.clone(), rows: rows.clone() }).collect();
+    }
+    let per_run = (24 / runs.len().max(1)).max(1);
+    runs.iter().zip(scene.run_names()).flat_map(|(rows, name)| cut(rows, name, per_run)).collect()
+}
+
+fn cut(rows: &Range<usize>, name: &str, wanted: usize) -> Vec<Unit> {
+    let parts = wanted.min(rows.len() / 10).max(1);
+    let edge = |index: usize| rows.start + rows.len() * index / parts;
+    (0..parts)
+        .map(|index| Unit { name: format!("{name}[{}/{parts}]", index + 1), rows: edge(index)..edge(index + 1) })
+        .collect()
+}
+
+/// Every fourth unit is held out; none where there are fewer than four.
+#[must_use]
+pub fn held_out(units: &[Unit]) -> BTreeSet<usize> {
+    (0..units.len()).filter(|index| index % 4 == 3).collect()
+}
+
+/// Groups of rows that take part.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    groups: Vec<Range<usize>>,
+    /// Unbroken stretches of groups, within a unit.
+    pub stretches: Vec<Range<usize>>,
+    /// The unit of each group.
+    pub unit: Vec<usize>,
+}
+
+impl Frame {
+    /// The usable rows of the units that `takes` accepts.
+    #[must_use]
+    pub fn new(scene: &Scene, units: &[Unit], takes: impl Fn(usize) -> bool) -> Self {
+        let size = scene.rows().div_ceil(GROUPS_MAX).max(1);
+        let mut frame = Self { groups: Vec::new(), stretches: Vec::new(), unit: Vec::new() };
+        for (index, unit) in units.iter().enumerate().filter(|(index, _)| takes(*index)) {
+            for stretch in unbroken(scene, unit.rows.clone()) {
+                frame.add_stretch(index, stretch, size);
+            }
+        }
+        frame
+    }
+
+    fn add_stretch(&mut self, unit: usize, rows: Range<usize>, size: usize) {
+        let first = self.groups.len();
+        let mut start = rows.start;
+        while start < rows.end {
+            let end = (start + size).min(rows.end);
+            self.groups.push(start..end);
+            self.unit.push(unit);
+            start = end;
+        }
+        self.stretches.push(first..self.groups.len());
+    }
+
+    /// How many groups.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// No group at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// The rows of a group.
+    #[must_use]
+    pub fn rows(&self, group: usize) -> Range<usize> {
+        self.groups[group].clone()
+    }
+
+    /// The mean of a full-rate column over each group.
+    #[must_use]
+    pub fn reduce(&self, column: &[f64]) -> Vec<f64> {
+        let mean = |rows: &Range<usize>| {
+            if rows.len() == 1 {
+                column[rows.start]
+            } else {
+                column[rows.clone()].iter().sum::<f64>() / super::noise::count(rows.len())
+            }
+        };
+        self.groups.iter().map(mean).collect()
+    }
+}
+
+/// Stretches of usable rows without a gap longer than three periods.
+fn unbroken(scene: &Scene, rows: Range<usize>) -> Vec<Range<usize>> {
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    let longest_s = 3.0 * scene.period_s();
+    for row in rows.filter(|row| scene.usable()[*row]) {
+        match stretches.last_mut() {
+            Some(last) if last.end == row && scene.time_s()[row] - scene.time_s()[row - 1] <= longest_s => {
+                last.end = row + 1
+            }
+            _ => stretches.push(row..row + 1),
+        }
+    }
+    stretches
+}

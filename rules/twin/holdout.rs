@@ -1,0 +1,126 @@
+//! Held-out runs: predicted with parameters of the other runs only. A hidden state (which lot, a pump on or off, how
+//! worn this tool is) is followed through a held-out run from that run's own earlier rows.
+
+use super::frame::{Frame, Unit};
+use super::model::{Body, Part, simulate};
+use super::noise::{Arma, count};
+use crate::physics::Scene;
+use std::collections::BTreeSet;
+
+/// What a set of parts says about every row, and what each of its effects adds.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Simulated output per row.
+    pub total: Vec<f64>,
+    /// Contribution of each part per row.
+    pub contributions: Vec<Vec<f64>>,
+}
+
+/// Simulates every row; hidden states of `parts[first..]` are followed causally through the held-out units.
+#[must_use]
+pub fn predict(
+    scene: &mut Scene,
+    parts: &[Part],
+    first: usize,
+    units: &[Unit],
+    held: &BTreeSet<usize>,
+    noise: Noise,
+) -> Option<Prediction> {
+    let simulated = simulate(parts, scene)?;
+    let mut prediction = Prediction { total: simulated.total, contributions: simulated.contributions };
+    for index in first..parts.len() {
+        if follows_state(&parts[index]) {
+            follow(scene, parts, index, units, held, noise, &mut prediction);
+        }
+    }
+    Some(prediction)
+}
+
+/// The noise against which a state is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Its memory.
+    pub arma: Arma,
+    /// Standard deviation of a row.
+    pub deviation: f64,
+}
+
+/// Steps since a run: whether a held-out run beside the step lies before or after it must be followed.
+fn follows_state(part: &Part) -> bool {
+    match &part.body {
+        Body::Effect(effect, form) => {
+            effect.has_hidden_state() && form.place.as_ref().is_some_and(|(column, _)| column == "run")
+        }
+        _ => false,
+    }
+}
+
+fn follow(
+    scene: &Scene,
+    parts: &[Part],
+    index: usize,
+    units: &[Unit],
+    held: &BTreeSet<usize>,
+    noise: Noise,
+    prediction: &mut Prediction,
+) {
+    let Some(column) = unit_contribution(scene, &parts[index]) else { return };
+    let step = prediction.contributions[index].iter().position(|x| *x != 0.0).unwrap_or(scene.rows());
+    let beside = |unit: usize| {
+        let at = units.iter().position(|unit| unit.rows.contains(&step)).unwrap_or(0);
+        // Held-out runs between the last training run before the step and the first after it.
+        let low = (0..at).rev().find(|unit| !held.contains(unit)).unwrap_or(0);
+        held.contains(&unit) && unit > low && unit <= at
+    };
+    for unit in (0..units.len()).filter(|unit| beside(*unit)) {
+        follow_unit(scene, &column, index, units[unit].rows.clone(), noise, prediction);
+    }
+}
+
+/// The contribution the part would have in every row were its state present.
+fn unit_contribution(scene: &Scene, part: &Part) -> Option<Vec<f64>> {
+    let mut always = part.clone();
+    let first = scene.run_names().first()?.clone();
+    if let Body::Effect(_, form) = &mut always.body {
+        form.place = Some(("run".to_owned(), first));
+    }
+    always.contribution(scene)
+}
+
+/// Forward filter over two states, absent or present, with even odds at the start of the run.
+fn follow_unit(
+    scene: &Scene,
+    present: &[f64],
+    index: usize,
+    rows: std::ops::Range<usize>,
+    noise: Noise,
+    prediction: &mut Prediction,
+) {
+    let variance = (noise.deviation * noise.deviation * noise.arma.inflation()).max(f64::MIN_POSITIVE);
+    let mut log_odds: f64 = 0.0;
+    for row in rows {
+        let probability = 1.0 / (1.0 + (-log_odds).exp());
+        let before = prediction.contributions[index][row];
+        let without = prediction.total[row] - before;
+        let expected = probability * present[row];
+        prediction.contributions[index][row] = expected;
+        prediction.total[row] = without + expected;
+        if scene.usable()[row] {
+            let error = scene.recorded()[row] - without;
+            let gain = (error * error - (error - present[row]).powi(2)) / (2.0 * variance);
+            log_odds = (log_odds + gain).clamp(-20.0, 20.0);
+        }
+    }
+}
+
+/// Root mean square of recorded minus predicted over a frame; `None` for no rows.
+#[must_use]
+pub fn rmse(scene: &Scene, frame: &Frame, total: &[f64]) -> Option<f64> {
+    let mut sum = 0.0;
+    let mut rows = 0;
+    for row in (0..frame.len()).flat_map(|group| frame.rows(group)) {
+        sum += (scene.recorded()[row] - total[row]).powi(2);
+        rows += 1;
+    }
+    (rows > 0).then(|| (sum / count(rows)).sqrt())
+}

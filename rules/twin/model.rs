@@ -1,0 +1,236 @@
+//! A model: a list of effects with parameters, whose sum is the simulated output (`model/1`).
+
+use super::empirical::Empirical;
+use super::expression::Expression;
+use super::term::Term;
+use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// One parameter of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name, as in the file.
+    pub name: String,
+    /// Present value.
+    pub value: f64,
+    /// Never refitted.
+    pub fixed: bool,
+    /// Proportional or shaping.
+    pub entry: Entry,
+    /// Physically possible values.
+    pub range: (f64, f64),
+    /// Unit; `output` stands for the output's unit.
+    pub unit: String,
+}
+
+/// What a part computes.
+#[derive(Clone)]
+pub enum Body {
+    /// An effect of the catalogue in a form; the shape values stand in the parameters.
+    Effect(&'static dyn Effect, Form),
+    /// A sum of coefficient times term; one parameter per term.
+    Linear(Vec<Term>),
+    /// No-load power as a table over speed; one parameter per speed, interpolated quadratically.
+    Table(super::table::SpeedTable),
+    /// A user's expression over columns and its parameters.
+    Expression(Expression),
+    /// A description of what no effect explains.
+    Empirical(Empirical),
+}
+
+impl fmt::Debug for Body {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Effect(effect, form) => write!(f, "Effect({}, {form:?})", effect.doc().kind),
+            Self::Linear(terms) => write!(f, "Linear({terms:?})"),
+            Self::Table(table) => write!(f, "{table:?}"),
+            Self::Expression(expression) => write!(f, "Expression({})", expression.text()),
+            Self::Empirical(form) => write!(f, "{form:?}"),
+        }
+    }
+}
+
+/// One effect in a model.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Kind, as in the file.
+    pub kind: String,
+    /// The user's name for it, where given.
+    pub name: Option<String>,
+    /// What it computes.
+    pub body: Body,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Line of the file, 0 when it was not read from one.
+    pub line: usize,
+}
+
+impl Part {
+    /// A candidate as a part, its linear parameters at zero.
+    #[must_use]
+    pub fn candidate(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
+        let shape = form.shape.iter().map(|(name, value)| parameter(effect, name, *value, Entry::Shape));
+        let linear = linear.iter().map(|name| parameter(effect, name, 0.0, Entry::Linear));
+        Self {
+            kind: effect.doc().kind.to_owned(),
+            name: None,
+            body: Body::Effect(effect, form.clone()),
+            parameters: linear.chain(shape).collect(),
+            line: 0,
+        }
+    }
+
+    /// The name reports use: the user's, or the kind.
+    #[must_use]
+    pub fn label(&self) -> &str {
+        self.name.as_deref().unwrap_or(&self.kind)
+    }
+
+    /// The form with the present shape values.
+    fn form(&self, form: &Form) -> Form {
+        let mut form = form.clone();
+        for parameter in self.parameters.iter().filter(|parameter| parameter.entry == Entry::Shape) {
+            match form.shape.iter_mut().find(|(name, _)| *name == parameter.name) {
+                Some((_, value)) => *value = parameter.value,
+                None => {
+                    if let Body::Effect(effect, _) = &self.body
+                        && let Some(doc) = effect.doc().parameter(&parameter.name)
+                    {
+                        form.shape.push((doc.name, parameter.value));
+                    }
+                }
+            }
+        }
+        form
+    }
+
+    /// One column per linear parameter, by name; `None` when an input is missing. An expression has none.
+    #[must_use]
+    pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
+        match &self.body {
+            Body::Effect(effect, form) => {
+                let columns = effect.columns(scene, &self.form(form))?;
+                Some(columns.into_iter().map(|(name, column)| (name.to_owned(), column)).collect())
+            }
+            Body::Linear(terms) => {
+                terms.iter().map(|term| Some((term.text().to_owned(), term.column(scene)?))).collect()
+            }
+            Body::Table(table) => table.columns(scene),
+            Body::Empirical(form) => form.columns(scene),
+            Body::Expression(_) => Some(Vec::new()),
+        }
+    }
+
+    /// What the part adds to the output, in the output's unit.
+    #[must_use]
+    pub fn contribution(&self, scene: &Scene) -> Option<Vec<f64>> {
+        if let Body::Expression(expression) = &self.body {
+            return expression.evaluate(scene, &self.parameters);
+        }
+        let mut sum = vec![0.0; scene.rows()];
+        for (name, column) in self.columns(scene)? {
+            if let Some(parameter) = self.parameters.iter().find(|parameter| parameter.name == name) {
+                let factor = parameter.value;
+                sum.iter_mut().zip(&column).for_each(|(sum, x)| *sum += factor * x);
+            }
+        }
+        Some(sum)
+    }
+
+    /// Does it act on the measured output as a whole, and so come after every physical part?
+    #[must_use]
+    pub fn acts_on_output(&self) -> bool {
+        matches!(
+            self.kind.as_str(),
+            "sensor_gain" | "supply_voltage" | "clock_lag" | "meter_window" | "saturation" | "ripple_alias"
+        )
+    }
+
+    /// Is it the cut, whose contribution is the load for the others?
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.kind == "cutting_power"
+    }
+
+    /// The parameter of this name.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+}
+
+fn parameter(effect: &'static dyn Effect, name: &str, value: f64, entry: Entry) -> Parameter {
+    let doc: Option<&ParameterDoc> = effect.doc().parameter(name);
+    Parameter {
+        name: name.to_owned(),
+        value,
+        fixed: false,
+        entry,
+        range: doc.map_or((f64::NEG_INFINITY, f64::INFINITY), |doc| doc.range),
+        unit: doc.map_or("output", |doc| doc.unit).to_owned(),
+    }
+}
+
+/// What a simulation believes.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Name of the machine or model.
+    pub name: String,
+    /// The simulated quantity.
+    pub output: String,
+    /// The effects whose sum is the output.
+    pub parts: Vec<Part>,
+    /// Declared roles.
+    pub roles: BTreeMap<Role, String>,
+    /// Kinds that the search must not consider.
+    pub exclude: Vec<String>,
+    /// When not empty, the only kinds the search considers.
+    pub only: Vec<String>,
+    /// The user's own hypotheses, candidates besides the catalogue.
+    pub hypotheses: Vec<Part>,
+}
+
+/// What a model says about a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// The output, row by row.
+    pub total: Vec<f64>,
+    /// What each part adds.
+    pub contributions: Vec<Vec<f64>>,
+}
+
+/// Runs parts over a scene: the cut first, whose contribution becomes the load; then the other physical parts; last
+/// those that act on the output as a whole. The scene keeps load and simulated output for candidates. `None` when a
+/// part lacks an input.
+pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
+    let mut contributions: Vec<Vec<f64>> = vec![Vec::new(); parts.len()];
+    let mut total = vec![0.0; scene.rows()];
+    scene.set_load(None);
+    scene.set_simulated(None);
+    if parts.iter().any(Part::is_cut) {
+        run_stage(parts, scene, &mut contributions, &mut total, Part::is_cut)?;
+        scene.set_load(Some(total.clone()));
+    }
+    run_stage(parts, scene, &mut contributions, &mut total, |part| !part.is_cut() && !part.acts_on_output())?;
+    scene.set_simulated(Some(total.clone()));
+    if parts.iter().any(Part::acts_on_output) {
+        run_stage(parts, scene, &mut contributions, &mut total, Part::acts_on_output)?;
+        scene.set_simulated(Some(total.clone()));
+    }
+    Some(Simulated { total, contributions })
+}
+
+fn run_stage(
+    parts: &[Part],
+    scene: &Scene,
+    contributions: &mut [Vec<f64>],
+    total: &mut [f64],
+    belongs: impl Fn(&Part) -> bool,
+) -> Option<()> {
+    for (part, slot) in parts.iter().zip(contributions).filter(|(part, _)| belongs(part)) {
+        *slot = part.contribution(scene)?;
+        total.iter_mut().zip(slot.iter()).for_each(|(total, x)| *total += x);
+    }
+    Some(())
+}

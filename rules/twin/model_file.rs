@@ -1,0 +1,524 @@
+//! Model files (`model/1`): read with every problem at once, each with its line; written back in the same form.
+
+use super::expression::Expression;
+use super::model::{Body, Model, Parameter, Part};
+use super::table::SpeedTable;
+use super::term::Term;
+use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, effect};
+use adapters::channel::nearest;
+use std::collections::BTreeMap;
+use std::fmt;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// One thing wrong with a model file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// What is wrong and what was meant.
+    pub text: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: {}", self.line, self.text)
+    }
+}
+
+type Table<'a> = DeTable<'a>;
+type Entry1<'a> = (&'a Spanned<std::borrow::Cow<'a, str>>, &'a Spanned<DeValue<'a>>);
+
+/// Reads a model.
+///
+/// # Errors
+/// Every problem of the file.
+pub fn parse_model(text: &str) -> Result<Model, Vec<Problem>> {
+    let mut reader = Reader { text, problems: Vec::new() };
+    let model = reader.model();
+    match model {
+        Some(model) if reader.problems.is_empty() => Ok(model),
+        _ => Err(reader.problems),
+    }
+}
+
+/// Reads a file of hypotheses: `[[effect]]` entries of any kind, candidates besides the catalogue.
+///
+/// # Errors
+/// Every problem of the file.
+pub fn parse_hypotheses(text: &str) -> Result<Vec<Part>, Vec<Problem>> {
+    let mut reader = Reader { text, problems: Vec::new() };
+    let parts = reader.root().map(|table| reader.parts(table.get_ref(), &["schema", "effect"])).unwrap_or_default();
+    if reader.problems.is_empty() { Ok(parts) } else { Err(reader.problems) }
+}
+
+struct Reader<'t> {
+    text: &'t str,
+    problems: Vec<Problem>,
+}
+
+impl<'t> Reader<'t> {
+    fn line(&self, offset: usize) -> usize {
+        self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
+    }
+
+    fn wrong(&mut self, offset: usize, text: String) {
+        let line = self.line(offset);
+        self.problems.push(Problem { line, text });
+    }
+
+    fn root(&mut self) -> Option<Spanned<Table<'t>>> {
+        match DeTable::parse(self.text) {
+            Ok(table) => Some(table),
+            Err(error) => {
+                let offset = error.span().map_or(0, |span| span.start);
+                self.wrong(offset, format!("not valid TOML: {}", error.message()));
+                None
+            }
+        }
+    }
+
+    fn model(&mut self) -> Option<Model> {
+        let root = self.root()?;
+        let table = root.get_ref();
+        let known = ["schema", "name", "output", "effect", "roles", "candidates"];
+        let parts = self.parts(table, &known);
+        match table.get("schema").map(|schema| (schema.get_ref().as_str(), schema.span().start)) {
+            Some((Some("model/1"), _)) => {}
+            Some((_, offset)) => self.wrong(offset, "schema must be \"model/1\"".to_owned()),
+            None => self.wrong(0, "schema = \"model/1\" is missing".to_owned()),
+        }
+        let output = table.get("output").and_then(|output| output.get_ref().as_str());
+        if output.is_none() {
+            self.wrong(0, "output = \"<channel>\" is missing: which quantity does the model simulate?".to_owned());
+        }
+        if parts.is_empty() && self.problems.is_empty() {
+            self.wrong(0, "the model has no [[effect]]".to_owned());
+        }
+        let name = table.get("name").and_then(|name| name.get_ref().as_str()).unwrap_or("model").to_owned();
+        let roles = self.roles(table);
+        let (exclude, only) = self.candidates(table);
+        Some(Model { name, output: output?.to_owned(), parts, roles, exclude, only, hypotheses: Vec::new() })
+    }
+
+    fn unknown_keys(&mut self, table: &Table<'_>, known: &[&str], what: &str) {
+        for (key, _) in table {
+            let name = key.get_ref().as_ref();
+            if !known.contains(&name) {
+                let hint = suggestion(name, known.iter().copied());
+                self.wrong(key.span().start, format!("unknown key {name} in {what}{hint}"));
+            }
+        }
+    }
+
+    fn parts(&mut self, table: &Table<'_>, known: &[&str]) -> Vec<Part> {
+        self.unknown_keys(table, known, "the model");
+        let Some(effects) = table.get("effect") else { return Vec::new() };
+        let Some(entries) = effects.get_ref().as_array() else {
+            self.wrong(effects.span().start, "write effects as [[effect]]".to_owned());
+            return Vec::new();
+        };
+        let entries: Vec<_> =
+            entries.iter().filter_map(|entry| Some((entry.span().start, entry.get_ref().as_table()?))).collect();
+        entries.into_iter().filter_map(|(offset, entry)| self.part(entry, offset)).collect()
+    }
+
+    fn part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let known =
+            ["kind", "name", "parameters", "fixed", "columns", "expression", "process", "form", "place", "gear_stage"];
+        self.unknown_keys(table, &known, "an [[effect]]");
+        let Some(kind) = table.get("kind").and_then(|kind| kind.get_ref().as_str()) else {
+            self.wrong(offset, "an [[effect]] needs a kind".to_owned());
+            return None;
+        };
+        let kind_offset = table.get("kind").map_or(offset, |kind| kind.span().start);
+        let name = table.get("name").and_then(|name| name.get_ref().as_str()).map(str::to_owned);
+        let mut part = match kind {
+            "linear" => self.linear(table, offset)?,
+            "expression" => self.expression(table, offset)?,
+            "no_load_power" if has_table(table) => self.speed_table(table, offset)?,
+            _ => self.catalogue(kind, table, kind_offset)?,
+        };
+        part.name = name;
+        part.line = self.line(kind_offset);
+        self.fix(&mut part, table);
+        Some(part)
+    }
+
+    fn numbers(&mut self, table: &Table<'_>, key: &str) -> Vec<(String, f64, usize)> {
+        let Some(value) = table.get(key) else { return Vec::new() };
+        let Some(entries) = value.get_ref().as_table() else {
+            self.wrong(value.span().start, format!("{key} must be a table of numbers, {key} = {{ name = 1.0 }}"));
+            return Vec::new();
+        };
+        let read = |(key, value): Entry1<'_>| (key.get_ref().to_string(), number(value.get_ref()), value.span().start);
+        let entries: Vec<_> = entries.iter().map(read).collect();
+        let mut numbers = Vec::new();
+        for (name, value, offset) in entries {
+            match value {
+                Some(value) => numbers.push((name, value, offset)),
+                None => self.wrong(offset, format!("{name} must be a finite number")),
+            }
+        }
+        numbers
+    }
+
+    fn linear(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let coefficients = self.numbers(table, "columns");
+        if coefficients.is_empty() {
+            self.wrong(offset, "a linear effect needs columns = { column = coefficient }".to_owned());
+            return None;
+        }
+        let mut terms = Vec::new();
+        let mut parameters = Vec::new();
+        for (name, value, offset) in coefficients {
+            match Term::parse(&name) {
+                Ok(term) => {
+                    parameters.push(free(term.text(), value, Entry::Linear));
+                    terms.push(term);
+                }
+                Err(reason) => self.wrong(offset, reason),
+            }
+        }
+        Some(part("linear", Body::Linear(terms), parameters))
+    }
+
+    fn expression(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let parameters: Vec<Parameter> = self
+            .numbers(table, "parameters")
+            .into_iter()
+            .map(|(name, value, _)| free(&name, value, Entry::Shape))
+            .collect();
+        let Some(text) = table.get("expression").and_then(|text| text.get_ref().as_str()) else {
+            self.wrong(offset, "an expression effect needs expression = \"...\"".to_owned());
+            return None;
+        };
+        let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
+        match Expression::compile(text, &names) {
+            Ok(expression) => Some(part("expression", Body::Expression(expression), parameters)),
+            Err(reason) => {
+                let offset = table.get("expression").map_or(offset, |text| text.span().start);
+                self.wrong(offset, format!("the expression does not compile: {reason}"));
+                None
+            }
+        }
+    }
+
+    fn speed_table(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let inside = table.get("parameters")?.get_ref().as_table()?;
+        self.unknown_keys(inside, &["speeds_rpm", "power_w"], "the no-load table");
+        let list = |key: &str| -> Option<Vec<f64>> {
+            inside.get(key)?.get_ref().as_array()?.iter().map(|value| number(value.get_ref())).collect()
+        };
+        let (speeds, powers) = (list("speeds_rpm").unwrap_or_default(), list("power_w").unwrap_or_default());
+        if speeds.is_empty() || speeds.len() != powers.len() || speeds.windows(2).any(|pair| pair[1] <= pair[0]) {
+            let text = "a no-load table needs increasing speeds_rpm and as many power_w".to_owned();
+            self.wrong(offset, text);
+            return None;
+        }
+        let parameters = powers
+            .iter()
+            .enumerate()
+            .map(|(index, power)| free(&format!("power_w[{index}]"), *power, Entry::Linear))
+            .collect();
+        let gear_stage = table.get("gear_stage").and_then(|stage| number(stage.get_ref()));
+        Some(part("no_load_power", Body::Table(SpeedTable { speeds_rpm: speeds, gear_stage }), parameters))
+    }
+
+    fn catalogue(&mut self, kind: &str, table: &Table<'_>, offset: usize) -> Option<Part> {
+        let Some(effect) = effect(kind) else {
+            let kinds = CATALOGUE.iter().map(|effect| effect.doc().kind).chain(["linear", "expression"]);
+            let hint = suggestion(kind, kinds);
+            self.wrong(offset, format!("unknown kind {kind}{hint}; `cnc-gateway effects list` shows every kind"));
+            return None;
+        };
+        let doc = effect.doc();
+        let mut parameters = Vec::new();
+        for (name, value, offset) in self.numbers(table, "parameters") {
+            let Some(known) = doc.parameter(&name) else {
+                let hint = suggestion(&name, doc.parameters.iter().map(|parameter| parameter.name));
+                self.wrong(offset, format!("{kind} has no parameter {name}{hint}"));
+                continue;
+            };
+            if value < known.range.0 || value > known.range.1 {
+                let (low, high) = known.range;
+                let unit = known.unit;
+                self.wrong(
+                    offset,
+                    format!("{kind}.{name} = {value} is outside its physical range {low} to {high} {unit}"),
+                );
+            }
+            let mut parameter = free(&name, value, known.entry);
+            parameter.range = known.range;
+            known.unit.clone_into(&mut parameter.unit);
+            parameters.push(parameter);
+        }
+        let form = self.form(effect, table);
+        Some(part(kind, Body::Effect(effect, form), parameters))
+    }
+
+    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
+        let mut form = Form::plain();
+        let chosen = table.get("form").or_else(|| table.get("process"));
+        if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
+            match form_name(name) {
+                Some(name) => form.name = name,
+                None => {
+                    let offset = chosen.map_or(0, |name| name.span().start);
+                    self.wrong(offset, format!("{} has no form {name}", effect.doc().kind));
+                }
+            }
+        }
+        if let Some(place) = table.get("place").and_then(|place| place.get_ref().as_table()) {
+            let word = |key: &str| place.get(key).and_then(|word| word.get_ref().as_str()).map(str::to_owned);
+            form.place = word("column").zip(word("equals").or_else(|| word("since")));
+        }
+        form
+    }
+
+    fn fix(&mut self, part: &mut Part, table: &Table<'_>) {
+        let Some(fixed) = table.get("fixed") else { return };
+        let Some(names) = fixed.get_ref().as_array() else {
+            self.wrong(fixed.span().start, "fixed must be a list of parameter names".to_owned());
+            return;
+        };
+        for name in names.iter() {
+            let text = name.get_ref().as_str().unwrap_or_default();
+            match part.parameters.iter_mut().find(|parameter| parameter.name == text) {
+                Some(parameter) => parameter.fixed = true,
+                None => {
+                    let hint = suggestion(text, part.parameters.iter().map(|parameter| parameter.name.as_str()));
+                    self.wrong(
+                        name.span().start,
+                        format!("fixed names {text:?}, which is no parameter of this effect{hint}"),
+                    );
+                }
+            }
+        }
+    }
+
+    fn roles(&mut self, table: &Table<'_>) -> BTreeMap<Role, String> {
+        let mut roles = BTreeMap::new();
+        let Some(entries) = table.get("roles").and_then(|roles| roles.get_ref().as_table()) else { return roles };
+        let read = |(key, value): Entry1<'_>| {
+            (key.get_ref().to_string(), value.get_ref().as_str().map(str::to_owned), key.span().start)
+        };
+        let entries: Vec<_> = entries.iter().map(read).collect();
+        for (name, column, offset) in entries {
+            match (Role::of(&name), column) {
+                (Some(role), Some(column)) => {
+                    roles.insert(role, column);
+                }
+                (None, _) => {
+                    let hint = suggestion(&name, Role::ALL.iter().map(|role| role.name()));
+                    self.wrong(offset, format!("unknown role {name}{hint}"));
+                }
+                (_, None) => self.wrong(offset, format!("role {name} must name a column")),
+            }
+        }
+        roles
+    }
+
+    fn candidates(&mut self, table: &Table<'_>) -> (Vec<String>, Vec<String>) {
+        let Some(candidates) = table.get("candidates").and_then(|entry| entry.get_ref().as_table()) else {
+            return (Vec::new(), Vec::new());
+        };
+        self.unknown_keys(candidates, &["exclude", "only"], "[candidates]");
+        let mut list = |key: &str| -> Vec<String> {
+            let Some(entries) = candidates.get(key).and_then(|entry| entry.get_ref().as_array()) else {
+                return Vec::new();
+            };
+            let kinds: Vec<_> = entries
+                .iter()
+                .map(|kind| (kind.get_ref().as_str().unwrap_or_default().to_owned(), kind.span().start))
+                .collect();
+            for (kind, offset) in &kinds {
+                if effect(kind).is_none() {
+                    let hint = suggestion(kind, CATALOGUE.iter().map(|effect| effect.doc().kind));
+                    self.wrong(*offset, format!("unknown kind {kind}{hint}"));
+                }
+            }
+            kinds.into_iter().map(|(kind, _)| kind).collect()
+        };
+        (list("exclude"), list("only"))
+    }
+}
+
+/// Names of forms are static; a file names one of those that effects offer.
+fn form_name(name: &str) -> Option<&'static str> {
+    FORM_NAMES.iter().copied().find(|known| *known == name)
+}
+
+/// Every form name that an effect of the catalogue uses.
+pub(super) const FORM_NAMES: [&str; 24] = [
+    "turning",
+    "milling",
+    "drilling",
+    "quadratic",
+    "level",
+    "viscous",
+    "measured",
+    "gradient",
+    "step",
+    "drift",
+    "lot",
+    "linear",
+    "settling",
+    "wander",
+    "constant",
+    "small",
+    "boxcar",
+    "coulomb",
+    "two",
+    "latent",
+    "by_position",
+    "both",
+    "stage",
+    "threshold",
+];
+
+fn has_table(table: &Table<'_>) -> bool {
+    let inside = table.get("parameters").and_then(|parameters| parameters.get_ref().as_table());
+    inside.is_some_and(|inside| inside.contains_key("speeds_rpm") || inside.contains_key("power_w"))
+}
+
+fn part(kind: &str, body: Body, parameters: Vec<Parameter>) -> Part {
+    Part { kind: kind.to_owned(), name: None, body, parameters, line: 0 }
+}
+
+fn free(name: &str, value: f64, entry: Entry) -> Parameter {
+    let range = (f64::NEG_INFINITY, f64::INFINITY);
+    Parameter { name: name.to_owned(), value, fixed: false, entry, range, unit: "output".to_owned() }
+}
+
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    let text = match value {
+        DeValue::Integer(integer) => integer.as_str().to_owned(),
+        DeValue::Float(float) => float.as_str().to_owned(),
+        _ => return None,
+    };
+    text.replace('_', "").parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+fn suggestion<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    nearest(name, known).map(|known| format!("; did you mean {known}?")).unwrap_or_default()
+}
+
+/// Writes a model in the form in which it is read.
+#[must_use]
+pub fn write_model(model: &Model) -> String {
+    let mut text =
+        format!("schema = \"model/1\"\nname   = {}\noutput = {}\n", quoted(&model.name), quoted(&model.output));
+    for part in &model.parts {
+        text.push_str(&write_part(part));
+    }
+    if !model.roles.is_empty() {
+        text.push_str("\n[roles]\n");
+        for (role, column) in &model.roles {
+            text.push_str(&format!("{} = {}\n", role.name(), quoted(column)));
+        }
+    }
+    if !model.exclude.is_empty() {
+        let kinds: Vec<String> = model.exclude.iter().map(|kind| quoted(kind)).collect();
+        text.push_str(&format!("\n[candidates]\nexclude = [{}]\n", kinds.join(", ")));
+    }
+    text
+}
+
+fn write_part(part: &Part) -> String {
+    let mut text = format!("\n[[effect]]\nkind = {}\n", quoted(&part.kind));
+    if let Some(name) = &part.name {
+        text.push_str(&format!("name = {}\n", quoted(name)));
+    }
+    let numbers: Vec<String> = part
+        .parameters
+        .iter()
+        .map(|parameter| format!("{} = {}", key(&parameter.name), float(parameter.value)))
+        .collect();
+    let numbers = numbers.join(", ");
+    match &part.body {
+        Body::Linear(_) => text.push_str(&format!("columns = {{ {numbers} }}\n")),
+        Body::Table(table) => text.push_str(&write_table(part, table)),
+        Body::Expression(expression) => {
+            text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", quoted(expression.text())));
+        }
+        Body::Empirical(form) => {
+            let expression = quoted(&form.expression());
+            text = format!("\n[[effect]]\nkind = \"expression\"\nname = \"unknown\"\n");
+            text.push_str(&format!("expression = {expression}\nparameters = {{ {numbers} }}\n"));
+        }
+        Body::Effect(_, form) => {
+            text.push_str(&format!("parameters = {{ {numbers} }}\n"));
+            if !form.name.is_empty() {
+                let key = if part.kind == "cutting_power" { "process" } else { "form" };
+                text.push_str(&format!("{key} = {}\n", quoted(form.name)));
+            }
+            if let Some((column, word)) = &form.place {
+                text.push_str(&format!("place = {{ column = {}, equals = {} }}\n", quoted(column), quoted(word)));
+            }
+        }
+    }
+    let fixed: Vec<String> =
+        part.parameters.iter().filter(|parameter| parameter.fixed).map(|parameter| quoted(&parameter.name)).collect();
+    if !fixed.is_empty() {
+        text.push_str(&format!("fixed = [{}]\n", fixed.join(", ")));
+    }
+    text
+}
+
+fn write_table(part: &Part, table: &SpeedTable) -> String {
+    let list = |values: Vec<f64>| values.into_iter().map(float).collect::<Vec<_>>().join(", ");
+    let powers = list(part.parameters.iter().map(|parameter| parameter.value).collect());
+    let speeds = list(table.speeds_rpm.clone());
+    let stage = table.gear_stage.map(|stage| format!("gear_stage = {}\n", float(stage))).unwrap_or_default();
+    format!("parameters = {{ speeds_rpm = [{speeds}], power_w = [{powers}] }}\n{stage}")
+}
+
+fn float(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn key(name: &str) -> String {
+    let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    if bare { name.to_owned() } else { quoted(name) }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_problem_comes_at_once_with_its_line() {
+        let text = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"flank_waer\"\n[[effect]]\nkind = \"flank_wear\"\nparameters = { k = -1.0, q = 1.0 }\nfixed = [\"z\"]\n[rolls]\n";
+        let problems = parse_model(text).expect_err("several problems");
+        let all = problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+        for wanted in [
+            "did you mean flank_wear?",
+            "line 7: flank_wear.k = -1 is outside",
+            "no parameter q",
+            "line 8: fixed",
+            "rolls; did you mean roles?",
+        ] {
+            assert!(all.contains(wanted), "{wanted} in:\n{all}");
+        }
+    }
+
+    #[test]
+    fn a_model_survives_being_written_and_read() {
+        let text = "schema = \"model/1\"\nname = \"a \\\"b\\\"\"\noutput = \"y_w\"\n[[effect]]\nkind = \"linear\"\ncolumns = { one = 1.0, \"a^2\" = -2.5e-5 }\nfixed = [\"one\"]\n[[effect]]\nkind = \"flank_wear\"\nparameters = { k = 2.0, p = 1.0 }\n[[effect]]\nkind = \"no_load_power\"\nparameters = { speeds_rpm = [100.0, 200.0], power_w = [10.0, 20.0] }\n[[effect]]\nkind = \"expression\"\nname = \"door\"\nexpression = \"k * a\"\nparameters = { k = 1.0 }\n[roles]\nspeed = \"n_rpm\"\n";
+        let once = write_model(&parse_model(text).expect("reads"));
+        let twice = write_model(&parse_model(&once).expect("reads again"));
+        assert_eq!(once, twice);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_makes_it_panic(text in "(schema|\\[\\[effect\\]\\]|kind|=|\"|\n|\\{|\\}|[a-z0-9.]|\\PC){0,120}") {
+            let _ = parse_model(&text);
+        }
+    }
+}

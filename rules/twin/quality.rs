@@ -1,0 +1,142 @@
+//! Faults of a recording that do not bias the comparison: they are noted, and their rows are left out.
+
+use crate::physics::Scene;
+
+/// One kind of fault found in one column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// `dropouts`, `spikes`, `quantisation` or `duplicate_time`.
+    pub fault: &'static str,
+    /// The column.
+    pub column: String,
+    /// Rows concerned.
+    pub rows: usize,
+}
+
+/// Neighbours on each side against which a row is judged.
+const NEIGHBOURS: usize = 3;
+/// Deviations from its neighbours, in robust standard deviations, beyond which a row is a spike.
+const SPIKE_DEVIATIONS: f64 = 8.0;
+/// Identical values in a row that count as a held dropout, where identical neighbours are rare.
+const HELD_ROWS: usize = 4;
+
+/// Notes faults and takes their rows out of the scene. `simulated` is the baseline's output.
+pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let output = scene.output().to_owned();
+    let mut note = |fault: &'static str, column: &str, rows: usize| {
+        if rows > 0 {
+            faults.push(Fault { fault, column: column.to_owned(), rows });
+        }
+    };
+    note("duplicate_time", "time_s", duplicates(scene));
+    note("quantisation", &output, quantised(scene));
+    let mut dropped = absent(scene);
+    let held = held(scene);
+    let zeros = zeros(scene, simulated);
+    dropped.extend(held.iter().chain(&zeros));
+    dropped.sort_unstable();
+    dropped.dedup();
+    scene.exclude(dropped.iter().copied());
+    note("dropouts", &output, dropped.len());
+    let spikes = spikes(scene, simulated);
+    scene.exclude(spikes.iter().copied());
+    note("spikes", &output, spikes.len());
+    faults
+}
+
+fn duplicates(scene: &Scene) -> usize {
+    let time_s = scene.time_s();
+    let same =
+        |rows: &std::ops::Range<usize>| time_s[rows.clone()].windows(2).filter(|pair| pair[0] >= pair[1]).count();
+    scene.runs().iter().map(same).sum()
+}
+
+fn absent(scene: &Scene) -> Vec<usize> {
+    (0..scene.rows()).filter(|row| !scene.usable()[*row]).collect()
+}
+
+/// Rows in which the output repeats exactly, where that is unusual.
+fn held(scene: &Scene) -> Vec<usize> {
+    let recorded = scene.recorded();
+    let equal = (1..scene.rows()).filter(|row| recorded[*row] == recorded[row - 1]).count();
+    let mut rows = Vec::new();
+    if equal * 10 > scene.rows() {
+        return rows;
+    }
+    let mut start = 0;
+    for row in 1..=scene.rows() {
+        if row == scene.rows() || recorded[row] != recorded[start] {
+            if row - start >= HELD_ROWS {
+                // The first of them was measured.
+                rows.extend(start + 1..row);
+            }
+            start = row;
+        }
+    }
+    rows
+}
+
+/// Rows that read exactly zero although the simulation says otherwise and few rows do.
+fn zeros(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
+    let recorded = scene.recorded();
+    let sizes: Vec<f64> = recorded.iter().map(|x| x.abs()).collect();
+    let typical = median(sizes).unwrap_or(0.0);
+    let zero = |row: &usize| scene.usable()[*row] && recorded[*row] == 0.0 && simulated[*row].abs() > 0.2 * typical;
+    let rows: Vec<usize> = (0..scene.rows()).filter(zero).collect();
+    if rows.len() * 10 > scene.rows() { Vec::new() } else { rows }
+}
+
+/// Isolated rows far from their neighbours while the simulation is steady.
+fn spikes(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
+    let residual: Vec<f64> =
+        scene.recorded().iter().zip(simulated).map(|(recorded, simulated)| recorded - simulated).collect();
+    let jumps: Vec<(usize, f64, f64)> =
+        scene.runs().iter().flat_map(|run| jumps_of(scene, &residual, simulated, run)).collect();
+    let Some(spread) = median(jumps.iter().map(|(_, jump, _)| jump.abs()).collect()).map(|mad| 1.4826 * mad) else {
+        return Vec::new();
+    };
+    let spike = |(_, jump, moved): &&(usize, f64, f64)| jump.abs() > SPIKE_DEVIATIONS * spread && *moved < spread;
+    let rows: Vec<usize> = jumps.iter().filter(spike).map(|(row, ..)| *row).collect();
+    if rows.len() * 30 > scene.rows() { Vec::new() } else { rows }
+}
+
+/// Per row: distance of its residual from the median of its neighbours, and how much the simulation moves around it.
+fn jumps_of(
+    scene: &Scene,
+    residual: &[f64],
+    simulated: &[f64],
+    run: &std::ops::Range<usize>,
+) -> Vec<(usize, f64, f64)> {
+    let usable: Vec<usize> = run.clone().filter(|row| scene.usable()[*row]).collect();
+    let judge = |at: usize| {
+        let near = &usable[at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(usable.len())];
+        let row = usable[at];
+        let others = near.iter().filter(|other| **other != row).map(|other| residual[*other]).collect();
+        let (low, high) = near.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), other| {
+            (low.min(simulated[*other]), high.max(simulated[*other]))
+        });
+        median(others).map(|median| (row, residual[row] - median, high - low))
+    };
+    (0..usable.len()).filter_map(judge).collect()
+}
+
+/// Rows on a coarse comb: the step between distinct values is a noticeable part of the spread between neighbours.
+fn quantised(scene: &Scene) -> usize {
+    let mut values: Vec<f64> =
+        scene.recorded().iter().zip(scene.usable()).filter(|(_, usable)| **usable).map(|(x, _)| *x).collect();
+    let rows = values.len();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    if rows > 200 && values.len() * 20 < rows { rows } else { 0 }
+}
+
+/// The median of finite values.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

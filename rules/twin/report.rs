@@ -1,0 +1,150 @@
+//! The diagnosis as JSON (`diagnosis/1`) and as rows.
+
+use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Fits, Missing, Quality, Rows, Shift};
+use super::locate::{Condition, Onset, Region, Span};
+use serde_json::{Map, Value, json};
+use std::fmt::Write as _;
+
+/// Significant digits of a printed number.
+const DIGITS: usize = 6;
+
+/// A finite number with six significant digits, so that the text does not depend on the last bits.
+fn number(x: f64) -> Value {
+    if !x.is_finite() {
+        return Value::Null;
+    }
+    let rounded: f64 = format!("{x:.*e}", DIGITS - 1).parse().unwrap_or(x);
+    json!(rounded)
+}
+
+fn optional(x: Option<f64>) -> Value {
+    x.map_or(Value::Null, number)
+}
+
+/// The whole diagnosis.
+#[must_use]
+pub fn to_json(diagnosis: &Diagnosis) -> Value {
+    let faults = diagnosis.data_quality.iter();
+    json!({
+        "schema": "diagnosis/1",
+        "output": diagnosis.output,
+        "unit": diagnosis.unit,
+        "verdict": diagnosis.verdict.word(),
+        "summary": diagnosis.summary,
+        "fit": diagnosis.fit.as_ref().map_or(Value::Null, fits),
+        "mismatch": diagnosis.mismatch.iter().map(region).collect::<Vec<_>>(),
+        "missing": diagnosis.missing.iter().map(missing).collect::<Vec<_>>(),
+        "alternatives": diagnosis.alternatives.iter().map(alternative).collect::<Vec<_>>(),
+        "baseline_shift": diagnosis.baseline_shift.iter().map(shift).collect::<Vec<_>>(),
+        "data_quality": faults.map(|f| json!({ "fault": f.fault, "column": f.column, "rows": f.rows })).collect::<Vec<_>>(),
+        "next_experiment": diagnosis.next_experiment.as_ref().map_or(Value::Null, experiment),
+    })
+}
+
+fn fits(fits: &Fits) -> Value {
+    let quality = |q: &Quality| json!({ "rmse": number(q.rmse), "held_out_rmse": optional(q.held_out_rmse) });
+    json!({
+        "rows": fits.rows,
+        "runs": fits.runs,
+        "held_out_runs": fits.held_out_runs,
+        "noise_floor": number(fits.noise_floor),
+        "before": quality(&fits.before),
+        "after": quality(&fits.after),
+    })
+}
+
+fn region(region: &Region) -> Value {
+    let mut object = Map::new();
+    object.insert("share".to_owned(), number(region.share));
+    object.insert("mean".to_owned(), number(region.mean));
+    object.insert("conditions".to_owned(), region.conditions.iter().map(condition).collect());
+    object.insert("spans".to_owned(), region.spans.iter().map(span).collect());
+    if let Some(onset) = &region.onset {
+        object.insert("onset".to_owned(), onset_value(onset));
+    }
+    Value::Object(object)
+}
+
+fn condition(condition: &Condition) -> Value {
+    match condition {
+        Condition::Range { column, min, max } => {
+            json!({ "column": column, "min": optional(*min), "max": optional(*max) })
+        }
+        Condition::Equals { column, words } => json!({ "column": column, "equals": words }),
+    }
+}
+
+fn span(span: &Span) -> Value {
+    json!({ "run": span.run, "from_s": span.from_s, "to_s": span.to_s })
+}
+
+fn onset_value(onset: &Onset) -> Value {
+    json!({ "run": onset.run, "time_s": onset.time_s, "low_s": onset.low_s, "high_s": onset.high_s })
+}
+
+fn missing(missing: &Missing) -> Value {
+    json!({
+        "effect": missing.effect,
+        "statement": missing.statement,
+        "equation": missing.equation,
+        "parameters": missing.parameters.iter().map(estimate).collect::<Vec<_>>(),
+        "delta_ic": number(missing.delta_ic),
+        "p_value": number(missing.p_value),
+        "held_out_rmse_before": optional(missing.held_out_rmse_before),
+        "held_out_rmse_after": optional(missing.held_out_rmse_after),
+        "absorbed_share": number(missing.absorbed_share),
+    })
+}
+
+fn estimate(e: &Estimate) -> Value {
+    json!({ "name": e.name, "value": number(e.value), "low": number(e.low), "high": number(e.high), "unit": e.unit })
+}
+
+fn alternative(other: &Alternative) -> Value {
+    json!({
+        "effect": other.effect,
+        "instead_of": other.instead_of,
+        "delta_ic": number(other.delta_ic),
+        "separating_experiment": other.separating_experiment,
+    })
+}
+
+fn shift(shift: &Shift) -> Value {
+    json!({ "parameter": shift.parameter, "before": number(shift.before), "after": number(shift.after) })
+}
+
+fn experiment(experiment: &Experiment) -> Value {
+    json!({
+        "statement": experiment.statement,
+        "minutes": number(experiment.minutes),
+        "expected_delta_ic": number(experiment.expected_delta_ic),
+        "effect": experiment.effect,
+    })
+}
+
+/// The rows as CSV: time, run, recorded, simulated before and after, contribution of each added effect.
+#[must_use]
+pub fn rows_csv(scene_time_s: &[f64], runs: &[String], recorded: &[Option<f64>], rows: &Rows) -> String {
+    let mut text = String::from("time_s,run,recorded,simulated_before,simulated_after");
+    for (kind, _) in &rows.effects {
+        let _ = write!(text, ",effect_{kind}");
+    }
+    text.push('\n');
+    let cell = |x: Option<f64>| x.map(|x| number(x).to_string()).unwrap_or_default();
+    for row in 0..scene_time_s.len() {
+        let at = |values: &[Option<f64>]| cell(values.get(row).copied().flatten());
+        let run = runs.get(row).map_or("", String::as_str);
+        let _ = write!(text, "{},{},{}", scene_time_s[row], quoted(run), at(recorded));
+        let _ = write!(text, ",{},{}", at(&rows.simulated_before), at(&rows.simulated_after));
+        let known = rows.simulated_after.get(row).copied().flatten().is_some();
+        for (_, values) in &rows.effects {
+            let _ = write!(text, ",{}", cell(values.get(row).copied().filter(|_| known)));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}

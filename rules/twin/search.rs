@@ -1,0 +1,192 @@
+//! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
+
+use super::designs::Design;
+use super::fit::{Data, Fit, fit};
+use super::gate::p_value;
+use super::model::Part;
+use super::noise::count;
+use super::scan::{Score, price, scan};
+
+/// Effects that may be found at once.
+const EFFECTS_MAX: usize = 4;
+/// Kinds that are fitted in full after a scan.
+const FITTED_SINGLES: usize = 10;
+/// Leaders on top of which the whole catalogue is scanned again.
+const LEADERS: usize = 4;
+/// Partners fitted in full per leader.
+const PARTNERS: usize = 3;
+/// Information a further effect must bring.
+const STEP_INFORMATION: f64 = 6.0;
+/// The p-value that a finding must not exceed.
+pub const P_MAX: f64 = 0.02;
+
+/// A set of effects on top of the baseline, fitted together with it.
+#[derive(Clone)]
+pub struct Hypothesis {
+    /// Indices of the designs.
+    pub members: Vec<usize>,
+    /// The joint fit; the members are its last parts, in order.
+    pub fit: Fit,
+    /// Gain over the baseline in information units, freedom paid for.
+    pub information: f64,
+}
+
+/// What a search found.
+pub struct Found {
+    /// The accepted hypothesis; no members when nothing passed the gate.
+    pub best: Hypothesis,
+    /// The p-value of each member, in order of acceptance.
+    pub p_values: Vec<f64>,
+    /// Other hypotheses that were fitted in full, best first.
+    pub others: Vec<Hypothesis>,
+    /// The p-value of the best hypothesis that was refused, when nothing was accepted.
+    pub refused_p: Option<f64>,
+}
+
+/// A search in progress.
+pub struct Search<'a, 'b> {
+    /// The recording.
+    pub data: &'a mut Data<'b>,
+    /// The baseline fitted alone.
+    pub base: &'a Fit,
+    /// Every hypothesis.
+    pub designs: &'a [Design],
+    /// Logarithm of the number of independent rows.
+    pub ln_rows: f64,
+    /// Seed of the resampling.
+    pub seed: u64,
+    tried: Vec<Hypothesis>,
+}
+
+impl<'a, 'b> Search<'a, 'b> {
+    /// A search that has not begun.
+    #[must_use]
+    pub fn new(data: &'a mut Data<'b>, base: &'a Fit, designs: &'a [Design], seed: u64) -> Self {
+        let rows = count(data.frame.len());
+        let ln_rows = (rows / base.noise.inflation()).max(20.0).ln();
+        Self { data, base, designs, ln_rows, seed, tried: Vec::new() }
+    }
+
+    /// Runs the search.
+    #[must_use]
+    pub fn run(mut self) -> Found {
+        let mut best = Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 };
+        let mut p_values = Vec::new();
+        let mut refused_p = None;
+        while best.members.len() < EFFECTS_MAX {
+            let Some(next) = self.grow(&best) else { break };
+            let needed = if best.members.is_empty() { 0.0 } else { STEP_INFORMATION };
+            if next.information < best.information + needed {
+                break;
+            }
+            let p = self.gate(&best, &next);
+            if p > P_MAX {
+                refused_p = best.members.is_empty().then_some(p);
+                break;
+            }
+            let added = next.members.len().saturating_sub(best.members.len());
+            p_values.extend(std::iter::repeat_n(p, added));
+            best = self.swapped(next);
+        }
+        let best = self.pruned(best);
+        self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
+        p_values.truncate(best.members.len());
+        Found { best, p_values, others: self.tried, refused_p }
+    }
+
+    /// The best hypothesis with one more member, or two where two are better than one.
+    fn grow(&mut self, from: &Hypothesis) -> Option<Hypothesis> {
+        let singles = self.extend(from, FITTED_SINGLES);
+        let mut best = singles.first()?.clone();
+        if from.members.len() + 2 <= EFFECTS_MAX {
+            for leader in singles.iter().take(LEADERS) {
+                for pair in self.extend(leader, PARTNERS) {
+                    if pair.information > best.information.max(singles[0].information + STEP_INFORMATION) {
+                        best = pair;
+                    }
+                }
+            }
+        }
+        Some(best)
+    }
+
+    /// The fully fitted extensions of a hypothesis by one design, best first: the best form of each of the `most`
+    /// likeliest kinds.
+    fn extend(&mut self, from: &Hypothesis, most: usize) -> Vec<Hypothesis> {
+        let mut scores = scan(&from.fit, self.data.frame, self.designs, self.ln_rows);
+        scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
+        let mut kinds: Vec<&str> = from.members.iter().map(|member| self.designs[*member].kind.as_str()).collect();
+        let mut chosen: Vec<&Score> = Vec::new();
+        for score in &scores {
+            let kind = self.designs[score.design].kind.as_str();
+            if chosen.len() < most && score.gain.is_finite() && !kinds.contains(&kind) {
+                kinds.push(kind);
+                chosen.push(score);
+            }
+        }
+        let mut fitted: Vec<Hypothesis> = chosen.iter().filter_map(|score| self.with(from, score.design)).collect();
+        fitted.sort_by(|a, b| b.information.total_cmp(&a.information));
+        self.tried.extend(fitted.iter().cloned());
+        fitted
+    }
+
+    fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
+        let mut parts = from.fit.parts.clone();
+        parts.push(self.designs[design].part.clone());
+        let mut members = from.members.clone();
+        members.push(design);
+        self.fitted(members, &parts, from.fit.noise)
+    }
+
+    fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
+        let fit = fit(self.data, parts, noise)?;
+        let prices: f64 = members.iter().map(|member| price(&self.designs[*member], self.ln_rows)).sum();
+        let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - prices;
+        information.is_finite().then_some(Hypothesis { members, fit, information })
+    }
+
+    fn gate(&self, from: &Hypothesis, next: &Hypothesis) -> f64 {
+        let innovations = next.fit.innovations(self.data.frame);
+        p_value(&from.fit, self.data.frame, self.designs, &innovations, next.fit.noise, self.ln_rows, self.seed)
+    }
+
+    /// Replaces members one by one where another explains more beside the rest.
+    fn swapped(&mut self, mut best: Hypothesis) -> Hypothesis {
+        for position in 0..best.members.len() {
+            if best.members.len() < 2 {
+                break;
+            }
+            let Some(rest) = self.without(&best, position) else { continue };
+            for other in self.extend(&rest, PARTNERS) {
+                if other.information > best.information + 1.0 {
+                    best = other;
+                }
+            }
+        }
+        best
+    }
+
+    fn without(&mut self, from: &Hypothesis, position: usize) -> Option<Hypothesis> {
+        let mut members = from.members.clone();
+        members.remove(position);
+        let first = from.fit.parts.len() - from.members.len();
+        let mut parts = from.fit.parts.clone();
+        parts.remove(first + position);
+        self.fitted(members, &parts, from.fit.noise)
+    }
+
+    /// Drops members that have become superfluous.
+    fn pruned(&mut self, mut best: Hypothesis) -> Hypothesis {
+        let mut position = 0;
+        while best.members.len() > 1 && position < best.members.len() {
+            match self.without(&best, position) {
+                Some(less) if less.information + STEP_INFORMATION > best.information => {
+                    best = less;
+                    position = 0;
+                }
+                _ => position += 1,
+            }
+        }
+        best
+    }
+}

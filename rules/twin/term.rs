@@ -1,0 +1,105 @@
+//! Terms of a `linear` part: a column, `one`, a power, a sign, an absolute value or a delay of a column.
+
+use crate::physics::Scene;
+use crate::physics::state::delayed;
+
+/// One term.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    text: String,
+    law: Law,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Law {
+    One,
+    Column(String),
+    Power(String, i32),
+    Sign(String),
+    Abs(String),
+    Delay(String, f64),
+}
+
+impl Term {
+    /// Parses `one`, `column`, `column^2`, `column^3`, `sign(column)`, `abs(column)` or `delay(column, 0.5)`.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let trimmed = text.trim();
+        let law = if trimmed == "one" {
+            Law::One
+        } else if let Some((column, power)) = trimmed.split_once('^') {
+            let power = power.trim().parse().ok().filter(|power| [2, 3].contains(power));
+            Law::Power(name(column)?, power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?)
+        } else if let Some(inside) = call(trimmed, "sign") {
+            Law::Sign(name(inside)?)
+        } else if let Some(inside) = call(trimmed, "abs") {
+            Law::Abs(name(inside)?)
+        } else if let Some(inside) = call(trimmed, "delay") {
+            let (column, delay) =
+                inside.split_once(',').ok_or_else(|| format!("{text}: write delay(column, seconds)"))?;
+            let delay = delay.trim().parse().ok().filter(|delay: &f64| delay.is_finite());
+            Law::Delay(name(column)?, delay.ok_or_else(|| format!("{text}: the delay must be a number of seconds"))?)
+        } else {
+            Law::Column(name(trimmed)?)
+        };
+        Ok(Self { text: trimmed.to_owned(), law })
+    }
+
+    /// As written.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The column it reads; `None` for `one`.
+    #[must_use]
+    pub fn input(&self) -> Option<&str> {
+        match &self.law {
+            Law::One => None,
+            Law::Column(name) | Law::Power(name, _) | Law::Sign(name) | Law::Abs(name) | Law::Delay(name, _) => {
+                Some(name)
+            }
+        }
+    }
+
+    /// Its values, `None` when the column is missing.
+    #[must_use]
+    pub fn column(&self, scene: &Scene) -> Option<Vec<f64>> {
+        let Some(input) = self.input() else { return Some(vec![1.0; scene.rows()]) };
+        let values = scene.column(input)?;
+        Some(match &self.law {
+            Law::One | Law::Column(_) => values.to_vec(),
+            Law::Power(_, power) => values.iter().map(|x| x.powi(*power)).collect(),
+            Law::Sign(_) => values.iter().map(|x| if *x == 0.0 { 0.0 } else { x.signum() }).collect(),
+            Law::Abs(_) => values.iter().map(|x| x.abs()).collect(),
+            Law::Delay(_, delay_s) => delayed(scene, values, *delay_s),
+        })
+    }
+}
+
+fn call<'a>(text: &'a str, function: &str) -> Option<&'a str> {
+    text.strip_prefix(function)?.trim_start().strip_prefix('(')?.strip_suffix(')')
+}
+
+fn name(text: &str) -> Result<String, String> {
+    let text = text.trim();
+    let fine = !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
+    if fine { Ok(text.to_owned()) } else { Err(format!("{text:?} is not the name of a column")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_of_the_contract_is_understood() {
+        for text in ["one", "velocity_m_s", "a^2", "a^3", "sign(a)", "abs(a)", "delay(a, 0.5)"] {
+            assert!(Term::parse(text).is_ok(), "{text}");
+        }
+        for text in ["a^4", "sin(a)", "delay(a)", ""] {
+            assert!(Term::parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! The verdict: names, intervals, alternatives, regions, the next experiment, and the sentence for the machinist.
+
+use super::diagnose::{Case, Outcome, ordinary_noise};
+use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
+use super::fit::Fit;
+use super::locate::{Region, region};
+use super::model::{Body, Model, Part};
+use crate::physics::effect;
+
+/// Information within which two explanations cannot be told apart.
+const CLASS_INFORMATION: f64 = 6.0;
+/// Normal quantile of a 95 % interval.
+const INTERVAL: f64 = 1.96;
+
+/// The diagnosis of a recording that does not suffice.
+#[must_use]
+pub fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
+    Diagnosis {
+        output: case.model.output.clone(),
+        unit: unit_of(&case.model.output).to_owned(),
+        verdict: Verdict::CannotTell,
+        summary: format!("Cannot tell: this needs {needed}."),
+        fit: None,
+        mismatch: Vec::new(),
+        missing: Vec::new(),
+        alternatives: Vec::new(),
+        baseline_shift: Vec::new(),
+        data_quality: case.faults.clone(),
+        next_experiment: Some(Experiment {
+            statement: format!("Record {needed}."),
+            minutes: 10.0,
+            expected_delta_ic: 0.0,
+            effect: String::new(),
+        }),
+        rows: Rows::default(),
+        model: case.model.clone(),
+        debug: String::new(),
+    }
+}
+
+/// The diagnosis of a completed search.
+#[must_use]
+pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
+    let missing = missing(case, &outcome);
+    let alternatives = alternatives(&outcome);
+    let verdict = outcome.verdict(!alternatives.is_empty());
+    let mismatch = regions(case, &outcome);
+    let unit = unit_of(&case.model.output).to_owned();
+    let mut diagnosis = Diagnosis {
+        output: case.model.output.clone(),
+        verdict,
+        summary: String::new(),
+        fit: Some(outcome.fits.clone()),
+        mismatch,
+        baseline_shift: if missing.is_empty() { Vec::new() } else { shifts(case, &outcome) },
+        missing,
+        next_experiment: experiment(&outcome, &alternatives),
+        alternatives,
+        data_quality: case.faults.clone(),
+        model: extended(case, outcome.last()),
+        debug: debug(&outcome),
+        rows: outcome.rows,
+        unit,
+    };
+    diagnosis.summary = super::words::summary(&diagnosis);
+    diagnosis
+}
+
+/// The unit at the end of a channel's name, as a symbol.
+#[must_use]
+pub fn unit_of(output: &str) -> &'static str {
+    let units = [
+        ("_mm_min", "mm/min"),
+        ("_counts", "counts"),
+        ("_pct", "%"),
+        ("_rpm", "rpm"),
+        ("_um", "um"),
+        ("_mm", "mm"),
+        ("_nm", "N m"),
+        ("_kw", "kW"),
+        ("_w", "W"),
+        ("_a", "A"),
+        ("_v", "V"),
+        ("_n", "N"),
+        ("_c", "°C"),
+        ("_m", "m"),
+    ];
+    units.iter().find(|(suffix, _)| output.ends_with(suffix)).map_or("1", |(_, unit)| *unit)
+}
+
+fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
+    if let Some(unknown) = &outcome.unknown {
+        let part = &unknown.fit.parts[case.parts.len()];
+        let mut found = vec![described(case, outcome, &unknown.fit, part, case.parts.len())];
+        found[0].delta_ic = unknown.information;
+        found[0].p_value = unknown.p_value;
+        found[0].held_out_rmse_before = outcome.fits.before.held_out_rmse;
+        found[0].held_out_rmse_after = outcome.fits.after.held_out_rmse;
+        return found;
+    }
+    let best = outcome.found.best.clone();
+    let first = case.parts.len();
+    let mut found: Vec<Missing> = Vec::new();
+    for position in 0..best.members.len() {
+        let mut missing = described(case, outcome, &best.fit, &best.fit.parts[first + position], first + position);
+        missing.p_value = outcome.found.p_values.get(position).copied().unwrap_or(super::search::P_MAX);
+        let without = if best.members.len() == 1 { None } else { case.without(&best, position) };
+        let fit = without.map_or_else(|| outcome.base.clone(), |without| without.fit);
+        missing.delta_ic = 2.0 * (best.fit.log_likelihood - fit.log_likelihood)
+            - super::scan::price(&outcome.designs[best.members[position]], case.ln_rows(&outcome.base));
+        missing.held_out_rmse_before =
+            case.predict(&fit).and_then(|prediction| case.quality(&prediction).held_out_rmse);
+        missing.held_out_rmse_after = outcome.fits.after.held_out_rmse;
+        found.push(missing);
+    }
+    found.sort_by(|a, b| b.delta_ic.total_cmp(&a.delta_ic));
+    found
+}
+
+/// A missing effect with its texts and parameters.
+fn described(case: &Case<'_>, outcome: &Outcome, fit: &Fit, part: &Part, index: usize) -> Missing {
+    let (statement, equation) = texts(part);
+    Missing {
+        effect: part.label().to_owned(),
+        statement,
+        equation,
+        parameters: estimates(case, fit, index),
+        delta_ic: 0.0,
+        p_value: 1.0,
+        held_out_rmse_before: None,
+        held_out_rmse_after: None,
+        absorbed_share: absorbed(case, outcome, index - case.parts.len()),
+    }
+}
+
+fn texts(part: &Part) -> (String, String) {
+    match &part.body {
+        Body::Empirical(form) => (
+            "Something real that no effect of the catalogue explains; described by its shape only".to_owned(),
+            form.equation(),
+        ),
+        Body::Expression(expression) => ("The user's hypothesis".to_owned(), expression.text().to_owned()),
+        Body::Effect(effect, form) => {
+            let place = form.place.as_ref().map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
+            (format!("{}{place}", effect.doc().en.statement), effect.doc().law.to_owned())
+        }
+        Body::Linear(_) | Body::Table(_) => (part.kind.clone(), part.kind.clone()),
+    }
+}
+
+fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
+    let covariance = fit.covariance(&case.frame);
+    let unit = unit_of(&case.model.output);
+    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
+    of_part
+        .map(|(index, free)| {
+            let parameter = &fit.parts[part].parameters[free.parameter];
+            let half = INTERVAL * covariance[index][index].max(0.0).sqrt();
+            Estimate {
+                name: parameter.name.clone(),
+                value: parameter.value,
+                low: (parameter.value - half).max(parameter.range.0),
+                high: (parameter.value + half).min(parameter.range.1),
+                unit: parameter.unit.replace("output", unit),
+            }
+        })
+        .collect()
+}
+
+/// Share of a contribution's variance that the baseline can imitate.
+fn absorbed(case: &Case<'_>, outcome: &Outcome, position: usize) -> f64 {
+    let Some((_, contribution)) = outcome.added.get(position) else { return 0.0 };
+    let reduced = case.frame.reduce(contribution);
+    let whole = super::linear::dot(&reduced, &reduced);
+    let left = super::linear::least_squares(&outcome.base.tangent, &reduced).rss;
+    if whole > 0.0 { (1.0 - left / whole).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Explanations within the class of the best: one member replaced by another kind.
+fn alternatives(outcome: &Outcome) -> Vec<Alternative> {
+    let best = &outcome.found.best;
+    let kind = |member: &usize| outcome.designs[*member].kind.as_str();
+    let mut kinds: Vec<&str> = best.members.iter().map(kind).collect();
+    if outcome.unknown.is_some() {
+        return kinds.iter().map(|name| alternative(name, "unknown", 0.0)).collect();
+    }
+    let mut all: Vec<Alternative> = Vec::new();
+    for other in &outcome.found.others {
+        let delta = best.information - other.information;
+        if other.members.len() != best.members.len() || delta > CLASS_INFORMATION {
+            continue;
+        }
+        let theirs: Vec<&str> = other.members.iter().map(kind).collect();
+        let gone: Vec<&str> = kinds.iter().copied().filter(|name| !theirs.contains(name)).collect();
+        let new: Vec<&str> = theirs.iter().copied().filter(|name| !kinds.contains(name)).collect();
+        if let ([gone], [new]) = (gone.as_slice(), new.as_slice())
+            && !all.iter().any(|known| known.effect == *new && known.instead_of == *gone)
+        {
+            all.push(alternative(new, gone, delta.max(0.0)));
+        }
+    }
+    kinds.clear();
+    all
+}
+
+fn alternative(other: &str, instead_of: &str, delta_ic: f64) -> Alternative {
+    let experiment = effect(other).or_else(|| effect(instead_of)).map_or("", |effect| effect.doc().en.experiment);
+    Alternative {
+        effect: other.to_owned(),
+        instead_of: instead_of.to_owned(),
+        delta_ic,
+        separating_experiment: experiment.to_owned(),
+    }
+}
+
+fn experiment(outcome: &Outcome, alternatives: &[Alternative]) -> Option<Experiment> {
+    let closest = alternatives.first()?;
+    let doc = effect(&closest.effect).or_else(|| effect(&closest.instead_of))?.doc();
+    Some(Experiment {
+        statement: doc.en.experiment.to_owned(),
+        minutes: doc.experiment_minutes,
+        expected_delta_ic: outcome.found.best.information.clamp(10.0, 100.0),
+        effect: doc.kind.to_owned(),
+    })
+}
+
+/// One region per added effect, the largest share first.
+fn regions(case: &Case<'_>, outcome: &Outcome) -> Vec<Region> {
+    let squares: f64 = outcome.added.iter().flat_map(|(_, values)| values).map(|x| x * x).sum();
+    let mut regions: Vec<Region> =
+        outcome.added.iter().map(|(_, values)| region(&case.scene, values, squares)).collect();
+    regions.retain(|region| !region.spans.is_empty());
+    regions.sort_by(|a, b| b.share.total_cmp(&a.share));
+    regions
+}
+
+fn shifts(case: &Case<'_>, outcome: &Outcome) -> Vec<Shift> {
+    let after = outcome.last();
+    let pairs = outcome.base.parts.iter().zip(&after.parts).take(case.parts.len());
+    pairs
+        .flat_map(|(before, after)| {
+            before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed).map(|(b, a)| Shift {
+                parameter: format!("{}.{}", before.label(), b.name),
+                before: b.value,
+                after: a.value,
+            })
+        })
+        .collect()
+}
+
+/// The model with what was found, refitted.
+fn extended(case: &Case<'_>, fit: &Fit) -> Model {
+    Model { parts: fit.parts.clone(), ..case.model.clone() }
+}
+
+/// The noise floor of a fit.
+#[must_use]
+pub fn noise_floor(fit: &Fit) -> f64 {
+    ordinary_noise(fit)
+}
+
+/// The leading hypotheses with their information.
+fn debug(outcome: &Outcome) -> String {
+    let name =
+        |members: &[usize]| members.iter().map(|m| outcome.designs[*m].kind.as_str()).collect::<Vec<_>>().join("+");
+    let best = &outcome.found.best;
+    let others = outcome.found.others.iter().take(8).map(|h| format!("{} {:.1}", name(&h.members), h.information));
+    let others: Vec<String> = others.collect();
+    let unknown =
+        outcome.unknown.as_ref().map(|u| format!("; unknown {:.1} p {}", u.information, u.p_value)).unwrap_or_default();
+    let noise = (outcome.base.noise, best.fit.noise);
+    let refused = outcome.found.refused_p;
+    format!(
+        "{} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
+        name(&best.members),
+        best.information,
+        outcome.found.p_values,
+        noise.0.phi,
+        noise.0.theta,
+        noise.1.phi,
+        noise.1.theta,
+        others.join(", ")
+    )
+}

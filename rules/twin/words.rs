@@ -1,0 +1,68 @@
+//! The diagnosis in plain words.
+
+use super::diagnosis::{Diagnosis, Verdict};
+use super::locate::Condition;
+
+/// One or two sentences for the machinist.
+#[must_use]
+pub fn summary(diagnosis: &Diagnosis) -> String {
+    let names: Vec<String> = diagnosis.missing.iter().map(|missing| missing.effect.replace('_', " ")).collect();
+    let fit = improvement(diagnosis);
+    match diagnosis.verdict {
+        Verdict::NoMismatch => "The recording agrees with the model: nothing remains beyond the noise.".to_owned(),
+        Verdict::CannotTell => diagnosis.summary.clone(),
+        Verdict::Unexplained => {
+            format!(
+                "Something real is missing from the model, and nothing in the catalogue explains it{}. {fit}",
+                region(diagnosis)
+            )
+        }
+        Verdict::Explained => format!("The model lacks {}{}. {fit}", names.join(" and "), region(diagnosis)),
+        Verdict::Ambiguous => {
+            let others: Vec<String> =
+                diagnosis.alternatives.iter().map(|other| other.effect.replace('_', " ")).collect();
+            format!(
+                "Something is missing from the model{}: most likely {}, but this recording cannot rule out {}. {fit}",
+                region(diagnosis),
+                names.join(" and "),
+                others.join(", ")
+            )
+        }
+    }
+}
+
+fn improvement(diagnosis: &Diagnosis) -> String {
+    let Some(fit) = &diagnosis.fit else { return String::new() };
+    let unit = &diagnosis.unit;
+    match (fit.before.held_out_rmse, fit.after.held_out_rmse) {
+        (Some(before), Some(after)) => {
+            format!(
+                "On runs that took no part in fitting the error falls from {before:.3} to {after:.3} {unit}; the noise is {:.3} {unit}.",
+                fit.noise_floor
+            )
+        }
+        _ => format!("The error falls from {:.3} to {:.3} {unit}.", fit.before.rmse, fit.after.rmse),
+    }
+}
+
+fn region(diagnosis: &Diagnosis) -> String {
+    let Some(first) = diagnosis.mismatch.first() else { return String::new() };
+    let conditions: Vec<String> = first.conditions.iter().map(condition).collect();
+    let place = if conditions.is_empty() { String::new() } else { format!(", where {}", conditions.join(" and ")) };
+    let since = first.onset.as_ref().map(|onset| format!(", since run {} at {:.0} s", onset.run, onset.time_s));
+    format!("{place}{} (on average {:+.3} {})", since.unwrap_or_default(), first.mean, diagnosis.unit)
+}
+
+/// A condition in words.
+#[must_use]
+pub fn condition(condition: &Condition) -> String {
+    match condition {
+        Condition::Range { column, min: Some(min), max: Some(max) } => {
+            format!("{column} is between {min:.3} and {max:.3}")
+        }
+        Condition::Range { column, min: Some(min), max: None } => format!("{column} is above {min:.3}"),
+        Condition::Range { column, min: None, max: Some(max) } => format!("{column} is below {max:.3}"),
+        Condition::Range { column, .. } => format!("{column} has any value"),
+        Condition::Equals { column, words } => format!("{column} is {}", words.join(" or ")),
+    }
+}
