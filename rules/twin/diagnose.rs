@@ -11,6 +11,7 @@ use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::{Arma, count};
 use super::quality::{Fault, clean, median};
+use super::scan::Bank;
 use super::search::{Found, Hypothesis, P_MAX, Search};
 use super::verdicts;
 use crate::physics::Scene;
@@ -110,7 +111,9 @@ impl<'a> Case<'a> {
         // Candidates see the load and the output that the fitted baseline simulates.
         let _ = simulate(&base.parts, &mut self.scene);
         let designs = designs(&self.scene, &self.frame, self.model);
-        let found = self.with_data(|data| Search::new(data, base, &designs, seed).run());
+        let frame = self.frame.clone();
+        let bank = Bank::new(&designs, &frame);
+        let found = self.with_data(|data| Search::new(data, base, &bank, seed).run());
         (found, designs)
     }
 
@@ -153,21 +156,21 @@ impl<'a> Case<'a> {
     fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
         let _ = simulate(&found.best.fit.parts, &mut self.scene);
         let designs = empirical_designs(&self.scene, &self.frame);
-        let on_top = self.best_empirical(&found.best.fit, &designs)?;
+        let frame = self.frame.clone();
+        let bank = Bank::new(&designs, &frame);
+        let on_top = self.best_empirical(&found.best.fit, &bank)?;
         let needed = UNKNOWN_SHARE * found.best.information;
         if on_top.information < needed.max(6.0) {
             return None;
         }
-        let innovations = on_top.fit.innovations(&self.frame);
-        let ln_rows = self.ln_rows(base);
-        let p = p_value(&found.best.fit, &self.frame, &designs, &innovations, on_top.fit.noise, ln_rows, seed);
+        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed);
         let size = distance(&found.best.fit.residual, &on_top.fit.residual);
         let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len());
         let small = size < SIZE_DEVIATIONS * ordinary_noise(&on_top.fit) && size < SIZE_SHARE * mean;
         if p > P_MAX || small {
             return None;
         }
-        let alone = if found.best.members.is_empty() { on_top } else { self.best_empirical(base, &designs)? };
+        let alone = if found.best.members.is_empty() { on_top } else { self.best_empirical(base, &bank)? };
         Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
     }
 
@@ -178,9 +181,10 @@ impl<'a> Case<'a> {
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    fn best_empirical(&mut self, from: &Fit, designs: &[Design]) -> Option<Hypothesis> {
+    fn best_empirical(&mut self, from: &Fit, bank: &Bank<'_>) -> Option<Hypothesis> {
         let ln_rows = self.ln_rows(from);
-        let scores = super::scan::scan(from, &self.frame, designs, ln_rows);
+        let designs = bank.designs;
+        let scores = bank.scan(from, ln_rows);
         let best = scores
             .iter()
             .filter(|score| score.information.is_finite())

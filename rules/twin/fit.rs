@@ -3,13 +3,11 @@
 use super::frame::Frame;
 use super::linear::{Solution, dot, least_squares};
 use super::model::{Part, simulate};
-use super::noise::{Arma, count, log_likelihood, whiten};
+use super::noise::{Arma, count, whiten};
 use crate::physics::{Entry, Scene};
 
 /// Gauss-Newton steps at most, per noise model.
 const STEPS_MAX: usize = 8;
-/// Rounds of fitting parameters and noise in turn.
-const ALTERNATIONS: usize = 2;
 /// Standard deviation of the weak prior on a baseline parameter, as a multiple of its nominal size.
 const PRIOR_SPREAD: f64 = 3.0;
 
@@ -68,23 +66,12 @@ pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
 
 fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
     let mut state = State::new(data, nominal.to_vec())?;
-    let mut noise = start;
-    for _ in 0..ALTERNATIONS {
-        state.descend(data, nominal, noise)?;
-        noise = super::noise::fit(&state.residual, &data.frame.stretches);
-    }
+    state.descend(data, nominal, start)?;
+    let (_, noise) = super::noise::fit_near(&state.residual, &data.frame.stretches, start);
     state.descend(data, nominal, noise)?;
-    let innovations = whiten(&state.residual, &data.frame.stretches, noise);
-    let rss = dot(&innovations, &innovations);
+    let (log_likelihood, noise) = super::noise::fit_near(&state.residual, &data.frame.stretches, noise);
     let tangent = tangent(data, &state.parts, &state.free)?;
-    Some(Fit {
-        log_likelihood: log_likelihood(rss, data.frame.len(), data.frame.stretches.len(), noise),
-        parts: state.parts,
-        free: state.free,
-        noise,
-        residual: state.residual,
-        tangent,
-    })
+    Some(Fit { log_likelihood, parts: state.parts, free: state.free, noise, residual: state.residual, tangent })
 }
 
 impl Fit {
@@ -142,7 +129,7 @@ impl State {
                 break;
             }
             (self.parts, self.residual, cost) = (parts, residual, new_cost);
-            if gained < 1e-7 * cost {
+            if gained < 3e-6 * cost {
                 break;
             }
         }
@@ -228,26 +215,33 @@ pub fn residual(data: &mut Data<'_>, parts: &[Part]) -> Option<Vec<f64>> {
 /// Derivatives of the simulated output by each free parameter, per group.
 pub fn tangent(data: &mut Data<'_>, parts: &[Part], free: &[Free]) -> Option<Vec<Vec<f64>>> {
     let base = simulate(parts, data.scene)?.total;
-    let coupled = parts.iter().any(Part::acts_on_output);
-    let mut columns = Vec::with_capacity(free.len());
-    let mut known: Option<(usize, Vec<(String, Vec<f64>)>)> = None;
-    for free in free {
-        let part = &parts[free.part];
-        let parameter = &part.parameters[free.parameter];
-        let direct = parameter.entry == Entry::Linear && !part.is_cut() && (!coupled || part.acts_on_output());
-        if direct {
-            if known.as_ref().is_none_or(|(index, _)| *index != free.part) {
-                known = Some((free.part, part.columns(data.scene)?));
-            }
-            let (_, part_columns) = known.as_ref()?;
-            let column = part_columns.iter().find(|(name, _)| *name == parameter.name);
-            columns.push(column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column)));
-        } else {
-            columns.push(difference(data, parts, *free, &base)?);
-            simulate(parts, data.scene)?;
+    let direct = |free: &Free| is_direct(parts, *free);
+    let mut columns = vec![Vec::new(); free.len()];
+    // The direct columns first: they read the load and output that were just simulated.
+    for (index, part) in parts.iter().enumerate() {
+        if !free.iter().any(|free| free.part == index && direct(free)) {
+            continue;
+        }
+        let known = part.columns(data.scene)?;
+        for (position, free) in free.iter().enumerate().filter(|(_, free)| free.part == index && direct(free)) {
+            let name = &part.parameters[free.parameter].name;
+            let column = known.iter().find(|(known, _)| known == name);
+            columns[position] = column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column));
         }
     }
+    for (position, free) in free.iter().enumerate().filter(|(_, free)| !direct(free)) {
+        columns[position] = difference(data, parts, *free, &base)?;
+    }
     Some(columns)
+}
+
+/// Is the derivative simply the part's own column? Not where other parts read what this one simulates.
+fn is_direct(parts: &[Part], free: Free) -> bool {
+    let part = &parts[free.part];
+    let linear = part.parameters[free.parameter].entry == Entry::Linear;
+    let coupled = parts.iter().any(Part::acts_on_output) && !part.acts_on_output();
+    let load_read = part.is_cut() && parts.iter().any(Part::reads_load);
+    linear && !coupled && !load_read
 }
 
 fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &[f64]) -> Option<Vec<f64>> {

@@ -147,6 +147,15 @@ impl Part {
         )
     }
 
+    /// Does it read the load that the cut simulates?
+    #[must_use]
+    pub fn reads_load(&self) -> bool {
+        match &self.body {
+            Body::Effect(effect, _) => !self.is_cut() && effect.doc().needs.iter().any(|need| need.contains("load")),
+            _ => false,
+        }
+    }
+
     /// Is it the cut, whose contribution is the load for the others?
     #[must_use]
     pub fn is_cut(&self) -> bool {

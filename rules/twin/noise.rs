@@ -111,10 +111,27 @@ pub fn fit(residual: &[f64], stretches: &[Range<usize>]) -> Arma {
     refine(best, score).1
 }
 
+/// The noise of residuals near a known one, with its log-likelihood: the start, a few of the grid, refined.
+#[must_use]
+pub fn fit_near(residual: &[f64], stretches: &[Range<usize>], start: Arma) -> (f64, Arma) {
+    let score = |noise: Arma| {
+        let e = whiten(residual, stretches, noise);
+        log_likelihood(dot(&e, &e), residual.len(), stretches.len(), noise)
+    };
+    let mut best = (score(start), start);
+    for noise in GRID.iter().step_by(3) {
+        let score = score(*noise);
+        if score > best.0 {
+            best = (score, *noise);
+        }
+    }
+    refine(best, score)
+}
+
 /// Pattern search with shrinking steps around a start.
 pub fn refine(mut best: (f64, Arma), score: impl Fn(Arma) -> f64) -> (f64, Arma) {
     let mut step = 0.1;
-    while step > 0.004 {
+    while step > 0.01 {
         let Arma { phi, theta } = best.1;
         // Memory close to one needs steps in proportion to what is left.
         let d_phi = step * (1.0 - phi).max(0.02);

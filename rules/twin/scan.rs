@@ -1,13 +1,27 @@
 //! Scanning: how much each hypothesis explains on top of a fit, the fit's own parameters moving along.
+//!
+//! Columns are whitened once per noise setting and kept; on top of any fit only inner products are needed.
 
 use super::designs::Design;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
 use super::noise::{Arma, count, log_likelihood, whiten};
+use std::cell::OnceCell;
 
 /// Share of a column's length that must lie outside what the fit can absorb: below it the hypothesis leaves no trace.
 const VISIBLE_SHARE: f64 = 2e-3;
+/// Noise settings at which hypotheses are compared in a first pass.
+const SETTINGS: [Arma; 8] = [
+    Arma { phi: 0.0, theta: 0.0 },
+    Arma { phi: 0.5, theta: 0.0 },
+    Arma { phi: 0.75, theta: -0.25 },
+    Arma { phi: 0.88, theta: -0.25 },
+    Arma { phi: 0.9, theta: -0.6 },
+    Arma { phi: 0.96, theta: -0.4 },
+    Arma { phi: 0.97, theta: -0.8 },
+    Arma { phi: 0.985, theta: -0.93 },
+];
 
 /// What a hypothesis explains on top of a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,96 +40,149 @@ pub fn price(design: &Design, ln_rows: f64) -> f64 {
     count(design.freedom) * ln_rows + 2.0 * design.ln_choices
 }
 
-/// Noise models at which hypotheses are compared in a first pass: the fit's own, and less memory, because an effect
-/// that is missing looks like memory.
-fn settings(noise: Arma) -> Vec<Arma> {
-    let mut settings = vec![noise];
-    let shorter = [Arma::WHITE, Arma { phi: 0.5, theta: 0.0 }, Arma { phi: 0.85, theta: -0.5 }];
-    settings.extend(shorter.into_iter().filter(|other| other.inflation() < noise.inflation() || other.phi < noise.phi));
-    settings
+/// Every hypothesis, whitened at the settings that have been asked for.
+pub struct Bank<'a> {
+    /// The hypotheses.
+    pub designs: &'a [Design],
+    frame: &'a Frame,
+    whitened: [OnceCell<Vec<White>>; SETTINGS.len()],
 }
 
-/// Scores every design on top of `fit`.
-#[must_use]
-pub fn scan(fit: &Fit, frame: &Frame, designs: &[Design], ln_rows: f64) -> Vec<Score> {
-    let mut best: Vec<f64> = vec![f64::NEG_INFINITY; designs.len()];
-    for noise in settings(fit.noise) {
-        let stage = Stage::new(fit, frame, noise);
-        for (design, best) in designs.iter().zip(&mut best) {
-            let rss = stage.rss - stage.explained(frame, design);
-            let likelihood = log_likelihood(rss, frame.len(), frame.stretches.len(), noise);
-            *best = best.max(2.0 * (likelihood - fit.log_likelihood));
-        }
+/// A design at one setting: whitened columns and their inner products.
+struct White {
+    columns: Vec<Vec<f64>>,
+    gram: Vec<Vec<f64>>,
+}
+
+impl<'a> Bank<'a> {
+    /// A bank that has whitened nothing yet.
+    #[must_use]
+    pub fn new(designs: &'a [Design], frame: &'a Frame) -> Self {
+        Self { designs, frame, whitened: std::array::from_fn(|_| OnceCell::new()) }
     }
-    let score = |(index, gain): (usize, f64)| Score {
-        design: index,
-        gain,
-        information: gain - price(&designs[index], ln_rows),
-    };
-    best.into_iter().enumerate().map(score).collect()
+
+    fn at(&self, setting: usize) -> &[White] {
+        self.whitened[setting].get_or_init(|| {
+            let one = |design: &Design| {
+                let white = |column: &Vec<f64>| whiten(column, &self.frame.stretches, SETTINGS[setting]);
+                let columns: Vec<Vec<f64>> = design.columns.iter().map(white).collect();
+                let gram = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
+                White { columns, gram }
+            };
+            self.designs.iter().map(one).collect()
+        })
+    }
+
+    /// The setting at which the fit's residual is likeliest.
+    #[must_use]
+    pub fn nearest(&self, fit: &Fit) -> usize {
+        let likelihood = |noise: Arma| {
+            let e = whiten(&fit.residual, &self.frame.stretches, noise);
+            log_likelihood(dot(&e, &e), self.frame.len(), self.frame.stretches.len(), noise)
+        };
+        let scored = SETTINGS.iter().map(|noise| likelihood(*noise)).enumerate();
+        scored.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best }).0
+    }
+
+    /// Scores every design on top of `fit`: at the fit's own noise, and at less memory, because an effect that is
+    /// missing looks like memory.
+    #[must_use]
+    pub fn scan(&self, fit: &Fit, ln_rows: f64) -> Vec<Score> {
+        let own = self.nearest(fit);
+        let mut settings = vec![own, own / 2, 0];
+        settings.dedup();
+        let mut best: Vec<f64> = vec![f64::NEG_INFINITY; self.designs.len()];
+        for setting in settings {
+            let stage = self.stage(fit, setting);
+            for (index, best) in best.iter_mut().enumerate() {
+                let rss = stage.rss - self.explained(&stage, index, &stage.residual);
+                let likelihood = log_likelihood(rss, self.frame.len(), self.frame.stretches.len(), SETTINGS[setting]);
+                *best = best.max(2.0 * (likelihood - fit.log_likelihood));
+            }
+        }
+        let score = |(index, gain): (usize, f64)| Score {
+            design: index,
+            gain,
+            information: gain - price(&self.designs[index], ln_rows),
+        };
+        best.into_iter().enumerate().map(score).collect()
+    }
+
+    /// A fit seen through one setting.
+    #[must_use]
+    pub fn stage(&self, fit: &Fit, setting: usize) -> Stage {
+        let noise = SETTINGS[setting];
+        let mut basis = Vec::new();
+        for column in &fit.tangent {
+            extend_basis(&mut basis, whiten(column, &self.frame.stretches, noise), 1e-7);
+        }
+        let mut residual = whiten(&fit.residual, &self.frame.stretches, noise);
+        project_out(&basis, &mut residual);
+        let rss = dot(&residual, &residual);
+        let outside = self.at(setting).iter().map(|white| outside(white, &basis)).collect();
+        Stage { setting, basis, residual, rss, outside }
+    }
+
+    /// Sum of squares of `target`, which lies outside the basis, that a design explains with lawful signs.
+    #[must_use]
+    pub fn explained(&self, stage: &Stage, design: usize, target: &[f64]) -> f64 {
+        let white = &self.at(stage.setting)[design];
+        let along: Vec<f64> = white.columns.iter().map(|column| dot(column, target)).collect();
+        lawful_gain(&stage.outside[design], &along, &self.designs[design].ranges)
+    }
+
+    /// Innovations of a fit at the noise of a setting.
+    #[must_use]
+    pub fn innovations(&self, fit: &Fit, setting: usize) -> Vec<f64> {
+        whiten(&fit.residual, &self.frame.stretches, SETTINGS[setting])
+    }
+
+    /// The rows of the comparison.
+    #[must_use]
+    pub fn frame(&self) -> &Frame {
+        self.frame
+    }
 }
 
-/// A fit seen through one noise model.
+/// A fit seen through one noise setting.
 pub struct Stage {
-    noise: Arma,
+    setting: usize,
     /// Orthonormal basis of the whitened tangent.
     pub basis: Vec<Vec<f64>>,
     /// Whitened residual outside that basis.
     pub residual: Vec<f64>,
     /// Its sum of squares.
     pub rss: f64,
+    /// Per design: inner products of its columns outside the basis; a zero diagonal marks an absorbed column.
+    outside: Vec<Vec<Vec<f64>>>,
 }
 
-impl Stage {
-    /// Whitens the fit's residual and tangent.
-    #[must_use]
-    pub fn new(fit: &Fit, frame: &Frame, noise: Arma) -> Self {
-        let mut basis = Vec::new();
-        for column in &fit.tangent {
-            extend_basis(&mut basis, whiten(column, &frame.stretches, noise), 1e-7);
+/// Inner products of whitened columns with their part inside the basis taken out.
+fn outside(white: &White, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let along: Vec<Vec<f64>> = white.columns.iter().map(|column| basis.iter().map(|q| dot(q, column)).collect()).collect();
+    let size = white.columns.len();
+    let mut gram = white.gram.clone();
+    for i in 0..size {
+        for j in 0..size {
+            gram[i][j] -= dot(&along[i], &along[j]);
         }
-        let mut residual = whiten(&fit.residual, &frame.stretches, noise);
-        project_out(&basis, &mut residual);
-        let rss = dot(&residual, &residual);
-        Self { noise, basis, residual, rss }
     }
-
-    /// Orthonormal columns of a design outside the fit's basis, with the coefficients that bring them back, and which
-    /// of the design's columns they come from.
-    #[must_use]
-    pub fn outside(&self, frame: &Frame, design: &Design) -> Vec<(usize, Vec<f64>)> {
-        let mut all = Vec::new();
-        for (index, column) in design.columns.iter().enumerate() {
-            let mut white = whiten(column, &frame.stretches, self.noise);
-            let before = dot(&white, &white).sqrt();
-            project_out(&self.basis, &mut white);
-            project_out(&self.basis, &mut white);
-            let after = dot(&white, &white).sqrt();
-            if after > VISIBLE_SHARE * before && after > 0.0 {
-                all.push((index, white));
-            }
+    for i in 0..size {
+        if gram[i][i] <= VISIBLE_SHARE * VISIBLE_SHARE * white.gram[i][i] {
+            gram[i][i] = 0.0;
         }
-        all
     }
-
-    /// Sum of squares that a design explains with lawful signs.
-    #[must_use]
-    pub fn explained(&self, frame: &Frame, design: &Design) -> f64 {
-        let columns = self.outside(frame, design);
-        lawful_gain(&columns, &design.ranges, &self.residual)
-    }
+    gram
 }
 
-/// Sum of squares explained by columns whose coefficients stay within their ranges; columns that would leave theirs
-/// are dropped, worst first.
-#[must_use]
-pub fn lawful_gain(columns: &[(usize, Vec<f64>)], ranges: &[(f64, f64)], target: &[f64]) -> f64 {
-    let mut kept: Vec<&(usize, Vec<f64>)> = columns.iter().collect();
+/// Sum of squares explained by columns whose coefficients keep lawful signs; unlawful and absorbed ones are dropped.
+fn lawful_gain(gram: &[Vec<f64>], along: &[f64], ranges: &[(f64, f64)]) -> f64 {
+    let mut kept: Vec<usize> = (0..along.len()).filter(|index| gram[*index][*index] > 0.0).collect();
     while !kept.is_empty() {
-        let (coefficients, gain) = solve_small(&kept, target);
-        let outside = kept.iter().zip(&coefficients).position(|((index, _), c)| !lawful(*c, ranges[*index]));
-        match outside {
-            None => return gain,
+        let coefficients = solve(gram, along, &kept);
+        let unlawful = kept.iter().zip(&coefficients).position(|(index, c)| !lawful(*c, ranges[*index]));
+        match unlawful {
+            None => return kept.iter().zip(&coefficients).map(|(index, c)| c * along[*index]).sum(),
             Some(position) => {
                 kept.remove(position);
             }
@@ -124,17 +191,35 @@ pub fn lawful_gain(columns: &[(usize, Vec<f64>)], ranges: &[(f64, f64)], target:
     0.0
 }
 
-/// A coefficient on the lawful side of zero; the size is judged after the full fit.
+/// A coefficient on the lawful side of zero; its size is judged after the full fit.
 fn lawful(coefficient: f64, range: (f64, f64)) -> bool {
     !(range.0 >= 0.0 && coefficient < 0.0 || range.1 <= 0.0 && coefficient > 0.0)
 }
 
-fn solve_small(columns: &[&(usize, Vec<f64>)], target: &[f64]) -> (Vec<f64>, f64) {
-    if let [(_, only)] = columns {
-        let (along, size) = (dot(only, target), dot(only, only));
-        return (vec![along / size], along * along / size);
+/// Solves the normal equations of the kept columns by Cholesky; a column that adds nothing gets a coefficient of zero.
+fn solve(gram: &[Vec<f64>], along: &[f64], kept: &[usize]) -> Vec<f64> {
+    let size = kept.len();
+    let mut lower = vec![vec![0.0; size]; size];
+    let mut forward = vec![0.0; size];
+    for i in 0..size {
+        for j in 0..=i {
+            let mut sum = gram[kept[i]][kept[j]];
+            for k in 0..j {
+                sum -= lower[i][k] * lower[j][k];
+            }
+            if i == j {
+                lower[i][i] = if sum > 1e-9 * gram[kept[i]][kept[i]] { sum.sqrt() } else { 0.0 };
+            } else if lower[j][j] > 0.0 {
+                lower[i][j] = sum / lower[j][j];
+            }
+        }
+        let sum: f64 = (0..i).map(|k| lower[i][k] * forward[k]).sum();
+        forward[i] = if lower[i][i] > 0.0 { (along[kept[i]] - sum) / lower[i][i] } else { 0.0 };
     }
-    let plain: Vec<Vec<f64>> = columns.iter().map(|(_, column)| column.clone()).collect();
-    let solution = super::linear::least_squares(&plain, target);
-    (solution.coefficients, dot(target, target) - solution.rss)
+    let mut solution = vec![0.0; size];
+    for i in (0..size).rev() {
+        let sum: f64 = (i + 1..size).map(|k| lower[k][i] * solution[k]).sum();
+        solution[i] = if lower[i][i] > 0.0 { (forward[i] - sum) / lower[i][i] } else { 0.0 };
+    }
+    solution
 }

@@ -1,20 +1,19 @@
 //! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
 
-use super::designs::Design;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
 use super::noise::count;
-use super::scan::{Score, price, scan};
+use super::scan::{Bank, Score, price};
 
 /// Effects that may be found at once.
 const EFFECTS_MAX: usize = 4;
 /// Kinds that are fitted in full after a scan.
-const FITTED_SINGLES: usize = 10;
+const FITTED_SINGLES: usize = 6;
 /// Leaders on top of which the whole catalogue is scanned again.
-const LEADERS: usize = 4;
+const LEADERS: usize = 3;
 /// Partners fitted in full per leader.
-const PARTNERS: usize = 3;
+const PARTNERS: usize = 2;
 /// Information a further effect must bring.
 const STEP_INFORMATION: f64 = 6.0;
 /// The p-value that a finding must not exceed.
@@ -50,7 +49,7 @@ pub struct Search<'a, 'b> {
     /// The baseline fitted alone.
     pub base: &'a Fit,
     /// Every hypothesis.
-    pub designs: &'a [Design],
+    pub bank: &'a Bank<'a>,
     /// Logarithm of the number of independent rows.
     pub ln_rows: f64,
     /// Seed of the resampling.
@@ -61,10 +60,10 @@ pub struct Search<'a, 'b> {
 impl<'a, 'b> Search<'a, 'b> {
     /// A search that has not begun.
     #[must_use]
-    pub fn new(data: &'a mut Data<'b>, base: &'a Fit, designs: &'a [Design], seed: u64) -> Self {
+    pub fn new(data: &'a mut Data<'b>, base: &'a Fit, bank: &'a Bank<'a>, seed: u64) -> Self {
         let rows = count(data.frame.len());
         let ln_rows = (rows / base.noise.inflation()).max(20.0).ln();
-        Self { data, base, designs, ln_rows, seed, tried: Vec::new() }
+        Self { data, base, bank, ln_rows, seed, tried: Vec::new() }
     }
 
     /// Runs the search.
@@ -113,12 +112,12 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The fully fitted extensions of a hypothesis by one design, best first: the best form of each of the `most`
     /// likeliest kinds.
     fn extend(&mut self, from: &Hypothesis, most: usize) -> Vec<Hypothesis> {
-        let mut scores = scan(&from.fit, self.data.frame, self.designs, self.ln_rows);
+        let mut scores = self.bank.scan(&from.fit, self.ln_rows);
         scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
-        let mut kinds: Vec<&str> = from.members.iter().map(|member| self.designs[*member].kind.as_str()).collect();
+        let mut kinds: Vec<&str> = from.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect();
         let mut chosen: Vec<&Score> = Vec::new();
         for score in &scores {
-            let kind = self.designs[score.design].kind.as_str();
+            let kind = self.bank.designs[score.design].kind.as_str();
             if chosen.len() < most && score.gain.is_finite() && !kinds.contains(&kind) {
                 kinds.push(kind);
                 chosen.push(score);
@@ -132,7 +131,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
         let mut parts = from.fit.parts.clone();
-        parts.push(self.designs[design].part.clone());
+        parts.push(self.bank.designs[design].part.clone());
         let mut members = from.members.clone();
         members.push(design);
         self.fitted(members, &parts, from.fit.noise)
@@ -140,14 +139,13 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
-        let prices: f64 = members.iter().map(|member| price(&self.designs[*member], self.ln_rows)).sum();
+        let prices: f64 = members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum();
         let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - prices;
         information.is_finite().then_some(Hypothesis { members, fit, information })
     }
 
     fn gate(&self, from: &Hypothesis, next: &Hypothesis) -> f64 {
-        let innovations = next.fit.innovations(self.data.frame);
-        p_value(&from.fit, self.data.frame, self.designs, &innovations, next.fit.noise, self.ln_rows, self.seed)
+        p_value(self.bank, &from.fit, &next.fit, self.ln_rows, self.seed)
     }
 
     /// Replaces members one by one where another explains more beside the rest.
