@@ -226,7 +226,8 @@ pub fn tangent(data: &mut Data<'_>, parts: &[Part], free: &[Free]) -> Option<Vec
         for (position, free) in free.iter().enumerate().filter(|(_, free)| free.part == index && direct(free)) {
             let name = &part.parameters[free.parameter].name;
             let column = known.iter().find(|(known, _)| known == name);
-            columns[position] = column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column));
+            columns[position] =
+                column.map_or_else(|| vec![0.0; data.frame.len()], |(_, column)| data.frame.reduce(column));
         }
     }
     for (position, free) in free.iter().enumerate().filter(|(_, free)| !direct(free)) {

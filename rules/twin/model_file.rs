@@ -444,7 +444,7 @@ fn write_part(part: &Part) -> String {
         }
         Body::Empirical(form) => {
             let expression = quoted(&form.expression());
-            text = format!("\n[[effect]]\nkind = \"expression\"\nname = \"unknown\"\n");
+            text = "\n[[effect]]\nkind = \"expression\"\nname = \"unknown\"\n".to_owned();
             text.push_str(&format!("expression = {expression}\nparameters = {{ {numbers} }}\n"));
         }
         Body::Effect(_, form) => {

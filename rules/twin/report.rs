@@ -131,10 +131,10 @@ pub fn rows_csv(scene_time_s: &[f64], runs: &[String], recorded: &[Option<f64>],
     }
     text.push('\n');
     let cell = |x: Option<f64>| x.map(|x| number(x).to_string()).unwrap_or_default();
-    for row in 0..scene_time_s.len() {
+    for (row, time_s) in scene_time_s.iter().enumerate() {
         let at = |values: &[Option<f64>]| cell(values.get(row).copied().flatten());
         let run = runs.get(row).map_or("", String::as_str);
-        let _ = write!(text, "{},{},{}", scene_time_s[row], quoted(run), at(recorded));
+        let _ = write!(text, "{time_s},{},{}", quoted(run), at(recorded));
         let _ = write!(text, ",{},{}", at(&rows.simulated_before), at(&rows.simulated_after));
         let known = rows.simulated_after.get(row).copied().flatten().is_some();
         for (_, values) in &rows.effects {

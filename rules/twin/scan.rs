@@ -2,6 +2,8 @@
 //!
 //! Columns are whitened once per noise setting and kept; on top of any fit only inner products are needed.
 
+#![expect(clippy::needless_range_loop, reason = "matrix arithmetic reads better with indices")]
+
 use super::designs::Design;
 use super::fit::Fit;
 use super::frame::Frame;
@@ -159,7 +161,8 @@ pub struct Stage {
 
 /// Inner products of whitened columns with their part inside the basis taken out.
 fn outside(white: &White, basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let along: Vec<Vec<f64>> = white.columns.iter().map(|column| basis.iter().map(|q| dot(q, column)).collect()).collect();
+    let along: Vec<Vec<f64>> =
+        white.columns.iter().map(|column| basis.iter().map(|q| dot(q, column)).collect()).collect();
     let size = white.columns.len();
     let mut gram = white.gram.clone();
     for i in 0..size {
