@@ -107,6 +107,7 @@ fn campaign() {
     println!("{}", score::tally::table(&outcomes));
     println!("{}", score::tally::by_effect(&outcomes));
     println!("{}", real::table());
+    println!("{}", score::endurance::million_rows());
     println!("not right, kept below {}:", score::tool::workshop().0.display());
     println!("{}", score::tally::failures(&outcomes));
 }
@@ -118,6 +119,8 @@ fn short() {
     let outcomes = score::run(&floors::sample(), 2);
     println!("{}", score::tally::table(&outcomes));
     println!("{}", score::tally::failures(&outcomes));
+    score::endurance::same_twice().expect("the same question gives the same bytes");
     let low = floors::missed(&outcomes);
-    assert!(low.is_empty(), "below the floor:\n{}", low.join("\n"));
+    assert!(low.is_empty(), "below the floor:\n{}\ncases in {}", low.join("\n"), score::tool::workshop().0.display());
+    score::tool::clear();
 }

@@ -64,3 +64,10 @@ pub(crate) fn keep(case: &Case) -> PathBuf {
     }
     given.join(&case.group).join(&case.name)
 }
+
+/// Removes everything that this process wrote.
+pub(crate) fn clear() {
+    let root = workshop().0.parent().map(Path::to_path_buf).unwrap_or_default();
+    // A folder that is left behind costs disk space only.
+    let _ = std::fs::remove_dir_all(root);
+}
