@@ -36,7 +36,7 @@ impl Expression {
         engine.set_max_string_size(1024);
         engine.set_max_array_size(64);
         engine.set_max_map_size(64);
-        let ast = engine.compile_expression(text).map_err(|error| error.to_string())?;
+        let ast = engine.compile_expression(without_ternaries(text)).map_err(|error| error.to_string())?;
         let inputs = identifiers(text).into_iter().filter(|name| !parameters.contains(name)).collect();
         Ok(Self { text: text.to_owned(), engine: Arc::new(engine), ast: Arc::new(ast), inputs })
     }
@@ -82,6 +82,80 @@ fn number(value: Result<rhai::Dynamic, Box<EvalAltResult>>) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
+/// The expression with every `condition ? a : b` written as rhai's `if condition { a } else { b }`.
+fn without_ternaries(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    // Inside out: every bracketed group is translated by itself, what remains has no brackets that matter.
+    while let Some(open) = rest.find(['(', '[']) {
+        let Some(close) = closing(rest, open) else { break };
+        out.push_str(&rest[..=open]);
+        let inside: Vec<String> = split_top(&rest[open + 1..close], ',').into_iter().map(without_ternaries).collect();
+        out.push_str(&inside.join(","));
+        out.push_str(&rest[close..=close]);
+        rest = &rest[close + 1..];
+    }
+    out.push_str(rest);
+    choice(&out)
+}
+
+/// Translates the choice at the top level, if there is one.
+fn choice(text: &str) -> String {
+    let Some(question) = top(text).find(|(at, c)| *c == '?' && is_choice(text, *at)).map(|(at, _)| at) else {
+        return text.to_owned();
+    };
+    let after = &text[question + 1..];
+    let mut open = 0;
+    for (at, c) in top(after) {
+        match c {
+            '?' if is_choice(after, at) => open += 1,
+            ':' if open == 0 => {
+                let (condition, yes, no) = (&text[..question], choice(&after[..at]), choice(&after[at + 1..]));
+                return format!("if {condition} {{ {yes} }} else {{ {no} }}");
+            }
+            ':' => open -= 1,
+            _ => {}
+        }
+    }
+    text.to_owned()
+}
+
+/// `??`, `?.` and `?[` are other operators.
+fn is_choice(text: &str, at: usize) -> bool {
+    let next = text[at + 1..].chars().next();
+    let before = text[..at].chars().next_back();
+    !matches!(next, Some('?' | '.' | '[')) && before != Some('?')
+}
+
+/// Characters outside every bracket.
+fn top(text: &str) -> impl Iterator<Item = (usize, char)> + '_ {
+    let mut depth = 0_i32;
+    text.char_indices().filter(move |(_, c)| {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth -= 1,
+            _ => {}
+        }
+        depth == 0
+    })
+}
+
+fn closing(text: &str, open: usize) -> Option<usize> {
+    top(&text[open..]).map(|(at, _)| open + at).find(|at| *at >= open && text[*at..].starts_with([')', ']']))
+}
+
+fn split_top(text: &str, separator: char) -> Vec<&str> {
+    let mut parts = Vec::new();
+    let mut start = 0;
+    let cuts: Vec<usize> = top(text).filter(|(_, c)| *c == separator).map(|(at, _)| at).collect();
+    for cut in cuts {
+        parts.push(&text[start..cut]);
+        start = cut + separator.len_utf8();
+    }
+    parts.push(&text[start..]);
+    parts
+}
+
 /// Names in the text that are not called as functions and are not literals.
 fn identifiers(text: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
@@ -116,6 +190,16 @@ mod tests {
         let text = "k * abs(axis_velocity_mm_min) * (ambient_temperature_c < 15.0 ? 1.0 : 0.0)";
         let got = Expression::compile(text, &["k".to_owned()]).expect("compiles");
         assert_eq!(got.inputs(), ["axis_velocity_mm_min", "ambient_temperature_c"]);
+    }
+
+    #[test]
+    fn choices_are_written_as_rhai_writes_them() {
+        let got = without_ternaries("k * (a < 1.0 ? 1.0 : b > 2.0 ? max(a, b ? c : d) : 0.0)");
+        assert_eq!(
+            got,
+            "k * (if a < 1.0  {  1.0  } else { if  b > 2.0  {  max(a,if  b  {  c  } else {  d })  } else {  0.0 } })"
+        );
+        assert_eq!(without_ternaries("a ?? b"), "a ?? b");
     }
 
     #[test]

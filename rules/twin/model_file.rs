@@ -501,7 +501,7 @@ mod tests {
             "line 7: flank_wear.k = -1 is outside",
             "no parameter q",
             "line 8: fixed",
-            "rolls; did you mean roles?",
+            "unknown key rolls in the model; did you mean roles?",
         ] {
             assert!(all.contains(wanted), "{wanted} in:\n{all}");
         }
