@@ -1,12 +1,15 @@
 //! What the box remembers: samples as compressed column blocks, everything else as ordinary tables, in one `SQLite` file.
-#![allow(dead_code, reason = "the reader that uses these parts follows")]
 
 mod block;
 mod commit;
 mod compact;
 mod error;
+mod export;
+mod ffi;
 mod house;
+mod info;
 mod keeper;
+mod list;
 mod lock;
 mod mailbox;
 mod options;
@@ -24,14 +27,19 @@ mod rows;
 mod schema;
 mod series;
 mod space;
+mod sql;
 mod status;
 mod tail;
 mod thread;
+mod vtab;
 mod walk;
 mod writer;
 
 pub use block::{Cells, NumberCells, Summary, WordCells};
 pub use error::HistoryError;
+pub use export::Format;
+pub use info::{Dropped, Info, TableRows};
+pub use list::{AlarmEntry, Span, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};
@@ -39,6 +47,7 @@ pub use reader::Reader;
 pub use reason::Reasons;
 pub use record::{Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, Record, StateChange};
 pub use rounding::rounded;
+pub use rusqlite::types::Value as SqlValue;
 pub use series::{Series, decimals_of_unit};
 pub use space::{DiskRoom, disk_room};
 pub use status::Status;

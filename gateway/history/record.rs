@@ -1,9 +1,10 @@
 //! What is remembered besides samples: one struct per kind, one row each.
 
 use adapters::clock::TimeNs;
+use serde::Serialize;
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Event {
     /// When.
     pub at_ns: TimeNs,
@@ -18,7 +19,7 @@ pub struct Event {
 }
 
 /// An alarm that begins. Raising one that is already raised counts up and changes nothing else.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Alarm {
     /// When it was raised.
     pub at_ns: TimeNs,
@@ -35,7 +36,7 @@ pub struct Alarm {
 }
 
 /// An alarm that ends.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct AlarmClear {
     /// When it was cleared.
     pub at_ns: TimeNs,
@@ -46,7 +47,7 @@ pub struct AlarmClear {
 }
 
 /// The machine enters a state; the one before ends at this moment.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct StateChange {
     /// Since when.
     pub at_ns: TimeNs,
@@ -59,7 +60,7 @@ pub struct StateChange {
 }
 
 /// A finished part or cycle.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Part {
     /// Beginning of the cycle.
     pub began_ns: TimeNs,
@@ -80,7 +81,7 @@ pub struct Part {
 }
 
 /// What a script wanted, and what the gate made of it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Decision {
     /// The tick.
     pub at_ns: TimeNs,
@@ -103,7 +104,7 @@ pub struct Decision {
 }
 
 /// A command to the machine, as sent and as read back.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Command {
     /// When it was sent.
     pub at_ns: TimeNs,
@@ -130,7 +131,7 @@ pub struct Command {
 }
 
 /// A model in force from now on.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Model {
     /// Since when.
     pub at_ns: TimeNs,
@@ -143,7 +144,7 @@ pub struct Model {
 }
 
 /// A finished diagnosis.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Diagnosis {
     /// When it was finished.
     pub at_ns: TimeNs,

@@ -106,6 +106,14 @@ fn explain(path: &Path, error: rusqlite::Error) -> HistoryError {
     }
 }
 
+/// Notes the size limit, for those who only read.
+pub(crate) fn note_limit(db: &Connection, max_bytes: u64) -> Result<(), HistoryError> {
+    let max_bytes = i64::try_from(max_bytes).unwrap_or(i64::MAX);
+    db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES ('max_bytes', ?1)", [max_bytes])
+        .map(drop)
+        .doing("noting the size limit")
+}
+
 /// Gives every series its number, creating what is new.
 pub(crate) fn register(db: &mut Connection, series: &mut [Series]) -> Result<(), HistoryError> {
     let registering = db.transaction().doing("registering the series")?;

@@ -1,11 +1,12 @@
 //! How the writer is doing, for the page, metrics and the health check.
 
 use adapters::clock::TimeNs;
+use serde::Serialize;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// A moment's figures.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Status {
     /// Samples up to and including this time survive a power cut; `None` before the first commit.
     pub acknowledged_through_ns: Option<TimeNs>,

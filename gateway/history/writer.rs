@@ -49,6 +49,7 @@ impl Writer {
         let mut db = schema::open_for_writing(path)?;
         let mut series = stored_series(&options)?;
         schema::register(&mut db, &mut series)?;
+        schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover(&mut db)?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(Shared::default());

@@ -1,4 +1,5 @@
 //! The history of the box: what goes in comes out, whatever happens in between.
 
 mod machine;
+mod questions;
 mod round_trip;

@@ -1,0 +1,88 @@
+//! A time range as CSV.
+
+use super::super::error::{HistoryError, at};
+use super::super::info::utc;
+use super::super::query::{Chunk, Query};
+use super::super::reader::Reader;
+use super::{Plan, RUN, run_text};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Writes gzipped CSV.
+pub(super) fn write_gzip(
+    reader: &Reader,
+    query: &Query,
+    plan: &Plan,
+    out: impl Write,
+    path: &Path,
+) -> Result<u64, HistoryError> {
+    let mut gzip = GzEncoder::new(out, Compression::default());
+    let rows = write(reader, query, plan, &mut gzip, path)?;
+    gzip.finish().and_then(|mut out| out.flush()).map_err(at(path))?;
+    Ok(rows)
+}
+
+/// Writes CSV.
+pub(super) fn write(
+    reader: &Reader,
+    query: &Query,
+    plan: &Plan,
+    out: impl Write,
+    path: &Path,
+) -> Result<u64, HistoryError> {
+    let mut out = ::csv::Writer::from_writer(out);
+    let mut problem = out.write_record(header(plan)).err();
+    let mut rows = 0;
+    let all = Query { series: plan.names(), ..query.clone() };
+    reader.samples(&all, |chunk| {
+        for row in 0..chunk.at_ns.len() {
+            problem = problem.take().or(out.write_record(cells(plan, chunk, row)).err());
+            if problem.is_some() {
+                return ControlFlow::Break(());
+            }
+            rows += 1;
+        }
+        ControlFlow::Continue(())
+    })?;
+    match problem {
+        Some(error) => Err(at(path)(std::io::Error::other(error))),
+        None => out.flush().map(|()| rows).map_err(at(path)),
+    }
+}
+
+fn header(plan: &Plan) -> Vec<String> {
+    let mut names = vec![if plan.monotone { "time_utc" } else { "time_s" }.to_owned()];
+    if !plan.monotone && !plan.has_run() {
+        names.push(RUN.to_owned());
+    }
+    for (series, missing) in &plan.series {
+        names.push(series.name.to_string());
+        if *missing {
+            names.push(format!("{}_missing", series.name));
+        }
+    }
+    names
+}
+
+fn cells(plan: &Plan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
+    let at_ns = chunk.at_ns[row];
+    let mut cells = vec![if plan.monotone { utc(at_ns) } else { plan.seconds(at_ns).to_string() }];
+    if !plan.monotone && !plan.has_run() {
+        cells.push(run_text(chunk.segment, None));
+    }
+    for (index, (series, missing)) in plan.series.iter().enumerate() {
+        let column = &chunk.columns[index];
+        let number = column.number(row).map(|number| number.to_string());
+        let text = number.or_else(|| column.word(row).map(str::to_owned));
+        let run = !plan.monotone && &*series.name == RUN;
+        cells.push(if run { run_text(chunk.segment, text.as_deref()) } else { text.unwrap_or_default() });
+        if *missing {
+            let reason = chunk.missing(index, row).filter(|word| *word != "not_provided");
+            cells.push(reason.unwrap_or_default().to_owned());
+        }
+    }
+    cells
+}

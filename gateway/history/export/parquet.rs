@@ -1,0 +1,216 @@
+//! A time range as Parquet: one column per series, values optional, zstd.
+
+use super::super::error::{HistoryError, at};
+use super::super::options::SeriesKind;
+use super::super::query::{Chunk, Query};
+use super::super::reader::Reader;
+use super::{Plan, RUN, run_text};
+use ::parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::schema::types::{Type, TypePtr};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows of a row group: bounds the memory of an export of any length.
+const GROUP_ROWS: usize = 65_536;
+
+/// Values of one column of the running row group.
+enum Values {
+    Times(Vec<i64>),
+    Numbers(Vec<f64>, Vec<i16>),
+    Texts(Vec<ByteArray>, Vec<i16>),
+}
+
+/// Writes Parquet.
+pub(super) fn write(
+    reader: &Reader,
+    query: &Query,
+    plan: &Plan,
+    out: impl Write + Send,
+    path: &Path,
+) -> Result<u64, HistoryError> {
+    let say = |error: ParquetError| at(path)(std::io::Error::other(error));
+    let mut group = Group::new(plan);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_created_by(concat!("cnc-gateway ", env!("CARGO_PKG_VERSION")).to_owned());
+    let schema = schema(plan).map_err(say)?;
+    let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties.build())).map_err(say)?;
+    let mut problem = None;
+    let mut rows = 0;
+    reader.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
+        group.add(chunk);
+        rows += chunk.at_ns.len() as u64;
+        if group.rows >= GROUP_ROWS {
+            problem = group.write(&mut file).err();
+        }
+        if problem.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    match problem {
+        Some(error) => return Err(say(error)),
+        None if group.rows > 0 => group.write(&mut file).map_err(say)?,
+        None => {}
+    }
+    file.finish().map_err(say)?;
+    file.inner_mut().flush().map_err(at(path))?;
+    Ok(rows)
+}
+
+fn schema(plan: &Plan) -> Result<TypePtr, ParquetError> {
+    let mut fields = vec![time_field(plan)?];
+    if !plan.monotone && !plan.has_run() {
+        fields.push(text_field(RUN)?);
+    }
+    for (series, missing) in &plan.series {
+        fields.push(match series.kind {
+            SeriesKind::Number => number_field(&series.name)?,
+            SeriesKind::Text => text_field(&series.name)?,
+        });
+        if *missing {
+            fields.push(text_field(&format!("{}_missing", series.name))?);
+        }
+    }
+    Type::group_type_builder("recording").with_fields(fields).build().map(Arc::new)
+}
+
+fn time_field(plan: &Plan) -> Result<TypePtr, ParquetError> {
+    let field = if plan.monotone {
+        let utc = LogicalType::timestamp(true, TimeUnit::NANOS);
+        Type::primitive_type_builder("time_utc", Physical::INT64).with_logical_type(Some(utc))
+    } else {
+        Type::primitive_type_builder("time_s", Physical::DOUBLE)
+    };
+    field.with_repetition(Repetition::REQUIRED).build().map(Arc::new)
+}
+
+fn number_field(name: &str) -> Result<TypePtr, ParquetError> {
+    Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::OPTIONAL).build().map(Arc::new)
+}
+
+fn text_field(name: &str) -> Result<TypePtr, ParquetError> {
+    Type::primitive_type_builder(name, Physical::BYTE_ARRAY)
+        .with_logical_type(Some(LogicalType::String))
+        .with_repetition(Repetition::OPTIONAL)
+        .build()
+        .map(Arc::new)
+}
+
+/// The running row group.
+struct Group<'a> {
+    plan: &'a Plan,
+    columns: Vec<Values>,
+    rows: usize,
+}
+
+impl<'a> Group<'a> {
+    fn new(plan: &'a Plan) -> Self {
+        Self { plan, columns: empty(plan), rows: 0 }
+    }
+
+    fn add(&mut self, chunk: &Chunk<'_>) {
+        self.rows += chunk.at_ns.len();
+        let mut columns = self.columns.iter_mut();
+        // The columns stand in the order of the schema, so each series finds its own next.
+        let mut fill = |cell: &dyn Fn(usize) -> Cell| {
+            if let Some(values) = columns.next() {
+                (0..chunk.at_ns.len()).for_each(|row| values.push(cell(row)));
+            }
+        };
+        let plan = self.plan;
+        if plan.monotone {
+            fill(&|row| Cell::Time(chunk.at_ns[row]));
+        } else {
+            fill(&|row| Cell::Number(Some(plan.seconds(chunk.at_ns[row]))));
+        }
+        if !plan.monotone && !plan.has_run() {
+            fill(&|_| Cell::Text(Some(run_text(chunk.segment, None))));
+        }
+        for (index, (series, missing)) in plan.series.iter().enumerate() {
+            let column = &chunk.columns[index];
+            match series.kind {
+                SeriesKind::Number => fill(&|row| Cell::Number(column.number(row))),
+                SeriesKind::Text if !plan.monotone && &*series.name == RUN => {
+                    fill(&|row| Cell::Text(Some(run_text(chunk.segment, column.word(row)))));
+                }
+                SeriesKind::Text => fill(&|row| Cell::Text(column.word(row).map(str::to_owned))),
+            }
+            if *missing {
+                let reason = |row| chunk.missing(index, row).filter(|word| *word != "not_provided");
+                fill(&|row| Cell::Text(reason(row).map(str::to_owned)));
+            }
+        }
+    }
+
+    fn write<W: Write + Send>(&mut self, file: &mut SerializedFileWriter<W>) -> Result<(), ParquetError> {
+        let mut group = file.next_row_group()?;
+        for values in &self.columns {
+            let Some(column) = group.next_column()? else { break };
+            match values {
+                Values::Times(times) => put::<Int64Type>(column, times, None)?,
+                Values::Numbers(numbers, levels) => put::<DoubleType>(column, numbers, self.levels(levels))?,
+                Values::Texts(texts, levels) => put::<ByteArrayType>(column, texts, self.levels(levels))?,
+            }
+        }
+        group.close()?;
+        (self.columns, self.rows) = (empty(self.plan), 0);
+        Ok(())
+    }
+
+    /// The levels of an optional column; the required `time_s` keeps none.
+    fn levels<'b>(&self, levels: &'b [i16]) -> Option<&'b [i16]> {
+        (!levels.is_empty()).then_some(levels)
+    }
+}
+
+enum Cell {
+    Time(i64),
+    Number(Option<f64>),
+    Text(Option<String>),
+}
+
+impl Values {
+    fn push(&mut self, cell: Cell) {
+        match (self, cell) {
+            (Self::Times(times), Cell::Time(at_ns)) => times.push(at_ns),
+            (Self::Numbers(numbers, levels), Cell::Number(number)) => {
+                levels.push(i16::from(number.is_some()));
+                numbers.extend(number);
+            }
+            (Self::Texts(texts, levels), Cell::Text(text)) => {
+                levels.push(i16::from(text.is_some()));
+                texts.extend(text.as_deref().map(ByteArray::from));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn empty(plan: &Plan) -> Vec<Values> {
+    let texts = || Values::Texts(Vec::new(), Vec::new());
+    let numbers = || Values::Numbers(Vec::new(), Vec::new());
+    let mut columns = vec![if plan.monotone { Values::Times(Vec::new()) } else { numbers() }];
+    if !plan.monotone && !plan.has_run() {
+        columns.push(texts());
+    }
+    for (series, missing) in &plan.series {
+        columns.push(if series.kind == SeriesKind::Number { numbers() } else { texts() });
+        if *missing {
+            columns.push(texts());
+        }
+    }
+    columns
+}
+
+fn put<T: DataType>(
+    mut column: SerializedColumnWriter<'_>,
+    values: &[T::T],
+    levels: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    column.typed::<T>().write_batch(values, levels, None)?;
+    column.close()
+}

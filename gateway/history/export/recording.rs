@@ -1,0 +1,88 @@
+//! A time range as a recording in memory, for `diagnose`, `identify` and back-tests.
+
+use super::super::error::HistoryError;
+use super::super::options::SeriesKind;
+use super::super::query::{Chunk, Query};
+use super::super::reader::Reader;
+use super::{Plan, RUN, run_text};
+use adapters::Recording;
+use adapters::recording::{Cells, Numbers, Words};
+use std::ops::ControlFlow;
+
+/// Columns under construction.
+struct Building<'a> {
+    plan: &'a Plan,
+    time_s: Vec<f64>,
+    columns: Vec<Cells>,
+    /// Reasons of absence, where a series has any.
+    missing: Vec<Option<Words>>,
+    runs: Words,
+}
+
+impl Reader {
+    /// The answer to `query` as a recording: the series as columns, `<series>_missing` beside those with absent values.
+    ///
+    /// # Errors
+    /// [`HistoryError::Question`] when there are no rows, and what [`Reader::samples`] says.
+    pub fn recording(&self, query: &Query) -> Result<Recording, HistoryError> {
+        let plan = self.plan(query)?;
+        let mut building = Building::new(&plan);
+        self.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
+            building.add(chunk);
+            ControlFlow::Continue(())
+        })?;
+        Ok(building.finish(self.path.display().to_string()))
+    }
+}
+
+impl<'a> Building<'a> {
+    fn new(plan: &'a Plan) -> Self {
+        let empty = |kind| match kind {
+            SeriesKind::Number => Cells::Numbers(Numbers::default()),
+            SeriesKind::Text => Cells::Words(Words::default()),
+        };
+        Self {
+            plan,
+            time_s: Vec::new(),
+            columns: plan.series.iter().map(|(series, _)| empty(series.kind)).collect(),
+            missing: plan.series.iter().map(|(_, missing)| missing.then(Words::default)).collect(),
+            runs: Words::default(),
+        }
+    }
+
+    fn add(&mut self, chunk: &Chunk<'_>) {
+        let plan = self.plan;
+        self.time_s.extend(chunk.at_ns.iter().map(|at_ns| plan.seconds(*at_ns)));
+        let run = plan.series.iter().position(|(series, _)| &*series.name == RUN);
+        for row in 0..chunk.at_ns.len() {
+            if !plan.monotone {
+                let run = run.and_then(|index| chunk.columns[index].word(row));
+                self.runs.push(&run_text(chunk.segment, run));
+            }
+            for (index, column) in self.columns.iter_mut().enumerate() {
+                match column {
+                    Cells::Numbers(numbers) => numbers.push(chunk.columns[index].number(row)),
+                    Cells::Words(words) => words.push(chunk.columns[index].word(row).unwrap_or("")),
+                }
+                if let Some(words) = &mut self.missing[index] {
+                    words.push(chunk.missing(index, row).filter(|word| *word != "not_provided").unwrap_or(""));
+                }
+            }
+        }
+    }
+
+    fn finish(self, source: String) -> Recording {
+        let start_ns = self.plan.monotone.then_some(self.plan.first_ns);
+        let mut recording = Recording::new(source, self.time_s, start_ns);
+        for ((series, _), (cells, missing)) in self.plan.series.iter().zip(self.columns.into_iter().zip(self.missing)) {
+            recording.set_column(&series.name, cells);
+            if let Some(words) = missing {
+                recording.set_column(&format!("{}_missing", series.name), Cells::Words(words));
+            }
+        }
+        if !self.plan.monotone {
+            recording.set_column(RUN, Cells::Words(self.runs));
+        }
+        recording
+    }
+}

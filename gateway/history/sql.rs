@@ -1,0 +1,48 @@
+//! A statement of the user's own, over the tables, the views and all samples.
+
+use super::error::{Doing, HistoryError};
+use super::ffi;
+use super::reader::Reader;
+use super::schema;
+use rusqlite::hooks::{AuthAction, AuthContext, Authorization};
+use rusqlite::types::Value;
+use std::ops::ControlFlow;
+
+impl Reader {
+    /// Runs one statement that reads. Besides the tables and views of the file there is `samples`: one row per tick with
+    /// `at_ns`, `time_utc`, `segment` and a column per series. `each` gets the names of the columns and one row.
+    ///
+    /// # Errors
+    /// [`HistoryError::Question`] with what `SQLite` says of the statement.
+    pub fn sql(
+        &self,
+        statement: &str,
+        mut each: impl FnMut(&[String], &[Value]) -> ControlFlow<()>,
+    ) -> Result<(), HistoryError> {
+        let say = |error: rusqlite::Error| {
+            HistoryError::Question(format!(
+                "{error}. The table samples has one row per tick; the other tables are those of the file."
+            ))
+        };
+        let mut db = schema::open_for_reading(&self.path)?;
+        ffi::load(&db, &self.path).doing("preparing the table samples")?;
+        db.authorizer(Some(only_this_file)).doing("preparing to read only this file")?;
+        let mut statement = db.prepare(statement).map_err(say)?;
+        let names: Vec<String> = statement.column_names().map(str::to_owned).collect();
+        let mut rows = statement.query([]).map_err(say)?;
+        while let Some(row) = rows.next().map_err(say)? {
+            let values: Result<Vec<Value>, _> = (0..names.len()).map(|column| row.get(column)).collect();
+            if each(&names, &values.map_err(say)?).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn only_this_file(context: AuthContext<'_>) -> Authorization {
+    match context.action {
+        AuthAction::Attach { .. } | AuthAction::Detach { .. } => Authorization::Deny,
+        _ => Authorization::Allow,
+    }
+}
