@@ -56,6 +56,7 @@ pub(crate) fn orders(seed: u64) -> Vec<Order> {
     list.extend(unlisted(seed));
     list.extend(nothing(seed));
     list.extend(alike(seed));
+    list.extend(absorbed(seed));
     list.extend(faulty(seed));
     let mut orders: Vec<Order> = list.into_iter().map(|w| Order::Spindle(Box::new(w))).collect();
     orders.extend(drive::orders(seed).into_iter().map(Order::Drive));
@@ -214,13 +215,10 @@ fn nothing(seed: u64) -> Vec<Wish> {
 /// Not to be told apart by construction.
 fn alike(seed: u64) -> Vec<Wish> {
     let one_speed = Needs { one_speed: true, ..Needs::default() };
-    let one_feed = Needs { one_feed: true, ..Needs::default() };
     let lots_with_tools = Needs { lots_with_tools: true, ..Needs::default() };
     let kinds = [
-        ("windage", "one_speed", Mode::Rich, one_speed),
         ("copper_loss", "one_speed", Mode::Rich, one_speed),
         ("load_loss", "one_speed", Mode::Rich, one_speed),
-        ("edge_force", "one_feed", Mode::Rich, one_feed),
         ("hardness_batch", "lot_is_edge", Mode::Production, lots_with_tools),
         ("speed_softening", "mono", Mode::Mono, Needs::default()),
         ("field_weakening", "one_speed", Mode::Rich, one_speed),
@@ -232,6 +230,16 @@ fn alike(seed: u64) -> Vec<Wish> {
         list.push(wish);
     }
     list
+}
+
+/// What the refit of the nominal law swallows: silence is right, and so is a class with the truth in it.
+fn absorbed(seed: u64) -> Vec<Wish> {
+    let one = |entry: Entry| {
+        let mut wish = wish("absorbed".into(), entry.name.into(), seed, Mode::Rich, vec![entry], 0.0);
+        wish.expect = Expect::Class;
+        wish
+    };
+    laws::absorbed().into_iter().map(one).collect()
 }
 
 /// Effects under spikes, dropouts, zeros and repeats.

@@ -195,6 +195,7 @@ impl Shop {
     fn override_chance(&self) -> f64 {
         match (self.needs.overrides, self.mode) {
             (true, _) => 0.7,
+            _ if self.needs.one_feed => 0.0,
             (false, Mode::Rich) => 0.08,
             _ => 0.0,
         }
@@ -245,7 +246,7 @@ impl Shop {
     fn air_pass(&self, dice: &mut Dice) -> Pass {
         let mut pass = self.draw_pass(1, dice);
         let top = if self.process == Process::Turning { 3800.0 } else { 8000.0 };
-        pass.speed_rpm = (dice.uniform(0.1, 1.0) * top).round();
+        pass.speed_rpm = if self.needs.one_speed { pass.speed_rpm } else { (dice.uniform(0.1, 1.0) * top).round() };
         (pass.cut_s, pass.air_s) = (0.0, dice.uniform(14.0, 20.0));
         pass
     }

@@ -88,8 +88,8 @@ impl Wish {
         let least = if self.rho < 0.3 { CLAIMABLE_SHARE / self.rho } else { NOISE_SHARE.0 };
         let loudest = NOISE_SHARE.1 * level;
         let (mut low, mut high) = (least * level, loudest);
-        if laws.is_empty() {
-            return Some((laws, level * dice.log_uniform(0.006, 0.035)));
+        if laws.is_empty() || self.rho == 0.0 {
+            return self.swallowed(stage, laws, level * dice.log_uniform(0.006, 0.035));
         }
         let mut units = Vec::new();
         for law in &laws {
@@ -107,6 +107,12 @@ impl Wish {
         }
         let exact = self.left_over(stage, &laws, 0) / self.rho;
         (exact <= 1.6 * loudest || self.rho >= 2.0).then_some((laws, exact.min(loudest)))
+    }
+
+    /// Nothing to balance: nothing is hidden, or what is hidden must vanish in the refit.
+    fn swallowed(&self, stage: &Stage, laws: Vec<Seeded>, sd: f64) -> Option<(Vec<Seeded>, f64)> {
+        let vanishes = laws.is_empty() || self.left_over(stage, &laws, 0) < 0.12 * sd;
+        vanishes.then_some((laws, sd))
     }
 
     /// A level of noise between the bounds; a single effect that is too strong gets the loudest noise.

@@ -112,3 +112,12 @@ pub(crate) fn inverter(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         Terms::power(share * strength * (per_a * current_a + 0.05 * current_a.powf(1.8)))
     })
 }
+
+/// Iron loss of the motor: hysteresis with speed to the power 1.2, eddy currents with its square.
+pub(crate) fn iron(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let (hysteresis_w, eddy_w) = (dice.uniform(30.0, 90.0), dice.uniform(20.0, 60.0));
+    Planted::machine(move |s| {
+        let speed = s.tick.speed_rpm / 1500.0;
+        Terms::power(strength * (hysteresis_w * speed.powf(1.2) + eddy_w * speed * speed))
+    })
+}

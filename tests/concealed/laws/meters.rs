@@ -106,6 +106,12 @@ pub(crate) fn gain_step(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted 
     })
 }
 
+/// A gain that was always wrong: the refit of the nominal law takes all of it.
+pub(crate) fn constant_gain(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let gain = strength * dice.sign() * dice.uniform(0.03, 0.07);
+    Planted::meter(move |_, power| power.iter().map(|p| p * (1.0 + gain)).collect())
+}
+
 /// The gain runs off with the warming of the burden.
 pub(crate) fn gain_drift(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (gain, tau_s) = (dice.sign() * dice.uniform(0.04, 0.08), dice.uniform(900.0, 2000.0));

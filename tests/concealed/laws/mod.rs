@@ -20,6 +20,8 @@ const SLOW: Needs = Needs { low_cutting_speed: true, ..NONE };
 const SHALLOW: Needs = Needs { shallow: true, ..NONE };
 const LADDER: Needs = Needs { idle_ladder: true, ..NONE };
 const OVERRIDES: Needs = Needs { overrides: true, ..NONE };
+const ONE_FEED: Needs = Needs { one_feed: true, ..NONE };
+const ONE_SPEED: Needs = Needs { one_speed: true, ..NONE };
 const NONE: Needs = Needs {
     creep: false,
     low_cutting_speed: false,
@@ -128,6 +130,17 @@ pub(crate) fn special() -> Vec<Entry> {
         Entry::new("runout", "once per revolution", material::runout).reach(0.3, 2.0),
         Entry::new("inverter_loss", "bent in the current", electric::inverter).also(&["copper_loss"]).reach(0.3, 2.0),
         Entry::new("constant_load_control", "only the program's feed recorded", record::programmed_feed),
+    ]
+}
+
+/// Listed effects that the refit of the nominal law takes away almost whole.
+pub(crate) fn absorbed() -> Vec<Entry> {
+    vec![
+        Entry::new("sensor_gain", "always wrong", meters::constant_gain),
+        Entry::new("iron_loss", "hysteresis and eddies", electric::iron),
+        Entry::new("dry_friction", "constant torque", spindle::coulomb).also(&["viscous_friction", "no_load_power"]),
+        Entry::new("edge_force", "rounded edge", material::rounded_edge).needs(ONE_FEED),
+        Entry::new("windage", "exponent 2.7", spindle::windage).needs(ONE_SPEED),
     ]
 }
 

@@ -133,3 +133,9 @@ pub(crate) fn sticking_seal(dice: &mut Dice, _: &Plan, strength: f64) -> Planted
         Terms::power(strength * extra_nm * s.tick.omega() / (1.0 + ratio * ratio))
     })
 }
+
+/// Bearings and seals that take a constant torque.
+pub(crate) fn coulomb(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let torque_nm = strength * dice.uniform(0.3, 1.5);
+    Planted::machine(move |s| Terms::power(torque_nm * s.tick.omega() * (s.tick.speed_rpm / 2.0).tanh()))
+}
