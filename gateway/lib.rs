@@ -1,4 +1,14 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
 
+pub mod cli;
 pub mod config;
 pub mod history;
+pub mod http;
+pub mod log;
+pub mod moment;
+pub mod pipeline;
+pub mod records;
+pub mod run;
+pub mod signals;
+pub mod status;
+pub mod usage;

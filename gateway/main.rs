@@ -1,3 +1,7 @@
 //! `cnc-gateway`: parses the arguments and calls one function.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    gateway::cli::main()
+}

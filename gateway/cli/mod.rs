@@ -1,0 +1,88 @@
+//! The command line: one file per subcommand, each with its arguments and one function.
+//!
+//! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
+
+mod run;
+
+use crate::log::{self, LogFormat};
+use clap::{Parser, Subcommand};
+use std::fmt;
+use std::process::ExitCode;
+
+/// How a command ended when it could run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0.
+    Fine,
+    /// The command ran and its answer is no: exit code 1.
+    No,
+}
+
+/// Why a command could not run: exit code 2.
+#[derive(Debug)]
+pub struct CannotRun {
+    /// What happened, and where.
+    pub what: String,
+    /// What to do next; may be empty when `what` says it.
+    pub next: String,
+}
+
+impl CannotRun {
+    /// What happened and what to do next.
+    pub fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
+        Self { what: what.into(), next: next.into() }
+    }
+}
+
+impl fmt::Display for CannotRun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.what)?;
+        if self.next.is_empty() { Ok(()) } else { write!(f, "\n  {}", self.next) }
+    }
+}
+
+/// What every subcommand returns.
+pub type CommandResult = Result<Outcome, CannotRun>;
+
+/// The edge box of one CNC machine: polls, merges, infers, decides, remembers and explains.
+#[derive(Debug, Parser)]
+#[command(name = "cnc-gateway", version, args_conflicts_with_subcommands = true)]
+struct Arguments {
+    /// Engineer's log on standard error: off, text or json. The operator's lines on standard output stay.
+    #[arg(long, global = true, value_enum, default_value_t = LogFormat::Off, value_name = "FORM")]
+    log: LogFormat,
+    /// Least level of the engineer's log: error, warn, info, debug or trace.
+    #[arg(long, global = true, default_value = "info", value_name = "LEVEL")]
+    log_level: tracing::Level,
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunArguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Poll, merge, infer, decide, store and serve (the default).
+    Run(run::RunArguments),
+}
+
+/// Parses the arguments of this process and does what they say.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    log::start(arguments.log, arguments.log_level);
+    match dispatch(arguments) {
+        Ok(Outcome::Fine) => ExitCode::SUCCESS,
+        Ok(Outcome::No) => ExitCode::from(1),
+        Err(cannot) => {
+            eprintln!("cnc-gateway: {cannot}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn dispatch(arguments: Arguments) -> CommandResult {
+    match arguments.command.unwrap_or(Command::Run(arguments.run)) {
+        Command::Run(run) => run::run(run),
+    }
+}

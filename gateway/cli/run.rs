@@ -1,0 +1,82 @@
+//! `cnc-gateway run`: the box, live.
+
+use super::{CannotRun, CommandResult, Outcome};
+use crate::config;
+use crate::run::{self, Plan, open::MachineSpeed};
+use clap::Args;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// RunArguments of `run`.
+#[derive(Debug, Args)]
+pub(super) struct RunArguments {
+    /// Configuration file; without one the embedded simulated lathe runs.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Directory of everything the box writes.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Address and port of the live page; port 0 takes a free one.
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: Option<SocketAddr>,
+    /// Machine time over real time, or max: simulated machines and recordings only.
+    #[arg(long, value_name = "N|max", value_parser = speed, default_value = "1")]
+    speed: MachineSpeed,
+    /// End after so many seconds of machine time.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<f64>,
+}
+
+fn speed(text: &str) -> Result<MachineSpeed, String> {
+    if text == "max" {
+        return Ok(MachineSpeed::Max);
+    }
+    match text.parse::<f64>() {
+        Ok(1.0) => Ok(MachineSpeed::Real),
+        Ok(times) if (0.01..=10_000.0).contains(&times) => Ok(MachineSpeed::Times(times)),
+        _ => Err("give a factor from 0.01 to 10000, or max".to_owned()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
+        _ => Err("give a number of seconds above 0".to_owned()),
+    }
+}
+
+/// Runs the box until it is told to stop.
+pub(super) fn run(arguments: RunArguments) -> CommandResult {
+    run::run(plan(arguments)?)?;
+    Ok(Outcome::Fine)
+}
+
+fn plan(arguments: RunArguments) -> Result<Plan, CannotRun> {
+    let overrides = overrides(&arguments);
+    let listen_in_environment = std::env::var_os(format!("{}HTTP__LISTEN", config::ENVIRONMENT_PREFIX)).is_some();
+    let port_named = arguments.config.is_some() || arguments.listen.is_some() || listen_in_environment;
+    let own = |name: &str| overrides.iter().any(|(key, _)| key == name);
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let environment: Vec<_> = environment.filter(|(name, _)| !own(name)).collect();
+    let config = config::load(arguments.config.as_deref(), environment.into_iter().chain(overrides.clone()));
+    let config = config.map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })?;
+    Ok(Plan { config, port_named, speed: arguments.speed, stop_after_s: arguments.seconds })
+}
+
+/// RunArguments go before the environment and the file: they are given as variables in place of those of the environment.
+fn overrides(arguments: &RunArguments) -> Vec<(String, String)> {
+    let mut overrides = Vec::new();
+    let mut set = |key: &str, value: String| overrides.push((format!("{}{key}", config::ENVIRONMENT_PREFIX), value));
+    if let Some(directory) = &arguments.data_dir {
+        let absolute = std::path::absolute(directory).unwrap_or_else(|_| directory.clone());
+        set("GATEWAY__DATA_DIR", absolute.display().to_string());
+    }
+    if let Some(listen) = &arguments.listen {
+        set("HTTP__LISTEN", listen.to_string());
+    }
+    overrides
+}

@@ -1,0 +1,218 @@
+//! `GET /api/v1/samples`, `states`, `alarms`, ...: the history, read through connections of its own.
+
+use super::Shared;
+use super::problem::ApiProblem;
+use super::query::QueryKeys;
+use crate::history::{Buckets, Chunk, HistoryError, Overview, Query, Reader};
+use crate::moment;
+use crate::records::{RecordKind, RecordQuery, records};
+use adapters::clock::{SECOND_NS, TimeNs};
+use axum::Json;
+use axum::extract::{Query as Pairs, State};
+use serde_json::{Value, json};
+use std::ops::ControlFlow;
+
+/// What is read when nobody says otherwise.
+const SPAN_DEFAULT_NS: i64 = 600 * SECOND_NS;
+/// About so many buckets when nobody says otherwise.
+const BUCKETS_DEFAULT: i64 = 600;
+/// Points in one answer, all series together.
+const POINTS_MAX: usize = 200_000;
+/// Series in one answer.
+const SERIES_MAX: usize = 32;
+/// Channels shown when nobody asks for others.
+const CHANNELS_DEFAULT: [&str; 3] = ["spindle_speed_rpm", "feed_mm_min", "spindle_power_w"];
+
+type Answer = Result<Json<Value>, ApiProblem>;
+type Given = Pairs<Vec<(String, String)>>;
+
+/// Runs `read` on a connection of its own, off the threads that serve.
+async fn reading(
+    shared: Shared,
+    read: impl FnOnce(&Reader, TimeNs) -> Result<Value, ApiProblem> + Send + 'static,
+) -> Answer {
+    let newest_ns = shared.status()?.at_ms.saturating_add(1).saturating_mul(1_000_000);
+    let path = shared.history.clone();
+    let task = tokio::task::spawn_blocking(move || {
+        let reader = Reader::open(&path).map_err(|error| trouble(&error))?;
+        read(&reader, newest_ns)
+    });
+    let broken = |_| ApiProblem::unavailable("the history cannot be read", "ask again; look at the log if it stays");
+    task.await.map_err(broken)?.map(Json)
+}
+
+fn trouble(error: &HistoryError) -> ApiProblem {
+    match error {
+        HistoryError::Question(text) => ApiProblem::request(text.clone(), "see /api/v1/channels and /openapi.json"),
+        error => ApiProblem::unavailable(error.to_string(), "the machine is still polled; see /api/v1/status"),
+    }
+}
+
+/// `from` and `to`.
+fn range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
+    let bad = |key: &str, what: String| ApiProblem::request(format!("{key}: {what}"), moment::NOTATION);
+    let moment = |key: &str| keys.text(key).map(|text| moment::parse(text, newest_ns).map_err(|what| bad(key, what)));
+    let to_ns = moment("to").transpose()?.unwrap_or(newest_ns);
+    let from_ns = moment("from").transpose()?.unwrap_or(to_ns.saturating_sub(SPAN_DEFAULT_NS));
+    if from_ns > to_ns {
+        return Err(ApiProblem::request("from lies after to", "swap them"));
+    }
+    Ok((from_ns, to_ns))
+}
+
+async fn rows(shared: Shared, kind: RecordKind, pairs: Vec<(String, String)>) -> Answer {
+    let known: &[&str] =
+        if kind == RecordKind::States { &["from", "to", "limit", "state"] } else { &["from", "to", "limit"] };
+    let keys = QueryKeys::of(pairs, known)?;
+    let limit = keys.number("limit", 1, 10_000)?.unwrap_or(1000);
+    reading(shared, move |reader, newest_ns| {
+        let (from_ns, to_ns) = range(&keys, newest_ns)?;
+        let query = RecordQuery { from_ns, to_ns, state: keys.text("state").map(str::to_owned), limit };
+        let found = records(reader, kind, &query).map_err(|error| trouble(&error))?;
+        Ok(json!({
+            "schema": format!("{}/1", kind.name()),
+            "from_ms": from_ns / 1_000_000,
+            "to_ms": to_ns / 1_000_000,
+            "truncated": found.truncated,
+            "rows": found.rows,
+        }))
+    })
+    .await
+}
+
+/// `GET /api/v1/states`
+pub(super) async fn states(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    rows(shared, RecordKind::States, pairs).await
+}
+
+/// `GET /api/v1/alarms`
+pub(super) async fn alarms(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    rows(shared, RecordKind::Alarms, pairs).await
+}
+
+/// `GET /api/v1/decisions`
+pub(super) async fn decisions(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    rows(shared, RecordKind::Decisions, pairs).await
+}
+
+/// `GET /api/v1/events`
+pub(super) async fn events(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    rows(shared, RecordKind::Events, pairs).await
+}
+
+/// `GET /api/v1/parts`
+pub(super) async fn parts(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    rows(shared, RecordKind::Parts, pairs).await
+}
+
+/// `GET /api/v1/samples`
+pub(super) async fn samples(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    let known = ["from", "to", "channels", "resolution_s", "state", "program", "tool"];
+    let keys = QueryKeys::of(pairs, &known)?;
+    let resolution_s = keys.number("resolution_s", 0.0, 31_622_400.0)?;
+    let mut series: Vec<String> = keys.list("channels").map(str::to_owned).collect();
+    if series.is_empty() {
+        series = CHANNELS_DEFAULT.map(str::to_owned).to_vec();
+    }
+    if series.len() > SERIES_MAX {
+        let title = format!("{} channels in one question", series.len());
+        return Err(ApiProblem::request(title, format!("ask for at most {SERIES_MAX} at once")));
+    }
+    reading(shared, move |reader, newest_ns| {
+        let (from_ns, to_ns) = range(&keys, newest_ns)?;
+        let text = |key: &str| keys.text(key).map(str::to_owned);
+        let (state, program, tool) = (text("state"), text("program"), text("tool"));
+        let query = Query { from_ns: Some(from_ns), to_ns: Some(to_ns), series, state, program, tool };
+        let resolution_s = resolution_s.unwrap_or_else(|| usual_resolution_s(to_ns - from_ns));
+        let series = if resolution_s > 0.0 { bucketed(reader, &query, resolution_s) } else { raw(reader, &query) }?;
+        Ok(json!({
+            "schema": "samples/1",
+            "from_ms": from_ns / 1_000_000,
+            "to_ms": to_ns / 1_000_000,
+            "resolution_s": resolution_s,
+            "series": series,
+        }))
+    })
+    .await
+}
+
+/// Whole seconds, about [`BUCKETS_DEFAULT`] of them.
+fn usual_resolution_s(span_ns: i64) -> f64 {
+    let seconds = (span_ns / SECOND_NS / BUCKETS_DEFAULT).max(1);
+    #[expect(clippy::cast_precision_loss, reason = "seconds of centuries fit")]
+    let seconds = seconds as f64;
+    seconds
+}
+
+fn too_many(points: usize) -> ApiProblem {
+    ApiProblem::request(
+        format!("{points} points or more in one answer; at most {POINTS_MAX} are given"),
+        "ask for fewer channels, a shorter time or a coarser resolution_s; `cnc-gateway history export` writes everything",
+    )
+}
+
+fn bucketed(reader: &Reader, query: &Query, resolution_s: f64) -> Result<Value, ApiProblem> {
+    #[expect(clippy::cast_possible_truncation, reason = "at most a year in ns")]
+    let width_ns = ((resolution_s * SECOND_NS as f64) as i64).max(1);
+    let buckets = (query.to_ns.unwrap_or(0).saturating_sub(query.from_ns.unwrap_or(0)) / width_ns).unsigned_abs();
+    let points = usize::try_from(buckets).unwrap_or(usize::MAX).saturating_mul(query.series.len());
+    if points > POINTS_MAX {
+        return Err(too_many(points));
+    }
+    let overview = reader.overview(query, width_ns).map_err(|error| trouble(&error))?;
+    let each = overview.series.iter().zip(&overview.columns);
+    let list = each.map(|(series, column)| {
+        json!({ "channel": &*series.name, "unit": &*series.unit, "points": points_of(&overview, column) })
+    });
+    Ok(list.collect())
+}
+
+fn points_of(overview: &Overview, column: &Buckets) -> Vec<Value> {
+    let times = overview.start_ns.iter().map(|start_ns| start_ns / 1_000_000);
+    match column {
+        Buckets::Numbers(summaries) => times
+            .zip(summaries)
+            .map(
+                |(at_ms, s)| {
+                    if s.count == 0 { json!([at_ms, null]) } else { json!([at_ms, s.mean, s.min, s.max, s.count]) }
+                },
+            )
+            .collect(),
+        Buckets::Words(words) => times.zip(words).map(|(at_ms, word)| json!([at_ms, word.as_deref()])).collect(),
+    }
+}
+
+fn raw(reader: &Reader, query: &Query) -> Result<Value, ApiProblem> {
+    let mut list: Vec<(String, String, Vec<Value>)> = Vec::new();
+    let mut points = 0;
+    let read = reader.samples(query, |chunk| {
+        points += chunk.at_ns.len() * chunk.columns.len();
+        if points > POINTS_MAX {
+            return ControlFlow::Break(());
+        }
+        append(&mut list, chunk);
+        ControlFlow::Continue(())
+    });
+    read.map_err(|error| trouble(&error))?;
+    if points > POINTS_MAX {
+        return Err(too_many(points));
+    }
+    let each = list.into_iter();
+    Ok(each.map(|(channel, unit, points)| json!({ "channel": channel, "unit": unit, "points": points })).collect())
+}
+
+fn append(list: &mut Vec<(String, String, Vec<Value>)>, chunk: &Chunk<'_>) {
+    if list.is_empty() {
+        let empty = |series: &crate::history::Series| (series.name.to_string(), series.unit.to_string(), Vec::new());
+        list.extend(chunk.series.iter().map(empty));
+    }
+    for (column, (cells, (_, _, points))) in chunk.columns.iter().zip(list).enumerate() {
+        for (row, at_ns) in chunk.at_ns.iter().enumerate() {
+            let at_ms = at_ns / 1_000_000;
+            let value = cells.number(row).map(Value::from).or_else(|| cells.word(row).map(Value::from));
+            points.push(
+                value.map_or_else(|| json!([at_ms, null, chunk.missing(column, row)]), |value| json!([at_ms, value])),
+            );
+        }
+    }
+}

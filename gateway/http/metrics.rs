@@ -1,0 +1,191 @@
+//! `GET /metrics`: the status for Prometheus. Names end in base units, counters in `_total`; a missing value is no
+//! sample, never a zero.
+
+use super::Shared;
+use super::problem::ApiProblem;
+use crate::status::{Shown, Status};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::IntoResponse;
+use std::fmt::Write;
+
+/// Our unit suffix, the base unit of Prometheus, and the factor to it.
+const BASE_UNITS: [(&str, &str, f64); 12] = [
+    ("_cm3_min", "_cubic_meters_per_second", 1e-6 / 60.0),
+    ("_mm_min", "_meters_per_second", 1e-3 / 60.0),
+    ("_per_rev_mm", "_per_revolution_meters", 1e-3),
+    ("_mm", "_meters", 1e-3),
+    ("_um", "_meters", 1e-6),
+    ("_pct", "_ratio", 1e-2),
+    ("_w", "_watts", 1.0),
+    ("_a", "_amperes", 1.0),
+    ("_v", "_volts", 1.0),
+    ("_c", "_celsius", 1.0),
+    ("_n", "_newtons", 1.0),
+    ("_count", "s_counted", 1.0),
+];
+
+/// Name and factor of a quantity in base units.
+fn base(name: &str) -> (String, f64) {
+    let found = BASE_UNITS.iter().find_map(|(ours, theirs, factor)| Some((name.strip_suffix(ours)?, theirs, factor)));
+    match found {
+        Some((stem, theirs, factor)) => (format!("cncgw_{stem}{theirs}"), *factor),
+        None => (format!("cncgw_{name}"), 1.0),
+    }
+}
+
+/// The text being built.
+#[derive(Default)]
+struct Page(String);
+
+impl Page {
+    /// One family with its samples: pairs of labels (`a="b"`, may be empty) and value.
+    fn family(&mut self, name: &str, kind: &str, help: &str, samples: impl IntoIterator<Item = (String, f64)>) {
+        let mut samples = samples.into_iter().peekable();
+        if samples.peek().is_none() {
+            return;
+        }
+        let _written = writeln!(self.0, "# HELP {name} {help}\n# TYPE {name} {kind}");
+        for (labels, value) in samples {
+            let labels = if labels.is_empty() { labels } else { format!("{{{labels}}}") };
+            let _written = writeln!(self.0, "{name}{labels} {value}");
+        }
+    }
+
+    fn gauge(&mut self, name: &str, help: &str, value: f64) {
+        self.family(name, "gauge", help, [(String::new(), value)]);
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a counter beyond 2^53 may lose its last digit")]
+    fn counter(&mut self, name: &str, help: &str, value: u64) {
+        self.family(name, "counter", help, [(String::new(), value as f64)]);
+    }
+}
+
+fn label(name: &str, value: &str) -> String {
+    let value = value.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
+    format!("{name}=\"{value}\"")
+}
+
+fn quantities(page: &mut Page, status: &Status) {
+    for channel in &status.channels {
+        if let Some(Shown::Number(value)) = channel.value {
+            let (name, factor) = base(channel.name);
+            let help = adapters::ChannelId::of(channel.name).map_or("Measured", |id| id.channel().en);
+            page.gauge(&name, help, value * factor);
+        }
+    }
+    for estimate in &status.estimates {
+        if let (Some(value), Some(uncertainty)) = (estimate.value, estimate.uncertainty) {
+            let (name, factor) = base(estimate.name);
+            page.gauge(&name, "Inferred, see /api/v1/channels", value * factor);
+            let (name, factor) = base(&format!("{}_uncertainty_w", estimate.name.trim_end_matches("_w")));
+            page.gauge(&name, "Half the 95 % interval of the inferred value", uncertainty * factor);
+        }
+    }
+    let present = status
+        .channels
+        .iter()
+        .map(|channel| (label("channel", channel.name), f64::from(u8::from(channel.missing.is_none()))));
+    page.family(
+        "cncgw_channel_present",
+        "gauge",
+        "1 when the channel has a value, 0 when it has a reason for none",
+        present,
+    );
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a counter beyond 2^53 may lose its last digit")]
+fn sources(page: &mut Page, status: &Status) {
+    let each = |value: fn(&crate::status::SourceStatus) -> Option<f64>| {
+        status
+            .sources
+            .iter()
+            .filter_map(move |source| Some((label("source", &source.name), value(source)?)))
+            .collect::<Vec<_>>()
+    };
+    let up = each(|source| Some(f64::from(u8::from(source.error.is_none()))));
+    page.family("cncgw_source_up", "gauge", "1 while the source answers", up);
+    let readings = each(|source| Some(source.readings as f64));
+    page.family("cncgw_source_readings_total", "counter", "Readings taken from the source", readings);
+    let failures = each(|source| Some(source.failures as f64));
+    page.family("cncgw_source_failures_total", "counter", "Polls of the source that failed", failures);
+    let missed = each(|source| Some(source.missed as f64));
+    page.family("cncgw_source_missed_total", "counter", "Beats left out because a poll took too long", missed);
+    let dropped = each(|source| Some(source.dropped as f64));
+    page.family("cncgw_source_dropped_total", "counter", "Readings that came too late or wrongly stamped", dropped);
+    let jitter = each(|source| source.jitter_p99_ms.map(|ms| ms / 1e3));
+    page.family(
+        "cncgw_source_jitter_p99_seconds",
+        "gauge",
+        "Deviation from the promised pace, 99th percentile",
+        jitter,
+    );
+    let trip = each(|source| source.round_trip_p50_ms.map(|ms| ms / 1e3));
+    page.family("cncgw_source_round_trip_seconds", "gauge", "From asking to answer, median", trip);
+}
+
+fn machine(page: &mut Page, status: &Status) {
+    let current = [(label("state", status.state.word), 1.0)];
+    page.family("cncgw_machine_state", "gauge", "1 for the state the machine is in", current);
+    let seconds = status.state.seconds_per_state.iter().map(|(word, s)| (label("state", word), *s));
+    page.family(
+        "cncgw_machine_state_seconds_total",
+        "counter",
+        "Machine time spent in each state since the start",
+        seconds,
+    );
+    page.counter("cncgw_parts_total", "Parts finished since the start", status.parts);
+    page.gauge("cncgw_alarms", "Alarms that stand", status.alarms.len() as f64);
+    page.gauge(
+        "cncgw_gate_armed",
+        "1 while overrides are written to the machine",
+        f64::from(u8::from(status.gate.mode == "armed")),
+    );
+    if let Some(pct) = status.gate.wanted_pct {
+        page.gauge("cncgw_feed_override_wanted_ratio", "Feed override the scripts ask for", pct / 100.0);
+    }
+    if let Some(pct) = status.gate.permitted_pct {
+        page.gauge("cncgw_feed_override_permitted_ratio", "Feed override the gate lets through or would", pct / 100.0);
+    }
+}
+
+fn own(page: &mut Page, status: &Status) {
+    let info = [(label("version", status.version), 1.0)];
+    page.family("cncgw_build_info", "gauge", "Version of the program", info);
+    page.gauge("cncgw_uptime_seconds", "Seconds since the start of the process", status.uptime_s);
+    page.counter("cncgw_ticks_total", "Ticks since the start", status.tick.count);
+    page.counter("cncgw_ticks_skipped_total", "Ticks left out because the box was too late", status.tick.skipped);
+    page.gauge(
+        "cncgw_tick_lateness_p99_seconds",
+        "Lateness of the tick, 99th percentile",
+        status.tick.late_p99_ms / 1e3,
+    );
+    page.counter("cncgw_history_samples_total", "Samples acknowledged by the history", status.history.rows);
+    page.counter("cncgw_history_lost_samples_total", "Samples that could not be stored", status.history.lost);
+    page.gauge("cncgw_history_size_bytes", "Bytes of the history on disk", status.history.bytes as f64);
+    let scripts = status.scripts.iter().map(|s| (label("script", &s.file), f64::from(u8::from(s.error.is_none()))));
+    page.family("cncgw_script_current", "gauge", "1 when the newest text of the script is in charge", scripts);
+    page.gauge("cncgw_problems", "Things that do not work while the box goes on", status.problems.len() as f64);
+    if let Some(usage) = crate::usage::read() {
+        page.gauge("process_resident_memory_bytes", "Resident memory", usage.resident_bytes as f64);
+        page.family("process_cpu_seconds_total", "counter", "Processor time", [(String::new(), usage.cpu_s)]);
+    }
+}
+
+/// The status as Prometheus text (exposition format 0.0.4).
+#[must_use]
+pub fn render(status: &Status) -> String {
+    let mut page = Page::default();
+    machine(&mut page, status);
+    quantities(&mut page, status);
+    sources(&mut page, status);
+    own(&mut page, status);
+    page.0
+}
+
+/// `GET /metrics`
+pub(super) async fn metrics(State(shared): State<Shared>) -> Result<impl IntoResponse, ApiProblem> {
+    let text = render(&*shared.status()?);
+    Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))
+}

@@ -1,0 +1,110 @@
+//! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
+
+use super::{Shared, router};
+use crate::log::{Notice, Severity};
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+/// Pause between two tries to get a port that another program holds.
+const RETRY: Duration = Duration::from_secs(5);
+
+/// Why nothing listens, in words for the operator.
+#[must_use]
+pub fn port_trouble(listen: SocketAddr, error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            format!("port {} on {} is in use by another program", listen.port(), listen.ip())
+        }
+        std::io::ErrorKind::PermissionDenied => format!("port {} may not be opened by this user", listen.port()),
+        _ => format!("{listen} cannot be opened: {error}"),
+    }
+}
+
+/// Opens the port.
+///
+/// # Errors
+/// What the system said; see [`port_trouble`] for words.
+pub async fn bind(listen: SocketAddr) -> std::io::Result<TcpListener> {
+    TcpListener::bind(listen).await
+}
+
+/// The server and how to end it.
+#[derive(Debug)]
+pub struct Server {
+    stop: watch::Sender<bool>,
+    task: tokio::task::JoinHandle<()>,
+}
+
+impl Server {
+    /// Serves on `listener`, or keeps trying to open `listen` when there is none. `report` says why nothing listens
+    /// while that is so.
+    #[must_use]
+    pub fn start(
+        listen: SocketAddr,
+        listener: Option<TcpListener>,
+        shared: Shared,
+        report: watch::Sender<Option<String>>,
+    ) -> Self {
+        let (stop, stopped) = watch::channel(false);
+        let task = tokio::spawn(serve(listen, listener, shared, stopped, report));
+        Self { stop, task }
+    }
+
+    /// Answers what is being asked, then closes; gives up waiting after two seconds.
+    pub async fn stop(self) {
+        let _nobody_left = self.stop.send(true);
+        let _gave_up = tokio::time::timeout(Duration::from_secs(2), self.task).await;
+    }
+}
+
+async fn serve(
+    listen: SocketAddr,
+    listener: Option<TcpListener>,
+    shared: Shared,
+    mut stopped: watch::Receiver<bool>,
+    report: watch::Sender<Option<String>>,
+) {
+    let listener = match listener {
+        Some(listener) => listener,
+        None => tokio::select! {
+            opened = keep_trying(listen, &report) => opened,
+            _ = stopped.wait_for(|stop| *stop) => return,
+        },
+    };
+    report.send_replace(None);
+    let address = listener.local_addr().unwrap_or(listen);
+    Notice::new(Severity::Info, "serving", format!("live page: http://{address}/")).say();
+    let ended = axum::serve(listener, router(shared))
+        .with_graceful_shutdown(async move {
+            let _stop_or_gone = stopped.wait_for(|stop| *stop).await;
+        })
+        .await;
+    if let Err(error) = ended {
+        Notice::new(Severity::Error, "http_ended", format!("the page has gone: {error}; restart the gateway")).say();
+    }
+}
+
+async fn keep_trying(listen: SocketAddr, report: &watch::Sender<Option<String>>) -> TcpListener {
+    loop {
+        match bind(listen).await {
+            Ok(listener) => return listener,
+            Err(error) => say_once(report, listen, &error),
+        }
+        tokio::time::sleep(RETRY).await;
+    }
+}
+
+fn say_once(report: &watch::Sender<Option<String>>, listen: SocketAddr, error: &std::io::Error) {
+    let trouble = port_trouble(listen, error);
+    let new = report.send_if_modified(|known| {
+        let changed = known.as_ref() != Some(&trouble);
+        *known = Some(trouble.clone());
+        changed
+    });
+    if new {
+        let text = format!("{trouble}: no page for now. Polling goes on; trying again every {} s", RETRY.as_secs());
+        Notice::new(Severity::Warning, "port_in_use", text).detail(error.to_string()).say();
+    }
+}

@@ -1,0 +1,128 @@
+//! `GET /api/v1/channels`: every name the box uses, with unit, range and text in English and Chinese.
+
+use adapters::channel::Kind;
+use adapters::{Absence, ChannelId};
+use axum::Json;
+use rules::estimators::State;
+use serde_json::{Map, Value, json};
+
+/// Quantities that are inferred: name, unit, English, Chinese.
+pub const ESTIMATES: [(&str, &str, &str, &str); 5] = [
+    ("filtered_power_w", "W", "Spindle power, filtered", "滤波后的主轴功率"),
+    ("no_load_power_w", "W", "No-load power at this speed", "空载功率"),
+    ("cutting_power_w", "W", "Cutting power", "切削功率"),
+    ("load_loss_w", "W", "Additional loss under load", "附加载荷损耗"),
+    ("visible_cutting_power_w", "W", "Least visible cutting power", "最小可见切削功率"),
+];
+
+/// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
+const NO_ESTIMATES: [(&str, &str, &str); 9] = [
+    ("not_yet", "no sample yet", "尚无采样"),
+    ("input_missing", "an input is missing", "缺少输入"),
+    ("spindle_stopped", "spindle stands still", "主轴静止"),
+    ("speed_changing", "spindle is changing speed", "主轴变速中"),
+    ("not_settled", "not settled yet", "尚未稳定"),
+    ("not_learned", "not learned at this speed", "该转速尚未学习"),
+    ("extrapolated", "too far from learned speeds", "超出已学习转速范围"),
+    ("imbalance", "coefficients contradict the power", "系数与功率矛盾"),
+    ("below_no_load", "below no-load power", "低于空载功率"),
+];
+
+fn absence(reason: Absence) -> (&'static str, &'static str) {
+    match reason {
+        Absence::NotProvided => ("no source has it", "无数据源"),
+        Absence::NotYetRead => ("not read yet", "尚未读取"),
+        Absence::MachineOff => ("machine is off", "机床已关机"),
+        Absence::Disconnected => ("source is not connected", "数据源未连接"),
+        Absence::Timeout => ("no answer in time", "应答超时"),
+        Absence::Refused => ("refused by the device", "设备拒绝"),
+        Absence::NotSupported => ("not supported by the device", "设备不支持"),
+        Absence::OutOfRange => ("outside the possible range", "超出物理范围"),
+        Absence::Stale => ("too old", "数据过旧"),
+        Absence::NotRecorded => ("not recorded", "未记录"),
+    }
+}
+
+/// A state's name, English and Chinese.
+#[must_use]
+pub fn state(state: State) -> (&'static str, &'static str) {
+    match state {
+        State::Off => ("Off", "关机"),
+        State::Standby => ("Standby", "待机"),
+        State::SpindleStart => ("Spindle start", "主轴启动"),
+        State::Idle => ("Idle", "空转"),
+        State::Cutting => ("Cutting", "切削"),
+        State::Unknown => ("Unknown", "未知"),
+        State::SpeedChange => ("Speed change", "变速"),
+        State::Rapid => ("Rapid", "快速移动"),
+    }
+}
+
+fn texts(en: &str, zh: &str) -> Value {
+    json!({ "en": en, "zh": zh })
+}
+
+fn quantities() -> Map<String, Value> {
+    let measured = ChannelId::all().map(|id| {
+        let channel = id.channel();
+        let kind = match channel.kind {
+            Kind::Continuous => "continuous",
+            Kind::Held => "held",
+            Kind::Text => "text",
+        };
+        let mut row =
+            json!({ "en": channel.en, "zh": channel.zh, "unit": channel.unit, "kind": kind, "origin": "measured" });
+        if channel.kind != Kind::Text {
+            row["range"] = json!([channel.range.0, channel.range.1]);
+        }
+        (channel.name.to_owned(), row)
+    });
+    let inferred = ESTIMATES.iter().map(|(name, unit, en, zh)| {
+        let row = json!({ "en": en, "zh": zh, "unit": unit, "kind": "continuous", "origin": "inferred" });
+        ((*name).to_owned(), row)
+    });
+    measured.chain(inferred).collect()
+}
+
+/// The whole vocabulary as one document.
+#[must_use]
+pub fn document() -> Value {
+    let reasons = Absence::ALL.into_iter().map(|reason| {
+        let (en, zh) = absence(reason);
+        (reason.word().to_owned(), texts(en, zh))
+    });
+    let no_estimates = NO_ESTIMATES.iter().map(|(word, en, zh)| ((*word).to_owned(), texts(en, zh)));
+    let states = State::ALL.into_iter().map(|word| {
+        let (en, zh) = state(word);
+        (word.word().to_owned(), texts(en, zh))
+    });
+    json!({
+        "schema": "channels/1",
+        "quantities": quantities(),
+        "states": states.collect::<Map<_, _>>(),
+        "absences": reasons.chain(no_estimates).collect::<Map<_, _>>(),
+    })
+}
+
+/// `GET /api/v1/channels`
+pub(super) async fn channels() -> Json<Value> {
+    Json(document())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rules::estimators::Estimates;
+
+    #[test]
+    fn everything_the_page_shows_has_a_name_in_both_languages() {
+        let document = document();
+        for (name, _) in Estimates::none(0).quantities() {
+            assert!(document["quantities"][name]["zh"].is_string(), "{name}");
+        }
+        assert_eq!(document["quantities"].as_object().map(Map::len), Some(ChannelId::count() + ESTIMATES.len()));
+        for state in State::ALL {
+            assert!(document["states"][state.word()]["en"].is_string(), "{state}");
+        }
+    }
+}

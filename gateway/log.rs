@@ -1,0 +1,102 @@
+//! Two texts for two readers: an operator's line on standard output, an engineer's detail on standard error.
+//!
+//! A [`Notice`] carries both. The operator's line says what happened and what to do; the detail names the code, the
+//! address and the numbers, as text or as one JSON object per line.
+
+use std::io::Write;
+use tracing::Level;
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::filter_fn;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+
+/// The form of the engineer's log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum LogFormat {
+    /// No engineer's log.
+    Off,
+    /// One line of text per event.
+    Text,
+    /// One JSON object per event.
+    Json,
+}
+
+/// How serious a notice is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Severity {
+    /// Something happened as it should.
+    Info,
+    /// Something does not work; the box goes on.
+    Warning,
+    /// Something is lost or stops.
+    Error,
+}
+
+impl Severity {
+    /// The word stored in the history and printed in logs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// Something worth telling, in two texts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Notice {
+    /// How serious.
+    pub severity: Severity,
+    /// A stable word for filters: `source_lost`, `port_in_use`, ...
+    pub code: &'static str,
+    /// For the person at the machine: what happened, where, what to do next.
+    pub operator: String,
+    /// For the engineer: addresses, numbers, the error as it came.
+    pub detail: String,
+}
+
+impl Notice {
+    /// A notice whose detail is the same as its text.
+    pub fn new(severity: Severity, code: &'static str, operator: impl Into<String>) -> Self {
+        Self { severity, code, operator: operator.into(), detail: String::new() }
+    }
+
+    /// Adds the engineer's detail.
+    #[must_use]
+    pub fn detail(mut self, detail: impl Into<String>) -> Self {
+        self.detail = detail.into();
+        self
+    }
+
+    /// Prints both texts: a line with the time for the operator, an event for the engineer.
+    pub fn say(&self) {
+        let Self { code, operator, detail, .. } = self;
+        let mark = if self.severity == Severity::Info { " " } else { "!" };
+        // An operator who closed the terminal is no reason to stop the box.
+        let _closed = writeln!(std::io::stdout(), "{} {mark} {operator}", clock_text());
+        match self.severity {
+            Severity::Info => tracing::info!(code, detail, "{operator}"),
+            Severity::Warning => tracing::warn!(code, detail, "{operator}"),
+            Severity::Error => tracing::error!(code, detail, "{operator}"),
+        }
+    }
+}
+
+/// The wall clock as `14:03:22Z`.
+fn clock_text() -> String {
+    jiff::Timestamp::now().strftime("%H:%M:%SZ").to_string()
+}
+
+/// Starts the engineer's log. A second call in one process changes nothing.
+pub fn start(format: LogFormat, level: Level) {
+    let wanted = filter_fn(move |event| *event.level() <= level);
+    let base = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(false);
+    let layer = match format {
+        LogFormat::Off => return,
+        LogFormat::Text => base.with_filter(wanted).boxed(),
+        LogFormat::Json => base.json().flatten_event(true).with_filter(wanted).boxed(),
+    };
+    let _already_started = tracing_subscriber::registry().with(layer).try_init();
+}

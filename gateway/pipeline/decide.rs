@@ -1,0 +1,144 @@
+//! What the scripts decided, as records: alarms raised and cleared, notes, and every change of what they ask for.
+
+use crate::history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
+use adapters::clock::TimeNs;
+use rules::script::{AlarmChange, Decision, OverrideRequest, SCRIPT_STOPPED};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Changes kept for the page.
+const RECENT: usize = 6;
+
+/// What was asked for, in whole percent: finer changes are not recorded one by one.
+#[derive(Debug, Clone, PartialEq)]
+struct Asked {
+    pct: i64,
+    reason: Arc<str>,
+    script: Arc<str>,
+}
+
+impl Asked {
+    fn of(request: &OverrideRequest) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
+        let pct = request.pct.round() as i64;
+        Self { pct, reason: request.reason.clone(), script: request.script.clone() }
+    }
+}
+
+/// A change worth showing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// When.
+    pub at_ns: TimeNs,
+    /// In plain words.
+    pub text: String,
+}
+
+/// Remembers what was last recorded.
+#[derive(Debug, Clone, Default)]
+pub struct Decisions {
+    asked: Option<Asked>,
+    recent: VecDeque<Change>,
+}
+
+impl Decisions {
+    /// The latest changes, newest first.
+    pub fn recent(&self) -> impl Iterator<Item = &Change> {
+        self.recent.iter()
+    }
+
+    /// Gives every record that this decision makes to `keep`.
+    pub fn step(&mut self, decision: &Decision, mut keep: impl FnMut(Record)) {
+        for change in &decision.alarms {
+            keep(alarm(change, decision.at_ns));
+        }
+        for note in &decision.notes {
+            keep(event("note", &note.script, &note.text, decision.at_ns));
+        }
+        for problem in &decision.problems {
+            keep(event("script_failed", &problem.file, &problem.to_string(), decision.at_ns));
+        }
+        let asked = decision.request.as_ref().map(Asked::of);
+        if asked != self.asked {
+            keep(self.change(decision, asked).into());
+        }
+    }
+
+    fn change(&mut self, decision: &Decision, asked: Option<Asked>) -> DecisionRow {
+        let before = std::mem::replace(&mut self.asked, asked);
+        let (text, row) = match (&decision.request, before) {
+            (Some(request), _) => {
+                (format!("{:.0} %: {}", request.pct, request.reason), row_of(request, decision.at_ns))
+            }
+            (None, before) => {
+                let script = before.map(|asked| asked.script.to_string()).unwrap_or_default();
+                let reason = "nothing is asked for any more".to_owned();
+                let wanted = "feed_override_pct".to_owned();
+                let unit = "%".to_owned();
+                let row = DecisionRow { at_ns: decision.at_ns, script, wanted, unit, reason, ..DecisionRow::default() };
+                ("100 %".to_owned(), row)
+            }
+        };
+        self.recent.push_front(Change { at_ns: decision.at_ns, text });
+        self.recent.truncate(RECENT);
+        DecisionRow {
+            outcome: "shadow".to_owned(),
+            outcome_reason: "the gate writes nothing in shadow".to_owned(),
+            ..row
+        }
+    }
+}
+
+fn row_of(request: &OverrideRequest, at_ns: TimeNs) -> DecisionRow {
+    DecisionRow {
+        at_ns,
+        script: request.script.to_string(),
+        script_version: format!("{:016x}", request.version),
+        wanted: "feed_override_pct".to_owned(),
+        value: request.pct.is_finite().then_some(request.pct),
+        unit: "%".to_owned(),
+        reason: request.reason.to_string(),
+        ..DecisionRow::default()
+    }
+}
+
+fn alarm(change: &AlarmChange, at_ns: TimeNs) -> Record {
+    let (code, source) = (change.name.to_string(), change.script.to_string());
+    if !change.raised {
+        return AlarmClear { at_ns, code, source }.into();
+    }
+    let severity = if &*change.name == SCRIPT_STOPPED { "critical" } else { "warning" };
+    let text = change.text.to_string();
+    Alarm { at_ns, code, source, severity: severity.to_owned(), en: text.clone(), zh: text }.into()
+}
+
+fn event(kind: &str, source: &str, text: &str, at_ns: TimeNs) -> Record {
+    Event { at_ns, kind: kind.to_owned(), source: source.to_owned(), text: text.to_owned(), detail: String::new() }
+        .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asking(at_ns: TimeNs, pct: Option<f64>) -> Decision {
+        let request =
+            pct.map(|pct| OverrideRequest { pct, reason: "test".into(), script: "a.rhai".into(), version: 7 });
+        Decision { at_ns, request, ..Decision::default() }
+    }
+
+    #[test]
+    fn only_changes_of_a_whole_percent_are_recorded() {
+        let mut decisions = Decisions::default();
+        let mut rows = Vec::new();
+        for (at_ns, pct) in
+            [(1, Some(90.0)), (2, Some(90.3)), (3, Some(89.0)), (4, Some(f64::NAN)), (5, None), (6, None)]
+        {
+            decisions.step(&asking(at_ns, pct), |record| rows.push(record));
+        }
+        let values: Vec<_> =
+            rows.iter().map(|row| matches!(row, Record::Decision(row) if row.value.is_some())).collect();
+        assert_eq!(values, [true, true, false, false]);
+        assert_eq!(decisions.recent().next().map(|change| change.at_ns), Some(5));
+    }
+}

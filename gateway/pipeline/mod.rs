@@ -1,0 +1,141 @@
+//! One tick, the same for a live machine and a replayed recording: sample in, estimates, decision and records out.
+//!
+//! Time is that of the sample; nothing here reads a clock. In steady state a tick allocates nothing: records are made
+//! only where something changes.
+
+mod channels;
+mod decide;
+mod extras;
+mod journal;
+mod parts;
+mod tally;
+
+pub use channels::Channels;
+pub use decide::{Change, Decisions};
+pub use extras::{series as stored_series, values as stored_values};
+pub use journal::Journal;
+pub use parts::Parts;
+pub use tally::Tally;
+
+use crate::history::{ExtraValue, Record};
+use adapters::Sample;
+use rules::estimators::{self, Estimates};
+use rules::script::Host;
+
+/// Where a tick leaves what is to be remembered.
+pub trait Store {
+    /// A sample with what is stored beside its channels.
+    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]);
+
+    /// Something that happened at this tick; always after the tick's sample.
+    fn record(&mut self, record: Record);
+}
+
+/// Remembers nothing.
+#[derive(Debug, Default)]
+pub struct NoStore;
+
+impl Store for NoStore {
+    fn sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
+
+    fn record(&mut self, _: Record) {}
+}
+
+/// Everything between the merge and the store.
+pub struct Pipeline {
+    channels: Channels,
+    estimators: estimators::Pipeline,
+    scripts: Host,
+    generation: u64,
+    decisions: Decisions,
+    journal: Journal,
+    parts: Parts,
+    tally: Tally,
+}
+
+impl Pipeline {
+    /// A pipeline that has seen nothing. The settings of the estimators are those of the scripts.
+    #[must_use]
+    pub fn new(mut estimators: estimators::Pipeline, scripts: Host) -> Self {
+        estimators.reconfigure(scripts.settings().clone());
+        Self {
+            channels: Channels::new(),
+            estimators,
+            generation: scripts.generation(),
+            scripts,
+            decisions: Decisions::default(),
+            journal: Journal::default(),
+            parts: Parts::default(),
+            tally: Tally::default(),
+        }
+    }
+
+    /// Takes one tick. Samples come in the order of time.
+    pub fn step(&mut self, sample: &Sample, store: &mut dyn Store) {
+        self.follow_settings();
+        let estimates = *self.estimators.infer(sample);
+        self.tally.step(sample.at_ns, estimates.state);
+        store.sample(sample, &stored_values(&estimates));
+        self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
+        let decision = self.scripts.tick(sample, &estimates);
+        self.decisions.step(decision, |record| store.record(record));
+        if let Some(part) = self.parts.step(&self.channels, sample, estimates.state) {
+            store.record(part.into());
+        }
+    }
+
+    /// Other scripts may bring other settings.
+    fn follow_settings(&mut self) {
+        if self.generation != self.scripts.generation() {
+            self.generation = self.scripts.generation();
+            self.estimators.reconfigure(self.scripts.settings().clone());
+        }
+    }
+
+    /// The scripts.
+    #[must_use]
+    pub fn scripts(&self) -> &Host {
+        &self.scripts
+    }
+
+    /// The scripts, to put others in charge.
+    pub fn scripts_mut(&mut self) -> &mut Host {
+        &mut self.scripts
+    }
+
+    /// What the scripts asked for last.
+    #[must_use]
+    pub fn decisions(&self) -> &Decisions {
+        &self.decisions
+    }
+
+    /// The estimates of the last tick.
+    #[must_use]
+    pub fn estimates(&self) -> &Estimates {
+        self.estimators.estimates()
+    }
+
+    /// The estimators, for what they have learned.
+    #[must_use]
+    pub fn estimators(&self) -> &estimators::Pipeline {
+        &self.estimators
+    }
+
+    /// Sums since the start.
+    #[must_use]
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Finished parts.
+    #[must_use]
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// What was last recorded.
+    #[must_use]
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+}

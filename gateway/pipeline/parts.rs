@@ -1,0 +1,134 @@
+//! Finished parts, from what the controller says: its part counter, or the name of the part where it has no counter.
+
+use super::channels::Channels;
+use crate::history::Part;
+use adapters::Sample;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::estimators::State;
+use std::sync::Arc;
+
+/// Longer steps between two ticks are pauses in which nothing is integrated.
+const STEP_MAX_NS: i64 = 2 * SECOND_NS;
+
+/// Follows the cycle in progress.
+#[derive(Debug, Clone, Default)]
+pub struct Parts {
+    count: Option<f64>,
+    part: Option<Arc<str>>,
+    began_ns: Option<TimeNs>,
+    last_ns: Option<TimeNs>,
+    cutting_s: f64,
+    energy_j: f64,
+    energy_known: bool,
+    finished: u64,
+}
+
+impl Parts {
+    /// Parts finished since the start.
+    #[must_use]
+    pub fn finished(&self) -> u64 {
+        self.finished
+    }
+
+    /// Takes one tick; gives the part that it finishes.
+    pub fn step(&mut self, channels: &Channels, sample: &Sample, state: State) -> Option<Part> {
+        self.integrate(channels, sample, state);
+        let parts = self.parts_by_count(channels, sample).or_else(|| self.part_by_name(channels, sample));
+        self.last_ns = Some(sample.at_ns);
+        let began_ns = *self.began_ns.get_or_insert(sample.at_ns);
+        let (count, name) = parts?;
+        let part = self.close(channels, sample, began_ns, count, name);
+        Some(part)
+    }
+
+    /// The counter rose. A counter that falls was reset and finishes nothing.
+    fn parts_by_count(&mut self, channels: &Channels, sample: &Sample) -> Option<(i64, String)> {
+        let count = sample.number(channels.part_count).ok()?;
+        let before = self.count.replace(count)?;
+        let name = sample.text(channels.part).unwrap_or_default().to_owned();
+        #[expect(clippy::cast_possible_truncation, reason = "the channel holds at most 1e9")]
+        (count > before).then(|| ((count - before).round() as i64, name))
+    }
+
+    /// Without a counter, another name of the part means that the one before is finished.
+    fn part_by_name(&mut self, channels: &Channels, sample: &Sample) -> Option<(i64, String)> {
+        let name = sample.text(channels.part)?;
+        if self.part.as_deref() == Some(name) {
+            return None;
+        }
+        let before = self.part.replace(Arc::from(name))?;
+        let counted = sample.number(channels.part_count).is_ok();
+        (!counted && !before.is_empty()).then(|| (1, before.to_string()))
+    }
+
+    fn integrate(&mut self, channels: &Channels, sample: &Sample, state: State) {
+        let step_ns = self.last_ns.map_or(0, |last_ns| sample.at_ns - last_ns);
+        if !(1..=STEP_MAX_NS).contains(&step_ns) {
+            return;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "at most two seconds in ns")]
+        let step_s = step_ns as f64 / SECOND_NS as f64;
+        if state == State::Cutting {
+            self.cutting_s += step_s;
+        }
+        let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
+        if let Ok(power_w) = power {
+            self.energy_j += power_w * step_s;
+            self.energy_known = true;
+        }
+    }
+
+    fn close(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {
+        let finished = Part {
+            began_ns,
+            ended_ns: sample.at_ns,
+            part,
+            program: sample.text(channels.program).unwrap_or_default().to_owned(),
+            count,
+            cutting_s: Some(self.cutting_s),
+            energy_j: self.energy_known.then_some(self.energy_j),
+            detail: String::new(),
+        };
+        self.finished += u64::try_from(count).unwrap_or(0);
+        (self.began_ns, self.cutting_s, self.energy_j, self.energy_known) = (Some(sample.at_ns), 0.0, 0.0, false);
+        finished
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::{Absence, ChannelId, Slot, Value};
+
+    fn sample(at_s: i64, count: Result<f64, Absence>, part: &str) -> Sample {
+        let mut sample = Sample::empty(at_s * SECOND_NS);
+        let mut set = |name: &str, value| sample.set(ChannelId::of(name).expect(name), Slot { value, age_ns: 0 });
+        set("part_count", count.map(Value::Number));
+        set("part", Ok(Value::Text(part.into())));
+        set("total_power_w", Ok(Value::Number(100.0)));
+        sample
+    }
+
+    #[test]
+    fn the_counter_finishes_parts_and_a_reset_does_not() {
+        let (channels, mut parts) = (Channels::new(), Parts::default());
+        let mut step = |at_s, count| parts.step(&channels, &sample(at_s, Ok(count), "A"), State::Cutting);
+        assert_eq!(step(0, 7.0), None);
+        assert_eq!(step(1, 7.0), None);
+        let part = step(2, 8.0).expect("finished");
+        assert_eq!((part.count, part.cutting_s, part.energy_j), (1, Some(2.0), Some(200.0)));
+        assert_eq!((part.began_ns, part.ended_ns), (0, 2 * SECOND_NS));
+        assert_eq!(step(3, 0.0), None);
+        assert_eq!(step(4, 2.0).expect("two at once").count, 2);
+        assert_eq!(parts.finished(), 3);
+    }
+
+    #[test]
+    fn without_a_counter_the_name_tells() {
+        let (channels, mut parts) = (Channels::new(), Parts::default());
+        let mut step = |at_s, part| parts.step(&channels, &sample(at_s, Err(Absence::NotProvided), part), State::Idle);
+        assert_eq!(step(0, "A"), None);
+        assert_eq!(step(1, "A"), None);
+        assert_eq!(step(2, "B").expect("A is finished").part, "A");
+    }
+}

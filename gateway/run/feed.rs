@@ -1,0 +1,120 @@
+//! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
+
+use crate::status::SourceStatus;
+use adapters::clock::TimeNs;
+use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
+use adapters::worker::{Worker, WorkerState, WorkerStats};
+use adapters::{Sample, SourceError};
+use std::time::Duration;
+
+/// See the [module](self).
+pub enum Feed {
+    /// One thread per source.
+    Threads {
+        /// The sources, in the order of precedence.
+        workers: Vec<Worker>,
+        /// Their readings.
+        merge: Merge,
+    },
+    /// Sources that bring their own time.
+    Stepped {
+        /// Sources and merge.
+        lockstep: Lockstep,
+        /// Name and period of each source.
+        sources: Vec<(String, Duration)>,
+    },
+}
+
+impl Feed {
+    /// Samples at the tick `now_ns` (minus the merge's delay). `false` when every source has come to its end.
+    pub fn sample_into(&mut self, sample: &mut Sample, now_ns: TimeNs) -> bool {
+        match self {
+            Self::Threads { workers, merge } => {
+                for (index, worker) in workers.iter().enumerate() {
+                    worker.drain_into(merge, SourceId(index));
+                }
+                merge.sample_into(sample, now_ns.saturating_sub(merge.delay_ns()));
+                !workers.iter().all(Worker::is_finished)
+            }
+            Self::Stepped { lockstep, .. } => lockstep.sample_into(sample, now_ns),
+        }
+    }
+
+    /// How each source is doing.
+    #[must_use]
+    pub fn status(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
+        match self {
+            Self::Threads { workers, merge } => {
+                let each = workers.iter().enumerate();
+                each.map(|(i, worker)| of_worker(worker.name(), &worker.stats(now_ns), merge.counts(SourceId(i))))
+                    .collect()
+            }
+            Self::Stepped { lockstep, sources } => {
+                let each = sources.iter().enumerate();
+                each.map(|(i, (name, period))| {
+                    of_step(name, *period, lockstep.last_error(SourceId(i)), lockstep.merge().counts(SourceId(i)))
+                })
+                .collect()
+            }
+        }
+    }
+
+    /// Stops every thread; does not wait for a vendor library that hangs.
+    pub fn stop(&self) {
+        if let Self::Threads { workers, .. } = self {
+            workers.iter().for_each(Worker::stop);
+        }
+    }
+}
+
+fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+fn dropped(counts: MergeCounts) -> u64 {
+    counts.too_late + counts.clock_steps + counts.unannounced
+}
+
+fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStatus {
+    let failing = matches!(stats.state, WorkerState::Failing | WorkerState::Stuck);
+    let known = stats.polls > 1;
+    SourceStatus {
+        name: name.to_owned(),
+        state: stats.state.word(),
+        error: stats.last_error.as_ref().filter(|_| failing).map(ToString::to_string),
+        period_s: stats.period.as_secs_f64(),
+        period_kept_s: known.then_some(stats.period_kept.p50.as_secs_f64()),
+        jitter_p50_ms: known.then(|| milliseconds(stats.lateness.p50)),
+        jitter_p99_ms: known.then(|| milliseconds(stats.lateness.p99)),
+        round_trip_p50_ms: known.then(|| milliseconds(stats.round_trip.p50)),
+        round_trip_p99_ms: known.then(|| milliseconds(stats.round_trip.p99)),
+        readings: counts.readings,
+        failures: stats.failures,
+        missed: stats.missed,
+        dropped: dropped(counts) + stats.dropped,
+    }
+}
+
+fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: MergeCounts) -> SourceStatus {
+    let (state, error) = match error {
+        None => ("reading", None),
+        Some(SourceError::Off { .. }) => ("off", None),
+        Some(SourceError::End { .. }) => ("ended", None),
+        Some(error) => ("failing", Some(error.to_string())),
+    };
+    SourceStatus {
+        name: name.to_owned(),
+        state,
+        error,
+        period_s: period.as_secs_f64(),
+        period_kept_s: None,
+        jitter_p50_ms: None,
+        jitter_p99_ms: None,
+        round_trip_p50_ms: None,
+        round_trip_p99_ms: None,
+        readings: counts.readings,
+        failures: counts.failures,
+        missed: 0,
+        dropped: dropped(counts),
+    }
+}

@@ -1,0 +1,200 @@
+//! What may fail while the box goes on: store, sources, clock, memory of the estimators. Each failure is told once, is
+//! remembered as an event, and is shown while it lasts.
+
+use super::clock::{BoxClock, ClockStep};
+use super::feed::Feed;
+use super::keep::Kept;
+use crate::history::{Event, ExtraValue, Record};
+use crate::log::{Notice, Severity};
+use crate::pipeline::{Pipeline, Store};
+use crate::status::{HistoryStatus, Problem};
+use adapters::Sample;
+use adapters::clock::{SECOND_NS, TimeNs};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// Everything is looked at about this often.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// What the estimators have learned is saved about this often.
+const SAVE_EVERY: Duration = Duration::from_secs(60);
+/// One day of machine time.
+const DAY_NS: i64 = 86_400 * SECOND_NS;
+
+/// See the [module](self).
+pub struct Health {
+    kept: Kept,
+    clock: Option<Arc<BoxClock>>,
+    behind_ns: i64,
+    port: watch::Receiver<Option<String>>,
+    memory: PathBuf,
+    sources: Vec<Option<String>>,
+    looked: Option<Instant>,
+    saved: Instant,
+    day: Option<i64>,
+}
+
+impl Health {
+    /// `clock` is the box's own where machine time is real time, `port` the trouble with the page's port, `memory` the
+    /// file for what the estimators have learned.
+    #[must_use]
+    pub fn new(
+        kept: Kept,
+        clock: Option<Arc<BoxClock>>,
+        port: watch::Receiver<Option<String>>,
+        memory: PathBuf,
+    ) -> Self {
+        Self {
+            kept,
+            clock,
+            behind_ns: 0,
+            port,
+            memory,
+            sources: Vec::new(),
+            looked: None,
+            saved: Instant::now(),
+            day: None,
+        }
+    }
+
+    /// Remembers and tells that something happened.
+    pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
+        notice.say();
+        let (kind, text) = (notice.code.to_owned(), notice.operator.clone());
+        let detail =
+            if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
+        self.kept.record(Event { at_ns, kind, source: source.to_owned(), text, detail }.into());
+    }
+
+    /// Looks after everything, about once per second.
+    pub fn look(&mut self, pipeline: &Pipeline, feed: &Feed, now_ns: TimeNs) {
+        if self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
+            return;
+        }
+        self.looked = Some(Instant::now());
+        self.kept.look();
+        self.look_at_clock(now_ns);
+        self.look_at_sources(feed, now_ns);
+        let day = now_ns.div_euclid(DAY_NS);
+        if self.day.replace(day).is_some_and(|before| before != day) {
+            self.kept.maintain(now_ns);
+        }
+        if self.saved.elapsed() >= SAVE_EVERY {
+            self.save(pipeline);
+        }
+    }
+
+    fn look_at_clock(&mut self, now_ns: TimeNs) {
+        let Some(step) = self.clock.as_ref().and_then(|clock| clock.look()) else { return };
+        self.behind_ns = if let ClockStep::Back(by_ns) = step { by_ns } else { 0 };
+        let notice = match step {
+            ClockStep::Forward(by_ns) => {
+                let text = format!("the wall clock was set forward by {}; the box follows, with a gap", span(by_ns));
+                Notice::new(Severity::Warning, "clock_forward", text)
+            }
+            ClockStep::Back(by_ns) => {
+                let text = format!(
+                    "the wall clock was set back by {}; the box keeps its own time until it is started again",
+                    span(by_ns)
+                );
+                Notice::new(Severity::Warning, "clock_back", text)
+            }
+            ClockStep::Right => Notice::new(Severity::Info, "clock_right", "the wall clock agrees with the box again"),
+        };
+        self.event(now_ns, "gateway", &notice);
+    }
+
+    fn look_at_sources(&mut self, feed: &Feed, now_ns: TimeNs) {
+        let status = feed.status(now_ns);
+        self.sources.resize(status.len(), None);
+        for (index, source) in status.into_iter().enumerate() {
+            let before = std::mem::replace(&mut self.sources[index], source.error.clone());
+            let notice = match (before, source.error) {
+                (None, Some(error)) => Notice::new(Severity::Warning, "source_lost", error),
+                (Some(_), None) => Notice::new(Severity::Info, "source_back", format!("{} answers again", source.name)),
+                _ => continue,
+            };
+            self.event(now_ns, &source.name, &notice);
+        }
+    }
+
+    /// Saves what the estimators have learned: a new file in the place of the old one.
+    fn save(&mut self, pipeline: &Pipeline) {
+        self.saved = Instant::now();
+        let text = pipeline.estimators().snapshot().to_string();
+        let fresh = self.memory.with_extension("new");
+        let directory = self.memory.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let saved =
+            directory.and_then(|()| std::fs::write(&fresh, text)).and_then(|()| std::fs::rename(&fresh, &self.memory));
+        if let Err(error) = saved {
+            let text = format!("what was learned could not be saved in {}: {error}", self.memory.display());
+            tracing::warn!("{text}");
+        }
+    }
+
+    /// The last tick is over.
+    pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
+        self.save(pipeline);
+        let notice = Notice::new(Severity::Info, "stopped", "stopped");
+        self.kept.record(
+            Event {
+                at_ns,
+                kind: notice.code.to_owned(),
+                source: "gateway".to_owned(),
+                text: notice.operator,
+                detail: String::new(),
+            }
+            .into(),
+        );
+        self.kept.close();
+    }
+
+    /// The store.
+    #[must_use]
+    pub fn history_status(&self) -> HistoryStatus {
+        self.kept.status()
+    }
+
+    /// What does not work.
+    #[must_use]
+    pub fn problems(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        let mut add = |what: String, next: &str| problems.push(Problem { what, next: next.to_owned() });
+        if let Some(what) = self.port.borrow().clone() {
+            add(what, "stop the other program, or choose another port with --listen");
+        }
+        if let Some(what) = self.kept.status().error {
+            add(what, "polling goes on; nothing that was acknowledged is lost");
+        }
+        if self.behind_ns > 0 {
+            let what = format!("the wall clock is {} behind the box", span(self.behind_ns));
+            add(what, "set the clock right, or start the box again when it is right");
+        }
+        for error in self.sources.iter().flatten() {
+            add(error.clone(), "the other sources go on");
+        }
+        problems
+    }
+}
+
+/// A length of time in words.
+fn span(ns: i64) -> String {
+    let seconds = ns / SECOND_NS;
+    match seconds {
+        0..=119 => format!("{seconds} s"),
+        120..=7199 => format!("{} min", seconds / 60),
+        7200..=172_799 => format!("{} h", seconds / 3600),
+        _ => format!("{} days", seconds / 86_400),
+    }
+}
+
+impl Store for Health {
+    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
+        self.kept.sample(sample, extras);
+    }
+
+    fn record(&mut self, record: Record) {
+        self.kept.record(record);
+    }
+}

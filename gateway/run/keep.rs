@@ -1,0 +1,204 @@
+//! The history of a running box: opened at the start, or again and again while the disk does not let it.
+
+use crate::config;
+use crate::history::{DiskRoom, HistoryError, Options, Reader, Record, Retention, Writer, disk_room};
+use crate::log::{Notice, Severity};
+use crate::pipeline::{Store, stored_series};
+use crate::status::HistoryStatus;
+use adapters::Sample;
+use adapters::clock::TimeNs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Pause between two tries to open a history that cannot be opened.
+const RETRY: Duration = Duration::from_secs(10);
+/// A rate of growth is told after this much machine time.
+const RATE_AFTER_S: f64 = 600.0;
+
+/// The history, open or not.
+#[derive(Debug)]
+pub struct Kept {
+    path: PathBuf,
+    options: Options,
+    writer: Option<Writer>,
+    /// Why there is no writer, and when to try again.
+    closed: Option<(String, Instant)>,
+    /// Rows in the file when it was opened.
+    rows_before: u64,
+    bytes_before: u64,
+    first_ns: Option<TimeNs>,
+    last_ns: TimeNs,
+    lost: u64,
+    told: Option<String>,
+}
+
+impl Kept {
+    /// Opens the history of the configuration, or goes on without it where the disk does not let it.
+    ///
+    /// # Errors
+    /// A history that belongs to somebody else: another gateway, a newer version, another program.
+    pub fn open(config: &config::History) -> Result<Self, HistoryError> {
+        let mut kept = Self {
+            path: config.path.clone(),
+            options: options(config),
+            writer: None,
+            closed: None,
+            rows_before: 0,
+            bytes_before: 0,
+            first_ns: None,
+            last_ns: 0,
+            lost: 0,
+            told: None,
+        };
+        match kept.try_open() {
+            Ok(()) => {}
+            Err(error) if foreign(&error) => return Err(error),
+            Err(error) => kept.put_off(&error),
+        }
+        Ok(kept)
+    }
+
+    fn try_open(&mut self) -> Result<(), HistoryError> {
+        let writer = Writer::open(&self.path, self.options.clone())?;
+        self.rows_before = rows_in(&self.path);
+        self.bytes_before = size(&self.path);
+        self.writer = Some(writer);
+        self.closed = None;
+        Ok(())
+    }
+
+    fn put_off(&mut self, error: &HistoryError) {
+        let text = error.to_string();
+        if self.closed.is_none() {
+            let operator =
+                format!("nothing is being stored: {text} Polling goes on; trying again every {} s", RETRY.as_secs());
+            Notice::new(Severity::Error, "history_closed", operator).detail(format!("{error:?}")).say();
+        }
+        self.closed = Some((text, Instant::now() + RETRY));
+    }
+
+    /// Time of the newest sample in the file.
+    #[must_use]
+    pub fn newest_ns(&self) -> Option<TimeNs> {
+        Reader::open(&self.path).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns)
+    }
+
+    /// Tries again to open, and tells what the writer has to say. Call it about once per second.
+    pub fn look(&mut self) {
+        if self.closed.as_ref().is_some_and(|(_, again)| Instant::now() >= *again) {
+            match self.try_open() {
+                Ok(()) => {
+                    let text =
+                        format!("storing again in {}; {} samples were not stored", self.path.display(), self.lost);
+                    Notice::new(Severity::Info, "history_open", text).say();
+                }
+                Err(error) => self.put_off(&error),
+            }
+        }
+        let degraded = self.writer.as_ref().and_then(|writer| writer.status().degraded);
+        if degraded != self.told {
+            match &degraded {
+                Some(text) => Notice::new(Severity::Error, "history_degraded", text.clone()).say(),
+                None => Notice::new(Severity::Info, "history_recovered", "the history is being written again").say(),
+            }
+            self.told = degraded;
+        }
+    }
+
+    /// Compacts and removes what is too old, in the background.
+    pub fn maintain(&self, now_ns: TimeNs) {
+        if let Some(writer) = &self.writer {
+            writer.maintain(now_ns);
+        }
+    }
+
+    /// Makes everything durable and ends the writer.
+    pub fn close(&mut self) {
+        let Some(writer) = self.writer.take() else { return };
+        let status = writer.close();
+        let rows = self.rows_before + status.rows;
+        match status.degraded {
+            None => {
+                let text = format!("history closed: {rows} samples in {}", self.path.display());
+                Notice::new(Severity::Info, "history_closed", text).say();
+            }
+            Some(reason) => {
+                let text = format!("the last samples could not be stored: {reason}");
+                Notice::new(Severity::Error, "history_closed", text).say();
+            }
+        }
+    }
+
+    /// For the status.
+    #[must_use]
+    pub fn status(&self) -> HistoryStatus {
+        let writer = self.writer.as_ref().map(Writer::status).unwrap_or_default();
+        let closed = self.closed.as_ref().map(|(text, _)| text.clone());
+        HistoryStatus {
+            path: self.path.display().to_string(),
+            rows: self.rows_before + writer.rows,
+            bytes: writer.bytes,
+            lasts_days: self.lasts_days(writer.bytes),
+            lost: self.lost + writer.dropped_samples + writer.lost_samples,
+            error: closed.or(writer.degraded),
+        }
+    }
+
+    /// Until the limit or the disk is full at the rate since the start.
+    #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+    fn lasts_days(&self, bytes: u64) -> Option<f64> {
+        let seconds = (self.last_ns - self.first_ns?) as f64 / 1e9;
+        let grown = bytes.checked_sub(self.bytes_before)? as f64;
+        let room = room(&self.path, &self.options.retention, bytes)? as f64;
+        (seconds >= RATE_AFTER_S && grown > 0.0).then(|| room / (grown / seconds) / 86_400.0)
+    }
+}
+
+impl Store for Kept {
+    fn sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
+        self.first_ns.get_or_insert(sample.at_ns);
+        self.last_ns = sample.at_ns;
+        match &self.writer {
+            Some(writer) => drop(writer.sample(sample, extras)),
+            None => self.lost += 1,
+        }
+    }
+
+    fn record(&mut self, record: Record) {
+        if let Some(writer) = &self.writer {
+            writer.record(record);
+        }
+    }
+}
+
+/// Does the file belong to somebody else? Then nothing may be written to it, now or later.
+fn foreign(error: &HistoryError) -> bool {
+    matches!(error, HistoryError::InUse { .. } | HistoryError::NewerSchema { .. } | HistoryError::NotAHistory { .. })
+}
+
+fn options(config: &config::History) -> Options {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the configuration holds 0.01 to 10000"
+    )]
+    let max_bytes = (config.max_gb * 1e9) as u64;
+    let retention = Retention { raw_days: config.retention_days, max_bytes, ..Retention::default() };
+    Options { group_commit: config.commit, retention, extras: stored_series(), ..Options::default() }
+}
+
+/// Bytes that may still be used.
+fn room(path: &Path, retention: &Retention, bytes: u64) -> Option<u64> {
+    let DiskRoom { free, .. } = disk_room(path)?;
+    Some(free.saturating_sub(retention.keep_free_bytes).min(retention.max_bytes.saturating_sub(bytes)))
+}
+
+fn size(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |metadata| metadata.len())
+}
+
+/// Samples in the file.
+fn rows_in(path: &Path) -> u64 {
+    let info = Reader::open(path).and_then(|reader| reader.info());
+    info.ok().and_then(|info| u64::try_from(info.samples).ok()).unwrap_or(0)
+}

@@ -1,0 +1,192 @@
+//! `run`: one machine, live. The tick has a thread of its own, so has every source; tokio only serves.
+
+pub mod clock;
+pub mod feed;
+pub mod health;
+pub mod keep;
+pub mod open;
+pub mod pace;
+pub mod report;
+pub mod tick;
+
+use crate::cli::CannotRun;
+use crate::config::Config;
+use crate::http::{Published, Server, Shared, bind, port_trouble};
+use crate::log::{Notice, Severity};
+use crate::pipeline::Pipeline;
+use crate::signals::{Request, Signals};
+use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use clock::BoxClock;
+use health::Health;
+use keep::Kept;
+use open::{MachineSpeed, Sources};
+use rules::estimators;
+use rules::script::Host;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+use tick::{Identity, Ticker, Wishes};
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+/// What the box shall do.
+#[derive(Debug)]
+pub struct Plan {
+    /// The configuration.
+    pub config: Config,
+    /// Did the user name the port? Then one that is in use is an error; otherwise the box goes on without its page and
+    /// keeps trying.
+    pub port_named: bool,
+    /// How fast machine time runs.
+    pub speed: MachineSpeed,
+    /// End after so many seconds of machine time.
+    pub stop_after_s: Option<f64>,
+}
+
+/// The tick, ready to go, and what it publishes.
+type Begun = (Ticker, watch::Receiver<Option<Published>>);
+
+/// Runs until told to stop.
+///
+/// # Errors
+/// Everything that makes it impossible to begin.
+pub fn run(plan: Plan) -> Result<(), CannotRun> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .max_blocking_threads(4)
+        .thread_name("serve")
+        .enable_all()
+        .build()
+        .map_err(|error| CannotRun::new(format!("no threads to serve with: {error}"), ""))?;
+    let listener = runtime.block_on(listen(&plan))?;
+    let wishes = Arc::new(Wishes::default());
+    let (report, port) = watch::channel(None);
+    let (ticker, live) = ticker(&plan, &wishes, port)?;
+    let thread = std::thread::Builder::new()
+        .name("tick".to_owned())
+        .spawn(move || ticker.run())
+        .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
+    runtime.block_on(serve(&plan, listener, live, &wishes, report));
+    let ended = thread.join();
+    runtime.shutdown_timeout(Duration::from_secs(1));
+    ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
+}
+
+fn address(plan: &Plan) -> Result<Option<SocketAddr>, CannotRun> {
+    let http = &plan.config.http;
+    if !http.enabled {
+        return Ok(None);
+    }
+    let bad = |_| CannotRun::new(format!("{} is no address to listen on", http.listen), "write 127.0.0.1:8080");
+    http.listen.parse().map(Some).map_err(bad)
+}
+
+/// A port that the user named is opened before anything else starts.
+async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
+    let Some(address) = address(plan)?.filter(|_| plan.port_named) else { return Ok(None) };
+    let next = "stop the other program, or choose another port with --listen 127.0.0.1:8081";
+    bind(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
+}
+
+fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String>>) -> Result<Begun, CannotRun> {
+    let config = &plan.config;
+    let data_dir = &config.gateway.data_dir;
+    let kept = Kept::open(&config.history).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let own = Arc::new(BoxClock::new());
+    let clock: Arc<dyn Clock> = own.clone();
+    let start_ns = start_ns(plan, &kept, clock.now_ns());
+    let opened = open::sources(config, plan.speed, &clock, start_ns);
+    let Sources { feed, pace, simulated, .. } =
+        opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
+    let memory = data_dir.join("estimators.json");
+    let mut scripts = Host::new();
+    let _refused_is_shown = scripts.load(&rules::script::shipped());
+    let pipeline = Pipeline::new(estimators(&memory), scripts);
+    let identity = Identity {
+        machine: config.gateway.name.clone(),
+        simulated,
+        speed: plan.speed.factor(),
+        rate_hz: config.gateway.tick_hz,
+    };
+    let (publish, live) = watch::channel(None);
+    #[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
+    let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
+    let own = (plan.speed == MachineSpeed::Real).then_some(own);
+    let mut health = Health::new(kept, own, port, memory);
+    let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
+    health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
+    let wishes = wishes.clone();
+    Ok((Ticker { identity, pace, feed, pipeline, health, wishes, publish, stop_after_ns }, live))
+}
+
+/// Now; an accelerated machine begins after everything that the history already holds.
+fn start_ns(plan: &Plan, kept: &Kept, now_ns: TimeNs) -> TimeNs {
+    let Some(newest_ns) = kept.newest_ns().filter(|newest_ns| *newest_ns >= now_ns) else { return now_ns };
+    if plan.speed == MachineSpeed::Real {
+        let text = "the history holds samples from the future (an accelerated run, or a clock that was wrong); \
+                    new ones are stored with the time of this clock";
+        Notice::new(Severity::Warning, "history_ahead", text).detail(format!("{} ns", newest_ns - now_ns)).say();
+        return now_ns;
+    }
+    newest_ns + SECOND_NS
+}
+
+/// The estimators, with what they had learned before.
+fn estimators(memory: &Path) -> estimators::Pipeline {
+    let settings = estimators::Settings::default();
+    let fresh = || estimators::Pipeline::new(settings.clone());
+    let Ok(text) = std::fs::read_to_string(memory) else { return fresh() };
+    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
+    estimators::Pipeline::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
+        Notice::new(Severity::Warning, "nothing_learned", error.to_string()).say();
+        fresh()
+    })
+}
+
+/// Serves until a signal says stop, or the tick has ended by itself.
+async fn serve(
+    plan: &Plan,
+    listener: Option<TcpListener>,
+    live: watch::Receiver<Option<Published>>,
+    wishes: &Arc<Wishes>,
+    report: watch::Sender<Option<String>>,
+) {
+    let shared = Shared::new(live.clone(), plan.config.history.path.clone());
+    let server = match address(plan) {
+        Ok(Some(address)) => Some(Server::start(address, listener, shared, report)),
+        _ => None,
+    };
+    tokio::select! {
+        () = obey(wishes) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
+        () = until_closed(live) => {}
+    }
+    wishes.stop.store(true, Ordering::SeqCst);
+    if let Some(server) = server {
+        server.stop().await;
+    }
+}
+
+/// Returns when a signal says stop.
+async fn obey(wishes: &Wishes) {
+    let mut signals = match Signals::listen() {
+        Ok(signals) => signals,
+        Err(error) => {
+            let text = format!("signals cannot be heard ({error}): stop the box with SIGKILL; nothing stored is lost");
+            Notice::new(Severity::Warning, "no_signals", text).say();
+            return std::future::pending().await;
+        }
+    };
+    loop {
+        match signals.next().await {
+            Request::Stop => return,
+            Request::Reload => wishes.reload.store(true, Ordering::SeqCst),
+        }
+    }
+}
+
+/// Returns when the tick has ended and nothing will be published any more.
+async fn until_closed(mut live: watch::Receiver<Option<Published>>) {
+    while live.changed().await.is_ok() {}
+}

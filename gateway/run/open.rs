@@ -1,0 +1,123 @@
+//! From the configuration to something that gives samples at its pace.
+
+use super::feed::Feed;
+use super::pace::Pace;
+use crate::config::Config;
+use adapters::address::Target;
+use adapters::clock::{Clock, TimeNs};
+use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
+use adapters::open::{OpenError, open, open_pull};
+use adapters::worker::{Worker, WorkerSettings};
+use adapters::{Actuator, Pull, Source};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How fast machine time runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MachineSpeed {
+    /// As fast as real time.
+    Real,
+    /// So many times as fast; simulated machines and recordings only.
+    Times(f64),
+    /// As fast as possible; simulated machines and recordings only.
+    Max,
+}
+
+impl MachineSpeed {
+    /// Machine time over real time; `None` as fast as possible.
+    #[must_use]
+    pub fn factor(self) -> Option<f64> {
+        match self {
+            Self::Real => Some(1.0),
+            Self::Times(times) => Some(times),
+            Self::Max => None,
+        }
+    }
+}
+
+/// What the sources give.
+pub struct Sources {
+    /// The samples.
+    pub feed: Feed,
+    /// When they are taken.
+    pub pace: Pace,
+    /// Ways to the feed override, each with the name of its source.
+    pub actuators: Vec<(String, Box<dyn Actuator>)>,
+    /// Is every source simulated?
+    pub simulated: bool,
+}
+
+/// Opens every source of the configuration. An accelerated machine begins at `start_ns`.
+///
+/// # Errors
+/// Everything that cannot be opened, in words.
+pub fn sources(
+    config: &Config,
+    speed: MachineSpeed,
+    clock: &Arc<dyn Clock>,
+    start_ns: TimeNs,
+) -> Result<Sources, Vec<String>> {
+    match speed {
+        MachineSpeed::Real => live(config, clock),
+        MachineSpeed::Times(_) | MachineSpeed::Max => stepped(config, speed, start_ns),
+    }
+}
+
+fn period(config: &Config) -> Duration {
+    Duration::from_secs_f64(1.0 / config.gateway.tick_hz)
+}
+
+fn simulated(config: &Config) -> bool {
+    config.sources.iter().all(|source| matches!(source.address.target(), Target::Simulated(_)))
+}
+
+fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
+    let (mut found, mut actuators, mut problems) = (Vec::new(), Vec::new(), Vec::new());
+    for source in &config.sources {
+        match open(&source.address, clock.now_ns()) {
+            Ok(opened) => {
+                let settings = WorkerSettings { deadline: source.deadline, ..WorkerSettings::default() };
+                found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
+                actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+            }
+            Err(error) => problems.push(error.to_string()),
+        }
+    }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let feed = threads(found, clock).map_err(|error| vec![format!("no thread for a source: {error}")])?;
+    let pace = Pace::on_clock(clock.clone(), period(config));
+    Ok(Sources { feed, pace, actuators, simulated: simulated(config) })
+}
+
+fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Clock>) -> std::io::Result<Feed> {
+    let plans: Vec<SourcePlan> = sources.iter().map(|(source, _)| SourcePlan::of(source.as_ref())).collect();
+    let merge = Merge::new(&plans, Delay::SlowestPeriod);
+    let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
+    Ok(Feed::Threads { workers: sources.into_iter().map(start).collect::<Result<_, _>>()?, merge })
+}
+
+fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
+    let (mut found, mut actuators, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
+    for source in &config.sources {
+        match open_pull(&source.address, start_ns) {
+            Ok(opened) => {
+                found.extend(opened.sources);
+                actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+            }
+            Err(error) => problems.push(accelerated(&error)),
+        }
+    }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
+    let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names };
+    let pace = Pace::stepped(speed.factor(), start_ns, period(config));
+    Ok(Sources { feed, pace, actuators, simulated: simulated(config) })
+}
+
+fn accelerated(error: &OpenError) -> String {
+    format!("{error}. With --speed only simulated machines and recordings can be read")
+}

@@ -1,0 +1,144 @@
+//! When the next tick is: on the box's clock, or at a multiple of real time for a machine that is simulated.
+
+use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Lateness is told over so many ticks: a minute at 10 Hz.
+const WINDOW: usize = 600;
+
+/// A slow tick looks this often whether it shall stop.
+const STOP_LOOK_NS: i64 = SECOND_NS / 5;
+
+/// An accelerated machine that falls further behind than this goes on from where it is.
+const BEHIND_MAX: Duration = Duration::from_secs(1);
+
+enum Beat {
+    /// The ticks of a real machine: on the clock, late ones are left out.
+    Clock(Arc<dyn Clock>),
+    /// `speed` seconds of machine time per second, `None` as fast as possible; no tick is left out.
+    Stepped { speed: Option<f64>, anchor: (Instant, TimeNs) },
+}
+
+/// Gives the times of the ticks, waiting for each.
+pub struct Pace {
+    beat: Beat,
+    period_ns: i64,
+    due_ns: TimeNs,
+    late_ns: Vec<i64>,
+    cursor: usize,
+    skipped: u64,
+}
+
+impl Pace {
+    /// Ticks on the clock.
+    #[must_use]
+    pub fn on_clock(clock: Arc<dyn Clock>, period: Duration) -> Self {
+        let due_ns = clock.now_ns();
+        Self::new(Beat::Clock(clock), due_ns, period)
+    }
+
+    /// Ticks of an accelerated machine, beginning at `start_ns`.
+    #[must_use]
+    pub fn stepped(speed: Option<f64>, start_ns: TimeNs, period: Duration) -> Self {
+        Self::new(Beat::Stepped { speed, anchor: (Instant::now(), start_ns) }, start_ns, period)
+    }
+
+    fn new(beat: Beat, due_ns: TimeNs, period: Duration) -> Self {
+        let period_ns = i64::try_from(period.as_nanos()).unwrap_or(SECOND_NS).max(1);
+        Self { beat, period_ns, due_ns, late_ns: Vec::with_capacity(WINDOW), cursor: 0, skipped: 0 }
+    }
+
+    /// Waits for the next tick and gives its time; `None` when it shall stop.
+    pub fn next_tick(&mut self, stop: &AtomicBool) -> Option<TimeNs> {
+        self.due_ns += self.period_ns;
+        match &mut self.beat {
+            Beat::Clock(clock) => {
+                while !stop.load(Ordering::SeqCst) && clock.now_ns() < self.due_ns {
+                    clock.sleep_until(self.due_ns.min(clock.now_ns() + STOP_LOOK_NS));
+                }
+                let late_ns = clock.now_ns() - self.due_ns;
+                self.note(late_ns);
+                // What is more than a period late is left out, so that the box catches up at once.
+                let whole = (late_ns / self.period_ns).max(0);
+                self.skipped += whole.unsigned_abs();
+                self.due_ns += whole * self.period_ns;
+            }
+            Beat::Stepped { speed: None, .. } => {}
+            Beat::Stepped { speed: Some(speed), anchor } => {
+                let late = wait(*speed, *anchor, self.due_ns);
+                if late > BEHIND_MAX {
+                    *anchor = (Instant::now(), self.due_ns);
+                }
+                self.note(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
+            }
+        }
+        (!stop.load(Ordering::SeqCst)).then_some(self.due_ns)
+    }
+
+    fn note(&mut self, late_ns: i64) {
+        if self.late_ns.len() < WINDOW {
+            self.late_ns.push(late_ns);
+        } else {
+            self.late_ns[self.cursor] = late_ns;
+            self.cursor = (self.cursor + 1) % WINDOW;
+        }
+    }
+
+    /// Median and 99th percentile of the lateness, ms.
+    #[must_use]
+    pub fn late_ms(&self) -> (f64, f64) {
+        let mut sorted = self.late_ns.clone();
+        sorted.sort_unstable();
+        let at = |share: f64| {
+            let index = (sorted.len() as f64 * share) as usize;
+            sorted.get(index.min(sorted.len().saturating_sub(1))).map_or(0.0, |ns| *ns as f64 / 1e6)
+        };
+        (at(0.5), at(0.99))
+    }
+
+    /// Ticks left out since the start.
+    #[must_use]
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+}
+
+/// Sleeps until machine time `due_ns`; gives how late it is in real time.
+fn wait(speed: f64, (began, began_ns): (Instant, TimeNs), due_ns: TimeNs) -> Duration {
+    let machine = Duration::from_nanos((due_ns - began_ns).max(0).unsigned_abs());
+    let due = began + machine.div_f64(speed);
+    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    Instant::now().saturating_duration_since(due)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::clock::ManualClock;
+
+    static GO: AtomicBool = AtomicBool::new(false);
+
+    #[test]
+    fn late_ticks_are_left_out_and_counted() {
+        let clock = ManualClock::at(0);
+        let mut pace = Pace::on_clock(Arc::new(clock.clone()), Duration::from_millis(100));
+        clock.set(100_000_000);
+        assert_eq!(pace.next_tick(&GO), Some(100_000_000));
+        clock.set(450_000_000);
+        assert_eq!(pace.next_tick(&GO), Some(400_000_000));
+        assert_eq!(pace.skipped(), 2);
+        assert_eq!(pace.late_ms().1, 250.0);
+    }
+
+    #[test]
+    fn an_accelerated_machine_leaves_no_tick_out() {
+        let mut pace = Pace::stepped(Some(1000.0), 0, Duration::from_millis(100));
+        let began = Instant::now();
+        let ticks: Vec<_> = (0..100).filter_map(|_| pace.next_tick(&GO)).collect();
+        assert_eq!(ticks, (1..=100).map(|n| n * 100_000_000).collect::<Vec<_>>());
+        assert!(began.elapsed() >= Duration::from_millis(10));
+        assert_eq!(pace.skipped(), 0);
+    }
+}

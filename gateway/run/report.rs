@@ -1,0 +1,131 @@
+//! From the pipeline's figures to the status document.
+
+use crate::pipeline::Pipeline;
+use crate::status::{
+    AlarmStatus, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, ScriptStatus, Shown, StateStatus,
+};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{Sample, Slot, Value};
+use rules::estimators::{Estimated, Estimates};
+use rules::script::SCRIPT_STOPPED;
+
+/// Half the 95 % interval of a normal distribution, in standard deviations.
+const HALF_INTERVAL: f64 = 1.96;
+
+/// Milliseconds since 1970.
+#[must_use]
+pub fn milliseconds(at_ns: TimeNs) -> i64 {
+    at_ns.div_euclid(1_000_000)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "an age or a stay of less than a hundred days")]
+fn seconds(ns: i64) -> f64 {
+    ns as f64 / SECOND_NS as f64
+}
+
+/// Every provided channel.
+#[must_use]
+pub fn channels(sample: &Sample) -> Vec<ChannelStatus> {
+    sample.provided().map(|(id, slot)| channel(id.name(), id.channel().unit, slot)).collect()
+}
+
+fn channel(name: &'static str, unit: &'static str, slot: &Slot) -> ChannelStatus {
+    let (value, missing) = match &slot.value {
+        Ok(Value::Number(number)) => (Some(Shown::Number(*number)), None),
+        Ok(Value::Text(text)) => (Some(Shown::Text(text.to_string())), None),
+        Err(absence) => (None, Some(absence.word())),
+    };
+    let age_s = value.is_some().then(|| seconds(slot.age_ns));
+    ChannelStatus { name, value, unit, age_s, missing }
+}
+
+/// Everything inferred.
+#[must_use]
+pub fn estimates(estimates: &Estimates) -> Vec<EstimateStatus> {
+    estimates.quantities().into_iter().map(|(name, estimated)| estimate(name, estimated)).collect()
+}
+
+fn estimate(name: &'static str, estimated: Estimated) -> EstimateStatus {
+    let (value, missing) = (estimated.ok(), estimated.err());
+    EstimateStatus {
+        name,
+        value: value.map(|estimate| estimate.value),
+        uncertainty: value.map(|estimate| HALF_INTERVAL * estimate.sd),
+        unit: "W",
+        missing: missing.map(rules::estimators::NoEstimate::word),
+        why: missing.map(|reason| reason.to_string()),
+    }
+}
+
+/// What the machine is doing.
+#[must_use]
+pub fn state(pipeline: &Pipeline) -> StateStatus {
+    let estimates = pipeline.estimates();
+    StateStatus {
+        word: estimates.state.word(),
+        since_ms: milliseconds(estimates.since_ns),
+        seconds: seconds((estimates.at_ns - estimates.since_ns).max(0)),
+        seconds_per_state: pipeline.tally().seconds_per_state(),
+        why: estimates.unknown_because.map(|reason| reason.to_string()),
+        visibility: estimates.visibility.word(),
+        no_load_origin: estimates.no_load_origin.word(),
+    }
+}
+
+/// Alarms that stand: the controller's own, then those of the scripts.
+#[must_use]
+pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
+    let controller = pipeline.journal().alarm().map(|(text, since_ns)| AlarmStatus {
+        code: "controller".to_owned(),
+        severity: "critical".to_owned(),
+        text: text.to_owned(),
+        since_ms: milliseconds(since_ns),
+    });
+    let scripts = pipeline.scripts().alarms().iter().map(|alarm| AlarmStatus {
+        code: format!("{} ({})", alarm.name, alarm.script),
+        severity: if &*alarm.name == SCRIPT_STOPPED { "critical" } else { "warning" }.to_owned(),
+        text: alarm.text.to_string(),
+        since_ms: milliseconds(alarm.since_ns),
+    });
+    controller.into_iter().chain(scripts).collect()
+}
+
+/// The way of an override to the machine.
+#[must_use]
+pub fn gate(pipeline: &Pipeline) -> GateStatus {
+    let request = pipeline.scripts().decision().request.as_ref();
+    let recent = pipeline.decisions().recent();
+    GateStatus {
+        mode: "shadow",
+        wanted_pct: request.map(|request| request.pct),
+        reason: request.map(|request| format!("{} ({})", request.reason, request.script)),
+        permitted_pct: None,
+        held: None,
+        written_pct: None,
+        recent: recent
+            .map(|change| DecisionStatus { at_ms: milliseconds(change.at_ns), text: change.text.clone() })
+            .collect(),
+    }
+}
+
+/// Scripts, each with why its newest text is not in charge.
+#[must_use]
+pub fn scripts(pipeline: &Pipeline) -> Vec<ScriptStatus> {
+    let status = pipeline.scripts().status();
+    let refused = |file: &str| status.refused.iter().find(|problem| problem.file == file).map(ToString::to_string);
+    let known = status.scripts.iter().map(|script| ScriptStatus {
+        file: script.file.to_string(),
+        version: format!("{:016x}", script.version)[..8].to_owned(),
+        condition: script.condition.word(),
+        error: refused(&script.file).or_else(|| script.condition.problem().map(ToString::to_string)),
+    });
+    let new =
+        status.refused.iter().filter(|problem| !status.scripts.iter().any(|script| *script.file == *problem.file));
+    let never = new.map(|problem| ScriptStatus {
+        file: problem.file.clone(),
+        version: String::new(),
+        condition: "refused",
+        error: Some(problem.to_string()),
+    });
+    known.chain(never).collect()
+}

@@ -1,0 +1,122 @@
+//! The tick thread: waits for the tick, samples, steps the pipeline, hands the status over.
+
+use super::feed::Feed;
+use super::health::Health;
+use super::pace::Pace;
+use super::report;
+use crate::http::Published;
+use crate::pipeline::Pipeline;
+use crate::status::{Problem, Status, TickStatus};
+use adapters::Sample;
+use adapters::clock::TimeNs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// The status is published at most this often.
+const PUBLISH_EVERY: Duration = Duration::from_millis(190);
+
+/// What the rest of the process asks of the tick.
+#[derive(Debug, Default)]
+pub struct Wishes {
+    /// Finish this tick and end.
+    pub stop: AtomicBool,
+    /// Read scripts again.
+    pub reload: AtomicBool,
+}
+
+/// What does not change while the box runs.
+#[derive(Debug, Clone)]
+pub struct Identity {
+    /// Name of the machine.
+    pub machine: String,
+    /// Is it simulated?
+    pub simulated: bool,
+    /// Machine time over real time; `None` as fast as possible.
+    pub speed: Option<f64>,
+    /// Ticks per second of machine time.
+    pub rate_hz: f64,
+}
+
+/// Everything the tick thread owns.
+pub struct Ticker {
+    /// See [`Identity`].
+    pub identity: Identity,
+    /// Gives the times of the ticks.
+    pub pace: Pace,
+    /// Gives the samples.
+    pub feed: Feed,
+    /// Infers, decides, records.
+    pub pipeline: Pipeline,
+    /// Store, scripts, clock: what may fail while the box goes on.
+    pub health: Health,
+    /// What the rest of the process wants.
+    pub wishes: Arc<Wishes>,
+    /// Where the status goes.
+    pub publish: watch::Sender<Option<Published>>,
+    /// End after so much machine time.
+    pub stop_after_ns: Option<i64>,
+}
+
+impl Ticker {
+    /// Runs until it is told to stop, the time is over, or every source has come to its end.
+    pub fn run(mut self) {
+        let started = Instant::now();
+        let mut published = None;
+        let mut sample = Sample::empty(0);
+        let mut first_ns = None;
+        while let Some(now_ns) = self.pace.next_tick(&self.wishes.stop) {
+            let began_ns = *first_ns.get_or_insert(now_ns);
+            let alive = self.feed.sample_into(&mut sample, now_ns);
+            self.health.look(&self.pipeline, &self.feed, now_ns);
+            self.pipeline.step(&sample, &mut self.health);
+            let over = !alive || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
+            if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {
+                published = Some(Instant::now());
+                self.send(&sample, now_ns, started);
+            }
+            if over {
+                break;
+            }
+        }
+        self.feed.stop();
+        self.health.close(&self.pipeline, sample.at_ns);
+        self.wishes.stop.store(true, Ordering::SeqCst);
+    }
+
+    fn send(&self, sample: &Sample, now_ns: TimeNs, started: Instant) {
+        let status = Arc::new(self.status(sample, now_ns, started));
+        self.publish.send_replace(Some(Published { status, at: Instant::now() }));
+    }
+
+    fn status(&self, sample: &Sample, now_ns: TimeNs, started: Instant) -> Status {
+        let Identity { machine, simulated, speed, rate_hz } = self.identity.clone();
+        let (late_p50_ms, late_p99_ms) = self.pace.late_ms();
+        let count = self.pipeline.tally().ticks();
+        Status {
+            schema: "status/1",
+            version: env!("CARGO_PKG_VERSION"),
+            machine,
+            simulated,
+            speed,
+            at_ms: report::milliseconds(sample.at_ns),
+            uptime_s: started.elapsed().as_secs_f64(),
+            tick: TickStatus { rate_hz, count, late_p50_ms, late_p99_ms, skipped: self.pace.skipped() },
+            state: report::state(&self.pipeline),
+            channels: report::channels(sample),
+            estimates: report::estimates(self.pipeline.estimates()),
+            alarms: report::alarms(&self.pipeline),
+            parts: self.pipeline.parts().finished(),
+            gate: report::gate(&self.pipeline),
+            sources: self.feed.status(now_ns),
+            scripts: report::scripts(&self.pipeline),
+            history: self.health.history_status(),
+            problems: self.problems(),
+        }
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        self.health.problems()
+    }
+}

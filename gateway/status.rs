@@ -1,0 +1,242 @@
+//! What the box says of itself at this moment: one document (`status/1`) for the page, the API and the metrics.
+//!
+//! The tick builds it a few times per second and hands it over whole, so that no reader ever waits for the tick or the
+//! tick for a reader. Every number carries its unit in its name or beside it; a missing one carries its reason.
+
+use serde::Serialize;
+
+/// A number or a word.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Shown {
+    /// In the unit beside it.
+    Number(f64),
+    /// A state word or name.
+    Text(String),
+}
+
+/// One measured channel: a value with unit and age, or the reason for none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelStatus {
+    /// Name, as everywhere.
+    pub name: &'static str,
+    /// The value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<Shown>,
+    /// Unit of the value; `1` for pure numbers, empty for text.
+    pub unit: &'static str,
+    /// Seconds since the value was true; 0 between two readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_s: Option<f64>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<&'static str>,
+}
+
+/// One inferred quantity: a value with its uncertainty, or the reason for none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EstimateStatus {
+    /// Name, ending in the unit.
+    pub name: &'static str,
+    /// The value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Half the width of the 95 % interval (1.96 standard deviations), in the same unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<f64>,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// The reason for none, as a word.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<&'static str>,
+    /// The same in plain words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+/// What the machine is doing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateStatus {
+    /// The word.
+    pub word: &'static str,
+    /// Since when, milliseconds since 1970.
+    pub since_ms: i64,
+    /// For how long, seconds.
+    pub seconds: f64,
+    /// Seconds of machine time in each state since the start.
+    pub seconds_per_state: Vec<(&'static str, f64)>,
+    /// Why it is unknown, where it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+    /// Can cutting be seen in the spindle power?
+    pub visibility: &'static str,
+    /// Where the no-load power comes from.
+    pub no_load_origin: &'static str,
+}
+
+/// An alarm that stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlarmStatus {
+    /// Its name in the script that raised it.
+    pub code: String,
+    /// `warning` or `critical`.
+    pub severity: String,
+    /// What the operator reads.
+    pub text: String,
+    /// Since when, milliseconds since 1970.
+    pub since_ms: i64,
+}
+
+/// A decision worth showing: a change of what scripts ask for or of what the gate lets through.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecisionStatus {
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+    /// In plain words.
+    pub text: String,
+}
+
+/// The way of a feed override to the machine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GateStatus {
+    /// `off`, `shadow` (decide and record, write nothing) or `armed`.
+    pub mode: &'static str,
+    /// What the scripts ask for, %.
+    pub wanted_pct: Option<f64>,
+    /// Why they ask, in their words.
+    pub reason: Option<String>,
+    /// What the gate lets through (or would, in shadow), %.
+    pub permitted_pct: Option<f64>,
+    /// Why the gate holds back, where it does.
+    pub held: Option<String>,
+    /// What was really written, %; `null` in shadow.
+    pub written_pct: Option<f64>,
+    /// The latest changes, newest first.
+    pub recent: Vec<DecisionStatus>,
+}
+
+/// A source and how it keeps its pace.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SourceStatus {
+    /// Its address.
+    pub name: String,
+    /// What it is doing: `reading`, `off` (the machine is switched off), `failing`, `stuck`, `ended`, ...
+    pub state: &'static str,
+    /// What went wrong last and what to do, while it lasts.
+    pub error: Option<String>,
+    /// Pace it promises, s.
+    pub period_s: f64,
+    /// Median of the pace it keeps, s, once known.
+    pub period_kept_s: Option<f64>,
+    /// How late polls begin against their beat, ms, once known: median and 99th percentile.
+    pub jitter_p50_ms: Option<f64>,
+    /// See `jitter_p50_ms`.
+    pub jitter_p99_ms: Option<f64>,
+    /// From asking to answer, ms, once known: median and 99th percentile.
+    pub round_trip_p50_ms: Option<f64>,
+    /// See `round_trip_p50_ms`.
+    pub round_trip_p99_ms: Option<f64>,
+    /// Readings since the start.
+    pub readings: u64,
+    /// Failed polls since the start.
+    pub failures: u64,
+    /// Beats left out because a poll took too long.
+    pub missed: u64,
+    /// Readings and polls dropped: too late, by a stepping clock, unannounced, or nobody took them.
+    pub dropped: u64,
+}
+
+/// A script and whether its newest text is in charge.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScriptStatus {
+    /// File name.
+    pub file: String,
+    /// Version in charge (start of the text's digest).
+    pub version: String,
+    /// `running`, `waiting` (for a value), `reverted`, `suspended` or `refused`.
+    pub condition: &'static str,
+    /// Why it does not run as written, with line and column.
+    pub error: Option<String>,
+}
+
+/// The store.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HistoryStatus {
+    /// The file.
+    pub path: String,
+    /// Samples acknowledged since the start of the file.
+    pub rows: u64,
+    /// Bytes on disk.
+    pub bytes: u64,
+    /// Days until the disk (or the limit) is full at this rate.
+    pub lasts_days: Option<f64>,
+    /// Samples that could not be stored since the start.
+    pub lost: u64,
+    /// What is wrong and what to do, while it lasts.
+    pub error: Option<String>,
+}
+
+/// The tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TickStatus {
+    /// Ticks per second of machine time.
+    pub rate_hz: f64,
+    /// Ticks since the start.
+    pub count: u64,
+    /// Lateness against the plan, ms: median and 99th percentile of the last minute.
+    pub late_p50_ms: f64,
+    /// See `late_p50_ms`.
+    pub late_p99_ms: f64,
+    /// Ticks left out because the box was too late for them.
+    pub skipped: u64,
+}
+
+/// Something that does not work while the box goes on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Problem {
+    /// What and where.
+    pub what: String,
+    /// What to do next.
+    pub next: String,
+}
+
+/// The whole document.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Status {
+    /// `status/1`.
+    pub schema: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the machine.
+    pub machine: String,
+    /// Is the machine simulated?
+    pub simulated: bool,
+    /// Machine time over real time; `null` when as fast as possible.
+    pub speed: Option<f64>,
+    /// The instant this document is about, milliseconds since 1970.
+    pub at_ms: i64,
+    /// Seconds since the start of the process.
+    pub uptime_s: f64,
+    /// The tick.
+    pub tick: TickStatus,
+    /// What the machine is doing.
+    pub state: StateStatus,
+    /// Every channel that a source provides.
+    pub channels: Vec<ChannelStatus>,
+    /// Everything inferred.
+    pub estimates: Vec<EstimateStatus>,
+    /// Alarms that stand.
+    pub alarms: Vec<AlarmStatus>,
+    /// Finished parts since the start.
+    pub parts: u64,
+    /// The way of an override to the machine.
+    pub gate: GateStatus,
+    /// Sources.
+    pub sources: Vec<SourceStatus>,
+    /// Scripts.
+    pub scripts: Vec<ScriptStatus>,
+    /// The store.
+    pub history: HistoryStatus,
+    /// What does not work while the box goes on.
+    pub problems: Vec<Problem>,
+}
