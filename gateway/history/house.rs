@@ -14,6 +14,11 @@ use std::time::{Duration, Instant};
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 /// Steps of deleting in one go; each is a transaction of a few milliseconds.
 const STEPS_MAX: usize = 8;
+/// Bytes of a page, `SQLite`'s default.
+const PAGE_BYTES: u64 = 4_096;
+/// Pages in the write-ahead log before it is copied back: 1 MB, fewer where the reserve is smaller.
+const LOG_PAGES_MAX: u64 = 256;
+const LOG_PAGES_MIN: u64 = 8;
 /// Free pages are given back to the disk in steps of this many.
 const VACUUM_PAGES: u32 = 256;
 
@@ -44,6 +49,12 @@ impl House {
         let mut reserve = Reserve::beside(path, reserve_bytes);
         reserve.keep();
         Self { path: path.to_owned(), retention, reserve, ceiling: None, looked: None, task: None, retired: 0 }
+    }
+
+    /// Keeps the log so short that the reserve has room for all of it when it must be copied back on a full disk.
+    pub(crate) fn bound_log(&self, db: &Connection) -> Result<(), HistoryError> {
+        let pages = (self.reserve.bytes() / 2 / PAGE_BYTES).clamp(LOG_PAGES_MIN, LOG_PAGES_MAX);
+        db.pragma_update(None, "wal_autocheckpoint", pages as i64).doing("bounding the write-ahead log")
     }
 
     /// After a commit: looks at the disk now and then, and keeps the file below what it may have. Returns its size.

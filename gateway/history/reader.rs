@@ -50,7 +50,8 @@ impl Reader {
                    SELECT min(start_ns) AS first_ns, NULL AS last_ns FROM blocks
                    UNION ALL SELECT NULL, max(end_ns) FROM blocks WHERE start_ns >=
                      (SELECT max(start_ns) FROM blocks) - 600000000000
-                   UNION ALL SELECT min(start_ns), max(end_ns) FROM tail)",
+                   UNION ALL SELECT min(start_ns), max(end_ns) FROM tail
+                     WHERE first_row >= (SELECT coalesce(max(first_row + rows), 0) FROM blocks))",
                 [],
                 |row| Ok((row.get(0)?, row.get(1)?)),
             )

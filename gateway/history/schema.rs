@@ -11,8 +11,6 @@ pub(crate) const SCHEMA: i64 = 1;
 /// `cncg`, stored as `application_id`.
 const APPLICATION: i64 = 0x636e_6367;
 const TABLES: &str = include_str!("schema.sql");
-/// Pages in the write-ahead log before it is copied back: 1 MB, which also bounds what a full disk must still hold.
-const CHECKPOINT_PAGES: u32 = 256;
 
 /// Opens the file for writing and creates the tables in a new one.
 pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> {
@@ -26,7 +24,6 @@ pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> 
     }
     db.pragma_update(None, "journal_mode", "WAL").map_err(|error| explain(path, error))?;
     db.pragma_update(None, "synchronous", "FULL").doing("choosing durable commits")?;
-    db.pragma_update(None, "wal_autocheckpoint", CHECKPOINT_PAGES).doing("bounding the write-ahead log")?;
     if new {
         create(&db).map_err(|error| explain(path, error))?;
     }

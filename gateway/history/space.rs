@@ -44,6 +44,11 @@ impl Reserve {
         Self { path: beside(path, ".reserve"), bytes: bytes.min(total / 16), held: false }
     }
 
+    /// Its size.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// Gives the room back to the disk.
     pub(crate) fn release(&mut self) {
         self.held = false;

@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// This many sealed blocks are committed without waiting for the next regular commit.
-const BLOCKS_PRESSING: usize = 32;
+const BLOCKS_PRESSING: usize = 16;
 /// At least this long between attempts while the disk refuses.
 const RETRY: Duration = Duration::from_millis(250);
 /// When asked to finish and the disk refuses: this many attempts.
@@ -139,14 +139,19 @@ impl Thread {
 
     /// One commit; on a full disk a second one after making room.
     fn attempt(&mut self) -> Result<(), HistoryError> {
-        let Self { db, keeper, slots, options, house, .. } = self;
-        let Err(first) = commit(db, keeper, slots, &options.origin) else { return Ok(()) };
-        if !first.is_full() {
-            return Err(first);
+        match self.commit_all() {
+            Err(error) if error.is_full() => {
+                let waiting: u64 = self.keeper.blocks.iter().map(|block| block.bytes() as u64).sum();
+                self.house.make_room(&mut self.db, 2 * waiting + 65_536)?;
+                self.commit_all()
+            }
+            done => done,
         }
-        let wanted = 2 * keeper.blocks.iter().map(|block| block.bytes() as u64).sum::<u64>() + 65_536;
-        house.make_room(db, wanted)?;
-        commit(db, keeper, slots, &options.origin)
+    }
+
+    fn commit_all(&mut self) -> Result<(), HistoryError> {
+        while !commit(&mut self.db, &mut self.keeper, &mut self.slots, &self.options.origin)? {}
+        Ok(())
     }
 
     fn acknowledge(&mut self) {

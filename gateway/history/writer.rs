@@ -53,10 +53,12 @@ impl Writer {
         let end = recover(&mut db)?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(Shared::default());
+        let house = House::new(path, options.retention, options.reserve_bytes);
+        house.bound_log(&db)?;
         let thread = Thread {
             keeper: Keeper::new(series, end)?,
             slots: TailSlots::load(&db)?,
-            house: House::new(path, options.retention, options.reserve_bytes),
+            house,
             db,
             mailbox: mailbox.clone(),
             shared: shared.clone(),
