@@ -17,7 +17,7 @@
 //! | `vocabulary` | what a script sees and can call |
 //! | `engine` | the interpreter and its limits |
 //! | `compile`, `examine`, `settings` | from text to a script, and everything that is wrong with it |
-//! | `host`, `slot`, `collect`, `notes` | running |
+//! | `host`, `slot`, `running`, `collect`, `notes` | running |
 //! | `decision`, `status`, `problem` | what comes out |
 //! | `shipped` | the scripts that come with the gateway |
 
@@ -29,6 +29,7 @@ mod examine;
 mod host;
 mod notes;
 mod problem;
+mod running;
 mod settings;
 mod shipped;
 mod slot;

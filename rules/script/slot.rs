@@ -6,6 +6,7 @@ use super::decision::{Alarm, AlarmChange, Decision, Note, OverrideRequest, SCRIP
 use super::engine::{OPERATIONS_MAX, Shared};
 use super::notes::NoteLimit;
 use super::problem;
+use super::running::Running;
 use super::status::{Condition, ScriptStatus};
 use super::vocabulary::{Seen, View};
 use crate::estimators::Estimates;
@@ -30,6 +31,7 @@ pub(super) struct Slot {
     script: Arc<Script>,
     previous: Option<Arc<Script>>,
     scope: Scope<'static>,
+    running: Running,
     timers: Timers,
     condition: Condition,
     request: Option<OverrideRequest>,
@@ -57,6 +59,7 @@ impl Slot {
     fn fresh(script: Arc<Script>, previous: Option<Arc<Script>>) -> Self {
         Self {
             scope: scope_of(&script),
+            running: Running::new(),
             script,
             previous,
             timers: Timers::default(),
@@ -107,7 +110,7 @@ impl Slot {
         self.ran_ns = Some(sample.at_ns);
         self.fill(&view);
         self.exchange(shared, sample.at_ns);
-        let outcome = engine.run_ast_with_scope(&mut self.scope, &self.script.ast).and_then(|()| self.bounded(engine));
+        let outcome = self.running.run(engine, &mut self.scope, &self.script.ast).and_then(|()| self.bounded(engine));
         self.scope.rewind(1 + self.script.reads.len());
         let mut collected = shared.lock();
         std::mem::swap(&mut collected.timers, &mut self.timers);
