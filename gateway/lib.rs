@@ -2,6 +2,7 @@
 
 pub mod cli;
 pub mod config;
+pub mod gate;
 pub mod history;
 pub mod http;
 pub mod log;

@@ -22,7 +22,7 @@ impl Running {
             deprecated,
             reason = "the only call that takes caches; rhai offers no other before its next major version"
         )]
-        engine.eval_statements_raw(&mut global, &mut caches, scope, ast.statements())?;
+        let _value = engine.eval_statements_raw(&mut global, &mut caches, scope, ast.statements())?;
         self.kept = Some((global, caches));
         Ok(())
     }

@@ -1,0 +1,122 @@
+//! Who let the gate write, and until when. Off after every start.
+
+use crate::config::GateMode;
+use adapters::clock::{SECOND_NS, TimeNs};
+use std::fmt;
+use std::time::Duration;
+use thiserror::Error;
+
+/// Somebody armed the gate.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Armed {
+    /// Who.
+    pub by: String,
+    /// Since when.
+    pub since_ns: TimeNs,
+    /// Until when, by itself.
+    pub until_ns: TimeNs,
+}
+
+/// Why the gate is not armed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Disarmed {
+    /// Nobody has armed it since the start.
+    Start,
+    /// Somebody disarmed it.
+    Person,
+    /// The time was over.
+    Expired,
+    /// What was read back was not what had been written.
+    ReadBack,
+    /// The machine could not be written to or read back.
+    Line,
+    /// The clock jumped back.
+    Clock,
+    /// The machine has given no fresh values for ten seconds.
+    Silent,
+}
+
+impl fmt::Display for Disarmed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "not armed since the start",
+            Self::Person => "disarmed on the box",
+            Self::Expired => "the time of arming is over",
+            Self::ReadBack => "the machine did not take the override that was written",
+            Self::Line => "the machine could not be reached",
+            Self::Clock => "the clock jumped back",
+            Self::Silent => "no fresh values from the machine for ten seconds",
+        })
+    }
+}
+
+/// Why the gate cannot be armed.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ArmError {
+    /// The configuration does not allow it.
+    #[error(
+        "the gate cannot be armed: `mode` under [gate] is {0:?}; write mode = \"armed\" and source = \"...\" and start again"
+    )]
+    Mode(&'static str),
+    /// A person has to answer for it.
+    #[error("the gate cannot be armed: say who arms it")]
+    Nobody,
+}
+
+#[derive(Debug)]
+pub(super) struct Arming {
+    mode: GateMode,
+    lasts_ns: i64,
+    state: Result<Armed, Disarmed>,
+    silent_since_ns: Option<TimeNs>,
+}
+
+/// Without fresh values for this long, somebody has to look before the gate writes again.
+const SILENT_NS: i64 = 10 * SECOND_NS;
+
+impl Arming {
+    pub(super) fn new(mode: GateMode, lasts: Duration) -> Self {
+        let lasts_ns = i64::try_from(lasts.as_nanos()).unwrap_or(i64::MAX);
+        Self { mode, lasts_ns, state: Err(Disarmed::Start), silent_since_ns: None }
+    }
+
+    pub(super) fn arm(&mut self, by: &str, at_ns: TimeNs) -> Result<&Armed, ArmError> {
+        if self.mode != GateMode::Armed {
+            return Err(ArmError::Mode(self.mode.word()));
+        }
+        if by.trim().is_empty() {
+            return Err(ArmError::Nobody);
+        }
+        let until_ns = at_ns.saturating_add(self.lasts_ns);
+        self.state = Ok(Armed { by: by.trim().to_owned(), since_ns: at_ns, until_ns });
+        self.state.as_ref().map_err(|_| ArmError::Nobody)
+    }
+
+    pub(super) fn disarm(&mut self, why: Disarmed) {
+        if self.state.is_ok() {
+            self.state = Err(why);
+        }
+    }
+
+    /// Ends an arming whose time is over.
+    pub(super) fn expire(&mut self, at_ns: TimeNs) {
+        match &self.state {
+            Ok(armed) if at_ns >= armed.until_ns => self.disarm(Disarmed::Expired),
+            Ok(armed) if at_ns < armed.since_ns => self.disarm(Disarmed::Clock),
+            _ => {}
+        }
+    }
+
+    /// Told at every tick whether fresh values are missing.
+    pub(super) fn silent(&mut self, missing: bool, at_ns: TimeNs) {
+        if !missing {
+            self.silent_since_ns = None;
+        } else if at_ns - *self.silent_since_ns.get_or_insert(at_ns) >= SILENT_NS {
+            self.disarm(Disarmed::Silent);
+        }
+    }
+
+    pub(super) fn state(&self) -> Result<&Armed, Disarmed> {
+        self.state.as_ref().map_err(|why| *why)
+    }
+}

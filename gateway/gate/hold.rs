@@ -1,0 +1,220 @@
+//! The reasons that hold 100 %, whatever a script asks for.
+
+use super::channel;
+use super::thread_cycle::ThreadCycle;
+use adapters::words::{execution, mode, operation};
+use adapters::{Absence, ChannelId, Sample};
+use rules::estimators::{Estimates, State};
+use std::fmt;
+
+/// Why 100 % is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// The configuration says `mode = "off"`.
+    Off,
+    /// A value that the decision needs is missing or too old.
+    Missing(ChannelId, Absence),
+    /// Neither power, nor current, nor load of the spindle is measured: only estimates would speak for the request.
+    OnlyEstimated,
+    /// The state of the machine is unknown.
+    StateUnknown,
+    /// The controller shows an alarm.
+    Alarm,
+    /// Handwheel, jog, reference.
+    Manual,
+    /// Single commands typed in.
+    Mdi,
+    /// One block at a time.
+    SingleBlock,
+    /// The controller is in another mode than automatic.
+    NotAutomatic,
+    /// Feed hold was pressed.
+    FeedHold,
+    /// No program runs.
+    NotRunning,
+    /// Rapid traverse.
+    Rapid,
+    /// A thread is cut: the feed follows the spindle.
+    Threading,
+    /// A thread is tapped: the feed follows the spindle.
+    Tapping,
+}
+
+impl Hold {
+    /// The word in the history and in JSON.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Missing(..) => "missing",
+            Self::OnlyEstimated => "only_estimated",
+            Self::StateUnknown => "state_unknown",
+            Self::Alarm => "alarm",
+            Self::Manual => "manual",
+            Self::Mdi => "mdi",
+            Self::SingleBlock => "single_block",
+            Self::NotAutomatic => "not_automatic",
+            Self::FeedHold => "feed_hold",
+            Self::NotRunning => "not_running",
+            Self::Rapid => "rapid",
+            Self::Threading => "threading",
+            Self::Tapping => "tapping",
+        }
+    }
+
+    /// The reason in Chinese.
+    #[must_use]
+    pub fn zh(self) -> String {
+        let fixed = match self {
+            Self::Missing(channel, absence) => return format!("{} 无有效数据（{absence}）", channel.channel().zh),
+            Self::Off => "闸门关闭",
+            Self::OnlyEstimated => "主轴功率、电流、负载均无实测值",
+            Self::StateUnknown => "机床状态未知",
+            Self::Alarm => "数控系统报警",
+            Self::Manual => "手动方式",
+            Self::Mdi => "MDI 方式",
+            Self::SingleBlock => "单段方式",
+            Self::NotAutomatic => "非自动方式",
+            Self::FeedHold => "进给保持",
+            Self::NotRunning => "程序未运行",
+            Self::Rapid => "快速移动",
+            Self::Threading => "螺纹切削",
+            Self::Tapping => "攻丝",
+        };
+        fixed.to_owned()
+    }
+}
+
+impl fmt::Display for Hold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Missing(channel, absence) => return write!(f, "{channel} has no fresh value ({absence})"),
+            Self::Off => "the gate is off",
+            Self::OnlyEstimated => "no power, current or load of the spindle is measured",
+            Self::StateUnknown => "the state of the machine is unknown",
+            Self::Alarm => "the controller shows an alarm",
+            Self::Manual => "the controller is in a manual mode",
+            Self::Mdi => "the controller is in MDI",
+            Self::SingleBlock => "single block",
+            Self::NotAutomatic => "the controller is not in automatic",
+            Self::FeedHold => "feed hold",
+            Self::NotRunning => "no program runs",
+            Self::Rapid => "rapid traverse",
+            Self::Threading => "a thread is being cut",
+            Self::Tapping => "a thread is being tapped",
+        })
+    }
+}
+
+/// The channels that are looked at, and what NC blocks have said about threads.
+#[derive(Debug)]
+pub(super) struct Interlocks {
+    stale_ns: i64,
+    mode: Option<ChannelId>,
+    execution: Option<ChannelId>,
+    feed: Option<ChannelId>,
+    speed: Option<ChannelId>,
+    alarm: Option<ChannelId>,
+    rapid: Option<ChannelId>,
+    operation: Option<ChannelId>,
+    block: Option<ChannelId>,
+    loads: [Option<ChannelId>; 3],
+    cycle: ThreadCycle,
+}
+
+impl Interlocks {
+    pub(super) fn new(stale_ns: i64) -> Self {
+        Self {
+            stale_ns,
+            mode: channel("mode"),
+            execution: channel("execution"),
+            feed: channel("feed_mm_min"),
+            speed: channel("spindle_speed_rpm"),
+            alarm: channel("alarm"),
+            rapid: channel("rapid"),
+            operation: channel("operation"),
+            block: channel("block"),
+            loads: ["spindle_power_w", "spindle_current_a", "spindle_load_pct"].map(channel),
+            cycle: ThreadCycle::default(),
+        }
+    }
+
+    /// The first reason, or none. Called at every tick: it also follows the NC blocks.
+    pub(super) fn look(&mut self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+        if let Some(block) = self.block.and_then(|block| sample.text(block)) {
+            self.cycle.follow(block);
+        }
+        self.thread(sample)
+            .or_else(|| self.data(sample))
+            .or_else(|| self.controller(sample))
+            .or_else(|| self.motion(sample, estimates))
+    }
+
+    /// Threads come first: there a change of the feed spoils the part even when everything else is well.
+    fn thread(&self, sample: &Sample) -> Option<Hold> {
+        let operation = self.operation.and_then(|operation| sample.text(operation)).unwrap_or_default();
+        if operation.eq_ignore_ascii_case(operation::THREADING) {
+            return Some(Hold::Threading);
+        }
+        if operation.eq_ignore_ascii_case(operation::TAPPING) {
+            return Some(Hold::Tapping);
+        }
+        self.cycle.hold()
+    }
+
+    fn data(&self, sample: &Sample) -> Option<Hold> {
+        let needed = [self.mode, self.execution, self.feed, self.speed];
+        let missing = needed.into_iter().flatten().find_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        if let Some((id, why)) = missing {
+            return Some(Hold::Missing(id, why));
+        }
+        let optional = [self.alarm, self.rapid, self.operation].into_iter().flatten();
+        let silent = optional.filter_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        // A controller may not have these at all; one that has them and is silent is another matter.
+        let mut silent = silent.filter(|(_, why)| !matches!(why, Absence::NotProvided | Absence::NotSupported));
+        if let Some((id, why)) = silent.next() {
+            return Some(Hold::Missing(id, why));
+        }
+        let measured = self.loads.into_iter().flatten().any(|id| self.absence(sample, id).is_none());
+        (!measured).then_some(Hold::OnlyEstimated)
+    }
+
+    /// Why there is no fresh value.
+    fn absence(&self, sample: &Sample, id: ChannelId) -> Option<Absence> {
+        let slot = sample.slot(id);
+        match &slot.value {
+            Err(why) => Some(*why),
+            Ok(_) if slot.age_ns > self.stale_ns || slot.age_ns < 0 => Some(Absence::Stale),
+            Ok(_) => None,
+        }
+    }
+
+    fn controller(&self, sample: &Sample) -> Option<Hold> {
+        let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
+        if !text(self.alarm).is_empty() {
+            return Some(Hold::Alarm);
+        }
+        match text(self.mode) {
+            mode::AUTOMATIC => {}
+            mode::SEMI_AUTOMATIC => return Some(Hold::SingleBlock),
+            mode::MANUAL_DATA_INPUT => return Some(Hold::Mdi),
+            mode::MANUAL => return Some(Hold::Manual),
+            _ => return Some(Hold::NotAutomatic),
+        }
+        match text(self.execution) {
+            execution::ACTIVE => None,
+            execution::FEED_HOLD => Some(Hold::FeedHold),
+            _ => Some(Hold::NotRunning),
+        }
+    }
+
+    fn motion(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+        let rapid = self.rapid.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
+        match estimates.state {
+            State::Unknown => Some(Hold::StateUnknown),
+            State::Rapid => Some(Hold::Rapid),
+            _ if rapid => Some(Hold::Rapid),
+            _ => None,
+        }
+    }
+}

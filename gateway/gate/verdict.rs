@@ -1,0 +1,64 @@
+//! What the gate decided, as a value and as words.
+
+use super::hold::Hold;
+use super::limit::Bound;
+use adapters::clock::TimeNs;
+use adapters::units::OverridePct;
+
+/// What became of the request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// As asked for; without a request, the programmed feed.
+    Permitted,
+    /// Inside the band and the pace instead.
+    Limited(Bound),
+    /// 100 %, because of this.
+    Held(Hold),
+    /// Not a number from 0 to 254 %: back to 100 %.
+    Refused,
+}
+
+/// The decision of one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// The tick.
+    pub at_ns: TimeNs,
+    /// What was asked for, as it was; may be no number.
+    pub wanted_pct: Option<f64>,
+    /// What is let through.
+    pub permitted: OverridePct,
+    /// How the one became the other.
+    pub outcome: Outcome,
+    /// May it be written?
+    pub armed: bool,
+}
+
+impl Verdict {
+    /// The word in the history: `written`, `shadow`, `held`, `limited` or `refused`.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self.outcome {
+            Outcome::Held(_) => "held",
+            Outcome::Refused => "refused",
+            Outcome::Limited(_) => "limited",
+            Outcome::Permitted if self.armed => "written",
+            Outcome::Permitted => "shadow",
+        }
+    }
+
+    /// Why, for the operator.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match self.outcome {
+            Outcome::Permitted if self.armed => "as asked for".to_owned(),
+            Outcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
+            Outcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
+            Outcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
+            Outcome::Limited(Bound::Slew) => format!("the change is limited; {} now", self.permitted),
+            Outcome::Limited(Bound::NotPossible) | Outcome::Refused => {
+                "a feed override is a number from 0 to 254 %; back to 100 %".to_owned()
+            }
+            Outcome::Held(hold) => format!("100 % is held: {hold}"),
+        }
+    }
+}
