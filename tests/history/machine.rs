@@ -80,6 +80,11 @@ impl Machine {
         Self { gaps: true, ..self }
     }
 
+    /// The same with full mantissas.
+    pub(crate) fn interpolated(self) -> Self {
+        Self { interpolated: true, ..self }
+    }
+
     /// The quantity number `index` of [`QUANTITIES`] in `row`.
     pub(crate) fn quantity(&self, row: i64, index: usize) -> f64 {
         let exact = exact(row, index);
@@ -111,13 +116,18 @@ impl Machine {
         START_NS + row * TICK_NS
     }
 
-    /// Fills `sample` with the signals of `row`.
-    pub(crate) fn fill(&self, row: i64, sample: &mut Sample) {
+    /// Fills `sample` with the quantities of `row`.
+    pub(crate) fn fill_quantities(&self, row: i64, sample: &mut Sample) {
         sample.at_ns = Self::at_ns(row);
         for (index, channel) in self.channels.iter().enumerate() {
             let value = self.missing(row, index).map_or_else(|| Ok(Value::Number(self.quantity(row, index))), Err);
             sample.set(*channel, Slot { value, age_ns: 0 });
         }
+    }
+
+    /// Fills `sample` with the signals of `row`.
+    pub(crate) fn fill(&self, row: i64, sample: &mut Sample) {
+        self.fill_quantities(row, sample);
         for (index, channel) in self.texts.iter().enumerate() {
             let value = self.word(row, index).map(|word| Value::Text(word.clone())).ok_or(Absence::Stale);
             sample.set(*channel, Slot { value, age_ns: 0 });

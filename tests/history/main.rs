@@ -1,5 +1,6 @@
 //! The history of the box: what goes in comes out, whatever happens in between.
 
+mod figures;
 mod full;
 mod killed;
 mod machine;
