@@ -1,5 +1,6 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
 
+pub mod check;
 pub mod cli;
 pub mod config;
 pub mod gate;
@@ -9,6 +10,7 @@ pub mod log;
 pub mod moment;
 pub mod pipeline;
 pub mod records;
+pub mod reload;
 pub mod run;
 pub mod signals;
 pub mod status;

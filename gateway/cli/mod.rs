@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
+mod check;
 mod run;
 
 use crate::log::{self, LogFormat};
@@ -64,6 +65,8 @@ struct Arguments {
 enum Command {
     /// Poll, merge, infer, decide, store and serve (the default).
     Run(run::RunArguments),
+    /// Tell everything that is wrong with configuration, scripts, model and recordings.
+    Check(check::CheckArguments),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -84,5 +87,6 @@ pub fn main() -> ExitCode {
 fn dispatch(arguments: Arguments) -> CommandResult {
     match arguments.command.unwrap_or(Command::Run(arguments.run)) {
         Command::Run(run) => run::run(run),
+        Command::Check(check) => check::run(&check),
     }
 }

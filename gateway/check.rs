@@ -1,0 +1,181 @@
+//! Reads everything that the user wrote - configuration, scripts, model, recordings - and tells everything that is
+//! wrong, before a machine is involved.
+
+use crate::config::{self, Config, Problem};
+use crate::reload::read_directory;
+use adapters::address::{FanucBackend, Target};
+use adapters::recording::{RecordingError, read_path};
+use rules::{script, twin};
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+
+/// What was read and what is wrong with it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Default)]
+pub struct Report {
+    /// What was read, one line each.
+    pub read: Vec<String>,
+    /// Everything that is wrong, in the order in which it was found.
+    pub problems: Vec<Problem>,
+}
+
+impl Report {
+    /// Nothing is wrong.
+    #[must_use]
+    pub fn fine(&self) -> bool {
+        self.problems.is_empty()
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for line in &self.read {
+            writeln!(f, "{line}")?;
+        }
+        for problem in &self.problems {
+            writeln!(f, "{problem}")?;
+        }
+        match self.problems.len() {
+            0 => writeln!(f, "nothing is wrong"),
+            1 => writeln!(f, "1 problem"),
+            count => writeln!(f, "{count} problems"),
+        }
+    }
+}
+
+impl From<script::Problem> for Problem {
+    fn from(problem: script::Problem) -> Self {
+        let script::Problem { file, line, column, what, next } = problem;
+        Self { file, line, column, what, next }
+    }
+}
+
+/// Checks the file, or without one the built-in configuration, and everything it names.
+#[must_use]
+pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String, String)>) -> Report {
+    let mut report = Report::default();
+    match config::load(file, environment) {
+        Ok(config) => {
+            let name = file.map_or_else(|| config::BUILT_IN.to_owned(), |file| file.display().to_string());
+            report.read.push(summary(&name, &config));
+            check_scripts(&config, &mut report);
+            check_model(&config, &mut report);
+            check_sources(&config, &mut report);
+        }
+        Err(problems) => report.problems = problems,
+    }
+    report
+}
+
+fn summary(name: &str, config: &Config) -> String {
+    let sources: Vec<&str> = config.sources.iter().map(|source| source.name.as_str()).collect();
+    let gate = match config.gate.mode {
+        config::GateMode::Off => "the gate is off",
+        config::GateMode::Shadow => "the gate decides and records, and writes nothing",
+        config::GateMode::Armed => "the gate may be armed on the box",
+    };
+    format!("{name}: reads {} at {} ticks per second; {gate}", sources.join(", "), config.gateway.tick_hz)
+}
+
+fn check_scripts(config: &Config, report: &mut Report) {
+    let directory = &config.scripts.directory;
+    let shown = directory.display();
+    let files = if directory.exists() {
+        read_directory(directory)
+    } else {
+        report.read.push(format!("{shown}: not there yet; the first start writes the shipped scripts into it"));
+        Ok(script::shipped())
+    };
+    match files.and_then(|files| script::compile(&files)) {
+        Ok(set) => report.read.push(format!("{shown}: {} scripts", set.len())),
+        Err(problems) => report.problems.extend(problems.into_iter().map(|problem| below(directory, problem))),
+    }
+}
+
+/// The name of the file as the user can open it.
+fn below(directory: &Path, problem: script::Problem) -> Problem {
+    let mut problem = Problem::from(problem);
+    if directory.join(&problem.file).is_file() {
+        problem.file = directory.join(&problem.file).display().to_string();
+    }
+    problem
+}
+
+fn check_model(config: &Config, report: &mut Report) {
+    let Some(path) = &config.twin.model else { return };
+    let name = path.display().to_string();
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) => {
+            let next = "`model` under [twin] names it; `identify` writes one";
+            return report.problems.push(Problem::of(name, format!("the model cannot be read: {error}"), next));
+        }
+    };
+    match twin::parse_model(&text) {
+        Ok(model) => report.read.push(format!("{name}: a model of {} effects", model.parts.len())),
+        Err(problems) => report.problems.extend(problems.into_iter().map(|problem| Problem {
+            file: name.clone(),
+            line: Some(problem.line),
+            column: None,
+            what: problem.text,
+            next: String::new(),
+        })),
+    }
+}
+
+fn check_sources(config: &Config, report: &mut Report) {
+    for source in &config.sources {
+        match source.address.target() {
+            Target::Replay(replay) => check_recording(&replay.file, report),
+            Target::Fanuc { backend: FanucBackend::Vendor(library), .. } | Target::HncNet { library, .. } => {
+                check_library(library, report);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn check_library(path: &Path, report: &mut Report) {
+    if !path.is_file() {
+        let next =
+            "`library=` in the address names it; the machine's maker delivers it, it cannot come with the gateway";
+        report.problems.push(Problem::of(path.display().to_string(), "the vendor library is not there", next));
+    }
+}
+
+fn check_recording(path: &Path, report: &mut Report) {
+    let name = path.display().to_string();
+    let row = |problem: adapters::recording::RowProblem| Problem {
+        file: name.clone(),
+        line: usize::try_from(problem.line).ok(),
+        column: None,
+        what: problem.column.map_or_else(String::new, |column| format!("{column}: ")) + problem.reason.as_str(),
+        next: String::new(),
+    };
+    match read_path(path) {
+        Ok(read) => {
+            let rows = read.recording.rows();
+            report.read.push(format!("{name}: {rows} rows, {} refused", read.refused));
+            let described = read.problems.len() as u64;
+            report.problems.extend(read.problems.into_iter().map(row));
+            if read.refused > described {
+                let what = format!("{} more rows are refused", read.refused - described);
+                report.problems.push(Problem::of(name, what, "the first of them are told above"));
+            }
+        }
+        Err(RecordingError::Io { error, .. }) => {
+            report.problems.push(Problem::of(
+                name,
+                format!("the recording cannot be read: {error}"),
+                "look at the path",
+            ));
+        }
+        Err(RecordingError::Header { reason, .. }) => {
+            report.problems.push(Problem { line: Some(1), ..Problem::of(name.clone(), reason, "") });
+        }
+        Err(RecordingError::Empty { problems, .. }) => {
+            report.problems.push(Problem::of(name.clone(), "the recording has no usable row", ""));
+            report.problems.extend(problems.into_iter().map(row));
+        }
+    }
+}

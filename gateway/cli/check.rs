@@ -1,0 +1,63 @@
+//! `cnc-gateway check`: is everything right that the user wrote?
+
+use super::{CannotRun, CommandResult, Outcome};
+use crate::check::check;
+use crate::config::{self, keys};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Reads configuration, scripts, model and recordings and tells everything that is wrong at once.
+#[derive(Debug, Args)]
+pub(super) struct CheckArguments {
+    /// Configuration file; without one the built-in configuration is checked.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// The result as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Print every key of the configuration with default, range and meaning.
+    #[arg(long, group = "print")]
+    keys: bool,
+    /// Print a complete configuration file to start from.
+    #[arg(long, group = "print")]
+    example: bool,
+    /// Print everything that a script can see, call and set.
+    #[arg(long, group = "print")]
+    vocabulary: bool,
+    /// Language of the vocabulary.
+    #[arg(long, value_parser = ["en", "zh"], default_value = "en", value_name = "LANGUAGE")]
+    language: String,
+}
+
+/// Checks, or prints a table.
+pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
+    if arguments.keys {
+        print!("{}", keys::table());
+    } else if arguments.example {
+        print!("{}", keys::example());
+    } else if arguments.vocabulary {
+        print!("{}", rules::script::vocabulary(arguments.language == "zh"));
+    } else {
+        return tell(arguments);
+    }
+    Ok(Outcome::Fine)
+}
+
+fn tell(arguments: &CheckArguments) -> CommandResult {
+    let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());
+    if let Some(path) = unreadable {
+        let problems = config::load(Some(path), []).err().unwrap_or_default();
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        return Err(CannotRun::new(lines.join("\n"), ""));
+    }
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let report = check(arguments.config.as_deref(), environment);
+    if arguments.json {
+        let json = serde_json::json!({ "schema": "check/1", "fine": report.fine(), "read": report.read, "problems": report.problems });
+        println!("{json:#}");
+    } else {
+        print!("{report}");
+    }
+    Ok(if report.fine() { Outcome::Fine } else { Outcome::No })
+}

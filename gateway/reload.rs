@@ -1,0 +1,288 @@
+//! The scripts on disk: written there on the first start, watched, compiled beside the tick, swapped only when all of
+//! them compile.
+//!
+//! [`Reloader`] looks at the directory once a second on a thread of its own, so that a slow disk never delays a tick. A
+//! change is taken when it has stood still for one look, so that a file is not read while an editor is writing it.
+
+use adapters::channel::nearest;
+use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, compile, shipped};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, SystemTime};
+
+/// Time between two looks at the directory.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// The list of what was delivered, so that a script that the user has deleted stays deleted.
+const DELIVERED: &str = ".shipped";
+
+/// What became of the shipped scripts when the directory was looked at.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Furnished {
+    /// Written because they had never been there, or were an older version that nobody had edited.
+    pub written: Vec<String>,
+    /// Written as `NAME.new` because the user has edited NAME.
+    pub beside: Vec<String>,
+}
+
+/// Writes the scripts that come with the gateway into the directory, which is created if need be. A script that was
+/// edited is never touched: the shipped version is written beside it as `NAME.new`. A deleted one stays deleted.
+///
+/// # Errors
+/// The directory or a file in it cannot be written; what is there already can still be read.
+pub fn furnish(directory: &Path) -> std::io::Result<Furnished> {
+    std::fs::create_dir_all(directory)?;
+    let list = directory.join(DELIVERED);
+    let mut delivered = read_list(&list);
+    let before = delivered.clone();
+    let mut furnished = Furnished::default();
+    for file in shipped() {
+        let (digest, path) = (digest(file.text.as_bytes()), directory.join(&file.name));
+        let present = std::fs::read(&path).ok().map(|bytes| self::digest(&bytes));
+        match (delivered.insert(file.name.clone(), digest), present) {
+            (Some(old), _) if old == digest => {}
+            (_, Some(there)) if there == digest => {}
+            (Some(_), None) => {}
+            (Some(old), Some(there)) if there == old => write(&path, &file, &mut furnished.written)?,
+            (None, None) => write(&path, &file, &mut furnished.written)?,
+            (_, Some(_)) => write(&directory.join(format!("{}.new", file.name)), &file, &mut furnished.beside)?,
+        }
+    }
+    if delivered != before {
+        let lines: String = delivered.iter().map(|(name, digest)| format!("{name} {digest:016x}\n")).collect();
+        std::fs::write(list, lines)?;
+    }
+    Ok(furnished)
+}
+
+/// A whole file in one step: written beside, then renamed.
+fn write(path: &Path, file: &ScriptFile, done: &mut Vec<String>) -> std::io::Result<()> {
+    let mut fresh = path.as_os_str().to_owned();
+    fresh.push(".writing");
+    std::fs::write(&fresh, &file.text)?;
+    std::fs::rename(&fresh, path)?;
+    done.push(path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default());
+    Ok(())
+}
+
+fn read_list(path: &Path) -> BTreeMap<String, u64> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let line = |line: &str| {
+        let (name, digest) = line.split_once(' ')?;
+        Some((name.to_owned(), u64::from_str_radix(digest, 16).ok()?))
+    };
+    text.lines().filter_map(line).collect()
+}
+
+/// FNV-1a: tells one text from another, keeps no secret.
+fn digest(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// Every script of the directory, in the order of the names.
+///
+/// # Errors
+/// The directory, or files in it, cannot be read: all of them at once.
+pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<Problem>> {
+    let mut problems = Vec::new();
+    let mut files = Vec::new();
+    for path in paths(directory).map_err(|error| vec![unreadable(directory, &error)])? {
+        match read_script(&path) {
+            Ok(file) => files.push(file),
+            Err(error) => problems.push(unreadable(&path, &error)),
+        }
+    }
+    if problems.is_empty() { Ok(files) } else { Err(problems) }
+}
+
+fn paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(directory)? {
+        let path = entry?.path();
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if path.extension().is_some_and(|end| end == "rhai") && !hidden && !path.is_dir() {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// Reads no more than a script may be long, and one byte to see that it is longer.
+fn read_script(path: &Path) -> std::io::Result<ScriptFile> {
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(TEXT_MAX as u64 + 1).read_to_string(&mut text)?;
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(ScriptFile { name, text })
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
+    let next = match error.kind() {
+        std::io::ErrorKind::NotFound => misspelt(path),
+        std::io::ErrorKind::InvalidData => "save the file as UTF-8".to_owned(),
+        _ => "look at the permissions".to_owned(),
+    };
+    Problem {
+        file: path.display().to_string(),
+        line: None,
+        column: None,
+        what: format!("cannot be read: {error}"),
+        next,
+    }
+}
+
+/// A directory of nearly this name beside it, if there is one.
+fn misspelt(path: &Path) -> String {
+    let beside = path.parent().and_then(|parent| std::fs::read_dir(parent).ok()).into_iter().flatten().flatten();
+    let names: Vec<String> = beside.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let wanted = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    match nearest(&wanted, names.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean {near:?}?"),
+        None => "create it, or name another one as `directory` under [scripts]".to_owned(),
+    }
+}
+
+/// What a file is recognised by without reading it.
+type Mark = (PathBuf, Option<SystemTime>, u64);
+
+/// Notices changes of a directory of scripts. Reads files only when their names, times or lengths have changed.
+#[derive(Debug)]
+pub struct Watch {
+    directory: PathBuf,
+    marks: Option<Vec<Mark>>,
+    taken: Option<Vec<Mark>>,
+    content: Option<Result<Vec<ScriptFile>, Vec<Problem>>>,
+}
+
+impl Watch {
+    /// Nothing has been seen; the first look takes everything.
+    #[must_use]
+    pub fn new(directory: &Path) -> Self {
+        Self { directory: directory.to_owned(), marks: None, taken: None, content: None }
+    }
+
+    /// Everything, when it has changed and then stood still since the look before; at the first look, and with `now`,
+    /// at once and whether it has changed or not.
+    pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<Problem>>> {
+        let marks = self.marks();
+        let still = self.marks.replace(marks.clone()).is_none_or(|before| before == marks);
+        let changed = self.taken.as_ref() != Some(&marks);
+        if !(now || still && changed) {
+            return None;
+        }
+        self.taken = Some(marks);
+        let content = read_directory(&self.directory);
+        let same = self.content.as_ref() == Some(&content);
+        let content = self.content.insert(content);
+        (now || !same).then_some(content)
+    }
+
+    fn marks(&self) -> Vec<Mark> {
+        let paths = paths(&self.directory).unwrap_or_default();
+        let mark = |path: PathBuf| {
+            let metadata = std::fs::metadata(&path).ok();
+            let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
+            (path, modified, metadata.map_or(0, |metadata| metadata.len()))
+        };
+        paths.into_iter().map(mark).collect()
+    }
+}
+
+/// The newest scripts: ready to run, or what is wrong with them.
+pub type Loaded = Result<ScriptSet, Vec<Problem>>;
+
+/// Watches and compiles on a thread of its own.
+#[derive(Debug)]
+pub struct Reloader {
+    newest: Receiver<Loaded>,
+    asked: SyncSender<()>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Reloader {
+    /// Starts to watch. Without `poll` only [`Reloader::ask`] makes it look. The first look is not repeated: load the
+    /// scripts with [`load_now`] before.
+    ///
+    /// # Errors
+    /// No thread could be started.
+    pub fn start(directory: &Path, poll: bool) -> std::io::Result<Self> {
+        let (send, newest) = sync_channel(1);
+        let (asked, asks) = sync_channel(1);
+        let stop = Arc::new(AtomicBool::new(false));
+        let (directory, stopped) = (directory.to_owned(), stop.clone());
+        let work = move || watch(Watch::new(&directory), poll, &asks, &send, &stopped);
+        std::thread::Builder::new().name("scripts".to_owned()).spawn(work)?;
+        Ok(Self { newest, asked, stop })
+    }
+
+    /// Looks now, and compiles even when nothing has changed. Returns at once.
+    pub fn ask(&self) {
+        // A full queue means that it has been asked already.
+        let _asked_before = self.asked.try_send(());
+    }
+
+    /// What was found since the last call, if anything was.
+    pub fn take(&self) -> Option<Loaded> {
+        self.newest.try_recv().ok()
+    }
+
+    /// Puts newly found scripts in charge, or lets the host say why they are refused. Tells what happened, if anything.
+    pub fn step(&self, host: &mut Host) -> Option<Result<usize, Vec<Problem>>> {
+        Some(put_in_charge(self.take()?, host))
+    }
+}
+
+impl Drop for Reloader {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        self.ask();
+    }
+}
+
+fn watch(mut watch: Watch, poll: bool, asks: &Receiver<()>, send: &SyncSender<Loaded>, stop: &AtomicBool) {
+    watch.look(false);
+    loop {
+        let asked = match asks.recv_timeout(LOOK_EVERY) {
+            Ok(()) => true,
+            Err(RecvTimeoutError::Timeout) => false,
+            Err(RecvTimeoutError::Disconnected) => return,
+        };
+        if stop.load(Ordering::SeqCst) {
+            return;
+        }
+        if !asked && !poll {
+            continue;
+        }
+        let found = watch.look(asked).cloned();
+        if let Some(found) = found
+            && send.send(found.and_then(|files| compile(&files))).is_err()
+        {
+            return;
+        }
+    }
+}
+
+/// Reads, compiles and puts in charge at once, as at the start. Tells how many scripts there are.
+///
+/// # Errors
+/// Everything that is wrong; the host says so too, and whatever was in charge stays.
+pub fn load_now(directory: &Path, host: &mut Host) -> Result<usize, Vec<Problem>> {
+    put_in_charge(read_directory(directory).and_then(|files| compile(&files)), host)
+}
+
+fn put_in_charge(loaded: Loaded, host: &mut Host) -> Result<usize, Vec<Problem>> {
+    match loaded {
+        Ok(set) => {
+            let count = set.len();
+            host.install(set);
+            Ok(count)
+        }
+        Err(problems) => {
+            host.refuse(problems.clone());
+            Err(problems)
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! `cnc-gateway check` as a user runs it: the real binary, real files, exit codes.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn check(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
+        .arg("check")
+        .args(arguments)
+        .current_dir(directory)
+        .env_remove("CNC_GATEWAY__GATEWAY__TICK_HZ")
+        .output()
+        .expect("it runs")
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A configuration with one mistake in everything it names.
+fn furnish(directory: &Path) {
+    let config = "[[source]]\naddress = \"replay:run.csv\"\n[[source]]\naddress = \"fanuc://10.0.0.5?backend=vendor&library=missing.so\"\n\
+                  [gateway]\ndata_dir = \"data\"\n[twin]\nmodel = \"model.toml\"\n";
+    fs::write(directory.join("cnc-gateway.toml"), config).expect("written");
+    fs::write(directory.join("run.csv"), "time_s,spindle_speed_rpm\n0,100\n1,fast\n2,300\n").expect("written");
+    let model =
+        "schema = \"model/1\"\nname = \"m\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_powr\"\n";
+    fs::write(directory.join("model.toml"), model).expect("written");
+    fs::create_dir_all(directory.join("data/scripts")).expect("created");
+    fs::write(directory.join("data/scripts/mine.rhai"), "alarn(\"a\", \"b\");\n").expect("written");
+}
+
+#[test]
+fn everything_that_is_wrong_is_told_at_once() {
+    let directory = tempfile::tempdir().expect("a directory");
+    furnish(directory.path());
+    let output = check(directory.path(), &["--config", "cnc-gateway.toml"]);
+    let text = text(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    for part in [
+        "data/scripts/mine.rhai:1:1: there is no function `alarn`",
+        "did you mean `alarm`?",
+        "model.toml:5: ",
+        "run.csv:3: ",
+        "missing.so: the vendor library is not there",
+        "4 problems",
+    ] {
+        assert!(text.contains(part), "{part}\n---\n{text}");
+    }
+}
+
+#[test]
+fn the_result_as_json_names_every_place() {
+    let directory = tempfile::tempdir().expect("a directory");
+    furnish(directory.path());
+    let output = check(directory.path(), &["--config", "cnc-gateway.toml", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((output.status.code(), &json["fine"]), (Some(1), &serde_json::json!(false)));
+    let problems = json["problems"].as_array().expect("a list");
+    assert_eq!(problems.len(), 4);
+    assert_eq!(problems[0]["line"], 1);
+}
+
+#[test]
+fn exit_codes_tell_fine_wrong_and_could_not_run() {
+    let directory = tempfile::tempdir().expect("a directory");
+    assert_eq!(check(directory.path(), &[]).status.code(), Some(0), "the built-in configuration");
+    let missing = check(directory.path(), &["--config", "nothing.toml"]);
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("check --example"));
+    let example = text(&check(directory.path(), &["--example"]));
+    fs::write(directory.path().join("new.toml"), example).expect("written");
+    let output = check(directory.path(), &["--config", "new.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert!(text(&output).contains("writes nothing") && text(&output).contains("nothing is wrong"));
+}
+
+#[test]
+fn the_tables_are_printed() {
+    let directory = tempfile::tempdir().expect("a directory");
+    assert!(text(&check(directory.path(), &["--keys"])).contains("| `gateway.tick_hz` | 10.0 |"));
+    assert!(text(&check(directory.path(), &["--vocabulary"])).contains("| `spindle_power_w` | W |"));
+    assert!(text(&check(directory.path(), &["--vocabulary", "--language", "zh"])).contains("主轴驱动功率"));
+}

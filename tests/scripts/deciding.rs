@@ -1,0 +1,105 @@
+//! Alarms, requests, memory, time: what a script can do.
+
+use super::*;
+use adapters::Absence;
+
+#[test]
+fn an_alarm_has_hysteresis_and_a_minimum_duration() {
+    let mut host = host("alarm_above(\"hot\", spindle_load_pct, 100.0, 90.0, 0.5, \"hot\");");
+    let mut load = vec![80.0; 5];
+    load.extend([105.0; 3]); // too short
+    load.extend([95.0; 3]);
+    load.extend([105.0; 7]); // from 1.1 s on
+    load.extend([95.0; 20]); // not below 90
+    load.extend([85.0; 3]); // too short
+    load.extend([95.0; 5]);
+    load.extend([85.0; 10]); // from 4.6 s on
+    assert_eq!(alarms(&mut host, "spindle_load_pct", &load), ["+hot at 1.6", "-hot at 5.1"]);
+}
+
+#[test]
+fn an_alarm_without_a_value_stays_as_it_is() {
+    let mut host = host("alarm_above(\"hot\", spindle_load_pct, 100.0, 90.0, 0.0, \"hot\");");
+    assert_eq!(host.tick(&sample(0.0, &[("spindle_load_pct", 120.0)]), &cutting(0.0, 1.0)).alarms.len(), 1);
+    assert!(host.tick(&sample(0.1, &[]), &cutting(0.1, 1.0)).alarms.is_empty());
+    assert_eq!(host.alarms().len(), 1);
+    let cleared = &host.tick(&sample(0.2, &[("spindle_load_pct", 10.0)]), &cutting(0.2, 1.0)).alarms;
+    assert!(cleared.len() == 1 && !cleared[0].raised);
+}
+
+#[test]
+fn a_plain_alarm_stands_while_its_line_is_reached() {
+    let mut host = host("if spindle_load_pct > 50.0 { alarm(\"a\", \"text\") }");
+    assert_eq!(alarms(&mut host, "spindle_load_pct", &[10.0, 60.0, 70.0, 10.0]), ["+a at 0.1", "-a at 0.3"]);
+}
+
+#[test]
+fn a_comparison_with_a_missing_value_is_false_and_arithmetic_waits() {
+    let mut quiet = host("if spindle_load_pct > 50.0 || spindle_load_pct < 50.0 { alarm(\"a\", \"\") }");
+    assert!(quiet.tick(&sample(0.0, &[]), &Estimates::none(0)).alarms.is_empty());
+
+    let mut host = host("request_feed_override(150.0 - spindle_load_pct, \"load\");");
+    assert_eq!(request(&mut host, 0.0, &[("spindle_load_pct", 70.0)]), Some(80.0));
+    assert_eq!(request(&mut host, 0.1, &[]), None, "a request does not outlive its reason");
+    let status = host.status();
+    let Condition::Waiting(problem) = &status.scripts[0].condition else { panic!("{status:?}") };
+    assert_eq!(
+        problem.to_string(),
+        "test.rhai:1:29: spindle_load_pct has no value (not_provided)\n    \
+         ask has(x) first, or write (x ?? 0.0) to use another number where x has no value"
+    );
+    assert_eq!(request(&mut host, 0.2, &[("spindle_load_pct", 60.0)]), Some(90.0), "it goes on by itself");
+    assert!(host.status().well());
+}
+
+#[test]
+fn the_reason_of_absence_reaches_the_operator() {
+    let mut host = host("note(`power ${spindle_power_w + 1.0}`);");
+    let mut sample = sample(0.0, &[]);
+    sample.set(ChannelId::of("spindle_power_w").expect("a channel"), Slot::absent(Absence::Timeout));
+    host.tick(&sample, &Estimates::none(0));
+    assert!(format!("{:?}", host.status()).contains("spindle_power_w has no value (timeout)"));
+}
+
+#[test]
+fn the_least_request_counts_and_no_number_goes_first() {
+    let mut host = Host::new();
+    let ask = |name: &str, pct: &str| file(name, &format!("request_feed_override({pct}, \"{name}\");"));
+    host.load(&[ask("a.rhai", "90"), ask("b.rhai", "80.5"), ask("c.rhai", "95")]).expect("they compile");
+    assert_eq!(request(&mut host, 0.0, &[]), Some(80.5));
+    host.load(&[ask("a.rhai", "90"), ask("b.rhai", "0.0/0.0")]).expect("they compile");
+    assert!(request(&mut host, 0.1, &[]).is_some_and(f64::is_nan), "the gate must see and refuse it");
+}
+
+#[test]
+fn memory_timers_and_pace() {
+    let mut host = host(
+        "const EVERY_S = 1.0;\n\
+         memory.runs = (memory.runs ?? 0) + 1;\n\
+         if held_s(\"on\", spindle_load_pct > 50.0) >= 3.0 { alarm(\"long\", \"\") }\n\
+         note(`run ${memory.runs} dt ${dt_s}`);",
+    );
+    let mut notes = Vec::new();
+    let mut raised = Vec::new();
+    for tick in 0..60 {
+        let at_s = f64::from(tick) / 10.0;
+        let decision = host.tick(&sample(at_s, &[("spindle_load_pct", 60.0)]), &cutting(at_s, 1.0));
+        notes.extend(decision.notes.iter().map(|note| note.text.to_string()));
+        raised.extend(decision.alarms.iter().map(|_| at_s));
+    }
+    assert_eq!(notes[0], "run 1 dt 0.0");
+    assert_eq!(notes[5], "run 6 dt 1.0");
+    assert_eq!(notes.len(), 6);
+    assert_eq!(raised, [3.0]);
+}
+
+#[test]
+fn a_pause_is_not_bridged() {
+    let mut host = host("if held_s(\"on\", true) > 5.0 { alarm(\"long\", \"\") } note(`dt ${dt_s}`);");
+    host.tick(&sample(0.0, &[]), &Estimates::none(0));
+    let decision = host.tick(&sample(3600.0, &[]), &Estimates::none(0)).clone();
+    assert_eq!(&*decision.notes[0].text, "dt 0.0");
+    assert!(decision.alarms.is_empty(), "an hour without ticks is not an hour in which the condition held");
+    let back = host.tick(&sample(10.0, &[]), &Estimates::none(0));
+    assert!(back.problems.is_empty() && back.alarms.is_empty());
+}

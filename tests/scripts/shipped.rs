@@ -1,0 +1,104 @@
+//! The scripts that come with the gateway.
+
+use super::*;
+use rules::script::{shipped, words};
+
+#[test]
+fn the_shipped_scripts_compile_and_run_with_and_without_values() {
+    let mut host = Host::new();
+    host.load(&shipped()).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    assert_eq!(host.settings().get("c1"), Some(0.15));
+    let numbers: Vec<(&str, f64)> =
+        words().iter().filter(|word| ChannelId::of(word.name).is_some()).map(|word| (word.name, 1.0)).collect();
+    let numbers: Vec<_> = numbers
+        .into_iter()
+        .filter(|(name, _)| ChannelId::of(name).is_some_and(|id| id.channel().kind != adapters::channel::Kind::Text))
+        .collect();
+    for tick in 0..600 {
+        let at_s = f64::from(tick) / 10.0;
+        let values: &[(&str, f64)] = if tick % 200 < 100 { &numbers } else { &[] };
+        let decision = host.tick(&sample(at_s, values), &cutting(at_s, 100.0));
+        assert!(decision.problems.is_empty(), "{}", told(&decision.problems));
+    }
+    assert!(host.status().well(), "{:?}", host.status());
+}
+
+#[test]
+fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
+    let mut host = Host::new();
+    host.load(&shipped()).expect("they compile");
+    let heavy: Vec<Option<f64>> =
+        (10..110).map(|tick| request(&mut host, f64::from(tick) / 10.0, &[("spindle_load_pct", 95.0)])).collect();
+    let last = heavy.last().copied().flatten().expect("a heavy cut is slowed down");
+    assert!(last < 90.0, "{last}");
+    assert_eq!(request(&mut host, 11.1, &[]), None, "without the load nothing is asked for");
+}
+
+#[test]
+fn the_shipped_tool_wear_tells_a_worn_edge_and_begins_anew_with_the_next() {
+    let mut host = Host::new();
+    host.load(&shipped()).expect("they compile");
+    let mut raised = Vec::new();
+    for tick in 0..3600 {
+        let at_s = f64::from(tick) / 10.0;
+        let power_w = if tick < 1200 { 1000.0 } else { 1000.0 + f64::from(tick - 1200) };
+        let mut sample = sample(at_s, &[]);
+        set_text(&mut sample, "tool", if tick < 3000 { "T1" } else { "T2" });
+        for change in &host.tick(&sample, &cutting(at_s, power_w)).alarms {
+            raised.push(format!("{}{}", if change.raised { '+' } else { '-' }, change.name));
+        }
+    }
+    assert_eq!(raised, ["+tool_wear", "+tool_worn", "-tool_wear", "-tool_worn"]);
+}
+
+#[test]
+fn the_shipped_energy_counts_what_it_should() {
+    let mut host = Host::new();
+    host.load(&shipped()).expect("they compile");
+    let mut notes = Vec::new();
+    for tick in 0..=36_000_u32 {
+        let at_s = f64::from(tick) / 10.0;
+        let part = f64::from(tick / 36_000);
+        let values = [("total_power_w", 2000.0), ("part_count", part)];
+        let decision = host.tick(&sample(at_s, &values), &cutting(at_s, 500.0));
+        notes.extend(
+            decision.notes.iter().filter(|note| &*note.script == "energy.rhai").map(|note| note.text.to_string()),
+        );
+    }
+    assert_eq!(notes, ["part 1.0: 2.0 kWh, 25.0 % of it cutting, 0.0 s idle"]);
+}
+
+#[test]
+fn every_word_can_be_read() {
+    for word in words() {
+        let text = format!("let x = {};", word.name);
+        compile(&[file("word.rhai", &text)]).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+    }
+}
+
+#[test]
+fn the_same_samples_give_the_same_decisions() {
+    let run = || {
+        let mut host = Host::new();
+        host.load(&shipped()).expect("they compile");
+        let mut text = String::new();
+        let mut seed = 1_u64;
+        for tick in 0..5000 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let random = (seed >> 40) as f64 / 16_777_216.0;
+            let slow = f64::from(tick % 400) / 400.0;
+            let at_s = f64::from(tick) / 10.0;
+            let values = [
+                ("spindle_load_pct", 150.0 * slow + 10.0 * random),
+                ("total_power_w", 3000.0 * random),
+                ("part_count", f64::from(tick / 500)),
+            ];
+            let provided = if seed.is_multiple_of(7) { &values[1..] } else { &values[..] };
+            text += &format!("{:?}\n", host.tick(&sample(at_s, provided), &cutting(at_s, 900.0 * random)));
+        }
+        text
+    };
+    let first = run();
+    assert!(first.contains("raised: true") && first.contains("constant load"));
+    assert!(first == run(), "two runs differ");
+}
