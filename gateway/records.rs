@@ -87,6 +87,18 @@ pub fn records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> Result
     Ok(Records { rows, truncated })
 }
 
+/// The answer as a document.
+#[must_use]
+pub fn document(kind: RecordKind, query: &RecordQuery, found: Records) -> Value {
+    json!({
+        "schema": format!("{}/1", kind.name()),
+        "from_ms": ms(query.from_ns),
+        "to_ms": ms(query.to_ns),
+        "truncated": found.truncated,
+        "rows": found.rows,
+    })
+}
+
 fn ms(at_ns: TimeNs) -> i64 {
     at_ns.div_euclid(1_000_000)
 }

@@ -3,11 +3,17 @@
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
 mod check;
+mod history;
+mod replay;
 mod run;
 
 use crate::log::{self, LogFormat};
 use clap::{Parser, Subcommand};
+use crate::reload::read_directory;
+use rules::script::{Host, shipped};
 use std::fmt;
+use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// How a command ended when it could run.
@@ -67,6 +73,10 @@ enum Command {
     Run(run::RunArguments),
     /// Tell everything that is wrong with configuration, scripts, model and recordings.
     Check(check::CheckArguments),
+    /// Run recordings through the same pipeline as fast as possible.
+    Replay(replay::ReplayArguments),
+    /// Ask what the box remembers: query, export, info.
+    History(history::HistoryArguments),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -88,5 +98,29 @@ fn dispatch(arguments: Arguments) -> CommandResult {
     match arguments.command.unwrap_or(Command::Run(arguments.run)) {
         Command::Run(run) => run::run(run),
         Command::Check(check) => check::run(&check),
+        Command::Replay(replay) => replay::run(replay),
+        Command::History(history) => history::run(history),
     }
+}
+
+/// Prints to standard output; a reader who has gone is no error.
+fn print(text: &str) {
+    let _reader_has_gone = std::io::stdout().write_all(text.as_bytes());
+}
+
+/// Prints a document on lines of its own.
+fn print_json(document: &serde_json::Value) {
+    print(&format!("{document:#}\n"));
+}
+
+/// The scripts of a directory, or those that come with the gateway.
+fn scripts_from(directory: Option<&Path>) -> Result<Host, CannotRun> {
+    let told = |problems: Vec<rules::script::Problem>| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    };
+    let files = directory.map_or_else(|| Ok(shipped()), read_directory).map_err(told)?;
+    let mut host = Host::new();
+    host.load(&files).map_err(told)?;
+    Ok(host)
 }

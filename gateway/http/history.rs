@@ -3,14 +3,14 @@
 use super::Shared;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
-use crate::history::{Buckets, Chunk, HistoryError, Overview, Query, Reader};
+use crate::history::{HistoryError, Query, Reader};
 use crate::moment;
-use crate::records::{RecordKind, RecordQuery, records};
+use crate::records::{RecordKind, RecordQuery, document, records};
+use crate::samples;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
-use serde_json::{Value, json};
-use std::ops::ControlFlow;
+use serde_json::Value;
 
 /// What is read when nobody says otherwise.
 const SPAN_DEFAULT_NS: i64 = 600 * SECOND_NS;
@@ -69,13 +69,7 @@ async fn rows(shared: Shared, kind: RecordKind, pairs: Vec<(String, String)>) ->
         let (from_ns, to_ns) = range(&keys, newest_ns)?;
         let query = RecordQuery { from_ns, to_ns, state: keys.text("state").map(str::to_owned), limit };
         let found = records(reader, kind, &query).map_err(|error| trouble(&error))?;
-        Ok(json!({
-            "schema": format!("{}/1", kind.name()),
-            "from_ms": from_ns / 1_000_000,
-            "to_ms": to_ns / 1_000_000,
-            "truncated": found.truncated,
-            "rows": found.rows,
-        }))
+        Ok(document(kind, &query, found))
     })
     .await
 }
@@ -106,7 +100,7 @@ pub(super) async fn parts(State(shared): State<Shared>, Pairs(pairs): Given) -> 
 }
 
 /// `GET /api/v1/samples`
-pub(super) async fn samples(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn sample_series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     let known = ["from", "to", "channels", "resolution_s", "state", "program", "tool"];
     let keys = QueryKeys::of(pairs, &known)?;
     let resolution_s = keys.number("resolution_s", 0.0, 31_622_400.0)?;
@@ -124,14 +118,12 @@ pub(super) async fn samples(State(shared): State<Shared>, Pairs(pairs): Given) -
         let (state, program, tool) = (text("state"), text("program"), text("tool"));
         let query = Query { from_ns: Some(from_ns), to_ns: Some(to_ns), series, state, program, tool };
         let resolution_s = resolution_s.unwrap_or_else(|| usual_resolution_s(to_ns - from_ns));
-        let series = if resolution_s > 0.0 { bucketed(reader, &query, resolution_s) } else { raw(reader, &query) }?;
-        Ok(json!({
-            "schema": "samples/1",
-            "from_ms": from_ns / 1_000_000,
-            "to_ms": to_ns / 1_000_000,
-            "resolution_s": resolution_s,
-            "series": series,
-        }))
+        let found = if resolution_s > 0.0 {
+            samples::bucketed(reader, &query, resolution_s, POINTS_MAX)
+        } else {
+            samples::raw(reader, &query, POINTS_MAX)
+        };
+        found.map(|series| samples::document((from_ns, to_ns), resolution_s, series)).map_err(|error| trouble(&error))
     })
     .await
 }
@@ -142,77 +134,4 @@ fn usual_resolution_s(span_ns: i64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "seconds of centuries fit")]
     let seconds = seconds as f64;
     seconds
-}
-
-fn too_many(points: usize) -> ApiProblem {
-    ApiProblem::request(
-        format!("{points} points or more in one answer; at most {POINTS_MAX} are given"),
-        "ask for fewer channels, a shorter time or a coarser resolution_s; `cnc-gateway history export` writes everything",
-    )
-}
-
-fn bucketed(reader: &Reader, query: &Query, resolution_s: f64) -> Result<Value, ApiProblem> {
-    #[expect(clippy::cast_possible_truncation, reason = "at most a year in ns")]
-    let width_ns = ((resolution_s * SECOND_NS as f64) as i64).max(1);
-    let buckets = (query.to_ns.unwrap_or(0).saturating_sub(query.from_ns.unwrap_or(0)) / width_ns).unsigned_abs();
-    let points = usize::try_from(buckets).unwrap_or(usize::MAX).saturating_mul(query.series.len());
-    if points > POINTS_MAX {
-        return Err(too_many(points));
-    }
-    let overview = reader.overview(query, width_ns).map_err(|error| trouble(&error))?;
-    let each = overview.series.iter().zip(&overview.columns);
-    let list = each.map(|(series, column)| {
-        json!({ "channel": &*series.name, "unit": &*series.unit, "points": points_of(&overview, column) })
-    });
-    Ok(list.collect())
-}
-
-fn points_of(overview: &Overview, column: &Buckets) -> Vec<Value> {
-    let times = overview.start_ns.iter().map(|start_ns| start_ns / 1_000_000);
-    match column {
-        Buckets::Numbers(summaries) => times
-            .zip(summaries)
-            .map(
-                |(at_ms, s)| {
-                    if s.count == 0 { json!([at_ms, null]) } else { json!([at_ms, s.mean, s.min, s.max, s.count]) }
-                },
-            )
-            .collect(),
-        Buckets::Words(words) => times.zip(words).map(|(at_ms, word)| json!([at_ms, word.as_deref()])).collect(),
-    }
-}
-
-fn raw(reader: &Reader, query: &Query) -> Result<Value, ApiProblem> {
-    let mut list: Vec<(String, String, Vec<Value>)> = Vec::new();
-    let mut points = 0;
-    let read = reader.samples(query, |chunk| {
-        points += chunk.at_ns.len() * chunk.columns.len();
-        if points > POINTS_MAX {
-            return ControlFlow::Break(());
-        }
-        append(&mut list, chunk);
-        ControlFlow::Continue(())
-    });
-    read.map_err(|error| trouble(&error))?;
-    if points > POINTS_MAX {
-        return Err(too_many(points));
-    }
-    let each = list.into_iter();
-    Ok(each.map(|(channel, unit, points)| json!({ "channel": channel, "unit": unit, "points": points })).collect())
-}
-
-fn append(list: &mut Vec<(String, String, Vec<Value>)>, chunk: &Chunk<'_>) {
-    if list.is_empty() {
-        let empty = |series: &crate::history::Series| (series.name.to_string(), series.unit.to_string(), Vec::new());
-        list.extend(chunk.series.iter().map(empty));
-    }
-    for (column, (cells, (_, _, points))) in chunk.columns.iter().zip(list).enumerate() {
-        for (row, at_ns) in chunk.at_ns.iter().enumerate() {
-            let at_ms = at_ns / 1_000_000;
-            let value = cells.number(row).map(Value::from).or_else(|| cells.word(row).map(Value::from));
-            points.push(
-                value.map_or_else(|| json!([at_ms, null, chunk.missing(column, row)]), |value| json!([at_ms, value])),
-            );
-        }
-    }
 }

@@ -77,7 +77,7 @@ pub const ROUTES: [Route; 14] = [
     ("/api/v1/status", || get(status)),
     ("/api/v1/live", || get(live::live)),
     ("/api/v1/channels", || get(vocabulary::channels)),
-    ("/api/v1/samples", || get(history::samples)),
+    ("/api/v1/samples", || get(history::sample_series)),
     ("/api/v1/states", || get(history::states)),
     ("/api/v1/alarms", || get(history::alarms)),
     ("/api/v1/decisions", || get(history::decisions)),

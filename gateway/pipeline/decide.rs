@@ -1,5 +1,6 @@
 //! What the scripts decided, as records: alarms raised and cleared, notes, and every change of what they ask for.
 
+use crate::gate::Verdict;
 use crate::history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
 use adapters::clock::TimeNs;
 use rules::script::{AlarmChange, Decision, OverrideRequest, SCRIPT_STOPPED};
@@ -15,13 +16,14 @@ struct Asked {
     pct: i64,
     reason: Arc<str>,
     script: Arc<str>,
+    outcome: &'static str,
 }
 
 impl Asked {
-    fn of(request: &OverrideRequest) -> Self {
+    fn of(request: &OverrideRequest, verdict: &Verdict) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
         let pct = request.pct.round() as i64;
-        Self { pct, reason: request.reason.clone(), script: request.script.clone() }
+        Self { pct, reason: request.reason.clone(), script: request.script.clone(), outcome: verdict.word() }
     }
 }
 
@@ -47,8 +49,8 @@ impl Decisions {
         self.recent.iter()
     }
 
-    /// Gives every record that this decision makes to `keep`.
-    pub fn step(&mut self, decision: &Decision, mut keep: impl FnMut(Record)) {
+    /// Gives every record that this decision, and what the gate made of it, makes to `keep`.
+    pub fn step(&mut self, decision: &Decision, verdict: &Verdict, mut keep: impl FnMut(Record)) {
         for change in &decision.alarms {
             keep(alarm(change, decision.at_ns));
         }
@@ -58,35 +60,35 @@ impl Decisions {
         for problem in &decision.problems {
             keep(event("script_failed", &problem.file, &problem.to_string(), decision.at_ns));
         }
-        let asked = decision.request.as_ref().map(Asked::of);
+        let asked = decision.request.as_ref().map(|request| Asked::of(request, verdict));
         if asked != self.asked {
-            keep(self.change(decision, asked).into());
+            keep(self.change(decision, verdict, asked).into());
         }
     }
 
-    fn change(&mut self, decision: &Decision, asked: Option<Asked>) -> DecisionRow {
+    fn change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<Asked>) -> DecisionRow {
+        let at_ns = decision.at_ns;
         let before = std::mem::replace(&mut self.asked, asked);
-        let (text, row) = match (&decision.request, before) {
-            (Some(request), _) => {
-                (format!("{:.0} %: {}", request.pct, request.reason), row_of(request, decision.at_ns))
+        let (text, row) = match &decision.request {
+            Some(request) => {
+                let text = format!("{:.0} % ({}): {}", request.pct, request.reason, verdict.reason());
+                (text, row_of(request, at_ns))
             }
-            (None, before) => {
+            None => {
                 let script = before.map(|asked| asked.script.to_string()).unwrap_or_default();
                 let reason = "nothing is asked for any more".to_owned();
-                let wanted = "feed_override_pct".to_owned();
-                let unit = "%".to_owned();
-                let row = DecisionRow { at_ns: decision.at_ns, script, wanted, unit, reason, ..DecisionRow::default() };
-                ("100 %".to_owned(), row)
+                let row = DecisionRow { at_ns, script, reason, ..empty_row() };
+                ("the programmed feed, 100 %".to_owned(), row)
             }
         };
-        self.recent.push_front(Change { at_ns: decision.at_ns, text });
+        self.recent.push_front(Change { at_ns, text });
         self.recent.truncate(RECENT);
-        DecisionRow {
-            outcome: "shadow".to_owned(),
-            outcome_reason: "the gate writes nothing in shadow".to_owned(),
-            ..row
-        }
+        DecisionRow { outcome: verdict.word().to_owned(), outcome_reason: verdict.reason(), ..row }
     }
+}
+
+fn empty_row() -> DecisionRow {
+    DecisionRow { wanted: "feed_override_pct".to_owned(), unit: "%".to_owned(), ..DecisionRow::default() }
 }
 
 fn row_of(request: &OverrideRequest, at_ns: TimeNs) -> DecisionRow {
@@ -94,11 +96,9 @@ fn row_of(request: &OverrideRequest, at_ns: TimeNs) -> DecisionRow {
         at_ns,
         script: request.script.to_string(),
         script_version: format!("{:016x}", request.version),
-        wanted: "feed_override_pct".to_owned(),
         value: request.pct.is_finite().then_some(request.pct),
-        unit: "%".to_owned(),
         reason: request.reason.to_string(),
-        ..DecisionRow::default()
+        ..empty_row()
     }
 }
 
@@ -127,6 +127,11 @@ mod tests {
         Decision { at_ns, request, ..Decision::default() }
     }
 
+    fn verdict(at_ns: TimeNs) -> Verdict {
+        let permitted = adapters::units::OverridePct::FULL;
+        Verdict { at_ns, wanted_pct: None, permitted, outcome: crate::gate::Outcome::Permitted, armed: false }
+    }
+
     #[test]
     fn only_changes_of_a_whole_percent_are_recorded() {
         let mut decisions = Decisions::default();
@@ -134,7 +139,7 @@ mod tests {
         for (at_ns, pct) in
             [(1, Some(90.0)), (2, Some(90.3)), (3, Some(89.0)), (4, Some(f64::NAN)), (5, None), (6, None)]
         {
-            decisions.step(&asking(at_ns, pct), |record| rows.push(record));
+            decisions.step(&asking(at_ns, pct), &verdict(at_ns), |record| rows.push(record));
         }
         let values: Vec<_> =
             rows.iter().map(|row| matches!(row, Record::Decision(row) if row.value.is_some())).collect();

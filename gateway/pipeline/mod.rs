@@ -17,6 +17,7 @@ pub use journal::Journal;
 pub use parts::Parts;
 pub use tally::Tally;
 
+use crate::gate::{Gate, Verdict};
 use crate::history::{ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::{self, Estimates};
@@ -47,6 +48,8 @@ pub struct Pipeline {
     estimators: estimators::Pipeline,
     scripts: Host,
     generation: u64,
+    gate: Gate,
+    verdict: Option<Verdict>,
     decisions: Decisions,
     journal: Journal,
     parts: Parts,
@@ -56,13 +59,15 @@ pub struct Pipeline {
 impl Pipeline {
     /// A pipeline that has seen nothing. The settings of the estimators are those of the scripts.
     #[must_use]
-    pub fn new(mut estimators: estimators::Pipeline, scripts: Host) -> Self {
+    pub fn new(mut estimators: estimators::Pipeline, scripts: Host, gate: Gate) -> Self {
         estimators.reconfigure(scripts.settings().clone());
         Self {
             channels: Channels::new(),
             estimators,
             generation: scripts.generation(),
             scripts,
+            gate,
+            verdict: None,
             decisions: Decisions::default(),
             journal: Journal::default(),
             parts: Parts::default(),
@@ -78,7 +83,9 @@ impl Pipeline {
         store.sample(sample, &stored_values(&estimates));
         self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
         let decision = self.scripts.tick(sample, &estimates);
-        self.decisions.step(decision, |record| store.record(record));
+        let verdict = self.gate.decide(decision.request.as_ref(), sample, &estimates);
+        self.decisions.step(decision, &verdict, |record| store.record(record));
+        self.verdict = Some(verdict);
         if let Some(part) = self.parts.step(&self.channels, sample, estimates.state) {
             store.record(part.into());
         }
@@ -101,6 +108,18 @@ impl Pipeline {
     /// The scripts, to put others in charge.
     pub fn scripts_mut(&mut self) -> &mut Host {
         &mut self.scripts
+    }
+
+    /// The gate.
+    #[must_use]
+    pub fn gate(&self) -> &Gate {
+        &self.gate
+    }
+
+    /// What the gate made of the last request.
+    #[must_use]
+    pub fn verdict(&self) -> Option<&Verdict> {
+        self.verdict.as_ref()
     }
 
     /// What the scripts asked for last.

@@ -11,6 +11,7 @@ pub mod tick;
 
 use crate::cli::CannotRun;
 use crate::config::Config;
+use crate::gate::Gate;
 use crate::http::{Published, Server, Shared, bind, port_trouble};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
@@ -103,7 +104,7 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let memory = data_dir.join("estimators.json");
     let mut scripts = Host::new();
     let _refused_is_shown = scripts.load(&rules::script::shipped());
-    let pipeline = Pipeline::new(estimators(&memory), scripts);
+    let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,

@@ -1,5 +1,7 @@
 //! From the pipeline's figures to the status document.
 
+use crate::config::GateMode;
+use crate::gate::{Gate, Outcome, Verdict};
 use crate::pipeline::Pipeline;
 use crate::status::{
     AlarmStatus, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, ScriptStatus, Shown, StateStatus,
@@ -94,17 +96,28 @@ pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
 #[must_use]
 pub fn gate(pipeline: &Pipeline) -> GateStatus {
     let request = pipeline.scripts().decision().request.as_ref();
+    let verdict = pipeline.verdict();
+    let changed = verdict.filter(|verdict| verdict.outcome != Outcome::Permitted);
     let recent = pipeline.decisions().recent();
     GateStatus {
-        mode: "shadow",
+        mode: mode(pipeline.gate()),
         wanted_pct: request.map(|request| request.pct),
         reason: request.map(|request| format!("{} ({})", request.reason, request.script)),
-        permitted_pct: None,
-        held: None,
+        permitted_pct: verdict.map(|verdict| f64::from(verdict.permitted.percent())),
+        held: changed.map(Verdict::reason),
         written_pct: None,
         recent: recent
             .map(|change| DecisionStatus { at_ms: milliseconds(change.at_ns), text: change.text.clone() })
             .collect(),
+    }
+}
+
+/// Armed is what is armed on the box, not what the configuration allows.
+fn mode(gate: &Gate) -> &'static str {
+    match (gate.limits().mode, gate.armed()) {
+        (GateMode::Off, _) => "off",
+        (_, Ok(_)) => "armed",
+        (GateMode::Shadow | GateMode::Armed, Err(_)) => "shadow",
     }
 }
 

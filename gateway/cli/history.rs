@@ -1,0 +1,255 @@
+//! `cnc-gateway history`: what the box remembers.
+
+use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::history::{HistoryError, Query, Reader, SqlValue};
+use crate::moment;
+use crate::records::{RecordKind, RecordQuery, document, records};
+use crate::samples;
+use adapters::clock::TimeNs;
+use clap::{Args, Subcommand, ValueEnum};
+use serde_json::{Map, Value, json};
+use std::io::{BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `history`.
+#[derive(Debug, Args)]
+pub(super) struct HistoryArguments {
+    /// History database.
+    #[arg(long, global = true, value_name = "DB", default_value = "cnc-gateway-data/history.db")]
+    history: PathBuf,
+    #[command(subcommand)]
+    question: Question,
+}
+
+#[derive(Debug, Subcommand)]
+enum Question {
+    /// Samples, records or a statement of your own, as CSV or JSON.
+    Query(QueryArguments),
+    /// Samples into a file: .csv, .csv.gz or .parquet, a recording that replay and diagnose read.
+    Export(ExportArguments),
+    /// How much there is, how fast it grows and how long the disk lasts.
+    Info {
+        /// Print as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Debug, Args)]
+struct Selection {
+    /// Beginning: 2026-01-31T08:15:00Z, 2026-01-31, or a time before the newest sample such as -10m, -8h, -7d.
+    #[arg(long, allow_hyphen_values = true, value_name = "TIME")]
+    from: Option<String>,
+    /// End (excluded), in the same notation.
+    #[arg(long, allow_hyphen_values = true, value_name = "TIME")]
+    to: Option<String>,
+    /// Channels and estimates, separated by commas; all that were delivered when left out.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    channels: Vec<String>,
+    /// Only samples in this machine state.
+    #[arg(long)]
+    state: Option<String>,
+    /// Only samples of this NC program.
+    #[arg(long)]
+    program: Option<String>,
+    /// Only samples of this tool.
+    #[arg(long)]
+    tool: Option<String>,
+}
+
+#[derive(Debug, Args)]
+struct QueryArguments {
+    #[command(flatten)]
+    selection: Selection,
+    /// Length of a bucket in seconds, with mean, least and greatest value; without it every sample.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    resolution: Option<f64>,
+    /// Records instead of samples.
+    #[arg(long, value_enum, value_name = "KIND", conflicts_with_all = ["resolution", "channels", "sql"])]
+    records: Option<RecordKind>,
+    /// One SELECT over the tables, the views and the virtual table `samples`.
+    #[arg(long, value_name = "SELECT", conflicts_with_all = ["resolution", "channels"])]
+    sql: Option<String>,
+    /// Form of the answer.
+    #[arg(long, value_enum, default_value_t = Form::Csv)]
+    format: Form,
+    /// The same as --format json.
+    #[arg(long)]
+    json: bool,
+    /// At most so many records, the newest ones.
+    #[arg(long, default_value_t = 10_000)]
+    limit: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    Csv,
+    Json,
+}
+
+#[derive(Debug, Args)]
+struct ExportArguments {
+    /// The file; its ending decides the format.
+    file: PathBuf,
+    #[command(flatten)]
+    selection: Selection,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 31_622_400.0 => Ok(seconds),
+        _ => Err("give a number of seconds above 0, at most a year".to_owned()),
+    }
+}
+
+/// Answers.
+pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
+    let path = &arguments.history;
+    let reader = Reader::open(path).map_err(|error| cannot(&error))?;
+    match arguments.question {
+        Question::Info { json } => info(&reader, json),
+        Question::Export(export) => {
+            let (query, _) = export.selection.query(&reader)?;
+            let rows = reader.export(&query, &export.file).map_err(|error| cannot(&error))?;
+            print(&format!("{rows} rows written to {}\n", export.file.display()));
+            Ok(Outcome::Fine)
+        }
+        Question::Query(query) => query.answer(&reader, path),
+    }
+}
+
+fn cannot(error: &HistoryError) -> CannotRun {
+    CannotRun::new(error.to_string(), "")
+}
+
+fn info(reader: &Reader, json: bool) -> CommandResult {
+    let info = reader.info().map_err(|error| cannot(&error))?;
+    if json {
+        let mut document = json!({ "schema": "history-info/1" });
+        if let (Value::Object(document), Ok(Value::Object(fields))) = (&mut document, serde_json::to_value(&info)) {
+            document.extend(fields);
+        }
+        print_json(&document);
+    } else {
+        print(&info.to_string());
+    }
+    Ok(Outcome::Fine)
+}
+
+impl Selection {
+    /// The question, and its range with both ends named.
+    fn query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
+        let span = reader.span().map_err(|error| cannot(&error))?;
+        let (first_ns, newest_ns) = span.unwrap_or((0, 0));
+        let bad = |what: String| CannotRun::new(what, "");
+        let moment =
+            |text: &Option<String>| text.as_ref().map(|text| moment::parse(text, newest_ns).map_err(bad)).transpose();
+        let from_ns = moment(&self.from)?.unwrap_or(first_ns);
+        let to_ns = moment(&self.to)?.unwrap_or(newest_ns.saturating_add(1));
+        let query = Query {
+            from_ns: Some(from_ns),
+            to_ns: Some(to_ns),
+            series: self.channels.clone(),
+            state: self.state.clone(),
+            program: self.program.clone(),
+            tool: self.tool.clone(),
+        };
+        Ok((query, (from_ns, to_ns)))
+    }
+}
+
+impl QueryArguments {
+    fn answer(&self, reader: &Reader, path: &Path) -> CommandResult {
+        let (query, range) = self.selection.query(reader)?;
+        let json = self.json || self.format == Form::Json;
+        let out = BufWriter::new(std::io::stdout().lock());
+        let done = match (&self.records, &self.sql, self.resolution) {
+            (Some(kind), ..) => self.answer_records(reader, *kind, range, json, out),
+            (None, Some(sql), _) => answer_sql(reader, sql, json, out),
+            (None, None, Some(resolution_s)) if json => samples::bucketed(reader, &query, resolution_s, usize::MAX)
+                .map(|series| print_json(&samples::document(range, resolution_s, series))),
+            (None, None, Some(resolution_s)) => samples::bucketed_csv(reader, &query, resolution_s, out),
+            (None, None, None) if json => samples::raw(reader, &query, usize::MAX)
+                .map(|series| print_json(&samples::document(range, 0.0, series))),
+            (None, None, None) => reader.export_csv(&query, out, path).map(drop),
+        };
+        done.map(|()| Outcome::Fine).map_err(|error| cannot(&error))
+    }
+
+    fn answer_records(
+        &self,
+        reader: &Reader,
+        kind: RecordKind,
+        (from_ns, to_ns): (TimeNs, TimeNs),
+        json: bool,
+        out: impl Write,
+    ) -> Result<(), HistoryError> {
+        let query = RecordQuery { from_ns, to_ns, state: self.selection.state.clone(), limit: self.limit };
+        let found = records(reader, kind, &query)?;
+        if json {
+            print_json(&document(kind, &query, found));
+            return Ok(());
+        }
+        let mut table = Table::new(out);
+        found.rows.iter().filter_map(Value::as_object).try_for_each(|row| table.row(row)).map_err(output)
+    }
+}
+
+fn output(error: csv::Error) -> HistoryError {
+    HistoryError::Io { path: "the output".into(), error: std::io::Error::other(error) }
+}
+
+/// Objects as lines of CSV.
+struct Table<W: Write> {
+    csv: csv::Writer<W>,
+    headed: bool,
+}
+
+impl<W: Write> Table<W> {
+    fn new(out: W) -> Self {
+        Self { csv: csv::Writer::from_writer(out), headed: false }
+    }
+
+    fn row(&mut self, row: &Map<String, Value>) -> Result<(), csv::Error> {
+        if !self.headed {
+            self.csv.write_record(row.keys())?;
+            self.headed = true;
+        }
+        self.csv.write_record(row.values().map(|value| match value {
+            Value::String(text) => text.clone(),
+            Value::Null => String::new(),
+            other => other.to_string(),
+        }))
+    }
+}
+
+fn answer_sql(reader: &Reader, sql: &str, json: bool, out: impl Write) -> Result<(), HistoryError> {
+    let mut rows = Vec::new();
+    let mut table = Table::new(out);
+    let mut failed = None;
+    reader.sql(sql, |names, values| {
+        let row: Map<String, Value> = names.iter().cloned().zip(values.iter().map(json_of)).collect();
+        if json {
+            rows.push(Value::Object(row));
+        } else if let Err(error) = table.row(&row) {
+            failed = Some(error);
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    })?;
+    if json {
+        print_json(&json!({ "schema": "sql/1", "rows": rows }));
+    }
+    failed.map_or(Ok(()), |error| Err(output(error)))
+}
+
+fn json_of(value: &SqlValue) -> Value {
+    match value {
+        SqlValue::Null => Value::Null,
+        SqlValue::Integer(number) => json!(number),
+        SqlValue::Real(number) => json!(number),
+        SqlValue::Text(text) => json!(text),
+        SqlValue::Blob(bytes) => json!(format!("{} bytes", bytes.len())),
+    }
+}

@@ -1,0 +1,39 @@
+//! `cnc-gateway replay`: recordings through the same pipeline as fast as possible.
+
+use super::{CannotRun, CommandResult, Outcome, print_json, scripts_from};
+use crate::config;
+use crate::replay::{Plan, replay};
+use clap::Args;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+pub(super) struct ReplayArguments {
+    /// Recordings (.csv, .csv.gz), in order.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// History database to store into; created when absent. The same command again stores nothing twice.
+    #[arg(long, value_name = "DB")]
+    history: Option<PathBuf>,
+    /// Directory of scripts; without it those that come with the gateway decide.
+    #[arg(long, value_name = "DIR")]
+    scripts: Option<PathBuf>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Replays and prints the summary.
+pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
+    let ReplayArguments { files, history, scripts, json } = arguments;
+    let plan = Plan { files, history, progress: std::io::stderr().is_terminal() };
+    let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
+    let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
+    if json {
+        print_json(&summary.json());
+    } else {
+        super::print(&summary.to_string());
+    }
+    Ok(Outcome::Fine)
+}

@@ -1,0 +1,182 @@
+//! `replay`: recordings through the same pipeline as a live machine, row by row, as fast as possible.
+//!
+//! A replay that was broken off goes on where it was: the pipeline runs over the stored rows again, because what it has
+//! learned from them cannot be skipped, and stores only what is not in the history yet.
+
+mod motion;
+mod resume;
+mod summary;
+
+pub use motion::Motion;
+pub use summary::{FileSummary, Kept, Summary};
+
+use crate::cli::CannotRun;
+use crate::config;
+use crate::gate::Gate;
+use crate::history::{ExtraValue, Options, Record, WhenFull, Writer};
+use crate::pipeline::{Pipeline, Store, stored_series};
+use adapters::clock::TimeNs;
+use adapters::merge::{Delay, Lockstep};
+use adapters::recording::{ReadRecording, read_path};
+use adapters::replay::{Replay, UNKNOWN_PAUSE_S};
+use adapters::{Pull, Sample};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use resume::{Before, origin_of};
+use rules::estimators::{self, VisibilityTally};
+use rules::script::Host;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use summary::Counts;
+
+/// The progress is shown anew after so many rows.
+const PROGRESS_ROWS: u64 = 2048;
+
+/// What to replay, and where to.
+#[derive(Debug)]
+pub struct Plan {
+    /// Recordings, in order.
+    pub files: Vec<PathBuf>,
+    /// The history they go into; without one nothing is stored.
+    pub history: Option<PathBuf>,
+    /// Show a progress bar on a terminal.
+    pub progress: bool,
+}
+
+/// Stores what is not stored yet, and counts everything.
+struct Sink {
+    writer: Option<Writer>,
+    before: Before,
+    counts: Counts,
+}
+
+impl Store for Sink {
+    fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
+        self.counts.rows += 1;
+        if !self.before.has_row(self.counts.rows)
+            && let Some(writer) = &self.writer
+        {
+            writer.sample(sample, extras);
+            self.counts.stored += 1;
+        }
+    }
+
+    fn record(&mut self, record: Record) {
+        self.counts.record(&record);
+        if !self.before.has_record(self.counts.rows, &record)
+            && let Some(writer) = &self.writer
+        {
+            writer.record(record);
+        }
+    }
+}
+
+/// Replays every file through one pipeline; the gate decides within these limits and writes nothing.
+///
+/// # Errors
+/// A file that cannot be read, or a history that cannot be written.
+pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary, CannotRun> {
+    let began = Instant::now();
+    let fresh = estimators::Pipeline::new(estimators::Settings::default());
+    let mut pipeline = Pipeline::new(fresh, scripts, Gate::new(gate));
+    let mut files = Vec::new();
+    let mut counts = Counts::default();
+    let mut visibility = VisibilityTally::default();
+    let mut motion = Motion::default();
+    let mut next_ns = 0;
+    for file in &plan.files {
+        let read = read_path(file).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+        files.push(FileSummary::of(file, &read));
+        let mut one = OneFile { plan, pipeline: &mut pipeline, visibility: &mut visibility, motion: &mut motion };
+        let (of_file, last_ns) = one.run(file, &read, next_ns)?;
+        counts.add(&of_file);
+        next_ns = last_ns + (UNKNOWN_PAUSE_S * 1e9) as i64;
+    }
+    let kept = plan.history.as_ref().map(|path| Kept::of(path, &counts));
+    Ok(Summary {
+        files,
+        counts,
+        kept,
+        seconds_per_state: pipeline.tally().seconds_per_state(),
+        parts: pipeline.parts().finished(),
+        visibility: visibility.verdict(),
+        motion,
+        took: began.elapsed(),
+    })
+}
+
+/// One recording on its way through the pipeline.
+struct OneFile<'a> {
+    plan: &'a Plan,
+    pipeline: &'a mut Pipeline,
+    visibility: &'a mut VisibilityTally,
+    motion: &'a mut Motion,
+}
+
+impl OneFile<'_> {
+    /// Replays the file, which begins at `next_ns` when it has no dates; what happened, and the time of the last row.
+    fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(Counts, TimeNs), CannotRun> {
+        let origin = origin_of(file).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""))?;
+        let before = self.before(&origin)?;
+        let writer = self.plan.history.as_ref().map(|path| open(path, &origin)).transpose()?;
+        let source = Replay::new(origin, &read.recording, before.origin_ns.unwrap_or(next_ns.max(before.free_ns)));
+        let rows = source.rows() as u64;
+        let bar = self.bar(rows, file);
+        let mut sink = Sink { writer, before, counts: Counts::default() };
+        let last_ns = self.through(source, &mut sink, &bar);
+        bar.finish_and_clear();
+        close(sink.writer.take())?;
+        Ok((sink.counts, last_ns))
+    }
+
+    /// What the history already holds of this recording.
+    fn before(&self, origin: &str) -> Result<Before, CannotRun> {
+        let found = self.plan.history.as_deref().filter(|path| path.exists()).map(|path| Before::read(path, origin));
+        found.transpose().map(Option::unwrap_or_default).map_err(|error| CannotRun::new(error.to_string(), ""))
+    }
+
+    fn through(&mut self, source: Replay, sink: &mut Sink, bar: &ProgressBar) -> TimeNs {
+        let mut sources = Lockstep::new(vec![Box::new(source) as Box<dyn Pull>], Delay::Fixed(Duration::ZERO));
+        let mut sample = Sample::empty(0);
+        while let Some(now_ns) = sources.next_ns() {
+            sources.sample_into(&mut sample, now_ns);
+            self.pipeline.step(&sample, sink);
+            if let Some(record) = sink.before.continued(sink.counts.rows, &sample, self.pipeline.estimates()) {
+                sink.record(record);
+            }
+            self.visibility.add(self.pipeline.estimates());
+            self.motion.add(&sample, self.pipeline.estimates());
+            if sink.counts.rows.is_multiple_of(PROGRESS_ROWS) {
+                bar.set_position(sink.counts.rows);
+            }
+        }
+        sample.at_ns
+    }
+
+    fn bar(&self, rows: u64, file: &Path) -> ProgressBar {
+        let target = if self.plan.progress { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(rows), target);
+        let form = "{msg} {wide_bar} {human_pos}/{human_len} rows, {per_sec}, {eta} left";
+        bar.set_style(ProgressStyle::with_template(form).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_message(file.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        bar
+    }
+}
+
+fn open(path: &Path, origin: &str) -> Result<Writer, CannotRun> {
+    let options =
+        Options { when_full: WhenFull::Wait, extras: stored_series(), origin: origin.to_owned(), ..Options::default() };
+    Writer::open(path, options).map_err(|error| CannotRun::new(error.to_string(), ""))
+}
+
+fn close(writer: Option<Writer>) -> Result<(), CannotRun> {
+    let Some(writer) = writer else { return Ok(()) };
+    let flushed = writer.flush();
+    let status = writer.close();
+    match status.degraded.or_else(|| flushed.err().map(|error| error.to_string())) {
+        None => Ok(()),
+        Some(reason) => Err(CannotRun::new(
+            format!("not everything could be stored: {reason}"),
+            "make room and run the same command again: it goes on where it stopped",
+        )),
+    }
+}

@@ -1,0 +1,178 @@
+//! What a replay amounts to, in words and as JSON (`replay/1`).
+
+use super::Motion;
+use crate::history::Record;
+use adapters::recording::ReadRecording;
+use rules::estimators::VisibilityVerdict;
+use serde_json::{Map, Value, json};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Refused rows described in words.
+const PROBLEMS_SHOWN: usize = 10;
+
+/// Sums of one or several files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Rows that went through the pipeline.
+    pub rows: u64,
+    /// Rows that were stored now.
+    pub stored: u64,
+    /// Alarms raised.
+    pub alarms: u64,
+    /// Changes of what the scripts ask for.
+    pub decisions: u64,
+    /// Changes of state.
+    pub state_changes: u64,
+}
+
+impl Counts {
+    /// Counts a record.
+    pub(super) fn record(&mut self, record: &Record) {
+        match record {
+            Record::Alarm(_) => self.alarms += 1,
+            Record::Decision(_) => self.decisions += 1,
+            Record::State(_) => self.state_changes += 1,
+            _ => {}
+        }
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        self.rows += other.rows;
+        self.stored += other.stored;
+        self.alarms += other.alarms;
+        self.decisions += other.decisions;
+        self.state_changes += other.state_changes;
+    }
+}
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileSummary {
+    /// The file.
+    pub file: PathBuf,
+    /// Rows that could be used.
+    pub rows: u64,
+    /// Rows that could not.
+    pub refused: u64,
+    /// Why not, at most a hundred of them.
+    pub problems: Vec<String>,
+}
+
+impl FileSummary {
+    /// What was read from `file`.
+    #[must_use]
+    pub fn of(file: &Path, read: &ReadRecording) -> Self {
+        let name = file.display();
+        let problems = read.problems.iter().map(|problem| format!("{name}, {problem}")).collect();
+        Self { file: file.to_owned(), rows: read.recording.rows() as u64, refused: read.refused, problems }
+    }
+
+    fn json(&self) -> Value {
+        let Self { file, rows, refused, problems } = self;
+        json!({ "file": file.display().to_string(), "rows": rows, "refused_rows": refused, "problems": problems })
+    }
+}
+
+/// Where the rows went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Kept {
+    /// The history.
+    pub path: PathBuf,
+    /// Rows stored now.
+    pub stored: u64,
+    /// Rows that were there already.
+    pub already: u64,
+}
+
+impl Kept {
+    pub(super) fn of(path: &Path, counts: &Counts) -> Self {
+        Self { path: path.to_owned(), stored: counts.stored, already: counts.rows - counts.stored }
+    }
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub struct Summary {
+    /// The recordings.
+    pub files: Vec<FileSummary>,
+    /// Sums over all of them.
+    pub counts: Counts,
+    /// Where the rows went.
+    pub kept: Option<Kept>,
+    /// Machine time in each state, s.
+    pub seconds_per_state: Vec<(&'static str, f64)>,
+    /// Parts finished.
+    pub parts: u64,
+    /// Could cutting be seen?
+    pub visibility: VisibilityVerdict,
+    /// Agreement with the machine's own words.
+    pub motion: Motion,
+    /// How long it took.
+    pub took: Duration,
+}
+
+impl Summary {
+    fn refused(&self) -> u64 {
+        self.files.iter().map(|file| file.refused).sum()
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a rate")]
+    fn rows_per_s(&self) -> f64 {
+        self.counts.rows as f64 / self.took.as_secs_f64().max(1e-9)
+    }
+
+    /// The whole summary.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let seconds: Map<String, Value> = self
+            .seconds_per_state
+            .iter()
+            .map(|(word, s)| ((*word).to_owned(), json!((s * 1e3).round() / 1e3)))
+            .collect();
+        let kept = self.kept.as_ref().map(|kept| {
+            json!({ "path": kept.path.display().to_string(), "stored_rows": kept.stored, "rows_already_there": kept.already })
+        });
+        json!({
+            "schema": "replay/1",
+            "files": self.files.iter().map(FileSummary::json).collect::<Vec<_>>(),
+            "rows": self.counts.rows,
+            "refused_rows": self.refused(),
+            "seconds_per_state": seconds,
+            "state_changes": self.counts.state_changes,
+            "parts": self.parts,
+            "alarms": self.counts.alarms,
+            "decisions": self.counts.decisions,
+            "visibility": { "verdict": self.visibility.word(), "text": self.visibility.to_string() },
+            "spindle_edges": { "all": self.motion.edges, "right": self.motion.right },
+            "motion": self.motion.json(),
+            "history": kept,
+            "took_s": self.took.as_secs_f64(),
+            "rows_per_s": self.rows_per_s().round(),
+        })
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (rows, took, rate) = (self.counts.rows, self.took.as_secs_f64(), self.rows_per_s());
+        writeln!(f, "{rows} rows in {took:.2} s ({rate:.0} rows/s), {} refused", self.refused())?;
+        let problems: Vec<&String> = self.files.iter().flat_map(|file| &file.problems).collect();
+        problems.iter().take(PROBLEMS_SHOWN).try_for_each(|problem| writeln!(f, "  {problem}"))?;
+        for (word, seconds) in self.seconds_per_state.iter().filter(|(_, seconds)| *seconds > 0.0) {
+            writeln!(f, "{word:>14} {seconds:>12.1} s")?;
+        }
+        let Self { parts, counts, .. } = self;
+        writeln!(f, "parts {parts}, alarms {}, decisions {}", counts.alarms, counts.decisions)?;
+        if self.motion.edges > 0 {
+            let Motion { right, edges, .. } = &self.motion;
+            writeln!(f, "spindle on and off: {right} of {edges} edges right at the very row")?;
+        }
+        writeln!(f, "{}", self.visibility)?;
+        if let Some(Kept { path, stored, already }) = &self.kept {
+            writeln!(f, "{}: {stored} rows stored, {already} were there already", path.display())?;
+        }
+        Ok(())
+    }
+}
