@@ -8,8 +8,8 @@ mod replay;
 mod run;
 
 use crate::log::{self, LogFormat};
-use clap::{Parser, Subcommand};
 use crate::reload::read_directory;
+use clap::{Parser, Subcommand};
 use rules::script::{Host, shipped};
 use std::fmt;
 use std::io::Write;

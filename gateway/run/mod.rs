@@ -7,6 +7,7 @@ pub mod keep;
 pub mod open;
 pub mod pace;
 pub mod report;
+pub mod rules;
 pub mod tick;
 
 use crate::cli::CannotRun;
@@ -16,13 +17,12 @@ use crate::http::{Published, Server, Shared, bind, port_trouble};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
+use ::rules::estimators;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use clock::BoxClock;
 use health::Health;
 use keep::Kept;
 use open::{MachineSpeed, Sources};
-use rules::estimators;
-use rules::script::Host;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -102,8 +102,7 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let Sources { feed, pace, simulated, .. } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let memory = data_dir.join("estimators.json");
-    let mut scripts = Host::new();
-    let _refused_is_shown = scripts.load(&rules::script::shipped());
+    let (scripts, watched) = rules::load(config);
     let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let identity = Identity {
         machine: config.gateway.name.clone(),
@@ -119,7 +118,7 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let wishes = wishes.clone();
-    Ok((Ticker { identity, pace, feed, pipeline, health, wishes, publish, stop_after_ns }, live))
+    Ok((Ticker { identity, pace, feed, pipeline, scripts: watched, health, wishes, publish, stop_after_ns }, live))
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

@@ -4,6 +4,7 @@ use super::feed::Feed;
 use super::health::Health;
 use super::pace::Pace;
 use super::report;
+use super::rules::Watched;
 use crate::http::Published;
 use crate::pipeline::Pipeline;
 use crate::status::{Problem, Status, TickStatus};
@@ -49,7 +50,9 @@ pub struct Ticker {
     pub feed: Feed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
-    /// Store, scripts, clock: what may fail while the box goes on.
+    /// Keeps the scripts as they are on disk.
+    pub scripts: Watched,
+    /// Store, sources, clock: what may fail while the box goes on.
     pub health: Health,
     /// What the rest of the process wants.
     pub wishes: Arc<Wishes>,
@@ -70,6 +73,7 @@ impl Ticker {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.health.look(&self.pipeline, &self.feed, now_ns);
+            self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.pipeline.step(&sample, &mut self.health);
             let over = !alive || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
             if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {

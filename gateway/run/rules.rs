@@ -1,0 +1,75 @@
+//! The scripts of a running box: delivered at the first start, loaded, watched, reloaded.
+
+use super::health::Health;
+use super::tick::Wishes;
+use crate::config::Config;
+use crate::log::{Notice, Severity};
+use crate::pipeline::Pipeline;
+use crate::reload::{Reloader, furnish, load_now};
+use adapters::clock::TimeNs;
+use rules::script::{Host, Problem, shipped};
+use std::sync::atomic::Ordering;
+
+/// Writes the shipped scripts where there are none, loads what is there, and watches it. Whatever is wrong is told, and
+/// the box goes on: with the shipped scripts from memory when the directory cannot be read at all.
+#[must_use]
+pub fn load(config: &Config) -> (Host, Watched) {
+    let directory = &config.scripts.directory;
+    let mut told = Vec::new();
+    if let Err(error) = furnish(directory) {
+        let text = format!("{}: the shipped scripts cannot be written there: {error}", directory.display());
+        told.push(Notice::new(Severity::Warning, "scripts_not_written", text));
+    }
+    let mut host = Host::new();
+    if directory.is_dir() {
+        if let Err(problems) = load_now(directory, &mut host) {
+            told.push(refused(&problems, "no script is in charge until this is put right"));
+        }
+    } else if host.load(&shipped()).is_ok() {
+        told.push(Notice::new(
+            Severity::Warning,
+            "scripts_from_memory",
+            "the shipped scripts are in charge as delivered",
+        ));
+    }
+    let reloader = Reloader::start(directory, config.scripts.reload);
+    if let Err(error) = &reloader {
+        let text = format!("changed scripts will not be noticed ({error}); start the box again after a change");
+        told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
+    }
+    (host, Watched { reloader: reloader.ok(), told })
+}
+
+fn refused(problems: &[Problem], consequence: &str) -> Notice {
+    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    let text = format!("scripts refused, {consequence}:\n  {}", lines.join("\n").replace('\n', "\n  "));
+    Notice::new(Severity::Warning, "scripts_refused", text)
+}
+
+/// Keeps the scripts of the pipeline as they are on disk.
+pub struct Watched {
+    reloader: Option<Reloader>,
+    told: Vec<Notice>,
+}
+
+impl Watched {
+    /// Takes what has been found on disk since the last tick. Costs nothing when there is nothing.
+    pub fn step(&mut self, pipeline: &mut Pipeline, health: &mut Health, wishes: &Wishes, now_ns: TimeNs) {
+        for notice in self.told.drain(..) {
+            health.event(now_ns, "scripts", &notice);
+        }
+        let Some(reloader) = &self.reloader else { return };
+        if wishes.reload.swap(false, Ordering::SeqCst) {
+            reloader.ask();
+        }
+        let notice = match reloader.step(pipeline.scripts_mut()) {
+            None => return,
+            Some(Ok(count)) => {
+                let text = format!("{count} scripts are in charge as they are on disk");
+                Notice::new(Severity::Info, "scripts_reloaded", text)
+            }
+            Some(Err(problems)) => refused(&problems, "the ones before stay in charge"),
+        };
+        health.event(now_ns, "scripts", &notice);
+    }
+}
