@@ -128,15 +128,9 @@ pub(crate) fn recording_share(scene: &Scene) -> Vec<f64> {
     elapsed_s.iter().map(|elapsed_s| elapsed_s / whole_s).collect()
 }
 
-/// Seconds since the first row; a pause of unknown length counts as one period.
+/// Seconds since the first row on the clock that never restarts.
 pub(crate) fn recording_elapsed_s(scene: &Scene) -> Vec<f64> {
-    let mut elapsed_s = vec![0.0; scene.rows()];
-    for row in 1..scene.rows() {
-        let step_s = scene.time_s()[row] - scene.time_s()[row - 1];
-        let restarts = scene.restarts().binary_search(&row).is_ok();
-        elapsed_s[row] = elapsed_s[row - 1] + if restarts { scene.period_s() } else { step_s.max(0.0) };
-    }
-    elapsed_s
+    scene.clock_s().to_vec()
 }
 
 /// Difference of the greatest and the least value.

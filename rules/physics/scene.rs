@@ -137,7 +137,8 @@ pub struct Scene {
     time_s: Vec<f64>,
     runs: Vec<Range<usize>>,
     run_names: Vec<String>,
-    restarts: Vec<usize>,
+    clock_s: Vec<f64>,
+    latent: Option<Vec<f64>>,
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
     absent: BTreeMap<String, Vec<bool>>,
@@ -168,7 +169,8 @@ impl Scene {
         let mut scene = Self {
             rows: recording.rows(),
             time_s: recording.time_s.clone(),
-            restarts: restarts(&recording, &runs),
+            clock_s: running_clock_s(&recording, &runs),
+            latent: None,
             period_s: median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
             usable: measured.iter().map(|value| value.is_some()).collect(),
@@ -262,11 +264,11 @@ impl Scene {
         &self.run_names
     }
 
-    /// Rows at which a state starts from an unknown value: the first row, and the first row of every run before which
-    /// the pause is unknown.
+    /// Seconds on a clock that never restarts: across a known pause it runs on, across an unknown one (the recording's
+    /// time restarts) it stands still. States are carried on this clock.
     #[must_use]
-    pub fn restarts(&self) -> &[usize] {
-        &self.restarts
+    pub fn clock_s(&self) -> &[f64] {
+        &self.clock_s
     }
 
     /// Median time between two rows of a run.
@@ -357,6 +359,17 @@ impl Scene {
         self.load = load;
     }
 
+    /// How present a hidden switch is in each row, 0 to 1, where a search has found one.
+    #[must_use]
+    pub fn latent(&self) -> Option<&[f64]> {
+        self.latent.as_deref()
+    }
+
+    /// Sets the state of a hidden switch.
+    pub fn set_latent(&mut self, latent: Option<Vec<f64>>) {
+        self.latent = latent;
+    }
+
     /// The output as the model simulates it, for effects of the measurement.
     #[must_use]
     pub fn simulated(&self) -> Option<&[f64]> {
@@ -369,11 +382,18 @@ impl Scene {
     }
 }
 
-fn restarts(recording: &Recording, runs: &[Range<usize>]) -> Vec<usize> {
+fn running_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
+    let time_s = &recording.time_s;
     if recording.pauses_known() {
-        return vec![0];
+        return time_s.iter().map(|time| time - time_s[0]).collect();
     }
-    runs.iter().map(|run| run.start).collect()
+    let period_s = median_period_s(time_s, runs);
+    let mut clock_s = vec![0.0; time_s.len()];
+    for (index, run) in runs.iter().enumerate() {
+        let start_s = if index == 0 { 0.0 } else { clock_s[run.start - 1] + period_s };
+        run.clone().for_each(|row| clock_s[row] = start_s + time_s[row] - time_s[run.start]);
+    }
+    clock_s
 }
 
 fn median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {

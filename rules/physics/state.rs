@@ -2,61 +2,34 @@
 
 use super::Scene;
 
-/// A first-order state `dx/dt = (u - x) / tau_s`, exact for an input held between rows, starting from zero at every
-/// restart of the scene. The input is held through a known pause only for one period, then it is zero.
+/// A first-order state `dx/dt = (u - x) / tau_s`, exact for an input held between rows, starting from zero. Across a
+/// known pause the input is held for ten periods, then it is zero; across an unknown pause the state stands still.
 #[must_use]
 pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = vec![0.0; input.len()];
-    for_each_stretch(scene, |rows| {
-        let mut x = 0.0;
-        for row in rows.clone() {
-            if row > rows.start {
-                x = advance(scene, x, input[row - 1], row, tau_s);
-            }
-            state[row] = x;
-        }
-    });
+    for row in 1..input.len() {
+        state[row] = advance(scene, state[row - 1], input[row - 1], row, tau_s);
+    }
     state
 }
 
 fn advance(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
-    let dt_s = (scene.time_s()[row] - scene.time_s()[row - 1]).max(0.0);
+    let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
     let driven_s = dt_s.min(10.0 * scene.period_s());
     let x = input + (x - input) * (-driven_s / tau_s).exp();
     x * (-(dt_s - driven_s) / tau_s).exp()
 }
 
-/// What is left of an initial state of one: `exp(-(t - t0) / tau_s)` since each restart.
+/// What is left of an initial state of one: `exp(-t / tau_s)` since the first row.
 #[must_use]
 pub fn decay(scene: &Scene, tau_s: f64) -> Vec<f64> {
-    let mut left = vec![0.0; scene.rows()];
-    for_each_stretch(scene, |rows| {
-        for row in rows.clone() {
-            left[row] = (-(scene.time_s()[row] - scene.time_s()[rows.start]) / tau_s).exp();
-        }
-    });
-    left
+    scene.clock_s().iter().map(|t| (-t / tau_s).exp()).collect()
 }
 
-/// Seconds since the last restart.
+/// Seconds since the first row.
 #[must_use]
 pub fn elapsed_s(scene: &Scene) -> Vec<f64> {
-    let mut elapsed = vec![0.0; scene.rows()];
-    for_each_stretch(scene, |rows| {
-        for row in rows.clone() {
-            elapsed[row] = scene.time_s()[row] - scene.time_s()[rows.start];
-        }
-    });
-    elapsed
-}
-
-/// Calls `act` with the rows between two restarts.
-pub fn for_each_stretch(scene: &Scene, mut act: impl FnMut(std::ops::Range<usize>)) {
-    let restarts = scene.restarts();
-    for (index, start) in restarts.iter().enumerate() {
-        let end = restarts.get(index + 1).copied().unwrap_or(scene.rows());
-        act(*start..end);
-    }
+    scene.clock_s().to_vec()
 }
 
 /// The value of `values` at `time_s[row] - delay_s` within the run, linearly between rows; held beyond its ends.

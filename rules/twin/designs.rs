@@ -7,6 +7,17 @@ use crate::physics::{CATALOGUE, Effect, Form, Scene};
 /// Kinds that build a model and are never a finding by themselves.
 const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 
+/// What a flexible or seldom cause must explain beyond the price of its parameters, in units of information: whoever
+/// bends at a threshold, steps at any word or acts at edges only imitates others easily.
+fn reluctance(kind: &str) -> f64 {
+    match kind {
+        "gear_stage" | "field_weakening" | "entry_exit" | "chatter" | "recipe_error" => 6.0,
+        "zero_drift" | "sensor_gain" | "built_up_edge" | "chip_thinning" | "engagement_timing" | "override_delay" => 3.0,
+        "inverter_loss" | "iron_loss" | "direction_asymmetry" | "depth_taper" | "meter_window" => 2.0,
+        _ => 0.0,
+    }
+}
+
 /// One hypothesis: an effect in one form.
 #[derive(Clone)]
 pub struct Design {
@@ -22,6 +33,8 @@ pub struct Design {
     pub freedom: usize,
     /// Natural logarithm of the number of alternatives of the same freedom.
     pub ln_choices: f64,
+    /// Price beyond the parameters and the choice, in units of information.
+    pub reluctance: f64,
 }
 
 /// Every hypothesis that this scene, with the load and output simulated by the baseline, can tell anything about.
@@ -59,6 +72,7 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
         kind: effect.doc().kind.to_owned(),
         freedom: names.len() + form.shape.len(),
         ln_choices: form.ln_choices,
+        reluctance: reluctance(effect.doc().kind),
         part,
         columns,
         ranges,
@@ -82,6 +96,7 @@ fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
         part: part.clone(),
         freedom: columns.len(),
         ln_choices: 0.0,
+        reluctance: 0.0,
         columns,
         ranges,
     })

@@ -98,7 +98,7 @@ impl Empirical {
 
 fn channel_values(scene: &Scene, channel: &str) -> Option<Vec<f64>> {
     match channel {
-        TIME => Some(scene.time_s().to_vec()),
+        TIME => Some(scene.clock_s().to_vec()),
         TIME_IN_RUN => {
             let mut values = scene.time_s().to_vec();
             for run in scene.runs() {
@@ -130,9 +130,7 @@ pub fn empirical_designs(scene: &Scene, frame: &Frame) -> Vec<Design> {
     let mut channels: Vec<String> =
         scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect();
     channels.push(TIME_IN_RUN.to_owned());
-    if scene.restarts().len() == 1 {
-        channels.push(TIME.to_owned());
-    }
+    channels.push(TIME.to_owned());
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
     let forms = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
     forms.flatten().filter_map(|form| design(form, scene, frame)).collect()
@@ -189,6 +187,7 @@ fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
         ranges: vec![any; columns.len()],
         freedom: columns.len(),
         ln_choices: 0.0,
+        reluctance: 0.0,
         part,
         columns,
     })

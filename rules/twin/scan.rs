@@ -39,7 +39,7 @@ pub struct Score {
 /// The price of a design: its parameters, and having been chosen among like ones.
 #[must_use]
 pub fn price(design: &Design, ln_rows: f64) -> f64 {
-    count(design.freedom) * ln_rows + 2.0 * design.ln_choices
+    count(design.freedom) * ln_rows + 2.0 * design.ln_choices + design.reluctance
 }
 
 /// Every hypothesis, whitened at the settings that have been asked for.

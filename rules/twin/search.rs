@@ -16,6 +16,8 @@ const LEADERS: usize = 3;
 const PARTNERS: usize = 2;
 /// Information a further effect must bring.
 const STEP_INFORMATION: f64 = 6.0;
+/// The same as a share of what is already explained: below it a further effect more likely mends the form of another.
+const STEP_SHARE: f64 = 0.05;
 /// The p-value that a finding must not exceed.
 pub const P_MAX: f64 = 0.02;
 
@@ -66,31 +68,43 @@ impl<'a, 'b> Search<'a, 'b> {
         Self { data, base, bank, ln_rows, seed, tried: Vec::new() }
     }
 
-    /// Runs the search.
+    /// Runs the search: grows as far as information is gained, then lets the gate decide how much of it is real.
+    ///
+    /// The gate resamples the innovations of the deepest hypothesis: what a later member explains must not count as
+    /// noise against an earlier one.
     #[must_use]
     pub fn run(mut self) -> Found {
-        let mut best = Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 };
+        let mut path = vec![Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 }];
+        while let Some(next) = self.next_step(&path[path.len() - 1]) {
+            path.push(next);
+        }
+        let deepest = path[path.len() - 1].clone();
         let mut p_values = Vec::new();
         let mut refused_p = None;
-        while best.members.len() < EFFECTS_MAX {
-            let Some(next) = self.grow(&best) else { break };
-            let needed = if best.members.is_empty() { 0.0 } else { STEP_INFORMATION };
-            if next.information < best.information + needed {
-                break;
-            }
-            let p = self.gate(&best, &next);
+        let mut best = path[0].clone();
+        for next in path.drain(1..) {
+            let p = p_value(self.bank, &best.fit, &deepest.fit, self.ln_rows, self.seed);
             if p > P_MAX {
                 refused_p = best.members.is_empty().then_some(p);
                 break;
             }
-            let added = next.members.len().saturating_sub(best.members.len());
-            p_values.extend(std::iter::repeat_n(p, added));
-            best = self.swapped(next);
+            p_values.resize(next.members.len(), p);
+            best = next;
         }
         let best = self.pruned(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
         Found { best, p_values, others: self.tried, refused_p }
+    }
+
+    /// The next hypothesis on the path, swapped to its best, when it brings enough.
+    fn next_step(&mut self, from: &Hypothesis) -> Option<Hypothesis> {
+        if from.members.len() >= EFFECTS_MAX {
+            return None;
+        }
+        let next = self.grow(from)?;
+        let needed = if from.members.is_empty() { 0.0 } else { STEP_INFORMATION.max(STEP_SHARE * from.information) };
+        (next.information > from.information + needed).then(|| self.swapped(next))
     }
 
     /// The best hypothesis with one more member, or two where two are better than one.
@@ -142,10 +156,6 @@ impl<'a, 'b> Search<'a, 'b> {
         let prices: f64 = members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum();
         let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - prices;
         information.is_finite().then_some(Hypothesis { members, fit, information })
-    }
-
-    fn gate(&self, from: &Hypothesis, next: &Hypothesis) -> f64 {
-        p_value(self.bank, &from.fit, &next.fit, self.ln_rows, self.seed)
     }
 
     /// Replaces members one by one where another explains more beside the rest.

@@ -1,6 +1,7 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
-use crate::physics::cut::cut_times;
+use crate::physics::cut::{cut_times, cutting_rows};
+use crate::physics::excitation::quantile;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Self-excited vibration in the cut.
@@ -10,15 +11,15 @@ pub struct Chatter;
 static DOC: EffectDoc = EffectDoc {
     kind: "chatter",
     family: "cutting",
-    law: "y = gain * L where ap > limit; mostly the scatter grows, the mean by 0-10 %",
+    law: "y = gain * L * (ap / limit - 1) where ap > limit; mostly the scatter grows, the mean by 0-10 %",
     parameters: &[
         ParameterDoc {
             name: "gain",
             unit: "1",
             entry: Entry::Linear,
-            range: (0.0, 0.3),
-            en: "growth of the mean cut while it chatters",
-            zh: "颤振时平均切削量的增长",
+            range: (0.0, 1.0),
+            en: "growth of the mean cut at twice the limit",
+            zh: "切深为极限两倍时平均切削量的增长",
         },
         ParameterDoc {
             name: "limit_mm",
@@ -30,7 +31,7 @@ static DOC: EffectDoc = EffectDoc {
         },
     ],
     needs: &["load | engaged", "depth_of_cut_mm"],
-    source: "stability lobes; an effect of the scatter, not searched for in the mean",
+    source: "stability lobes; above the limit the cutting force grows with the vibration",
     experiment_minutes: 6.0,
     rivals: &["runout", "built_up_edge", "edge_force"],
     en: Texts {
@@ -54,14 +55,20 @@ impl Effect for Chatter {
         &DOC
     }
 
-    fn forms(&self, _scene: &Scene) -> Vec<Form> {
-        Vec::new()
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let Some(depth) = scene.column("depth_of_cut_mm") else { return Vec::new() };
+        let cutting = cutting_rows(scene);
+        let depths = || depth.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(depth, _)| *depth);
+        let limits = [0.4, 0.55, 0.7, 0.85].into_iter().filter_map(|share| quantile(depths(), share));
+        let mut limits: Vec<f64> = limits.filter(|limit| depths().any(|depth| depth > *limit)).collect();
+        limits.dedup();
+        limits.into_iter().map(|limit| Form::of(&[("limit_mm", limit)])).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let depth = scene.column("depth_of_cut_mm")?;
         let limit_mm = form.value("limit_mm").unwrap_or(2.0);
-        Some(vec![("gain", cut_times(scene, |row| if depth[row] > limit_mm { 1.0 } else { 0.0 })?)])
+        Some(vec![("gain", cut_times(scene, |row| (depth[row] / limit_mm - 1.0).max(0.0))?)])
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

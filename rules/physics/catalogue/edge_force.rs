@@ -11,15 +11,25 @@ pub struct EdgeForce;
 static DOC: EffectDoc = EffectDoc {
     kind: "edge_force",
     family: "cutting",
-    law: "P = kte * ap * vc / 60 * engaged; a force output takes kte * ap, a torque output D / 2000 of it",
-    parameters: &[ParameterDoc {
-        name: "kte_n_per_mm",
-        unit: "N/mm",
-        entry: Entry::Linear,
-        range: (0.0, 500.0),
-        en: "force per length of edge in the cut",
-        zh: "单位切削刃长度的力",
-    }],
+    law: "P = kte * (ap + nose) * vc / 60 * engaged; a force output takes kte * (ap + nose), a torque output D / 2000 of it",
+    parameters: &[
+        ParameterDoc {
+            name: "kte_n_per_mm",
+            unit: "N/mm",
+            entry: Entry::Linear,
+            range: (0.0, 500.0),
+            en: "force per length of edge in the cut",
+            zh: "单位切削刃长度的力",
+        },
+        ParameterDoc {
+            name: "nose_mm",
+            unit: "mm",
+            entry: Entry::Shape,
+            range: (0.0, 3.0),
+            en: "length of edge around the nose that is in the cut besides the depth",
+            zh: "除切深外刀尖圆弧参与切削的刃长",
+        },
+    ],
     needs: &["depth_of_cut_mm", "cutting_speed_m_min"],
     source: "edge-force model F = kt b h + kte b; kte 10-80 N/mm for steel and aluminium",
     experiment_minutes: 6.0,
@@ -46,14 +56,17 @@ impl Effect for EdgeForce {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        self.columns(scene, &Form::plain()).map(|_| Form::plain()).into_iter().collect()
+        let forms = [0.0, 0.8].map(|nose_mm| Form::of(&[("nose_mm", nose_mm)]));
+        forms.into_iter().filter(|form| self.columns(scene, form).is_some()).collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if is_displacement(scene) || is_axis_output(scene) {
             return None;
         }
-        let edge = in_output(scene, scene.column("depth_of_cut_mm")?)?;
+        let nose_mm = form.value("nose_mm").unwrap_or(0.0);
+        let length: Vec<f64> = scene.column("depth_of_cut_mm")?.iter().map(|depth| depth + nose_mm).collect();
+        let edge = in_output(scene, &length)?;
         let engaged = engaged(scene);
         Some(vec![("kte_n_per_mm", edge.iter().zip(&engaged).map(|(edge, engaged)| edge * engaged).collect())])
     }

@@ -59,7 +59,7 @@ impl Effect for InverterLoss {
         let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
         let known = turns && is_power(scene) && scene.load().is_some_and(varies);
         let named = |name| Form { name, ..Form::plain() };
-        if known { vec![named("conduction"), named("both")] } else { Vec::new() }
+        if known { vec![named("conduction")] } else { Vec::new() }
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {

@@ -66,7 +66,7 @@ impl Effect for OverrideDelay {
         if visits(scene, changes) < 3 {
             return Vec::new();
         }
-        delays(scene, &[0.1, 0.25, 0.5, 1.0]).iter().map(|delay| Form::of(&[("delay_s", *delay)])).collect()
+        delays(scene, &[0.1, 0.25, 0.5, 1.0, 2.0]).iter().map(|delay| Form::of(&[("delay_s", *delay)])).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
