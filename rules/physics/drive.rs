@@ -79,7 +79,7 @@ pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
 
 /// Does the drive of the output turn (rad/s) rather than slide (m/s)?
 pub(crate) fn turns(scene: &Scene) -> bool {
-    scene.output().contains("spindle") || scene.role(Role::Velocity).is_none()
+    !is_axis_output(scene) || scene.role(Role::Velocity).is_none()
 }
 
 /// A quantity in m, m/s, m/s2 or rad/s, by the unit at the end of its name.

@@ -12,10 +12,20 @@ const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 fn reluctance(kind: &str) -> f64 {
     match kind {
         "gear_stage" | "field_weakening" | "entry_exit" | "chatter" | "recipe_error" => 6.0,
-        "zero_drift" | "sensor_gain" | "built_up_edge" | "chip_thinning" | "engagement_timing" | "override_delay" => 3.0,
+        "zero_drift" | "saturation" => 10.0,
+        "sensor_gain" | "built_up_edge" | "chip_thinning" | "engagement_timing" | "override_delay" => 3.0,
         "inverter_loss" | "iron_loss" | "direction_asymmetry" | "depth_taper" | "meter_window" => 2.0,
         _ => 0.0,
     }
+}
+
+/// Kinds that act at the edges of the engagement only: one of them at a time, or they mend each other's form.
+const AT_EDGES: [&str; 4] = ["clock_lag", "meter_window", "engagement_timing", "entry_exit"];
+
+/// Would a hypothesis of these kinds be twice the same cause?
+#[must_use]
+pub fn excludes(present: &str, added: &str) -> bool {
+    present == added || AT_EDGES.contains(&present) && AT_EDGES.contains(&added)
 }
 
 /// One hypothesis: an effect in one form.

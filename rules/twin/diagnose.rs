@@ -223,6 +223,7 @@ pub struct Unknown {
     pub p_value: f64,
 }
 
+
 /// Robust standard deviation of what remains, edges and spikes left aside.
 #[must_use]
 pub fn ordinary_noise(fit: &Fit) -> f64 {

@@ -138,13 +138,12 @@ impl Part {
         Some(sum)
     }
 
-    /// Does it act on the measured output as a whole, and so come after every physical part?
+    /// Does it act on the output that the physical parts simulate, and so come after all of them?
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
-        matches!(
-            self.kind.as_str(),
-            "sensor_gain" | "supply_voltage" | "clock_lag" | "meter_window" | "saturation" | "ripple_alias"
-        )
+        let clipped = matches!(&self.body, Body::Effect(_, form) if form.name == "clipped");
+        let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation", "ripple_alias"];
+        clipped || acting.contains(&self.kind.as_str())
     }
 
     /// Does it read the load that the cut simulates?

@@ -1,5 +1,6 @@
 //! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
 
+use super::designs::excludes;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
@@ -128,11 +129,13 @@ impl<'a, 'b> Search<'a, 'b> {
     fn extend(&mut self, from: &Hypothesis, most: usize) -> Vec<Hypothesis> {
         let mut scores = self.bank.scan(&from.fit, self.ln_rows);
         scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
-        let mut kinds: Vec<&str> = from.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect();
+        let present: Vec<&str> = from.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect();
+        let mut kinds: Vec<&str> = Vec::new();
         let mut chosen: Vec<&Score> = Vec::new();
         for score in &scores {
             let kind = self.bank.designs[score.design].kind.as_str();
-            if chosen.len() < most && score.gain.is_finite() && !kinds.contains(&kind) {
+            let lawful = !kinds.contains(&kind) && !present.iter().any(|present| excludes(present, kind));
+            if chosen.len() < most && score.gain.is_finite() && lawful {
                 kinds.push(kind);
                 chosen.push(score);
             }

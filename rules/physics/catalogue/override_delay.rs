@@ -3,7 +3,7 @@
 use crate::physics::cut::{cut, cutting_rows};
 use crate::physics::excitation::{delays, visits};
 use crate::physics::state::delayed;
-use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Feed that follows late.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +70,7 @@ impl Effect for OverrideDelay {
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let feed = feed(scene)?;
+        let feed = feed_in_the_cut(scene)?;
         let before = delayed(scene, &feed, form.value("delay_s").unwrap_or(0.25));
         let law = |((load, before), now): ((&f64, &f64), &f64)| {
             let ratio = if *now > 0.0 { (before / now).clamp(0.0, 4.0) } else { 1.0 };
@@ -82,6 +82,19 @@ impl Effect for OverrideDelay {
     fn default_form(&self, _scene: &Scene) -> Form {
         Form::of(&[("delay_s", 0.25)])
     }
+}
+
+/// The feed, before each pass that of its first row: the delay acts on changes while cutting, not on the approach.
+fn feed_in_the_cut(scene: &Scene) -> Option<Vec<f64>> {
+    let mut feed = feed(scene)?;
+    for pass in scene.passes() {
+        let start = scene.runs().iter().find(|run| run.contains(&pass.start)).map_or(0, |run| run.start);
+        let engaged = scene.role(Role::Engaged)?;
+        let approach = (start..pass.start).rev().take_while(|row| engaged[*row] <= 0.5).collect::<Vec<_>>();
+        let first = feed[pass.start];
+        approach.into_iter().for_each(|row| feed[row] = first);
+    }
+    Some(feed)
 }
 
 /// The feed as reported, or else as commanded times its override.

@@ -1,5 +1,6 @@
 //! The meter or drive shows no more than its ceiling.
 
+use crate::physics::excitation::quantile;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Ceiling of the meter.
@@ -54,8 +55,17 @@ impl Effect for Saturation {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let ceiling = pile_up(scene).filter(|_| scene.simulated().is_some());
-        ceiling.map(|ceiling| Form::of(&[("ceiling", ceiling)])).into_iter().collect()
+        let Some(simulated) = scene.simulated() else { return Vec::new() };
+        let form = |ceiling: f64| Form::of(&[("ceiling", ceiling)]);
+        if let Some(ceiling) = pile_up(scene) {
+            return vec![form(ceiling)];
+        }
+        // Noise after the clipping smears the pile: then the ceiling lies a little below the greatest recorded values,
+        // and a fair number of rows is simulated beyond it.
+        let usable = || (0..scene.rows()).filter(|row| scene.usable()[*row]);
+        let levels = [0.995, 0.98, 0.95, 0.9].into_iter().filter_map(|share| quantile(usable().map(|row| scene.recorded()[row]), share));
+        let beyond = |ceiling: f64| usable().filter(|row| simulated[*row] > ceiling).count() >= 8;
+        levels.filter(|ceiling| beyond(*ceiling)).map(form).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
