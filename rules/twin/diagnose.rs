@@ -39,7 +39,8 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
     let Some(base) = case.fit_baseline() else {
         return Ok(verdicts::cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
     };
-    let (found, designs) = case.search(&base, seed);
+    let (mut found, designs) = case.search(&base, seed);
+    let base = case.settle(base, &mut found);
     let found = case.worth_claiming(found, &base);
     let unknown = case.unknown(&base, &found, seed);
     let outcome = Outcome::new(&mut case, base, found, designs, unknown);
@@ -104,7 +105,32 @@ impl<'a> Case<'a> {
 
     fn fit_baseline(&mut self) -> Option<Fit> {
         let parts = self.parts.clone();
-        self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))
+        let plain = self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))?;
+        self.frame.weigh(&plain.residual, plain.noise);
+        self.with_data(|data| fit(data, &plain.parts, plain.noise))
+    }
+
+    /// Weighs the rows by what the best hypothesis leaves, and fits it and the baseline again: rows that looked
+    /// outlandish because an effect was missing count in full once it is there.
+    fn settle(&mut self, base: Fit, found: &mut Found) -> Fit {
+        let best = &mut found.best;
+        if best.members.is_empty() {
+            return base;
+        }
+        self.frame.weigh(&best.fit.residual, best.fit.noise);
+        let parts = best.fit.parts.clone();
+        let again = self.with_data(|data| {
+            let best_again = fit(data, &parts, best.fit.noise)?;
+            let base_again = fit(data, &base.parts, base.noise)?;
+            Some((best_again, base_again))
+        });
+        let Some((best_again, base_again)) = again else { return base };
+        let shift = 2.0 * (best_again.log_likelihood - base_again.log_likelihood)
+            - 2.0 * (best.fit.log_likelihood - base.log_likelihood);
+        best.information += shift;
+        found.others.iter_mut().for_each(|other| other.information += shift);
+        best.fit = best_again;
+        base_again
     }
 
     fn search(&mut self, base: &Fit, seed: u64) -> (Found, Vec<Design>) {

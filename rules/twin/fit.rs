@@ -3,7 +3,7 @@
 use super::frame::Frame;
 use super::linear::{Solution, dot, least_squares};
 use super::model::{Part, simulate};
-use super::noise::{Arma, count, whiten};
+use super::noise::{Arma, count};
 use crate::physics::{Entry, Scene};
 
 /// Gauss-Newton steps at most, per noise model.
@@ -67,9 +67,9 @@ pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
 fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
     let mut state = State::new(data, nominal.to_vec())?;
     state.descend(data, nominal, start)?;
-    let (_, noise) = super::noise::fit_near(&state.residual, &data.frame.stretches, start);
+    let (_, noise) = super::noise::fit_near(&state.residual, data.frame, start);
     state.descend(data, nominal, noise)?;
-    let (log_likelihood, noise) = super::noise::fit_near(&state.residual, &data.frame.stretches, noise);
+    let (log_likelihood, noise) = super::noise::fit_near(&state.residual, data.frame, noise);
     let tangent = tangent(data, &state.parts, &state.free)?;
     Some(Fit { log_likelihood, parts: state.parts, free: state.free, noise, residual: state.residual, tangent })
 }
@@ -78,14 +78,14 @@ impl Fit {
     /// The innovations at the fitted noise.
     #[must_use]
     pub fn innovations(&self, frame: &Frame) -> Vec<f64> {
-        whiten(&self.residual, &frame.stretches, self.noise)
+        frame.whiten(&self.residual, self.noise)
     }
 
     /// Covariance of the free parameters, from the whitened tangent.
     #[must_use]
     pub fn covariance(&self, frame: &Frame) -> Vec<Vec<f64>> {
         let columns: Vec<Vec<f64>> =
-            self.tangent.iter().map(|column| whiten(column, &frame.stretches, self.noise)).collect();
+            self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
         let innovations = self.innovations(frame);
         let solution = least_squares(&columns, &innovations);
         let freedom = count(frame.len().saturating_sub(self.free.len()).max(1));
@@ -137,7 +137,7 @@ impl State {
     }
 
     fn cost(&self, data: &Data<'_>, noise: Arma) -> f64 {
-        let innovations = whiten(&self.residual, &data.frame.stretches, noise);
+        let innovations = data.frame.whiten(&self.residual, noise);
         dot(&innovations, &innovations)
     }
 
@@ -145,7 +145,7 @@ impl State {
     /// touch stays where the file put it.
     fn step(&self, data: &Data<'_>, nominal: &[Part], noise: Arma, tangent: &[Vec<f64>]) -> Vec<f64> {
         let size = self.free.len();
-        let whitened = |column: &[f64]| whiten(column, &data.frame.stretches, noise);
+        let whitened = |column: &[f64]| data.frame.whiten(column, noise);
         let mut target = whitened(&self.residual);
         let sigma = (dot(&target, &target) / count(target.len().max(1))).sqrt();
         let mut columns: Vec<Vec<f64>> = tangent.iter().map(|column| whitened(column)).collect();

@@ -3,12 +3,14 @@
 //! A long recording is reduced by averaging groups of neighbouring rows *after* every law has been evaluated at full
 //! rate, so that edges keep their shape.
 
+use super::noise::{Arma, whiten};
+use super::quality::median;
 use crate::physics::Scene;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Groups beyond which neighbouring rows are averaged.
-const GROUPS_MAX: usize = 20_000;
+const GROUPS_MAX: usize = 8_000;
 
 /// A stretch of rows that is held out, or not, as a whole.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,14 +55,36 @@ pub struct Frame {
     pub stretches: Vec<Range<usize>>,
     /// The unit of each group.
     pub unit: Vec<usize>,
+    /// Weight of each group's innovation; empty while all weigh the same.
+    weights: Vec<f64>,
 }
 
+/// Innovations beyond this many robust standard deviations lose weight.
+const HEAVY_DEVIATIONS: f64 = 4.0;
+
 impl Frame {
+    /// Innovations of a column within unbroken stretches, weighted.
+    #[must_use]
+    pub fn whiten(&self, column: &[f64], noise: Arma) -> Vec<f64> {
+        let mut white = whiten(column, &self.stretches, noise);
+        white.iter_mut().zip(&self.weights).for_each(|(e, weight)| *e *= weight);
+        white
+    }
+
+    /// Gives every group the weight that Huber's rule gives its innovation: one within four robust standard deviations,
+    /// falling beyond, so that a single row can say only so much for or against anything.
+    pub fn weigh(&mut self, residual: &[f64], noise: Arma) {
+        let innovations = whiten(residual, &self.stretches, noise);
+        let spread = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
+        let limit = HEAVY_DEVIATIONS * spread;
+        self.weights = innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
+    }
+
     /// The usable rows of the units that `takes` accepts.
     #[must_use]
     pub fn new(scene: &Scene, units: &[Unit], takes: impl Fn(usize) -> bool) -> Self {
         let size = scene.rows().div_ceil(GROUPS_MAX).max(1);
-        let mut frame = Self { groups: Vec::new(), stretches: Vec::new(), unit: Vec::new() };
+        let mut frame = Self { groups: Vec::new(), stretches: Vec::new(), unit: Vec::new(), weights: Vec::new() };
         for (index, unit) in units.iter().enumerate().filter(|(index, _)| takes(*index)) {
             for stretch in unbroken(scene, unit.rows.clone()) {
                 frame.add_stretch(index, stretch, size);

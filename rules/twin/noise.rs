@@ -3,6 +3,7 @@
 //! `x_t = phi x_{t-1} + e_t + theta e_{t-1}`; the innovations `e` are white when `phi` and `theta` are right. The first
 //! row of a stretch is weighted by the stationary variance. Every hypothesis profiles its own `phi` and `theta`.
 
+use super::frame::Frame;
 use super::linear::dot;
 use std::ops::Range;
 
@@ -113,10 +114,10 @@ pub fn fit(residual: &[f64], stretches: &[Range<usize>]) -> Arma {
 
 /// The noise of residuals near a known one, with its log-likelihood: the start, a few of the grid, refined.
 #[must_use]
-pub fn fit_near(residual: &[f64], stretches: &[Range<usize>], start: Arma) -> (f64, Arma) {
+pub fn fit_near(residual: &[f64], frame: &Frame, start: Arma) -> (f64, Arma) {
     let score = |noise: Arma| {
-        let e = whiten(residual, stretches, noise);
-        log_likelihood(dot(&e, &e), residual.len(), stretches.len(), noise)
+        let e = frame.whiten(residual, noise);
+        log_likelihood(dot(&e, &e), residual.len(), frame.stretches.len(), noise)
     };
     let mut best = (score(start), start);
     for noise in GRID.iter().step_by(3) {

@@ -8,7 +8,7 @@ use super::designs::Design;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
-use super::noise::{Arma, count, log_likelihood, whiten};
+use super::noise::{Arma, count, log_likelihood};
 use std::cell::OnceCell;
 
 /// Share of a column's length that must lie outside what the fit can absorb: below it the hypothesis leaves no trace.
@@ -66,7 +66,7 @@ impl<'a> Bank<'a> {
     fn at(&self, setting: usize) -> &[White] {
         self.whitened[setting].get_or_init(|| {
             let one = |design: &Design| {
-                let white = |column: &Vec<f64>| whiten(column, &self.frame.stretches, SETTINGS[setting]);
+                let white = |column: &Vec<f64>| self.frame.whiten(column, SETTINGS[setting]);
                 let columns: Vec<Vec<f64>> = design.columns.iter().map(white).collect();
                 let gram = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
                 White { columns, gram }
@@ -79,7 +79,7 @@ impl<'a> Bank<'a> {
     #[must_use]
     pub fn nearest(&self, fit: &Fit) -> usize {
         let likelihood = |noise: Arma| {
-            let e = whiten(&fit.residual, &self.frame.stretches, noise);
+            let e = self.frame.whiten(&fit.residual, noise);
             log_likelihood(dot(&e, &e), self.frame.len(), self.frame.stretches.len(), noise)
         };
         let scored = SETTINGS.iter().map(|noise| likelihood(*noise)).enumerate();
@@ -119,9 +119,9 @@ impl<'a> Bank<'a> {
         let noise = SETTINGS[setting];
         let mut basis = Vec::new();
         for column in &fit.tangent {
-            extend_basis(&mut basis, whiten(column, &self.frame.stretches, noise), 1e-7);
+            extend_basis(&mut basis, self.frame.whiten(column, noise), 1e-7);
         }
-        let mut residual = whiten(&fit.residual, &self.frame.stretches, noise);
+        let mut residual = self.frame.whiten(&fit.residual, noise);
         project_out(&basis, &mut residual);
         let rss = dot(&residual, &residual);
         let outside = self.at(setting).iter().map(|white| outside(white, &basis)).collect();
@@ -139,7 +139,7 @@ impl<'a> Bank<'a> {
     /// Innovations of a fit at the noise of a setting.
     #[must_use]
     pub fn innovations(&self, fit: &Fit, setting: usize) -> Vec<f64> {
-        whiten(&fit.residual, &self.frame.stretches, SETTINGS[setting])
+        self.frame.whiten(&fit.residual, SETTINGS[setting])
     }
 
     /// The rows of the comparison.
