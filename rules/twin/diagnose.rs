@@ -14,7 +14,7 @@ use super::quality::{Fault, clean, median};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, P_MAX, Search};
 use super::verdicts;
-use crate::physics::Scene;
+use crate::physics::{Form, Scene};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
@@ -136,11 +136,43 @@ impl<'a> Case<'a> {
     fn search(&mut self, base: &Fit, seed: u64) -> (Found, Vec<Design>) {
         // Candidates see the load and the output that the fitted baseline simulates.
         let _ = simulate(&base.parts, &mut self.scene);
-        let designs = designs(&self.scene, &self.frame, self.model);
+        let mut designs = designs(&self.scene, &self.frame, self.model);
+        designs.extend(self.hidden_switch(base));
         let frame = self.frame.clone();
         let bank = Bank::new(&designs, &frame);
         let found = self.with_data(|data| Search::new(data, base, &bank, seed).run());
         (found, designs)
+    }
+
+    /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
+    fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
+        let effect = crate::physics::effect("auxiliary_switch")?;
+        let wanted = self.model.only.is_empty() || self.model.only.iter().any(|kind| kind == "auxiliary_switch");
+        if !wanted || self.model.exclude.iter().any(|kind| kind == "auxiliary_switch") {
+            return None;
+        }
+        let found = super::latent::find(&base.residual, &self.frame.stretches)?;
+        self.scene.set_latent(Some(self.switch_per_row(&found)));
+        let form = Form { name: "latent", ln_choices: 0.5 * super::latent::price(&found), ..Form::default() };
+        super::designs::design(effect, &form, &self.scene, &self.frame)
+    }
+
+    /// The state of a hidden switch in every row: as found where the rows were fitted, followed causally in held-out
+    /// runs.
+    fn switch_per_row(&self, found: &super::latent::Switching) -> Vec<f64> {
+        let mut state = vec![0.0; self.scene.rows()];
+        for group in 0..self.frame.len() {
+            self.frame.rows(group).for_each(|row| state[row] = found.state[group]);
+        }
+        let simulated = self.scene.simulated().unwrap_or_default();
+        let on = found.state.iter().sum::<f64>() / count(found.state.len());
+        for rows in self.held.iter().map(|unit| self.units[*unit].rows.clone()) {
+            let residual: Vec<f64> = rows.clone().map(|row| self.scene.recorded()[row] - simulated[row]).collect();
+            let deviation = 0.5 * found.level.abs();
+            let followed = super::latent::follow(&residual, found, deviation, on);
+            rows.zip(followed).for_each(|(row, on)| state[row] = on);
+        }
+        state
     }
 
     /// Drops members whose remaining part is too small to claim, smallest first.
@@ -248,7 +280,6 @@ pub struct Unknown {
     /// The gate's answer.
     pub p_value: f64,
 }
-
 
 /// Robust standard deviation of what remains, edges and spikes left aside.
 #[must_use]

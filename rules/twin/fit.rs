@@ -84,8 +84,7 @@ impl Fit {
     /// Covariance of the free parameters, from the whitened tangent.
     #[must_use]
     pub fn covariance(&self, frame: &Frame) -> Vec<Vec<f64>> {
-        let columns: Vec<Vec<f64>> =
-            self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
+        let columns: Vec<Vec<f64>> = self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
         let innovations = self.innovations(frame);
         let solution = least_squares(&columns, &innovations);
         let freedom = count(frame.len().saturating_sub(self.free.len()).max(1));

@@ -77,7 +77,8 @@ impl Frame {
         let innovations = whiten(residual, &self.stretches, noise);
         let spread = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
         let limit = HEAVY_DEVIATIONS * spread;
-        self.weights = innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
+        self.weights =
+            innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
     }
 
     /// The usable rows of the units that `takes` accepts.

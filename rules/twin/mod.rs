@@ -22,6 +22,7 @@ pub mod frame;
 pub mod gate;
 pub mod holdout;
 pub mod inputs;
+pub mod latent;
 pub mod linear;
 pub mod locate;
 pub mod model;

@@ -101,7 +101,11 @@ impl<'a> Bank<'a> {
                 // The fit's own noise lies between the settings: at the nearest one the gain is over that setting.
                 let rows = count(self.frame.len());
                 let likelihood = log_likelihood(rss, self.frame.len(), self.frame.stretches.len(), SETTINGS[setting]);
-                let here = if setting == own { rows * (stage.rss / rss.max(f64::MIN_POSITIVE)).ln() } else { f64::NEG_INFINITY };
+                let here = if setting == own {
+                    rows * (stage.rss / rss.max(f64::MIN_POSITIVE)).ln()
+                } else {
+                    f64::NEG_INFINITY
+                };
                 *best = best.max(2.0 * (likelihood - fit.log_likelihood)).max(here);
             }
         }
