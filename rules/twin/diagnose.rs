@@ -127,6 +127,8 @@ impl<'a> Case<'a> {
         let Some((best_again, base_again)) = again else { return base };
         let shift = 2.0 * (best_again.log_likelihood - base_again.log_likelihood)
             - 2.0 * (best.fit.log_likelihood - base.log_likelihood);
+        // The search's own figure stays where rows had to be weighed down to see it.
+        let shift = shift.max(0.0);
         best.information += shift;
         found.others.iter_mut().for_each(|other| other.information += shift);
         best.fit = best_again;

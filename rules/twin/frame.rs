@@ -60,7 +60,7 @@ pub struct Frame {
 }
 
 /// Innovations beyond this many robust standard deviations lose weight.
-const HEAVY_DEVIATIONS: f64 = 4.0;
+const HEAVY_DEVIATIONS: f64 = 6.0;
 
 impl Frame {
     /// Innovations of a column within unbroken stretches, weighted.
@@ -71,7 +71,7 @@ impl Frame {
         white
     }
 
-    /// Gives every group the weight that Huber's rule gives its innovation: one within four robust standard deviations,
+    /// Gives every group the weight that Huber's rule gives its innovation: one within six robust standard deviations,
     /// falling beyond, so that a single row can say only so much for or against anything.
     pub fn weigh(&mut self, residual: &[f64], noise: Arma) {
         let innovations = whiten(residual, &self.stretches, noise);

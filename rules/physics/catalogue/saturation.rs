@@ -16,7 +16,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "share",
             unit: "1",
             entry: Entry::Linear,
-            range: (0.5, 1.5),
+            range: (0.0, 1.5),
             en: "one, when the ceiling explains all",
             zh: "为1时上限可完全解释",
         },
@@ -63,7 +63,9 @@ impl Effect for Saturation {
         // Noise after the clipping smears the pile: then the ceiling lies a little below the greatest recorded values,
         // and a fair number of rows is simulated beyond it.
         let usable = || (0..scene.rows()).filter(|row| scene.usable()[*row]);
-        let levels = [0.995, 0.98, 0.95, 0.9].into_iter().filter_map(|share| quantile(usable().map(|row| scene.recorded()[row]), share));
+        let levels = [0.995, 0.98, 0.95, 0.9]
+            .into_iter()
+            .filter_map(|share| quantile(usable().map(|row| scene.recorded()[row]), share));
         let beyond = |ceiling: f64| usable().filter(|row| simulated[*row] > ceiling).count() >= 8;
         levels.filter(|ceiling| beyond(*ceiling)).map(form).collect()
     }
