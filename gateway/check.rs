@@ -58,6 +58,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
         Ok(config) => {
             let name = file.map_or_else(|| config::BUILT_IN.to_owned(), |file| file.display().to_string());
             report.read.push(summary(&name, &config));
+            report.read.extend(open_to_all(&config));
             check_scripts(&config, &mut report);
             check_model(&config, &mut report);
             check_sources(&config, &mut report);
@@ -75,6 +76,14 @@ fn summary(name: &str, config: &Config) -> String {
         config::GateMode::Armed => "the gate may be armed on the box",
     };
     format!("{name}: reads {} at {} ticks per second; {gate}", sources.join(", "), config.gateway.tick_hz)
+}
+
+/// A page that others than this box can reach has no password.
+fn open_to_all(config: &Config) -> Option<String> {
+    let listen = &config.http.listen;
+    let own = listen.starts_with("127.") || listen.starts_with("[::1]") || listen.starts_with("localhost");
+    let open = config.http.enabled && !own;
+    open.then(|| format!("{listen}: everybody on this network can read the page; there is no password"))
 }
 
 fn check_scripts(config: &Config, report: &mut Report) {

@@ -5,11 +5,15 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn check(directory: &Path, arguments: &[&str]) -> Output {
+    check_with(directory, arguments, &[])
+}
+
+fn check_with(directory: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
         .arg("check")
         .args(arguments)
         .current_dir(directory)
-        .env_remove("CNC_GATEWAY__GATEWAY__TICK_HZ")
+        .envs(environment.iter().copied())
         .output()
         .expect("it runs")
 }
@@ -69,6 +73,8 @@ fn exit_codes_tell_fine_wrong_and_could_not_run() {
     let missing = check(directory.path(), &["--config", "nothing.toml"]);
     assert_eq!(missing.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&missing.stderr).contains("check --example"));
+    let open = text(&check_with(directory.path(), &[], &[("CNC_GATEWAY__HTTP__LISTEN", "0.0.0.0:8080")]));
+    assert!(open.contains("everybody on this network"), "{open}");
     let example = text(&check(directory.path(), &["--example"]));
     fs::write(directory.path().join("new.toml"), example).expect("written");
     let output = check(directory.path(), &["--config", "new.toml"]);
