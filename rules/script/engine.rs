@@ -9,14 +9,17 @@ use rhai::packages::{
 use rhai::{Dynamic, Engine, EvalAltResult, ImmutableString, OptimizationLevel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Operations in one run: a shipped script takes about a hundred; the worst that can be done with these takes 50 ms.
-pub const OPERATIONS_MAX: u64 = 25_000;
+/// Operations in one run; a shipped script takes about a hundred. An endless loop is stopped after a millisecond; one that
+/// does nothing but copy maps of the greatest size, after one or two tenths of a second.
+pub const OPERATIONS_MAX: u64 = 10_000;
 /// Bytes of one script file.
 pub const TEXT_MAX: usize = 64 * 1024;
 /// Bytes of one string, also of all strings in one map or array together.
-const STRING_MAX: usize = 2048;
-/// Elements of one array or map.
-const ELEMENTS_MAX: usize = 256;
+const STRING_MAX: usize = 1024;
+/// Elements of one array, those of arrays in it included.
+const ELEMENTS_MAX: usize = 128;
+/// Entries of one map, `memory` among them, those of maps in it included.
+const ENTRIES_MAX: usize = 256;
 const VARIABLES_MAX: usize = 256;
 const FUNCTIONS_MAX: usize = 64;
 const CALLS_MAX: usize = 32;
@@ -73,7 +76,7 @@ fn limits(engine: &mut Engine) {
     engine.set_max_expr_depths(DEPTH_MAX, DEPTH_MAX);
     engine.set_max_string_size(STRING_MAX);
     engine.set_max_array_size(ELEMENTS_MAX);
-    engine.set_max_map_size(ELEMENTS_MAX);
+    engine.set_max_map_size(ENTRIES_MAX);
     engine.set_max_variables(VARIABLES_MAX);
     engine.set_max_functions(FUNCTIONS_MAX);
 }
