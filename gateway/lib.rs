@@ -16,4 +16,5 @@ pub mod run;
 pub mod samples;
 pub mod signals;
 pub mod status;
+pub mod twin;
 pub mod usage;

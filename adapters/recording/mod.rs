@@ -180,13 +180,15 @@ pub struct Recording {
     /// Time of the first row where the recording has `time_utc`.
     pub start_ns: Option<TimeNs>,
     columns: Vec<Column>,
+    /// Recordings that do not share a clock were put together: the pauses between them are unknown.
+    joined: bool,
 }
 
 impl Recording {
     /// A recording of these times and no columns yet.
     #[must_use]
     pub fn new(source: impl Into<String>, time_s: Vec<f64>, start_ns: Option<TimeNs>) -> Self {
-        Self { source: source.into(), time_s, start_ns, columns: Vec::new() }
+        Self { source: source.into(), time_s, start_ns, columns: Vec::new(), joined: false }
     }
 
     /// Adds or replaces a column. Cells beyond the last row are cut, missing ones are absent.
@@ -249,9 +251,17 @@ impl Recording {
         runs
     }
 
+    /// Says that this is put together from recordings that do not share a clock.
+    pub fn forget_pauses(&mut self) {
+        self.joined = true;
+    }
+
     /// Is the pause between one run and the next known? It is with `time_utc`, and when `time_s` goes on increasing.
     #[must_use]
     pub fn pauses_known(&self) -> bool {
+        if self.joined {
+            return false;
+        }
         self.start_ns.is_some() || self.time_s.windows(2).all(|pair| pair[1] >= pair[0])
     }
 }

@@ -3,9 +3,12 @@
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
 mod check;
+mod diagnose;
+mod effects;
 mod history;
 mod replay;
 mod run;
+mod simulate;
 
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
@@ -77,6 +80,12 @@ enum Command {
     Replay(replay::ReplayArguments),
     /// Ask what the box remembers: query, export, info.
     History(history::HistoryArguments),
+    /// Run a model over a recording's inputs.
+    Simulate(simulate::SimulateArguments),
+    /// Compare a model with recordings: where they differ, which physics was left out, the model with it.
+    Diagnose(diagnose::DiagnoseArguments),
+    /// The catalogue of physical effects.
+    Effects(effects::EffectsArguments),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -100,6 +109,9 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),
         Command::History(history) => history::run(history),
+        Command::Simulate(simulate) => simulate::simulate(simulate),
+        Command::Diagnose(diagnose) => diagnose::diagnose(diagnose),
+        Command::Effects(effects) => effects::effects(effects),
     }
 }
 

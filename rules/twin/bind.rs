@@ -1,7 +1,7 @@
 //! Binding a model to a recording: forms and missing parameters are completed, missing inputs are named.
 
 use super::model::{Body, Model, Parameter, Part};
-use crate::physics::{Entry, Scene};
+use crate::physics::{Entry, Role, Scene};
 
 /// Completes every part for this scene.
 ///
@@ -59,6 +59,29 @@ fn added(name: &str, value: f64, entry: Entry, doc: Option<((f64, f64), &str)>) 
     Parameter { name: name.to_owned(), value, fixed: false, entry, range, unit: unit.to_owned() }
 }
 
+/// Which of an effect's needs the recording does not meet, each with the channels that would.
+fn lacking(needs: &[&str], scene: &Scene) -> String {
+    let met =
+        |name: &str| scene.column(name).is_some() || Role::of(name).is_some_and(|role| scene.role(role).is_some());
+    let lacking: Vec<String> = needs
+        .iter()
+        .filter(|need| !need.split('|').any(|name| met(name.trim())))
+        .map(|need| need.split('|').map(|name| channels(name.trim())).collect::<Vec<_>>().join(" or "))
+        .collect();
+    if lacking.is_empty() { needs.join(", ") } else { lacking.join(" and ") }
+}
+
+/// The channels that provide what an effect calls by its role, or that it is computed from.
+fn channels(need: &str) -> String {
+    match (Role::of(need).and_then(|role| role.defaults().first()), need) {
+        (Some(channel), _) => format!("{need} ({channel})"),
+        (None, "cutting_speed_m_min") => format!("{need} (or diameter_mm and spindle_speed_rpm)"),
+        (None, "feed_per_rev_mm") => format!("{need} (or feed_mm_min and spindle_speed_rpm)"),
+        (None, "removal_rate_cm3_min") => format!("{need} (or depth_of_cut_mm, width_of_cut_mm and feed_mm_min)"),
+        (None, _) => need.to_owned(),
+    }
+}
+
 fn missing_input(part: &Part, scene: &Scene) -> String {
     let place = format!("{} (line {})", part.label(), part.line);
     let absent = |names: &mut dyn Iterator<Item = &str>| {
@@ -85,7 +108,7 @@ fn missing_input(part: &Part, scene: &Scene) -> String {
             format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")
         }
         Body::Effect(effect, _) => {
-            format!("{place} needs {}: record them or declare roles", effect.doc().needs.join(", "))
+            format!("{place} needs {}: record it, or declare a role", lacking(effect.doc().needs, scene))
         }
     }
 }

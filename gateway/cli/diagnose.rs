@@ -1,0 +1,89 @@
+//! `cnc-gateway diagnose`: where model and recordings differ, which physics was left out, the model with it.
+
+use super::{CannotRun, CommandResult, Outcome};
+use crate::twin::{Given, Outputs, read_hypotheses, read_model, read_recordings};
+use clap::Args;
+use rules::physics::explain::Language;
+use rules::twin::{self, Diagnosis, Model};
+use std::path::PathBuf;
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+pub(super) struct DiagnoseArguments {
+    /// What the simulation believes (model/1).
+    #[arg(long, value_name = "M.toml")]
+    model: PathBuf,
+    /// Recordings (recording/1): .csv, .csv.gz, .parquet, or history:DB?from=..&to=..; several are put together, and
+    /// their runs stay distinct.
+    #[arg(long, value_name = "R.csv", num_args = 1.., required = true)]
+    recording: Vec<String>,
+    /// Write the diagnosis as JSON (diagnosis/1); without a path, or with -, to standard output in place of the words.
+    #[arg(long, value_name = "D.json", num_args = 0..=1, default_missing_value = "-")]
+    json: Option<PathBuf>,
+    /// Write recorded and simulated output and each added effect, row by row.
+    #[arg(long, value_name = "D.csv")]
+    rows: Option<PathBuf>,
+    /// Write the extended, refitted model.
+    #[arg(long, value_name = "NEW.toml")]
+    accept: Option<PathBuf>,
+    /// Seed of the resampling: the same input and seed give the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Directory of further hypotheses: .toml files with [[effect]] entries.
+    #[arg(long, value_name = "DIR")]
+    effects_dir: Option<PathBuf>,
+    /// Language of the words.
+    #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
+    lang: super::effects::Lang,
+}
+
+/// Reads, examines, compares, writes.
+pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
+    let (model, given) = inputs(&arguments)?;
+    given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    let examination = twin::examine(&given.recording, &model);
+    let mut unusable = examination.unusable;
+    unusable.extend(outputs(&arguments).trouble());
+    if !unusable.is_empty() {
+        return Err(cannot_use(&unusable));
+    }
+    examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let mut diagnosis = twin::diagnose(&given.recording, &model, arguments.seed).map_err(|all| cannot_use(&all))?;
+    note_refusals(&mut diagnosis, &given);
+    outputs(&arguments).write(&diagnosis, &given.recording).map_err(|problem| CannotRun::new(problem, ""))?;
+    Ok(Outcome::Fine)
+}
+
+/// Model, hypotheses and recordings; every problem of all of them at once.
+fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, Given), CannotRun> {
+    let mut problems = Vec::new();
+    let model = read_model(&arguments.model).map_err(|wrong| problems.extend(wrong));
+    let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
+    let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
+    let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
+    match (model, hypotheses, given) {
+        (Ok(model), Ok(hypotheses), Ok(given)) => Ok((Model { hypotheses, ..model }, given)),
+        _ => Err(cannot_use(&problems)),
+    }
+}
+
+pub(super) fn cannot_use(problems: &[String]) -> CannotRun {
+    CannotRun::new(format!("the input cannot be used:\n{}", problems.join("\n")), "")
+}
+
+/// Rows that were refused while reading belong to the quality of the recording.
+fn note_refusals(diagnosis: &mut Diagnosis, given: &Given) {
+    if given.refused > 0 {
+        let column = given.refused_column.clone().unwrap_or_else(|| "time_s".to_owned());
+        diagnosis.data_quality.push(twin::quality::Fault { fault: "refused_rows", column, rows: given.refused });
+    }
+}
+
+fn outputs(arguments: &DiagnoseArguments) -> Outputs {
+    Outputs {
+        json: arguments.json.clone(),
+        rows: arguments.rows.clone(),
+        accept: arguments.accept.clone(),
+        language: Language::from(arguments.lang),
+    }
+}

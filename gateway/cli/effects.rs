@@ -1,0 +1,72 @@
+//! `cnc-gateway effects`: the catalogue of physical effects, listed and explained.
+
+use super::{CannotRun, CommandResult, Outcome};
+use clap::{Args, Subcommand, ValueEnum};
+use rules::physics::explain::{self, Language};
+
+/// Arguments of `effects`.
+#[derive(Debug, Args)]
+pub(super) struct EffectsArguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Every effect with one sentence.
+    List(Printing),
+    /// Law, parameters, needs, what its absence looks like and the experiment that tells it apart.
+    Show {
+        /// Name of the effect, such as flank_wear.
+        kind: String,
+        #[command(flatten)]
+        printing: Printing,
+    },
+}
+
+#[derive(Debug, Args)]
+struct Printing {
+    /// Language of the texts.
+    #[arg(long, value_enum, default_value_t = Lang::En)]
+    lang: Lang,
+    /// Print JSON, with the texts in both languages.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Lang {
+    /// English.
+    En,
+    /// Chinese.
+    Zh,
+}
+
+impl From<Lang> for Language {
+    fn from(lang: Lang) -> Self {
+        match lang {
+            Lang::En => Self::En,
+            Lang::Zh => Self::Zh,
+        }
+    }
+}
+
+/// Prints the catalogue or one effect.
+pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
+    let text = match arguments.what {
+        What::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
+        What::List(printing) => explain::list(printing.lang.into()),
+        What::Show { kind, printing } => show(&kind, &printing)?,
+    };
+    print!("{text}");
+    Ok(Outcome::Fine)
+}
+
+fn show(kind: &str, printing: &Printing) -> Result<String, CannotRun> {
+    let text = if printing.json {
+        explain::explain_json(kind).map(|json| format!("{json:#}\n"))
+    } else {
+        explain::explain(kind, printing.lang.into())
+    };
+    text.map_err(|unknown| CannotRun::new(format!("there is no effect {}", unknown.kind), unknown.hint))
+}

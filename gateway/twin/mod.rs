@@ -1,0 +1,15 @@
+//! The twin at work: recordings from files and from the history, models from files, what becomes of a diagnosis. What a
+//! diagnosis is stands in `rules::twin`.
+
+mod history;
+mod join;
+mod models;
+mod outputs;
+mod parquet;
+mod recordings;
+pub mod simulation;
+
+pub use join::join;
+pub use models::{read_hypotheses, read_model};
+pub use outputs::{Outputs, put};
+pub use recordings::{Given, read_recordings};

@@ -1,0 +1,98 @@
+//! Where a diagnosis goes: words, JSON, rows, the accepted model.
+
+use adapters::Recording;
+use rules::physics::explain::Language;
+use rules::twin::{Diagnosis, diagnosis::Verdict, report, text, write_model};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What the user wants written. A path of `-` is standard output.
+#[derive(Debug, Clone, Default)]
+pub struct Outputs {
+    /// The diagnosis as JSON.
+    pub json: Option<PathBuf>,
+    /// Row by row.
+    pub rows: Option<PathBuf>,
+    /// The extended model.
+    pub accept: Option<PathBuf>,
+    /// Language of the words.
+    pub language: Language,
+}
+
+impl Outputs {
+    /// Files that cannot be written, before any work is done.
+    #[must_use]
+    pub fn trouble(&self) -> Vec<String> {
+        let paths = [&self.json, &self.rows, &self.accept].into_iter().flatten();
+        paths.filter(|path| !is_stdout(path)).filter_map(|path| trouble_of(path)).collect()
+    }
+
+    /// Writes everything.
+    ///
+    /// # Errors
+    /// The file that cannot be written, and why.
+    pub fn write(&self, diagnosis: &Diagnosis, recording: &Recording) -> Result<(), String> {
+        if let Some(path) = &self.json {
+            put(path, &format!("{:#}\n", report::to_json(diagnosis)))?;
+        } else {
+            put(Path::new("-"), &text::report(diagnosis, self.language))?;
+        }
+        if let Some(path) = &self.rows {
+            put(path, &rows(diagnosis, recording))?;
+        }
+        match &self.accept {
+            Some(_) if diagnosis.verdict == Verdict::CannotTell => {
+                eprintln!("note: no model was written, because nothing could be told");
+            }
+            Some(path) => put(path, &write_model(&diagnosis.model))?,
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// The rows as the contract wants them: one line per row of the input, in input order.
+fn rows(diagnosis: &Diagnosis, recording: &Recording) -> String {
+    let mut names = Vec::with_capacity(recording.rows());
+    for run in recording.runs() {
+        names.extend(std::iter::repeat_n(run.name, run.rows.len()));
+    }
+    let recorded: Vec<Option<f64>> = match recording.numbers(&diagnosis.output) {
+        Some(numbers) => numbers.iter().collect(),
+        None => vec![None; recording.rows()],
+    };
+    report::rows_csv(&recording.time_s, &names, &recorded, &diagnosis.rows)
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+fn trouble_of(path: &Path) -> Option<String> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !parent.is_dir() {
+        return Some(format!("{}: there is no directory {} to write into", path.display(), parent.display()));
+    }
+    path.is_dir().then(|| format!("{} is a directory; name a file to write", path.display()))
+}
+
+/// Writes a file as a whole or not at all, so that a reader never sees half of it.
+///
+/// # Errors
+/// The path and what the system said.
+pub fn put(path: &Path, text: &str) -> Result<(), String> {
+    if is_stdout(path) {
+        let mut out = std::io::stdout().lock();
+        let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        return written.map_err(|error| format!("standard output: {error}"));
+    }
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let say = |error: std::io::Error| format!("{}: {error}", path.display());
+    if path.exists() && !path.is_file() {
+        // A pipe or a device is written into, never replaced.
+        return std::fs::write(path, text).map_err(say);
+    }
+    std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).map_err(say)
+}

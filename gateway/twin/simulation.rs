@@ -1,0 +1,130 @@
+//! A model over the inputs of a recording, and how far it is from what was recorded.
+
+use adapters::Recording;
+use adapters::recording::{Cells, Numbers};
+use rules::physics::Scene;
+use rules::twin::text::short;
+use rules::twin::verdicts::unit_of;
+use rules::twin::{Model, bind::bind, inputs::rows_with_inputs, simulate};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// What a model says about a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    output: String,
+    name: String,
+    /// Simulated output; `None` where an input is absent.
+    total: Vec<Option<f64>>,
+    /// Label and contribution of each part.
+    parts: Vec<(String, Vec<f64>)>,
+    recorded: Vec<Option<f64>>,
+}
+
+/// Runs `model` over the inputs of `recording`; the output need not be recorded.
+///
+/// # Errors
+/// Everything the model needs and the recording lacks.
+pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<String>> {
+    let recorded: Option<Vec<Option<f64>>> = recording.numbers(&model.output).map(|numbers| numbers.iter().collect());
+    let mut complete = recording.clone();
+    if recorded.is_none() {
+        complete.set_column(&model.output, Cells::Numbers(Numbers::default()));
+    }
+    let mut scene = Scene::new(&complete, &model.output, &model.roles).map_err(|error| vec![error.to_string()])?;
+    let parts = bind(model, &scene)?;
+    let known = rows_with_inputs(&scene, &parts);
+    let Some(simulated) = simulate(&parts, &mut scene) else {
+        return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
+    };
+    let total = simulated.total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
+    let labels = parts.iter().map(|part| part.label().to_owned());
+    Ok(Simulation {
+        output: model.output.clone(),
+        name: model.name.clone(),
+        total,
+        parts: labels.zip(simulated.contributions).collect(),
+        recorded: recorded.unwrap_or_else(|| vec![None; recording.rows()]),
+    })
+}
+
+impl Simulation {
+    /// Root mean square of recorded minus simulated, and over how many rows; `None` where the output is not recorded.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+    pub fn rmse(&self) -> Option<(f64, usize)> {
+        let squares: Vec<f64> =
+            self.recorded.iter().zip(&self.total).filter_map(|(r, s)| Some(((*r)? - (*s)?).powi(2))).collect();
+        (!squares.is_empty()).then(|| ((squares.iter().sum::<f64>() / squares.len() as f64).sqrt(), squares.len()))
+    }
+
+    /// Label, mean, least and greatest contribution of each part.
+    #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+    fn summaries(&self) -> impl Iterator<Item = (&str, f64, f64, f64)> {
+        self.parts.iter().map(|(label, values)| {
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            (label.as_str(), mean, low, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+        })
+    }
+
+    /// For the reader.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let unit = unit_of(&self.output);
+        let rows = self.total.iter().flatten().count();
+        let mut text = format!("{}: {} simulated in {rows} of {} rows\n", self.name, self.output, self.total.len());
+        for (label, mean, low, high) in self.summaries() {
+            let _ = writeln!(text, "  {label}: mean {}, {} to {} {unit}", short(mean), short(low), short(high));
+        }
+        match self.rmse() {
+            Some((rmse, rows)) => {
+                let _ = writeln!(text, "rmse against the recording: {} {unit} over {rows} rows", short(rmse));
+            }
+            None => text.push_str("the output is not recorded, so there is nothing to compare it with\n"),
+        }
+        text
+    }
+
+    /// For programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let part = |(label, mean, low, high): (&str, f64, f64, f64)| json!({ "effect": label, "mean": mean, "min": low, "max": high });
+        json!({
+            "schema": "simulation/1",
+            "model": self.name,
+            "output": self.output,
+            "unit": unit_of(&self.output),
+            "rows": self.total.len(),
+            "simulated_rows": self.total.iter().flatten().count(),
+            "parts": self.summaries().map(part).collect::<Vec<_>>(),
+            "rmse": self.rmse().map(|(rmse, _)| rmse),
+            "compared_rows": self.rmse().map_or(0, |(_, rows)| rows),
+        })
+    }
+
+    /// One line per row of the recording: time, run, recorded, simulated, and each part's contribution.
+    #[must_use]
+    pub fn rows_csv(&self, recording: &Recording) -> String {
+        let mut text = String::from("time_s,run,recorded,simulated");
+        self.parts.iter().for_each(|(label, _)| text.push_str(&format!(",effect_{label}")));
+        text.push('\n');
+        let cell = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
+        for run in recording.runs() {
+            let name = quoted(&run.name);
+            for row in run.rows {
+                let (time_s, total) = (recording.time_s[row], self.total[row]);
+                let _ = write!(text, "{time_s},{name},{},{}", cell(self.recorded[row]), cell(total));
+                for (_, values) in &self.parts {
+                    let _ = write!(text, ",{}", cell(total.map(|_| values[row])));
+                }
+                text.push('\n');
+            }
+        }
+        text
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
