@@ -336,6 +336,7 @@ impl Outcome {
         let rows = Rows {
             simulated_before: visible(before.total),
             simulated_after: visible(after.total),
+            compared: case.scene.usable().to_vec(),
             effects: added.clone(),
         };
         Self { base, found, designs, unknown, fits, rows, added }

@@ -141,6 +141,8 @@ pub struct Rows {
     pub simulated_before: Vec<Option<f64>>,
     /// With it.
     pub simulated_after: Vec<Option<f64>>,
+    /// Rows that took part in the comparison: recorded, with every input, and free of faults.
+    pub compared: Vec<bool>,
     /// Contribution of each added effect.
     pub effects: Vec<(String, Vec<f64>)>,
 }

@@ -24,13 +24,18 @@ pub struct Unit {
 /// Units of hold-out: the runs, or stretches of them where there are fewer than four.
 #[must_use]
 pub fn units(scene: &Scene) -> Vec<Unit> {
-    let runs = scene.runs();
+    units_of(scene.runs(), scene.run_names())
+}
+
+/// The same from the rows and names of the runs.
+#[must_use]
+pub fn units_of(runs: &[Range<usize>], names: &[String]) -> Vec<Unit> {
+    let named = runs.iter().zip(names);
     if runs.len() >= 4 {
-        let named = runs.iter().zip(scene.run_names());
         return named.map(|(rows, name)| Unit { name: name.clone(), rows: rows.clone() }).collect();
     }
     let per_run = (24 / runs.len().max(1)).max(1);
-    runs.iter().zip(scene.run_names()).flat_map(|(rows, name)| cut(rows, name, per_run)).collect()
+    named.flat_map(|(rows, name)| cut(rows, name, per_run)).collect()
 }
 
 fn cut(rows: &Range<usize>, name: &str, wanted: usize) -> Vec<Unit> {

@@ -59,6 +59,8 @@ pub struct Onset {
 /// Where a missing effect acts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
+    /// The missing effect that acts here, by the name the report uses.
+    pub effect: String,
     /// Share of the missing effects' sum of squares that lies here.
     pub share: f64,
     /// Mean contribution here, in the output's unit.
@@ -78,13 +80,14 @@ pub fn active_rows(contribution: &[f64]) -> Vec<bool> {
     contribution.iter().map(|x| x.abs() > ACTIVE_SHARE * top && top > 0.0).collect()
 }
 
-/// The region of one contribution; `all_squares` is the sum of squares of all of them.
+/// The region of one effect's contribution; `all_squares` is the sum of squares of all of them.
 #[must_use]
-pub fn region(scene: &Scene, contribution: &[f64], all_squares: f64) -> Region {
+pub fn region(scene: &Scene, effect: &str, contribution: &[f64], all_squares: f64) -> Region {
     let active = active_rows(contribution);
     let inside = || contribution.iter().zip(&active).filter(|(_, active)| **active).map(|(x, _)| *x);
     let rows = inside().count().max(1);
     Region {
+        effect: effect.to_owned(),
         share: inside().map(|x| x * x).sum::<f64>() / all_squares.max(f64::MIN_POSITIVE),
         mean: inside().sum::<f64>() / count(rows),
         conditions: conditions(scene, &active),

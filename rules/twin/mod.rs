@@ -29,6 +29,7 @@ pub mod locate;
 pub mod model;
 pub mod model_file;
 pub mod noise;
+pub mod page;
 pub mod quality;
 pub mod report;
 pub mod scan;

@@ -5,7 +5,7 @@ use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Ro
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part};
-use crate::physics::effect;
+use crate::physics::{effect, unit_in};
 
 /// Information within which two explanations cannot be told apart.
 const CLASS_INFORMATION: f64 = 6.0;
@@ -150,7 +150,6 @@ fn texts(part: &Part) -> (String, String) {
 
 fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
     let covariance = fit.covariance(&case.frame);
-    let unit = unit_of(&case.model.output);
     let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
     of_part
         .map(|(index, free)| {
@@ -161,7 +160,7 @@ fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
                 value: parameter.value,
                 low: (parameter.value - half).max(parameter.range.0),
                 high: (parameter.value + half).min(parameter.range.1),
-                unit: parameter.unit.replace("output", unit),
+                unit: unit_in(&parameter.unit, &case.scene),
             }
         })
         .collect()
@@ -228,7 +227,7 @@ fn experiment(outcome: &Outcome, alternatives: &[Alternative]) -> Option<Experim
 fn regions(case: &Case<'_>, outcome: &Outcome) -> Vec<Region> {
     let squares: f64 = outcome.added.iter().flat_map(|(_, values)| values).map(|x| x * x).sum();
     let mut regions: Vec<Region> =
-        outcome.added.iter().map(|(_, values)| region(&case.scene, values, squares)).collect();
+        outcome.added.iter().map(|(effect, values)| region(&case.scene, effect, values, squares)).collect();
     regions.retain(|region| !region.spans.is_empty());
     regions.sort_by(|a, b| b.share.total_cmp(&a.share));
     regions

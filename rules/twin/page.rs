@@ -1,0 +1,91 @@
+//! The diagnosis as one self-contained HTML page, in the order a machinist and then an engineer reads: the answer, where,
+//! what, how much better, when, where in operating space, what else, what next.
+//!
+//! The page loads nothing: styles, drawings and a small read-out script stand in it. It reads without the script, on a
+//! phone, on paper, and in the dark. Same input, same bytes.
+
+mod axis;
+mod better;
+mod bins;
+mod contribution;
+mod data;
+mod maps;
+mod missing;
+mod next;
+mod place;
+mod plot;
+mod response;
+mod strip;
+#[cfg(test)]
+mod tests;
+mod text;
+mod verdict;
+
+use super::diagnosis::Diagnosis;
+use crate::physics::explain::Language;
+use adapters::Recording;
+use data::Data;
+use std::fmt::Write as _;
+use text::escape;
+
+/// Styles of the page.
+const STYLE: &str = include_str!("page/style.css");
+/// The read-out under the pointer.
+const READ_OUT: &str = include_str!("page/read_out.js");
+
+/// What the page is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct PageInput<'a> {
+    /// The diagnosis.
+    pub diagnosis: &'a Diagnosis,
+    /// The recording it was made from, with the same rows in the same order.
+    pub recording: &'a Recording,
+    /// Language of the page.
+    pub language: Language,
+}
+
+/// The page as HTML. Time and memory grow linearly with the rows, its size does not.
+#[must_use]
+pub fn page(input: &PageInput<'_>) -> String {
+    let data = Data::new(input);
+    let mut html = head(&data);
+    html.push_str(&verdict::section(&data));
+    html.push_str(&place::section(&data));
+    html.push_str(&missing::section(&data));
+    html.push_str(&next::alternatives(&data));
+    html.push_str(&next::experiment(&data));
+    html.push_str(&better::section(&data));
+    html.push_str(&contribution::section(&data));
+    html.push_str(&maps::section(&data));
+    html.push_str(&next::shifts(&data));
+    html.push_str(&next::quality(&data));
+    html.push_str(&next::glossary(&data));
+    let _ = write!(html, "</main>\n<script>{READ_OUT}</script>\n</body>\n</html>\n");
+    html
+}
+
+fn head(data: &Data<'_>) -> String {
+    let output = data.tongue.column(&data.diagnosis.output);
+    let title = format!("{}{output}", data.say("Diagnosis: ", "诊断："));
+    let source = file_name(&data.input.recording.source);
+    let model = &data.diagnosis.model.name;
+    let lines = [
+        (data.say("simulation", "仿真"), escape(model)),
+        (data.say("recording", "记录"), escape(source)),
+        (data.say("quantity", "物理量"), data.tongue.quantity(&data.diagnosis.output)),
+    ];
+    let lines: String = lines
+        .iter()
+        .filter(|(_, value)| !value.is_empty())
+        .map(|(name, value)| format!("<span>{name} <b>{value}</b></span>"))
+        .collect();
+    format!(
+        "<!doctype html>\n<html lang=\"{}\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n<header>{lines}</header>\n",
+        data.say("en", "zh")
+    )
+}
+
+/// The last part of a path: where a file lies is nobody's business.
+fn file_name(source: &str) -> &str {
+    source.rsplit(['/', '\\']).next().unwrap_or(source)
+}

@@ -1,0 +1,157 @@
+//! The rows behind the page: runs, what was held out, residuals, and a clock without pauses.
+
+use super::PageInput;
+use super::text::{Tongue, escape};
+use crate::twin::diagnosis::Diagnosis;
+use crate::twin::frame::{Unit, units_of};
+use adapters::recording::{Numbers, Run};
+use std::ops::Range;
+
+/// Which simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// Refitted without the missing physics.
+    Before,
+    /// With it.
+    After,
+}
+
+/// Everything the sections read.
+pub(super) struct Data<'a> {
+    pub(super) input: &'a PageInput<'a>,
+    pub(super) diagnosis: &'a Diagnosis,
+    pub(super) tongue: Tongue,
+    pub(super) runs: Vec<Run>,
+    /// The held-out runs or stretches.
+    pub(super) held: Vec<Unit>,
+    /// Start of every run on a clock without the pauses between runs.
+    starts_s: Vec<f64>,
+    recorded: Option<&'a Numbers>,
+}
+
+impl<'a> Data<'a> {
+    pub(super) fn new(input: &'a PageInput<'a>) -> Self {
+        let diagnosis = input.diagnosis;
+        let runs = input.recording.runs();
+        let rows: Vec<Range<usize>> = runs.iter().map(|run| run.rows.clone()).collect();
+        let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+        let held = diagnosis.fit.as_ref().map_or(&[][..], |fit| &fit.held_out_runs);
+        let held = units_of(&rows, &names).into_iter().filter(|unit| held.contains(&unit.name)).collect();
+        let starts_s = starts(&input.recording.time_s, &rows);
+        let recorded = input.recording.numbers(&diagnosis.output);
+        Self { input, diagnosis, tongue: Tongue(input.language), runs, held, starts_s, recorded }
+    }
+
+    /// The text in the page's language.
+    pub(super) fn say<'t>(&self, en: &'t str, zh: &'t str) -> &'t str {
+        self.tongue.say(en, zh)
+    }
+
+    /// How many rows the recording has.
+    pub(super) fn rows(&self) -> usize {
+        self.input.recording.rows()
+    }
+
+    /// Seconds as recorded.
+    pub(super) fn time_s(&self, row: usize) -> f64 {
+        self.input.recording.time_s.get(row).copied().unwrap_or(0.0)
+    }
+
+    /// The recorded output.
+    pub(super) fn recorded(&self, row: usize) -> Option<f64> {
+        self.recorded?.get(row)
+    }
+
+    /// The simulated output.
+    pub(super) fn simulated(&self, row: usize, fit: Fit) -> Option<f64> {
+        let rows = &self.diagnosis.rows;
+        let values = if fit == Fit::Before { &rows.simulated_before } else { &rows.simulated_after };
+        values.get(row).copied().flatten()
+    }
+
+    /// Did the row take part in the comparison?
+    pub(super) fn compared(&self, row: usize) -> bool {
+        self.diagnosis.rows.compared.get(row).copied().unwrap_or(false)
+    }
+
+    /// Recorded minus simulated, where the row took part.
+    pub(super) fn residual(&self, row: usize, fit: Fit) -> Option<f64> {
+        self.recorded(row).zip(self.simulated(row, fit)).filter(|_| self.compared(row)).map(|(a, b)| a - b)
+    }
+
+    /// Root mean square error over rows; `None` where none took part.
+    pub(super) fn error(&self, rows: Range<usize>, fit: Fit) -> Option<f64> {
+        let (sum, count) = rows
+            .filter_map(|row| self.residual(row, fit))
+            .fold((0.0, 0_u32), |(sum, count), x| (sum + x * x, count.saturating_add(1)));
+        (count > 0).then(|| (sum / f64::from(count)).sqrt())
+    }
+
+    /// Was something added to the model?
+    pub(super) fn added(&self) -> bool {
+        !self.diagnosis.rows.effects.is_empty()
+    }
+
+    /// Seconds of recording up to the start of a run, pauses left out.
+    pub(super) fn start_s(&self, run: usize) -> f64 {
+        self.starts_s.get(run).copied().unwrap_or(0.0)
+    }
+
+    /// The run of a row.
+    pub(super) fn run_of(&self, row: usize) -> usize {
+        self.runs.partition_point(|run| run.rows.end <= row)
+    }
+
+    /// Seconds of recording up to a row, pauses left out.
+    pub(super) fn worked_s(&self, row: usize) -> f64 {
+        let run = self.run_of(row);
+        let first = self.runs.get(run).map_or(0, |run| run.rows.start);
+        self.start_s(run) + self.time_s(row) - self.time_s(first)
+    }
+
+    /// Length of a stretch in seconds.
+    pub(super) fn length_s(&self, rows: &Range<usize>) -> f64 {
+        if rows.is_empty() { 0.0 } else { (self.time_s(rows.end - 1) - self.time_s(rows.start)).max(0.0) }
+    }
+
+    /// The unit of the output, escaped.
+    pub(super) fn unit(&self) -> String {
+        super::text::unit_text(&self.diagnosis.unit)
+    }
+
+    /// The name of a run or stretch in words, escaped.
+    pub(super) fn unit_name(&self, name: &str) -> String {
+        let Some((run, part)) = name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) else {
+            return format!("{} {}", self.say("run", "运行"), escape(name));
+        };
+        let (run, part) = (escape(run), escape(part));
+        match (self.runs.len(), self.tongue.0) {
+            (1, crate::physics::explain::Language::En) => format!("stretch {part}"),
+            (1, crate::physics::explain::Language::Zh) => format!("第{part}段"),
+            (_, crate::physics::explain::Language::En) => format!("run {run}, stretch {part}"),
+            (_, crate::physics::explain::Language::Zh) => format!("运行 {run} 第{part}段"),
+        }
+    }
+}
+
+fn starts(time_s: &[f64], runs: &[Range<usize>]) -> Vec<f64> {
+    let mut at = 0.0;
+    let mut starts = Vec::with_capacity(runs.len());
+    for run in runs {
+        starts.push(at);
+        let length = time_s[run.end - 1] - time_s[run.start];
+        at += length.max(0.0) + length.max(0.0) / (run.len() as f64);
+    }
+    starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_leaves_pauses_out_and_goes_on_where_time_restarts() {
+        let time_s = [0.0, 1.0, 2.0, 0.0, 1.0, 500.0];
+        assert_eq!(starts(&time_s, &[0..3, 3..5, 5..6]), vec![0.0, 2.0 + 2.0 / 3.0, 2.0 + 2.0 / 3.0 + 1.5]);
+    }
+}

@@ -1,0 +1,199 @@
+//! What else it could be, what to record next, bent parameters, data quality, and how to read the page.
+
+use super::data::Data;
+use super::text::{escape, fixed, number, signed, unit_text, with_unit};
+use crate::physics::explain::Language;
+use crate::twin::diagnosis::{Alternative, Shift};
+use crate::twin::quality::Fault;
+use std::fmt::Write as _;
+
+/// Other explanations, each with what separates it.
+pub(super) fn alternatives(data: &Data<'_>) -> String {
+    let others = &data.diagnosis.alternatives;
+    if others.is_empty() {
+        return String::new();
+    }
+    let rows: String = others.iter().map(|other| alternative(data, other)).collect();
+    let note = data.say(
+        "This recording supports these nearly as well. The smaller the lead, the harder they are to tell apart; under 6 units it is no proof.",
+        "此记录对下列解释的支持几乎相同。领先越小越难区分；不足6个单位不能作为证据。",
+    );
+    format!(
+        "<section><h2>{}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th>{}</th><th class=\"n\">{}</th><th>{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
+        data.say("What else it could be", "还可能是什么"),
+        data.say("could also be", "也可能是"),
+        data.say("instead of", "而不是"),
+        data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）"),
+        data.say("what tells them apart", "区分方法"),
+    )
+}
+
+fn alternative(data: &Data<'_>, other: &Alternative) -> String {
+    let experiment = match other.separating_experiment.is_empty() {
+        true => data.say("no experiment is known", "尚无已知试验").to_owned(),
+        false => data.tongue.catalogue(&other.separating_experiment),
+    };
+    format!(
+        "<tr><td>{}</td><td>{}</td><td class=\"n\">{}</td><td>{experiment}</td></tr>",
+        data.tongue.effect(&other.effect),
+        data.tongue.effect(&other.instead_of),
+        fixed(other.delta_ic, 1)
+    )
+}
+
+/// The experiment to do next.
+pub(super) fn experiment(data: &Data<'_>) -> String {
+    let Some(next) = &data.diagnosis.next_experiment else { return String::new() };
+    let minutes = with_unit(&fixed(next.minutes, i32::from(next.minutes.fract() != 0.0)), "min");
+    let gain = match (next.expected_delta_ic > 0.0, data.tongue.0) {
+        (true, Language::En) => {
+            format!("expected to bring {} units of information; 6 decide", number(next.expected_delta_ic))
+        }
+        (true, Language::Zh) => format!("预计带来{}个信息单位；6个即可判定", number(next.expected_delta_ic)),
+        (false, _) => data.say("what it will bring cannot be foreseen", "收益无法预估").to_owned(),
+    };
+    format!(
+        "<section class=\"next\"><h2>{}</h2><p class=\"lead\">{}{}</p><p class=\"note\">{} {minutes} · {gain}</p></section>\n",
+        data.say("What to record next", "下一步记录什么"),
+        super::place::capital(data.tongue.catalogue(&next.statement).trim_end_matches(['.', '。'])),
+        data.say(".", "。"),
+        data.say("about", "约"),
+    )
+}
+
+/// Parameters of the simulation that had been bent to imitate what was missing.
+pub(super) fn shifts(data: &Data<'_>) -> String {
+    let shifts = &data.diagnosis.baseline_shift;
+    if shifts.is_empty() {
+        return String::new();
+    }
+    let rows: String = shifts.iter().map(|shift| shifted(data, shift)).collect();
+    let note = data.say(
+        "While the effect was missing, fitting had bent these parameters of the simulation to imitate it.",
+        "在缺少该效应时，拟合曾扭曲仿真的这些参数来模仿它。",
+    );
+    format!(
+        "<section><h2>{}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th class=\"n\">{}</th><th class=\"n\">{}</th><th class=\"n\">{}</th><th>{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
+        data.say("Parameters that had been bent", "曾被扭曲的参数"),
+        data.say("parameter", "参数"),
+        data.say("before", "之前"),
+        data.say("after", "之后"),
+        data.say("change", "变化"),
+        data.say("unit", "单位"),
+    )
+}
+
+fn shifted(data: &Data<'_>, shift: &Shift) -> String {
+    let relative = 100.0 * (shift.after / shift.before - 1.0);
+    let change = match shift.before > 0.0 && shift.after > 0.0 && relative < 1000.0 {
+        true => with_unit(&signed_whole(relative), "%"),
+        false => signed(shift.after - shift.before),
+    };
+    let [before, after] = [shift.before, shift.after].map(|x| super::text::significant(x, 4));
+    format!(
+        "<tr><td><code>{}</code></td><td class=\"n\">{before}</td><td class=\"n\">{after}</td><td class=\"n\">{change}</td><td>{}</td></tr>",
+        escape(&shift.parameter).replace('.', ".<wbr>"),
+        unit_of(data, &shift.parameter)
+    )
+}
+
+fn signed_whole(x: f64) -> String {
+    let text = fixed(x, if x.abs() < 10.0 { 1 } else { 0 });
+    if x > 0.0 { format!("+{text}") } else { text }
+}
+
+/// The unit of `part.parameter` in the model, escaped.
+fn unit_of(data: &Data<'_>, name: &str) -> String {
+    let parameters = data.diagnosis.model.parts.iter().flat_map(|part| {
+        part.parameters.iter().map(move |parameter| (format!("{}.{}", part.label(), parameter.name), &parameter.unit))
+    });
+    let unit = parameters.into_iter().find(|(full, _)| full == name).map(|(_, unit)| unit.as_str());
+    let unit = unit_text(&unit.unwrap_or("").replace("output", &data.diagnosis.unit));
+    if unit.is_empty() { "\u{2013}".to_owned() } else { unit }
+}
+
+/// Faults of the recording.
+pub(super) fn quality(data: &Data<'_>) -> String {
+    let faults = &data.diagnosis.data_quality;
+    let title = data.say("The recording itself", "记录本身");
+    if faults.is_empty() {
+        let none = data.say(
+            "No dropouts, spikes, coarse steps or repeated times were found.",
+            "未发现缺失、尖峰、粗量化或重复时间。",
+        );
+        return format!("<section><h2>{title}</h2><p class=\"note\">{none}</p></section>\n");
+    }
+    let rows: String = faults.iter().map(|fault| faulty(data, fault)).collect();
+    let note = data.say(
+        "These do not bias the comparison. Rows without a trustworthy value took no part in it.",
+        "这些不会使比较产生偏差。没有可信数值的行未参与比较。",
+    );
+    format!(
+        "<section><h2>{title}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th>{}</th><th class=\"n\">{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
+        data.say("what", "问题"),
+        data.say("column", "列"),
+        data.say("rows", "行数"),
+    )
+}
+
+fn faulty(data: &Data<'_>, fault: &Fault) -> String {
+    let known = match fault.fault {
+        "dropouts" => data.say("no value, or a value that was held", "无值或保持的旧值"),
+        "spikes" => data.say("isolated spikes", "孤立尖峰"),
+        "quantisation" => data.say("recorded in coarse steps", "量化步长较粗"),
+        "duplicate_time" => data.say("time stands still or runs backwards", "时间停滞或倒退"),
+        other => other,
+    };
+    format!(
+        "<tr><td>{}</td><td><code>{}</code></td><td class=\"n\">{}</td></tr>",
+        escape(known),
+        escape(&fault.column),
+        fixed(fault.rows as f64, 0)
+    )
+}
+
+/// Words an engineer may want explained.
+pub(super) fn glossary(data: &Data<'_>) -> String {
+    let words = [
+        (
+            ("Before and after", "之前与之后"),
+            (
+                "Before is the simulation with its own parameters fitted to this recording as well as they can be. After is the same simulation with the missing effect added and everything fitted together.",
+                "“之前”是仅拟合自身参数的仿真；“之后”是加入缺失效应并共同拟合的仿真。",
+            ),
+        ),
+        (
+            ("Held out", "留出"),
+            (
+                "Runs that took no part in fitting, in choosing the effect, or in deciding when to stop. Their errors are what a fresh recording would show.",
+                "未参与拟合、选择效应及停止判断的运行，其误差相当于新记录上的误差。",
+            ),
+        ),
+        (
+            ("Ordinary noise", "普通噪声"),
+            (
+                "Robust standard deviation of what remains after everything is fitted, edges and spikes left aside.",
+                "全部拟合后剩余部分的稳健标准差，不计边沿和尖峰。",
+            ),
+        ),
+        (
+            ("Units of information", "信息单位"),
+            (
+                "Twice the gain in log-likelihood less a price for every parameter. Six units make one explanation twenty times as likely as another.",
+                "对数似然增益的两倍减去每个参数的代价。6个单位表示一种解释的可能性是另一种的20倍。",
+            ),
+        ),
+        (
+            ("95\u{202f}% interval", "95\u{202f}%区间"),
+            ("From the joint fit, with the noise's memory taken into account.", "来自共同拟合，已考虑噪声的相关性。"),
+        ),
+    ];
+    let mut html = String::new();
+    for (word, meaning) in words {
+        let _ = write!(html, "<dt>{}</dt><dd>{}</dd>", data.say(word.0, word.1), data.say(meaning.0, meaning.1));
+    }
+    format!(
+        "<details><summary>{}</summary><dl>{html}</dl></details>\n",
+        data.say("How to read this page", "如何阅读本页")
+    )
+}

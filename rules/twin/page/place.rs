@@ -1,0 +1,101 @@
+//! Where the missing effects act: conditions in words, sizes, times, and the strip of runs.
+
+use super::data::Data;
+use super::strip::{REGIONS_MAX, strip};
+use super::text::{fixed, number, signed, with_unit};
+use crate::physics::explain::Language;
+use crate::twin::locate::{Onset, Region, active_rows};
+
+/// Mean, as a share of the typical size, below which an effect counts as one of both signs.
+const MEAN_TELLS: f64 = 0.3;
+
+/// The section; empty where nothing is located.
+pub(super) fn section(data: &Data<'_>) -> String {
+    let regions = &data.diagnosis.mismatch;
+    if regions.is_empty() {
+        return String::new();
+    }
+    let items: String = regions.iter().enumerate().map(|(lane, region)| item(data, lane, region)).collect();
+    format!(
+        "<section><h2>{}</h2><ul class=\"regions\">{items}</ul>{}</section>\n",
+        data.say("Where", "在哪里"),
+        strip(data)
+    )
+}
+
+fn item(data: &Data<'_>, lane: usize, region: &Region) -> String {
+    let tongue = data.tongue;
+    let conditions: Vec<String> = region.conditions.iter().map(|condition| tongue.condition(condition)).collect();
+    let place = match conditions.is_empty() {
+        true => data
+            .say("Throughout the recording; no condition narrows it down", "遍及整个记录，没有条件能缩小范围")
+            .to_owned(),
+        false => format!("{}{}", data.say("Where ", ""), tongue.list(&conditions, (" and ", "且"))),
+    };
+    let colour = if lane < REGIONS_MAX { format!("e{lane}") } else { "none".to_owned() };
+    format!(
+        "<li><i class=\"{colour} s4\"></i><div><strong>{}</strong><p>{place}{}</p><p class=\"note\">{}</p></div></li>",
+        capital(&tongue.effect(&region.effect)),
+        data.say(".", "。"),
+        facts(data, region)
+    )
+}
+
+/// First letter upper case, where it is a plain letter.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn facts(data: &Data<'_>, region: &Region) -> String {
+    let unit = data.unit();
+    let share = with_unit(&fixed(100.0 * region.share, 0), "%");
+    let size = size(data, &region.effect);
+    let mut facts = match data.tongue.0 {
+        Language::En => vec![format!("{share} of what is missing lies here")],
+        Language::Zh => vec![format!("缺失部分的{share}位于此处")],
+    };
+    facts.push(match size.filter(|size| region.mean.abs() < MEAN_TELLS * size) {
+        Some(size) => {
+            let size = with_unit(&format!("±{}", number(size)), &unit);
+            format!("{}{size}", data.say("of both signs, typically ", "正负交替，典型大小"))
+        }
+        None => format!("{}{}", data.say("on average ", "平均"), with_unit(&signed(region.mean), &unit)),
+    });
+    facts.push(stretches(data, region));
+    if let Some(onset) = &region.onset {
+        facts.push(since(data, onset));
+    }
+    facts.join(" · ")
+}
+
+fn stretches(data: &Data<'_>, region: &Region) -> String {
+    let mut runs: Vec<&str> = region.spans.iter().map(|span| span.run.as_str()).collect();
+    runs.dedup();
+    runs.sort_unstable();
+    runs.dedup();
+    let (spans, runs, all) = (region.spans.len(), runs.len(), data.runs.len());
+    match (data.tongue.0, spans) {
+        (Language::En, 1) => format!("one stretch, in {runs} of {all} runs"),
+        (Language::En, _) => format!("{spans} stretches, in {runs} of {all} runs"),
+        (Language::Zh, _) => format!("{all}次运行中的{runs}次，共{spans}段"),
+    }
+}
+
+fn since(data: &Data<'_>, onset: &Onset) -> String {
+    let run = data.unit_name(&onset.run);
+    let [at, low, high] = [onset.time_s, onset.low_s, onset.high_s].map(|t| fixed(t, 0));
+    match data.tongue.0 {
+        Language::En => format!("since {run}, at {at}\u{a0}s (95\u{202f}% between {low} and {high}\u{a0}s)"),
+        Language::Zh => format!("自{run}的{at}\u{a0}s起（95\u{202f}%区间{low}至{high}\u{a0}s）"),
+    }
+}
+
+/// Root mean square of an effect over the rows where it acts: an effect of both signs has a mean that tells little.
+fn size(data: &Data<'_>, effect: &str) -> Option<f64> {
+    let (_, values) = data.diagnosis.rows.effects.iter().find(|(name, _)| name == effect)?;
+    let active = active_rows(values);
+    let inside = values.iter().zip(active).filter(|(_, active)| *active);
+    let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), (x, _)| (sum + x * x, count.saturating_add(1)));
+    (count > 0).then(|| (sum / f64::from(count)).sqrt())
+}

@@ -1,0 +1,352 @@
+//! Words and numbers of the page: two languages, quantities with units, escaping.
+
+use crate::physics::explain::Language;
+use crate::physics::{CATALOGUE, EffectDoc, effect};
+use crate::twin::locate::Condition;
+use adapters::channel::ChannelId;
+
+/// Endings of quantities' names with their units as printed; longer endings come first.
+const ENDINGS: [(&str, &str); 27] = [
+    ("_rpm_per_s", "rpm/s"),
+    ("_cm3_min", "cm³/min"),
+    ("_mm_min", "mm/min"),
+    ("_mm_s2", "mm/s²"),
+    ("_counts", "counts"),
+    ("_per_s", "1/s"),
+    ("_m_min", "m/min"),
+    ("_mm_s", "mm/s"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_rpm", "rpm"),
+    ("_pct", "%"),
+    ("_min", "min"),
+    ("_bar", "bar"),
+    ("_nm", "N m"),
+    ("_um", "µm"),
+    ("_mm", "mm"),
+    ("_kw", "kW"),
+    ("_hz", "Hz"),
+    ("_w", "W"),
+    ("_a", "A"),
+    ("_n", "N"),
+    ("_v", "V"),
+    ("_c", "°C"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_l", "l"),
+];
+
+/// Text that came from data, safe between tags and in attributes.
+pub(super) fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            c if c.is_control() && c != '\n' && c != '\t' => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// The language of the page.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tongue(pub(super) Language);
+
+impl Tongue {
+    /// The text in the page's language.
+    pub(super) fn say<'a>(self, en: &'a str, zh: &'a str) -> &'a str {
+        match self.0 {
+            Language::En => en,
+            Language::Zh => zh,
+        }
+    }
+
+    /// Words in a row: `a, b and c`.
+    pub(super) fn list(self, words: &[String], last: (&str, &str)) -> String {
+        let joint = self.say(last.0, last.1);
+        match words {
+            [] => String::new(),
+            [one] => one.clone(),
+            [first @ .., end] => format!("{}{joint}{end}", first.join(self.say(", ", "、"))),
+        }
+    }
+
+    /// The name of an effect in plain words, escaped.
+    pub(super) fn effect(self, kind: &str) -> String {
+        if kind == "unknown" {
+            return self.say("an unknown effect", "未知影响").to_owned();
+        }
+        let plain = || escape(&kind.replace('_', " "));
+        effect(kind).map_or_else(plain, |effect| escape(effect.doc().texts(self.0).name))
+    }
+
+    /// A text of the catalogue in the page's language; other text as it is. Escaped.
+    pub(super) fn catalogue(self, text: &str) -> String {
+        let pairs = CATALOGUE.iter().flat_map(|effect| pairs(effect.doc()));
+        let found = pairs.into_iter().find_map(|(en, zh)| Some((zh, text.strip_prefix(en)?)));
+        match (self.0, found) {
+            (Language::Zh, Some((zh, rest))) => escape(&format!("{zh}{rest}")),
+            _ => escape(text),
+        }
+    }
+
+    /// What a parameter of an effect is; empty where the catalogue does not know it.
+    pub(super) fn parameter(self, kind: &str, name: &str) -> String {
+        let doc = effect(kind).and_then(|effect| effect.doc().parameter(name));
+        doc.map(|doc| escape(self.say(doc.en, doc.zh))).unwrap_or_default()
+    }
+
+    /// A column as words without its unit, escaped.
+    pub(super) fn column(self, name: &str) -> String {
+        let known = ChannelId::of(name).map(|id| id.channel().zh);
+        match (self.0, known, special(name)) {
+            (_, _, Some((en, zh))) => self.say(en, zh).to_owned(),
+            (Language::Zh, Some(zh), _) => escape(zh),
+            _ => escape(&without_unit(name).replace('_', " ")),
+        }
+    }
+
+    /// A column with its unit in brackets, escaped.
+    pub(super) fn quantity(self, name: &str) -> String {
+        let unit = unit_of(name);
+        if unit.is_empty() { self.column(name) } else { format!("{} ({unit})", self.column(name)) }
+    }
+
+    /// A condition in words, escaped.
+    pub(super) fn condition(self, condition: &Condition) -> String {
+        match condition {
+            Condition::Equals { column, words } => {
+                let words: Vec<String> = words.iter().map(|word| escape(word)).collect();
+                format!("{}{}{}", self.column(column), self.say(" is ", "为"), self.list(&words, (" or ", "或")))
+            }
+            Condition::Range { column, min, max } => self.range(column, *min, *max),
+        }
+    }
+
+    fn range(self, column: &str, min: Option<f64>, max: Option<f64>) -> String {
+        if column == "engaged" && min.is_some() != max.is_some() {
+            let inside = min.is_some();
+            let (en, zh) = within(inside);
+            return self.say(en, zh).to_owned();
+        }
+        let name = self.column(column);
+        let with_unit = |x: f64| with_unit(&number(x), &unit_of(column));
+        match (min, max) {
+            (Some(min), Some(max)) if self.0 == Language::En => {
+                format!("{name} is between {} and {}", number(min), with_unit(max))
+            }
+            (Some(min), Some(max)) => format!("{name}在{}至{}之间", number(min), with_unit(max)),
+            (Some(min), None) => format!("{name}{}{}", self.say(" is above ", "高于"), with_unit(min)),
+            (None, Some(max)) => format!("{name}{}{}", self.say(" is below ", "低于"), with_unit(max)),
+            (None, None) => format!("{name}{}", self.say(" has any value", "任意值")),
+        }
+    }
+}
+
+fn pairs(doc: &'static EffectDoc) -> [(&'static str, &'static str); 2] {
+    [(doc.en.statement, doc.zh.statement), (doc.en.experiment, doc.zh.experiment)]
+}
+
+fn within(cut: bool) -> (&'static str, &'static str) {
+    if cut {
+        ("the tool is in the cut", "刀具切削时")
+    } else {
+        ("the tool is out of the cut", "刀具未切削时")
+    }
+}
+
+fn special(name: &str) -> Option<(&'static str, &'static str)> {
+    let known = [
+        ("run", ("run", "运行")),
+        ("tool", ("tool", "刀具")),
+        ("lot", ("lot", "材料批")),
+        ("operation", ("operation", "工序")),
+        ("program", ("program", "程序")),
+        ("time_in_run_s", ("time in the run", "运行内时间")),
+        ("time_s", ("time", "时间")),
+        ("cutting_speed_m_min", ("cutting speed", "切削速度")),
+        ("cutting_time_min", ("time in the cut of this tool", "刀具累计切削时间")),
+        ("feed_per_tooth_mm", ("feed per tooth", "每齿进给量")),
+        ("spindle_acceleration_rpm_per_s", ("spindle acceleration", "主轴加速度")),
+    ];
+    known.into_iter().find(|(known, _)| *known == name).map(|(_, words)| words)
+}
+
+fn without_unit(name: &str) -> &str {
+    ENDINGS.iter().find_map(|(ending, _)| name.strip_suffix(ending)).unwrap_or(name)
+}
+
+/// The unit of a column as printed, escaped; empty for pure numbers and text.
+pub(super) fn unit_of(name: &str) -> String {
+    match ChannelId::of(name).map(|id| id.channel().unit) {
+        Some("1") => String::new(),
+        Some(unit) => unit_text(unit),
+        None => ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit).to_owned(),
+    }
+}
+
+/// A unit as printed: powers raised, micro as a letter. Escaped.
+pub(super) fn unit_text(unit: &str) -> String {
+    let mut text = String::new();
+    let mut before = ' ';
+    for c in if unit == "1" { "" } else { unit }.chars() {
+        if c == '^' {
+            before = c;
+            continue;
+        }
+        text.push(match c {
+            'p' if before == '^' => 'ᵖ',
+            '2' if before.is_alphabetic() || ['^', ')'].contains(&before) => '²',
+            '3' if before.is_alphabetic() || ['^', ')'].contains(&before) => '³',
+            '*' => '·',
+            c => c,
+        });
+        before = c;
+    }
+    if let Some(rest) = text.strip_prefix("um") {
+        text = format!("µm{rest}");
+    }
+    escape(&text)
+}
+
+/// A printed number before its printed unit, kept on one line.
+pub(super) fn with_unit(number: &str, unit: &str) -> String {
+    match unit {
+        "" => number.to_owned(),
+        "%" => format!("{number}\u{202f}%"),
+        unit => format!("{number}\u{a0}{unit}"),
+    }
+}
+
+/// A number with three significant digits.
+pub(super) fn number(x: f64) -> String {
+    significant(x, 3)
+}
+
+/// A number with so many significant digits, whole digits kept.
+pub(super) fn significant(x: f64, digits: i32) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let size = exponent(x);
+    if !(-4..7).contains(&size) { scientific(x, digits) } else { fixed(x, (digits - 1 - size).max(0)) }
+}
+
+/// A number with its sign.
+pub(super) fn signed(x: f64) -> String {
+    if x > 0.0 { format!("+{}", number(x)) } else { number(x) }
+}
+
+/// Decimal exponent of the leading digit.
+pub(super) fn exponent(x: f64) -> i32 {
+    if x == 0.0 || !x.is_finite() {
+        return 0;
+    }
+    let text = format!("{:.2e}", x.abs());
+    text.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0)
+}
+
+/// A number with so many decimals, thousands set apart, a true minus sign.
+pub(super) fn fixed(x: f64, decimals: i32) -> String {
+    let places = usize::try_from(decimals.clamp(0, 12)).unwrap_or(0);
+    let text = format!("{:.places$}", x.abs());
+    let (whole, rest) = text.split_once('.').map_or((text.as_str(), String::new()), |(w, r)| (w, format!(".{r}")));
+    let minus = if x < 0.0 && text.chars().any(|c| c.is_ascii_digit() && c != '0') { "\u{2212}" } else { "" };
+    format!("{minus}{}{rest}", grouped(whole))
+}
+
+fn grouped(whole: &str) -> String {
+    if whole.len() < 5 {
+        return whole.to_owned();
+    }
+    let mut text = String::new();
+    for (index, c) in whole.chars().enumerate() {
+        if index > 0 && (whole.len() - index).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(c);
+    }
+    text
+}
+
+fn scientific(x: f64, digits: i32) -> String {
+    let places = usize::try_from(digits - 1).unwrap_or(0);
+    let text = format!("{:.places$e}", x.abs());
+    let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
+    let minus = if x < 0.0 { "\u{2212}" } else { "" };
+    format!("{minus}{mantissa}\u{202f}×\u{202f}10<sup>{}</sup>", power.replace('-', "\u{2212}"))
+}
+
+/// A law as HTML: one line per part, products and powers as printed mathematics.
+pub(super) fn law(text: &str) -> String {
+    let lines: Vec<String> =
+        text.split("; ").map(|part| format!("<span class=\"line\">{}</span>", formula(part))).collect();
+    lines.join("")
+}
+
+fn formula(text: &str) -> String {
+    let text = text
+        .replace(" * ", "\u{2009}·\u{2009}")
+        .replace(" - ", " \u{2212} ")
+        .replace("= -", "= \u{2212}")
+        .replace("(-", "(\u{2212}");
+    let mut html = String::new();
+    let mut rest = text.as_str();
+    while let Some((before, after)) = rest.split_once('^') {
+        let end = power_end(after);
+        html.push_str(&escape(before));
+        let power = after[..end].trim_start_matches('(').trim_end_matches(')');
+        html.push_str(&format!("<sup>{}</sup>", escape(power)));
+        rest = &after[end..];
+    }
+    html + escape(rest).as_str()
+}
+
+/// Where the power at the start of the text ends: after a bracketed term, a number or a name.
+fn power_end(text: &str) -> usize {
+    if text.starts_with('(') {
+        return text.find(')').map_or(text.len(), |at| at + 1);
+    }
+    text.find(|c: char| !(c.is_alphanumeric() || c == '.')).unwrap_or(text.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_in_print() {
+        let printed = [0.0, 12.345, -0.012345, 12345.6, 1.5e-7, -123_456_789.0].map(number);
+        let wanted = ["0", "12.3", "\u{2212}0.0123", "12\u{202f}346"];
+        assert_eq!(printed[..4], wanted);
+        assert_eq!(printed[4], "1.50\u{202f}×\u{202f}10<sup>\u{2212}7</sup>");
+        assert_eq!(printed[5], "\u{2212}1.23\u{202f}×\u{202f}10<sup>8</sup>");
+        assert_eq!(fixed(-0.001, 1), "0.0");
+        assert_eq!(exponent(999.9), 3);
+    }
+
+    #[test]
+    fn units_and_columns() {
+        assert_eq!(unit_text("N/mm2"), "N/mm²");
+        assert_eq!(unit_text("um/K"), "µm/K");
+        assert_eq!(unit_text("W/(mm min^p)"), "W/(mm minᵖ)");
+        assert_eq!(unit_of("x_force_n"), "N");
+        let en = Tongue(Language::En);
+        assert_eq!(en.quantity("axis_velocity_mm_min"), "axis velocity (mm/min)");
+        assert_eq!(en.quantity("engaged"), "engaged");
+        let tool = Condition::Equals { column: "tool".into(), words: vec!["<T1>".into(), "T2".into()] };
+        assert_eq!(en.condition(&tool), "tool is &lt;T1&gt; or T2");
+    }
+
+    #[test]
+    fn laws_are_set_as_mathematics_and_escaped() {
+        assert_eq!(formula("P = k * W^p"), "P = k\u{2009}·\u{2009}W<sup>p</sup>");
+        assert_eq!(formula("g^(5/3) < n"), "g<sup>5/3</sup> &lt; n");
+        assert_eq!(formula("x^"), "x<sup></sup>");
+    }
+}
