@@ -17,15 +17,13 @@
 //! Settled means: the power lies at the known no-load power, or two windows agree and are stationary. A spindle that is
 //! already under load when the gateway starts settles only against a table; otherwise cutting is not claimed.
 
-use super::estimate::NoEstimate;
+use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::evidence::Evidence;
-use super::inputs::Inputs;
-use super::no_load::NoLoad;
-use super::settings::Settings;
-use super::signals::{Feed, Signals, seconds};
+use super::signals::{Feed, Pace, seconds};
+use super::situation::{Situation, Tick};
 use super::state::State;
+use super::window::Means;
 use adapters::clock::TimeNs;
-use adapters::{Absence, ChannelId};
 use serde::{Deserialize, Serialize};
 
 /// How long a start or speed change without a known no-load power may stay unsettled under feed before the state is
@@ -45,6 +43,9 @@ const CUT_ENDS: f64 = 0.15;
 /// Weight of a new sample in the level of the cut.
 const CUT_LEVEL_WEIGHT: f64 = 0.2;
 
+/// However doubtful no-load power is, a power further from it, relative, has not settled for that reason alone.
+const WIDEST_BAND: f64 = 0.04;
+
 /// How the turning spindle got where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Phase {
@@ -58,16 +59,6 @@ enum Phase {
     Changing,
     /// The power has settled.
     Settled,
-}
-
-/// Everything the detector looks at in one tick.
-pub(super) struct Tick<'a> {
-    pub(super) inputs: &'a Inputs,
-    pub(super) signals: &'a Signals,
-    pub(super) settings: &'a Settings,
-    pub(super) filtered_w: Option<f64>,
-    /// No-load power at this speed, or why there is none.
-    pub(super) no_load: Result<NoLoad, NoEstimate>,
 }
 
 /// What the tick amounts to.
@@ -92,70 +83,10 @@ pub(super) struct Detector {
     /// Speed at which the power settled or was last seen settled, and when.
     settled_speed: Option<(TimeNs, f64)>,
     stands_since_ns: Option<TimeNs>,
+    /// Did the meter see power at the tick before?
+    powered: bool,
     /// Running excess over no-load power during the cut, W.
     cut_level_w: f64,
-}
-
-/// What the inputs say before any estimation.
-enum Situation {
-    Off,
-    Rest,
-    Turning,
-    Missing(NoEstimate),
-}
-
-impl Tick<'_> {
-    fn feed(&self) -> Feed {
-        self.signals.feed(self.inputs, self.settings)
-    }
-
-    fn situation(&self, crossing_zero: bool) -> Situation {
-        let no_power = self.inputs.total.is_ok_and(|total| total.abs() < self.settings.off_power_w);
-        let meter_is_on = self.inputs.total.is_ok() && !no_power;
-        match self.inputs.speed {
-            Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
-            Err(Absence::MachineOff) => Situation::Off,
-            Err(_) if no_power => Situation::Off,
-            Err(absence) => missing("spindle_speed_rpm", absence),
-            Ok(speed) if speed.abs() < self.settings.spindle_min_rpm && !crossing_zero => {
-                if no_power {
-                    Situation::Off
-                } else {
-                    Situation::Rest
-                }
-            }
-            Ok(_) if no_power => Situation::Missing(NoEstimate::Contradiction),
-            Ok(_) => match (self.inputs.power, self.inputs.stage) {
-                (Err(absence), _) => missing("spindle_power_w", absence),
-                (_, Err(absence)) => missing("gear_stage", absence),
-                _ => Situation::Turning,
-            },
-        }
-    }
-
-    /// Excess over no-load power above which a load counts as visible, W.
-    pub(super) fn visible_excess_w(&self) -> Option<f64> {
-        self.no_load.ok().map(|no_load| visible_excess_w(no_load, self.signals, self.settings))
-    }
-}
-
-impl Tick<'_> {
-    /// Excess over no-load power below which a load has ended, W.
-    fn ending_excess_w(&self) -> Option<f64> {
-        let share = (self.settings.c2_off / self.settings.c2_on).min(1.0);
-        self.visible_excess_w().map(|excess_w| share * excess_w)
-    }
-}
-
-/// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
-pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
-    let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
-    (relative * no_load.power_w).max(2.0 * no_load.sd_w)
-}
-
-fn missing(channel: &str, absence: Absence) -> Situation {
-    let reason = |channel| NoEstimate::Input { channel, absence };
-    Situation::Missing(ChannelId::of(channel).map_or(NoEstimate::NotYet, reason))
 }
 
 impl Detector {
@@ -169,6 +100,7 @@ impl Detector {
             missing_since_ns: None,
             settled_speed: None,
             stands_since_ns: None,
+            powered: false,
             cut_level_w: 0.0,
         }
     }
@@ -202,7 +134,9 @@ impl Detector {
 
     fn judge(&mut self, tick: &Tick<'_>) -> Verdict {
         self.notice_hidden_change(tick);
-        let situation = tick.situation(self.crossing_zero(tick));
+        let powered_before = self.powered;
+        self.powered = tick.powered().unwrap_or(powered_before);
+        let situation = tick.situation(self.crossing_zero(tick), powered_before);
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);
         }
@@ -254,8 +188,7 @@ impl Detector {
         if self.phase == Phase::Rest {
             self.enter(Phase::Starting, now_ns);
         }
-        let loaded = self.state == State::Cutting && tick.feed() != Feed::Off;
-        match tick.signals.steady(loaded, tick.settings) {
+        match tick.signals.steady(self.pace(tick), tick.settings) {
             Some(true) => {}
             Some(false) => {
                 if self.phase != Phase::Starting {
@@ -268,6 +201,14 @@ impl Detector {
             None => return self.pending(tick),
         }
         if self.phase == Phase::Settled { self.loaded(tick) } else { self.settle(tick) }
+    }
+
+    fn pace(&self, tick: &Tick<'_>) -> Pace {
+        match self.phase {
+            Phase::Settled if self.state == State::Cutting && tick.feed() != Feed::Off => Pace::Cutting,
+            Phase::Settled => Pace::Idling,
+            _ => Pace::Settling,
+        }
     }
 
     /// While the speed was not to be seen it may have changed.
@@ -303,17 +244,20 @@ impl Detector {
         let fed = tick.feed() != Feed::Off;
         let settled_at_w = match tick.no_load {
             Ok(known) => {
-                let at_known = (filtered_w - known.power_w).abs() <= tick.ending_excess_w().unwrap_or(0.0);
+                let band_w = tick.ending_excess_w().unwrap_or(0.0).min(WIDEST_BAND * known.power_w);
+                let at_known = known.is_estimate() && (filtered_w - known.power_w).abs() <= band_w;
                 // A cut can be too rough to be stationary: under feed it is enough that the start-up no longer decays.
-                let under_load = fed && tick.signals.window.falling(agreement_w) == Some(false);
+                let above = filtered_w > known.power_w;
+                let under_load = fed && above && tick.signals.window.falling(agreement_w) == Some(false);
                 if !(at_known || means.is_some() || under_load) {
                     return self.pending(tick);
                 }
-                None
+                let unmeasured = !fed && known.origin != NoLoadOrigin::Measured && !at_known;
+                means.filter(|_| unmeasured).map(Means::lower_w)
             }
             Err(_) => match means {
-                // The lower one: a start-up decays, and a cut that has just begun raises the newer one.
-                Some(means) if !fed || self.phase == Phase::Starting => Some(means.older_w.min(means.newer_w)),
+                Some(means) if !fed => Some(means.lower_w()),
+                Some(means) if self.phase == Phase::Starting => Some(tick.signals.least_level_w(means, tick.settings)),
                 _ => return self.pending(tick),
             },
         };

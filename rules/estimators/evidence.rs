@@ -1,8 +1,9 @@
 //! Evidence for load: a bounded cumulative sum of standardised excess power.
 //!
-//! Law: `S <- clamp(S + clamp((x - k) / sigma, -h/2, h/2), 0, h)`; load begins at `S = h` and ends at `S = 0`.
+//! Law: `S <- clamp(S + clamp((x - k) / sigma, -h/3, h/3), 0, h)`; load begins at `S = h` and ends at `S = 0`.
 //! A cumulative sum finds a small lasting step far sooner than a threshold on a filtered value at the same false-alarm
-//! rate (Page, Biometrika 1954); the inner clamp lets no single pulse decide, the outer one makes begin and end alike.
+//! rate (Page, Biometrika 1954); the inner clamp lets no pulse decide, not even one that
+//! interpolation has smeared over two ticks; the outer one makes begin and end alike.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ impl Evidence {
     pub fn add(&mut self, excess_w: f64, reference_w: f64, sd_w: f64, full: f64) {
         let step = (excess_w - reference_w) / sd_w.max(f64::MIN_POSITIVE);
         if step.is_finite() {
-            self.sum = (self.sum + step.clamp(-full / 2.0, full / 2.0)).clamp(0.0, full);
+            self.sum = (self.sum + step.clamp(-full / 3.0, full / 3.0)).clamp(0.0, full);
         }
     }
 
@@ -53,14 +54,14 @@ mod tests {
     }
 
     #[test]
-    fn a_heavy_cut_takes_two_samples_and_a_light_one_a_few() {
-        assert_eq!((steps_until_full(1000.0), steps_until_full(6.0), steps_until_full(3.0)), (Some(2), Some(4), None));
+    fn a_heavy_cut_takes_three_samples_and_a_light_one_a_few() {
+        assert_eq!((steps_until_full(1000.0), steps_until_full(6.0), steps_until_full(3.0)), (Some(3), Some(4), None));
     }
 
     #[test]
     fn one_pulse_never_decides() {
         let mut evidence = Evidence::default();
-        for excess in [0.0, 1e9, 0.0, 0.0, 1e9, 0.0] {
+        for excess in [0.0, 1e9, 1e9, 0.0, 0.0, 1e9, 1e9, 0.0] {
             evidence.add(excess, 3.0, 2.0, 5.0);
             assert!(!evidence.full(5.0));
         }

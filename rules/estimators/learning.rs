@@ -1,10 +1,14 @@
 //! Learning no-load power while the spindle idles.
 //!
-//! Idle power is cut into blocks of N samples; the mean of a block's middle half is one observation. An observation
-//! waits for the guard time and counts only if the feed stayed off: meter and controller may disagree on when a cut
-//! began. What lies below the known power is learned at once (warm-up lowers it), what lies visibly above it only after it has lasted:
-//! it may be a light cut that nobody reported.
+//! Idle power is cut into blocks of N samples; the mean of a block's middle part is one observation. Rapid traverse cannot
+//! cut, so its samples count at once; samples at rest count after the guard time, if the feed stayed off: meter and
+//! controller may disagree on when a cut began. A block may be collected from several short pauses at one speed.
+//!
+//! Power below the known one is believed once the next block confirms it (warm-up lowers no-load power). Power visibly
+//! above it may be a light cut that nobody reported, and is believed only in rapid traverse or after it has lasted.
+//! Under feed nothing is learned, except that no-load power cannot be above what is measured.
 
+use super::estimate::NoLoadOrigin;
 use super::filter::count;
 use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::Noise;
@@ -12,6 +16,13 @@ use super::settings::Settings;
 use super::signals::{length, seconds};
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Idle power: pulses of either sign, each smeared over two ticks, must leave no trace.
+const MIDDLE: (f64, f64) = (0.2, 0.8);
+
+/// Power under feed bounds no-load power from above: rather a little high than drawn down by a dip.
+const UPPER: (f64, f64) = (0.4, 0.9);
 
 /// Variance of the mean of the middle half, relative to that of the plain mean.
 const MIDDLE_HALF: f64 = 1.2;
@@ -19,106 +30,220 @@ const MIDDLE_HALF: f64 = 1.2;
 /// Two successive blocks of a settled spindle differ by less than this, relative.
 const AGREEMENT: f64 = 0.02;
 
+/// Power under feed further below a measured no-load power than this, relative, says nothing about it.
+const FAR_BELOW: f64 = 0.15;
+
+/// Within a block the speed may vary by this much, relative; more, and masses are accelerated.
+const SAME_SPEED: f64 = 0.004;
+
+/// A block is collected within this time, s.
+const BLOCK_LASTS_S: f64 = 120.0;
+
+/// A longer pause between two samples of a block, s, and slow changes no longer count as noise.
+const PAUSE_S: f64 = 0.5;
+
+/// At most this many samples wait for the guard time.
+const WAITING: usize = 512;
+
 /// A block's power.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Observation {
     pub(super) point: NoLoadPoint,
     pub(super) sd_w: f64,
     pub(super) at_ns: TimeNs,
     /// Does it agree with the block before it?
     confirmed: bool,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Learner {
-    length: usize,
-    block: Vec<f64>,
-    speed_sum: f64,
-    previous_w: Option<f64>,
-    before_w: Option<f64>,
-    waiting: Option<Observation>,
-    above_since_ns: Option<TimeNs>,
+    /// Are all samples from rapid traverse?
+    rapid: bool,
 }
 
 /// One tick of idle power.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct IdleTick {
     pub(super) at_ns: TimeNs,
     pub(super) power_w: f64,
     pub(super) speed_rpm: f64,
     pub(super) stage: usize,
+    pub(super) rapid: bool,
+}
+
+/// Powers at one speed of one gear stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Block {
+    length: usize,
+    /// The mean is that of the values between these quantiles.
+    quantiles: (f64, f64),
+    powers_w: Vec<f64>,
+    first: Option<IdleTick>,
+    rapid: bool,
+    /// Means of the blocks before, the latest first, and how many of the latest came without a pause.
+    means_w: [f64; 3],
+    blocks: usize,
+    unbroken: usize,
+    broken: bool,
+    last_ns: TimeNs,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Learner {
+    idle: Block,
+    fed: Block,
+    waiting: VecDeque<IdleTick>,
+    above_since_ns: Option<TimeNs>,
+}
+
+impl Block {
+    fn new(length: usize, quantiles: (f64, f64)) -> Self {
+        let powers_w = Vec::with_capacity(length);
+        Self {
+            length,
+            quantiles,
+            powers_w,
+            first: None,
+            rapid: true,
+            means_w: [0.0; 3],
+            blocks: 0,
+            unbroken: 0,
+            broken: true,
+            last_ns: 0,
+        }
+    }
+
+    fn clear(&mut self) {
+        self.powers_w.clear();
+        self.first = None;
+        self.rapid = true;
+    }
+
+    /// Another speed or stage, or too long ago.
+    fn clear_if_other(&mut self, tick: &IdleTick) {
+        let other = self.first.is_some_and(|first| {
+            let moved = (tick.speed_rpm.abs() - first.speed_rpm.abs()).abs() > SAME_SPEED * first.speed_rpm.abs();
+            let pause_s = seconds(first.at_ns, tick.at_ns);
+            moved || tick.stage != first.stage || !(0.0..=BLOCK_LASTS_S).contains(&pause_s)
+        });
+        if other {
+            self.clear();
+            (self.blocks, self.unbroken) = (0, 0);
+        }
+    }
+
+    /// The last three blocks, if no pause lies in between.
+    fn last_three_w(&self) -> Option<[f64; 3]> {
+        (self.unbroken >= 3 && self.means_w[1] > 0.0).then_some(self.means_w)
+    }
+
+    /// Takes a tick and yields the observation of a full block.
+    fn push(&mut self, tick: IdleTick, noise: &Noise) -> Option<Observation> {
+        self.clear_if_other(&tick);
+        self.broken |= seconds(self.last_ns, tick.at_ns) > PAUSE_S;
+        self.last_ns = tick.at_ns;
+        let first = *self.first.get_or_insert(tick);
+        self.powers_w.push(tick.power_w);
+        self.rapid &= tick.rapid;
+        if self.powers_w.len() < self.length {
+            return None;
+        }
+        let power_w = mean_between(&mut self.powers_w, self.quantiles);
+        let seen = self.observe(power_w, first, tick.at_ns, noise);
+        self.clear();
+        self.first = Some(IdleTick { at_ns: tick.at_ns, ..first });
+        seen
+    }
+
+    fn observe(&mut self, power_w: f64, first: IdleTick, at_ns: TimeNs, noise: &Noise) -> Option<Observation> {
+        let noise_w = noise.sd() * power_w;
+        let settling_w = (self.blocks > 0).then(|| power_w - self.means_w[0]);
+        let variance = MIDDLE_HALF * noise_w * noise_w / count(self.length)
+            + settling_w.map_or(0.0, |w| w * w / 2.0)
+            + 1e-6 * power_w * power_w;
+        self.means_w = [power_w, self.means_w[0], self.means_w[1]];
+        self.blocks += 1;
+        self.unbroken = if std::mem::take(&mut self.broken) { 0 } else { self.unbroken + 1 };
+        let point = NoLoadPoint { stage: first.stage, speed_rpm: first.speed_rpm.abs(), power_w };
+        let confirmed = settling_w.is_some_and(|w| w.abs() <= AGREEMENT * power_w);
+        let seen = Observation { point, sd_w: variance.sqrt(), at_ns, confirmed, rapid: self.rapid };
+        (power_w > 0.0).then_some(seen)
+    }
 }
 
 impl Learner {
     pub(super) fn new(settings: &Settings) -> Self {
         let length = length(settings.window_samples);
-        Self {
-            length,
-            block: Vec::with_capacity(length),
-            speed_sum: 0.0,
-            previous_w: None,
-            before_w: None,
-            waiting: None,
-            above_since_ns: None,
-        }
+        let (idle, fed) = (Block::new(length, MIDDLE), Block::new((3 * length / 4).max(5), UPPER));
+        Self { idle, fed, waiting: VecDeque::with_capacity(WAITING), above_since_ns: None }
     }
 
     /// The spindle no longer idles: what has not been confirmed is dropped.
     pub(super) fn stop(&mut self) {
-        self.clear_block();
-        self.previous_w = None;
-        self.before_w = None;
-        self.waiting = None;
+        self.waiting.clear();
         self.above_since_ns = None;
     }
 
-    fn clear_block(&mut self) {
-        self.block.clear();
-        self.speed_sum = 0.0;
+    /// A cut: what is being collected under feed is spoilt.
+    pub(super) fn cut(&mut self) {
+        self.stop();
+        self.fed.clear();
     }
 
-    /// Takes a tick of idle power with the feed off; yields an observation that has been confirmed.
-    pub(super) fn step(
+    /// Nothing collected so far can be relied upon.
+    pub(super) fn forget(&mut self) {
+        self.stop();
+        self.idle.clear();
+        self.fed.clear();
+    }
+
+    /// Takes a tick of idle power with the feed off or in rapid traverse; yields an observation to learn.
+    pub(super) fn idle(
         &mut self,
         tick: IdleTick,
         known: Option<NoLoad>,
         noise: &mut Noise,
         settings: &Settings,
     ) -> Option<Observation> {
-        let confirmed = self.waiting.filter(|it| seconds(it.at_ns, tick.at_ns) >= settings.learn_guard_s);
-        if confirmed.is_some() {
-            self.waiting = None;
+        let tick = if tick.rapid { Some(tick) } else { self.wait(tick, settings) };
+        self.fed.clear();
+        let seen = self.idle.push(tick?, noise)?;
+        if let Some(blocks_w) = self.idle.last_three_w() {
+            noise.push_blocks(blocks_w, count(self.idle.length));
         }
-        self.block.push(tick.power_w);
-        self.speed_sum += tick.speed_rpm.abs();
-        if self.block.len() >= self.length {
-            self.waiting = self.close_block(tick, noise);
-        }
-        confirmed.filter(|it| self.plausible(it, known, settings))
+        self.plausible(&seen, known, settings).then_some(seen)
     }
 
-    fn close_block(&mut self, tick: IdleTick, noise: &mut Noise) -> Option<Observation> {
-        let speed_rpm = self.speed_sum / count(self.block.len());
-        let power_w = middle_half_mean(&mut self.block);
-        let noise_w = noise.sd() * power_w;
-        let settling_w = self.previous_w.map(|previous| power_w - previous);
-        let variance = MIDDLE_HALF * noise_w * noise_w / count(self.block.len())
-            + settling_w.map_or(0.0, |w| w * w / 2.0)
-            + 1e-6 * power_w * power_w;
-        if let (Some(before), Some(previous)) = (self.before_w, self.previous_w.filter(|previous| *previous > 0.0)) {
-            noise.push_blocks([before, previous, power_w], count(self.length));
+    /// Through the queue: a tick comes out when it is as old as the guard time.
+    fn wait(&mut self, tick: IdleTick, settings: &Settings) -> Option<IdleTick> {
+        if self.waiting.len() == WAITING {
+            self.waiting.pop_front();
         }
-        self.before_w = self.previous_w.replace(power_w);
-        self.clear_block();
-        let point = NoLoadPoint { stage: tick.stage, speed_rpm, power_w };
-        let confirmed = settling_w.is_some_and(|w| w.abs() <= AGREEMENT * power_w);
-        (power_w > 0.0).then(|| Observation { point, sd_w: variance.sqrt(), at_ns: tick.at_ns, confirmed })
+        self.waiting.push_back(tick);
+        let ripe = |oldest: &&IdleTick| seconds(oldest.at_ns, tick.at_ns) >= settings.learn_guard_s;
+        self.waiting.front().filter(ripe)?;
+        self.waiting.pop_front()
     }
 
-    /// Power visibly below the known one must be confirmed by the next block, power above it must last.
+    /// Takes a tick of power under feed: no-load power cannot be above it. Yields an observation where it lies clearly
+    /// below what is known. A block begins with the feed, so that the first holds the approach alone.
+    pub(super) fn fed(
+        &mut self,
+        tick: IdleTick,
+        known: NoLoad,
+        noise: &Noise,
+        settings: &Settings,
+    ) -> Option<Observation> {
+        let seen = self.fed.push(tick, noise)?;
+        let noise_w = noise.sd() * seen.point.power_w * (MIDDLE_HALF / count(self.fed.length)).sqrt();
+        let sd_w = noise_w.hypot(0.5 * settings.c2_on * seen.point.power_w);
+        let below_w = known.power_w - seen.point.power_w;
+        // Far below is no drift: a spindle that brakes, or a meter that fails.
+        let near = known.origin != NoLoadOrigin::Measured || below_w < FAR_BELOW * known.power_w;
+        (near && below_w > 2.0 * noise_w).then_some(Observation { sd_w, ..seen })
+    }
+
     fn plausible(&mut self, seen: &Observation, known: Option<NoLoad>, settings: &Settings) -> bool {
-        let Some(known) = known else { return true };
+        // What is known of other speeds says too little to contradict a settled power at this one.
+        let Some(known) = known.filter(|known| known.origin == NoLoadOrigin::Measured) else { return seen.confirmed };
         let limit_w = known.power_w * settings.c2_off + 2.0 * known.sd_w.hypot(seen.sd_w);
         let above_w = seen.point.power_w - known.power_w;
         if above_w <= limit_w {
@@ -126,16 +251,17 @@ impl Learner {
             return above_w >= -limit_w || seen.confirmed;
         }
         let since = *self.above_since_ns.get_or_insert(seen.at_ns);
-        seconds(since, seen.at_ns) >= settings.relearn_up_s
+        seen.rapid && seen.confirmed || seconds(since, seen.at_ns) >= settings.relearn_up_s
     }
 }
 
-/// Mean of the values between the quartiles; sorts them.
-fn middle_half_mean(values: &mut [f64]) -> f64 {
+/// Mean of the values between two quantiles; sorts them.
+fn mean_between(values: &mut [f64], (low, high): (f64, f64)) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
-    let cut = values.len() / 4;
-    let middle = &values[cut..values.len() - cut];
-    middle.iter().sum::<f64>() / count(middle.len().max(1))
+    let n = values.len();
+    let at = |quantile: f64| length(quantile * count(n) + 0.5).min(n);
+    let kept = values.get(at(low)..at(high)).filter(|kept| !kept.is_empty()).unwrap_or(values);
+    kept.iter().sum::<f64>() / count(kept.len().max(1))
 }
 
 #[cfg(test)]
@@ -144,7 +270,8 @@ mod tests {
 
     #[test]
     fn pulses_leave_the_middle_half_alone() {
-        assert_eq!(middle_half_mean(&mut [5.0, 1e6, 5.0, 5.0, -1e6, 5.0, 5.0, 1e6]), 5.0);
-        assert_eq!(middle_half_mean(&mut [3.0]), 3.0);
+        assert_eq!(mean_between(&mut [5.0, 1e6, 5.0, 5.0, -1e6, 5.0, 5.0, 1e6], MIDDLE), 5.0);
+        assert_eq!(mean_between(&mut [5.0, 5.0, -1e6, -1e5, 5.0, 5.0, 5.0], UPPER), 5.0);
+        assert_eq!(mean_between(&mut [3.0], MIDDLE), 3.0);
     }
 }

@@ -11,8 +11,8 @@
 //! | `inputs`, `signals`, `noise` | what is needed of a sample, its recent past, how noisy it is |
 //! | `window` | has the power settled: two stationary windows that agree |
 //! | `evidence` | a small lasting step in noise |
-//! | `detector` | the states and every transition between them |
-//! | `no_load`, `learning` | no-load power over speed, per gear stage, learned from idle |
+//! | `situation`, `detector` | the states and every transition between them |
+//! | `no_load`, `interpolation`, `learning` | no-load power over speed, per gear stage, learned from idle |
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 
@@ -22,12 +22,14 @@ mod estimate;
 mod evidence;
 mod filter;
 mod inputs;
+mod interpolation;
 mod learning;
 mod no_load;
 mod noise;
 mod pipeline;
 mod settings;
 mod signals;
+mod situation;
 mod state;
 mod visibility;
 mod window;
@@ -38,7 +40,8 @@ pub use window::{Means, Window, stationary};
 pub use cutting::{Balance, balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
-pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable, lagrange, noise_gain, triple};
+pub use interpolation::{lagrange, noise_gain, triple};
+pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 pub use pipeline::{Pipeline, RestoreError};
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};
 pub use state::State;

@@ -1,17 +1,13 @@
 //! No-load power over speed, one table per gear stage.
 //!
-//! Law: quadratic Lagrange interpolation on three adjacent known speeds,
-//! `Pu(n) = sum_k Pu_k prod_(j != k) (n - n_j) / (n_k - n_j)`.
-//! Source: power separation on a lathe (CJK6136), equation 4.
-//! Choice of the three: least sum of distances to n; a tie goes to the slower speeds (400 rpm among 200, 300, 500, 600
-//! takes 200, 300, 500). Never across a gear stage. A quadratic through a slope break errs, so the difference to the
-//! neighbouring choice counts as uncertainty. Two known speeds interpolate linearly; one serves only itself.
-//! Direction of rotation does not matter: speeds are magnitudes.
+//! Never across a gear stage; between speeds see `interpolation`. Direction of rotation does not matter: speeds are
+//! magnitudes.
 //!
 //! What is learned is a joint estimate: no-load power drifts with temperature, mostly alike at every speed, so a
 //! power learned now also corrects those learned earlier (Kalman update with correlated random walks).
 
 use super::estimate::{NoEstimate, NoLoadOrigin};
+use super::interpolation::{Weights, noise_gain};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
 use super::signals::seconds;
 use adapters::clock::TimeNs;
@@ -23,8 +19,14 @@ const SHARED_DRIFT: f64 = 0.8;
 /// Uncertainty of configured no-load powers, relative.
 const CONFIGURED_SD: f64 = 0.03;
 
-/// Within known speeds, a quadratic that amplifies noise more than this gives way to the straight line.
-const INSIDE_GAIN_LIMIT: f64 = 1.5;
+/// One standard deviation of the exponent of the power law.
+const EXPONENT_SD: f64 = 0.3;
+
+/// Logarithmic distance over which a power law is better than nothing: a factor of two.
+const ROUGH_SPAN: f64 = 0.7;
+
+/// Uncertainty of an extrapolation by once the span of the known speeds, relative.
+const BEYOND_SD: f64 = 0.1;
 
 /// An innovation beyond this many standard deviations means that the machine has changed, not the noise.
 const SURPRISE_SD: f64 = 4.0;
@@ -53,77 +55,26 @@ pub struct NoLoad {
     pub origin: NoLoadOrigin,
 }
 
-/// Weights of the quadratic through three distinct speeds, at `speed_rpm`.
-#[must_use]
-pub fn lagrange(speeds_rpm: [f64; 3], speed_rpm: f64) -> [f64; 3] {
-    let [a, b, c] = speeds_rpm;
-    let n = speed_rpm;
-    [
-        (n - b) * (n - c) / ((a - b) * (a - c)),
-        (n - a) * (n - c) / ((b - a) * (b - c)),
-        (n - a) * (n - b) / ((c - a) * (c - b)),
-    ]
-}
-
-/// By how much weights amplify independent noise: the root of the sum of their squares.
-#[must_use]
-pub fn noise_gain(weights: &[f64]) -> f64 {
-    weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt()
-}
-
-/// Position of the first of the three adjacent speeds to use, among at least three ascending ones.
-#[must_use]
-pub fn triple(speeds_rpm: &[f64], speed_rpm: f64) -> usize {
-    let distance = |first: usize| speeds_rpm[first..first + 3].iter().map(|s| (s - speed_rpm).abs()).sum::<f64>();
-    let mut best = 0;
-    for first in 1..speeds_rpm.len().saturating_sub(2) {
-        if distance(first) < distance(best) {
-            best = first;
-        }
+impl NoLoad {
+    /// Not just the rough idea of [`NoLoadTable::rough`].
+    #[must_use]
+    pub fn is_estimate(&self) -> bool {
+        self.origin != NoLoadOrigin::None
     }
-    best
 }
 
 /// Known powers of one gear stage, ascending in speed, with their covariance.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-struct Stage {
-    speeds_rpm: Vec<f64>,
-    powers_w: Vec<f64>,
+pub(super) struct Stage {
+    pub(super) speeds_rpm: Vec<f64>,
+    pub(super) powers_w: Vec<f64>,
     /// Row by row, W^2, as of `aged_ns`.
     covariance: Vec<f64>,
     aged_ns: Option<TimeNs>,
 }
 
-/// Weights on known powers, by position.
-#[derive(Debug, Clone, Copy)]
-struct Weights {
-    at: [usize; 3],
-    weight: [f64; 3],
-}
-
-impl Weights {
-    fn one(at: usize, weight: f64) -> Self {
-        Self { at: [at; 3], weight: [weight, 0.0, 0.0] }
-    }
-
-    fn line(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
-        let (a, b) = (speeds_rpm[first], speeds_rpm[first + 1]);
-        let share = (n - a) / (b - a);
-        Self { at: [first, first + 1, first], weight: [1.0 - share, share, 0.0] }
-    }
-
-    fn quadratic(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
-        let three = [speeds_rpm[first], speeds_rpm[first + 1], speeds_rpm[first + 2]];
-        Self { at: [first, first + 1, first + 2], weight: lagrange(three, n) }
-    }
-
-    fn of(&self, powers_w: &[f64]) -> f64 {
-        self.at.iter().zip(self.weight).map(|(at, weight)| powers_w[*at] * weight).sum()
-    }
-}
-
 impl Stage {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.speeds_rpm.len()
     }
 
@@ -226,29 +177,21 @@ impl Stage {
         sum.max(0.0)
     }
 
-    /// Weights for `n` and those of the next best form, whose difference is the doubt in the interpolation itself.
-    fn forms(&self, n: f64) -> Option<(Weights, Weights)> {
-        let speeds = &self.speeds_rpm;
-        let line_at = speeds.partition_point(|known| *known < n).saturating_sub(1).min(self.len().checked_sub(2)?);
-        let line = Weights::line(speeds, line_at, n);
-        if self.len() == 2 {
-            let nearest = usize::from((speeds[1] - n).abs() < (speeds[0] - n).abs());
-            return Some((line, Weights::one(nearest, n / speeds[nearest])));
-        }
-        let first = triple(speeds, n);
-        let quadratic = Weights::quadratic(speeds, first, n);
-        if self.inside(n) && noise_gain(&quadratic.weight) > INSIDE_GAIN_LIMIT {
-            return Some((line, quadratic));
-        }
-        // The other triple that holds the same interval, where there is one; the straight line otherwise.
-        let other = if first == line_at { first.checked_sub(1) } else { Some(first + 1) };
-        let other = other.filter(|other| other + 3 <= self.len() && self.inside(n));
-        Some((quadratic, other.map_or(line, |other| Weights::quadratic(speeds, other, n))))
+    /// The power law alone, and its uncertainty; `None` too far from any known speed.
+    fn rough(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64)> {
+        let (_, distance) = self.nearest(n).filter(|(_, distance)| *distance <= ROUGH_SPAN)?;
+        let weights = self.by_law(n);
+        let power_w = weights.of(&self.powers_w);
+        let law_w = EXPONENT_SD * distance * power_w;
+        Some((power_w, (self.variance_w2(&weights, now_ns, settings) + law_w * law_w).sqrt()))
     }
 
-    fn inside(&self, n: f64) -> bool {
-        self.speeds_rpm.first().is_some_and(|first| *first <= n)
-            && self.speeds_rpm.last().is_some_and(|last| n <= *last)
+    /// How far `n` lies outside the known speeds, relative to the span they cover.
+    fn beyond(&self, n: f64) -> f64 {
+        match (self.speeds_rpm.first(), self.speeds_rpm.last()) {
+            (Some(first), Some(last)) if last > first => (first - n).max(n - last).max(0.0) / (last - first),
+            _ => 0.0,
+        }
     }
 }
 
@@ -326,8 +269,91 @@ impl NoLoadTable {
             return Err(NoEstimate::NotLearned);
         }
         let form_w = (power_w - other.of(&stage.powers_w)) / 3.0_f64.sqrt();
-        let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w).sqrt();
+        let beyond_w = BEYOND_SD * stage.beyond(n) * power_w;
+        let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w + beyond_w * beyond_w).sqrt();
         let origin = if inside { NoLoadOrigin::Interpolated } else { NoLoadOrigin::Extrapolated };
         Ok(NoLoad { power_w, sd_w, noise_gain, origin })
+    }
+
+    /// A rough idea of no-load power where [`NoLoadTable::at`] refuses: good enough to tell a heavy cut from none, not to
+    /// be called an estimate. `None` where the gear stage has no known power within a factor of two of the speed.
+    #[must_use]
+    pub fn rough(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Option<NoLoad> {
+        let (power_w, sd_w) = self.stages.get(stage)?.rough(speed_rpm.abs(), now_ns, settings)?;
+        Some(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::clock::SECOND_NS;
+
+    fn point(speed_rpm: f64, power_w: f64) -> NoLoadPoint {
+        NoLoadPoint { stage: 0, speed_rpm, power_w }
+    }
+
+    fn learned(points: &[(f64, f64)], settings: &Settings) -> NoLoadTable {
+        let mut table = NoLoadTable::new(settings);
+        points.iter().for_each(|(speed, power)| table.learn(point(*speed, *power), 2.0, 0, settings));
+        table
+    }
+
+    #[test]
+    fn warm_up_seen_at_one_speed_corrects_the_others() {
+        let settings = Settings::default();
+        let mut table = learned(&[(600.0, 400.0), (1200.0, 800.0)], &settings);
+        let later = 600 * SECOND_NS;
+        table.learn(point(600.0, 380.0), 2.0, later, &settings);
+        let other = table.at(0, 1200.0, later, &settings).expect("known");
+        assert!(other.power_w < 780.0 && other.power_w > 760.0, "{other:?}");
+        assert!(other.sd_w > 10.0, "less sure than a measurement: {other:?}");
+    }
+
+    #[test]
+    fn what_is_known_grows_old_but_not_without_bound() {
+        let settings = Settings::default();
+        let table = learned(&[(600.0, 400.0)], &settings);
+        let sd = |after_s: i64| table.at(0, 600.0, after_s * SECOND_NS, &settings).expect("known").sd_w;
+        assert!(sd(0) < 2.1 && sd(60) > 4.0 && sd(3600) > 15.0);
+        assert!(sd(1_000_000) < 1.01 * 400.0 * settings.no_load_drift.hypot(2.0 / 400.0));
+    }
+
+    #[test]
+    fn a_changed_machine_is_believed() {
+        let settings = Settings::default();
+        let mut table = learned(&[(600.0, 400.0), (600.0, 401.0), (600.0, 399.0)], &settings);
+        table.learn(point(600.0, 520.0), 2.0, SECOND_NS, &settings);
+        assert!((table.at(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
+    }
+
+    #[test]
+    fn the_most_doubtful_speed_makes_room() {
+        let settings = Settings::default();
+        let mut table = NoLoadTable::new(&settings);
+        for k in 0..SPEEDS_PER_STAGE {
+            let speed = 200.0 * 1.15_f64.powi(i32::try_from(k).expect("small"));
+            table.learn(point(speed, speed / 2.0), if k == 3 { 30.0 } else { 1.0 }, 0, &settings);
+        }
+        table.learn(point(10_000.0, 9000.0), 5.0, 0, &settings);
+        assert_eq!(table.points().count(), SPEEDS_PER_STAGE);
+        let gone = 200.0 * 1.15_f64.powi(3);
+        assert!(table.points().all(|known| (known.speed_rpm - gone).abs() > 1.0));
+    }
+
+    #[test]
+    fn unusable_powers_are_not_learned_and_a_rough_idea_has_its_limits() {
+        let settings = Settings::default();
+        let mut table = learned(&[(600.0, 400.0)], &settings);
+        for (speed, power) in [(0.0, 1.0), (-600.0, 400.0), (600.0, f64::NAN), (700.0, -1.0), (f64::INFINITY, 1.0)] {
+            table.learn(point(speed, power), 1.0, 0, &settings);
+        }
+        assert_eq!(table.points().count(), 1);
+        let rough = table.rough(0, 900.0, 0, &settings).expect("within a factor of two");
+        assert!((rough.power_w - 400.0 * 1.5_f64.powf(1.3)).abs() < 1e-9 && rough.sd_w > 0.1 * rough.power_w);
+        assert!(!rough.is_estimate());
+        assert_eq!(table.at(0, 900.0, 0, &settings), Err(NoEstimate::NotLearned));
+        assert_eq!(table.rough(0, 1300.0, 0, &settings), None);
+        assert_eq!(table.rough(1, 600.0, 0, &settings), None);
     }
 }

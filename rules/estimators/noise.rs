@@ -1,7 +1,7 @@
 //! How noisy the spindle power is, relative to its level.
 //!
-//! Two views, the larger counts: successive differences (blind to drift, but also to noise that a meter's averaging has
-//! smeared over several samples) and second differences of successive blocks of idle power (slow ripple).
+//! Two views, the larger counts: second differences of successive samples (blind to a start-up that decays, but also to
+//! noise that a meter's averaging has smeared) and of successive blocks of idle power (slow ripple).
 
 use super::settings::Settings;
 use serde::{Deserialize, Serialize};
@@ -18,28 +18,30 @@ pub(super) struct Noise {
     fast: f64,
     seen: f64,
     slow: f64,
-    last: Option<f64>,
+    last: [Option<f64>; 2],
 }
 
 impl Noise {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { fast: settings.power_noise * settings.power_noise, seen: 4.0, slow: 0.0, last: None }
+        Self { fast: settings.power_noise * settings.power_noise, seen: 4.0, slow: 0.0, last: [None; 2] }
     }
 
-    /// Takes a power measured at a steady level.
+    /// Takes a power measured at a steady speed.
     pub(super) fn push(&mut self, power_w: f64, level_w: f64) {
-        if let Some(last) = self.last.replace(power_w).filter(|_| level_w > 0.0) {
-            let relative = (power_w - last) / level_w;
+        let [second, third] = self.last;
+        self.last = [Some(power_w), second];
+        if let (Some(second), Some(third), true) = (second, third, level_w > 0.0) {
+            let relative = (power_w - 2.0 * second + third) / level_w;
             let limit = CLIP_SD * CLIP_SD * self.fast;
             self.seen += 1.0;
             let weight = (1.0 / self.seen).max(SLOW);
-            self.fast += weight * ((relative * relative / 2.0).min(limit) - self.fast);
+            self.fast += weight * ((relative * relative / 6.0).min(limit) - self.fast);
         }
     }
 
     /// The next value has no predecessor.
     pub(super) fn interrupt(&mut self) {
-        self.last = None;
+        self.last = [None; 2];
     }
 
     /// Takes three successive blocks of idle power, W. Their second difference is blind to a start-up that still decays.

@@ -1,13 +1,14 @@
 //! From a sample to estimates.
 
 use super::cutting::balance;
-use super::detector::{Detector, Tick, Verdict, visible_excess_w};
+use super::detector::{Detector, Verdict};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 use super::inputs::{Channels, Inputs};
 use super::learning::{IdleTick, Learner};
 use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 use super::settings::Settings;
-use super::signals::{Feed, Signals};
+use super::signals::{Feed, Pace, Signals};
+use super::situation::{Tick, visible_excess_w};
 use super::state::State;
 use adapters::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
@@ -78,9 +79,9 @@ impl Pipeline {
             self.memory.detector.unsettle(inputs.at_ns);
         }
         if broken.gap || broken.stage {
-            self.memory.learner.stop();
+            self.memory.learner.forget();
         }
-        let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power));
+        let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power, &self.settings));
         let mut no_load = self.reference(&inputs);
         let tick =
             Tick { inputs: &inputs, signals: &self.memory.signals, settings: &self.settings, filtered_w, no_load };
@@ -95,29 +96,27 @@ impl Pipeline {
         &self.estimates
     }
 
-    /// No-load power at the speed of this tick: learned, or else an upper bound at this very speed.
+    /// No-load power at the speed of this tick: learned; or else an upper bound at this very speed; or else a rough idea,
+    /// which serves the detector alone.
     fn reference(&self, inputs: &Inputs) -> Result<NoLoad, NoEstimate> {
         let speed_rpm = inputs.speed.map_err(|absence| self.input(self.channels.speed, absence))?.abs();
         if speed_rpm < self.settings.spindle_min_rpm {
             return Err(NoEstimate::SpindleStopped);
         }
-        let (signals, settings) = (&self.memory.signals, &self.settings);
-        let known = self.memory.no_load.at(signals.stage(), speed_rpm, inputs.at_ns, settings);
-        known.or_else(|reason| {
-            let bound = self.memory.upper_bound.filter(|bound| {
-                let near = (bound.speed_rpm - speed_rpm).abs() <= settings.speed_tolerance * speed_rpm;
-                near && bound.stage == signals.stage()
-            });
-            let sd_w = |bound: NoLoadPoint| 0.5 * settings.c2_on * bound.power_w;
-            bound
-                .map(|bound| NoLoad {
-                    power_w: bound.power_w,
-                    sd_w: sd_w(bound),
-                    noise_gain: 1.0,
-                    origin: NoLoadOrigin::UpperBound,
-                })
-                .ok_or(reason)
-        })
+        let (memory, settings) = (&self.memory, &self.settings);
+        let stage = memory.signals.stage();
+        let learned = memory.no_load.at(stage, speed_rpm, inputs.at_ns, settings);
+        let rough = || memory.no_load.rough(stage, speed_rpm, inputs.at_ns, settings);
+        learned.or_else(|reason| self.bound(stage, speed_rpm).or_else(rough).ok_or(reason))
+    }
+
+    fn bound(&self, stage: usize, speed_rpm: f64) -> Option<NoLoad> {
+        let bound = self.memory.upper_bound.filter(|bound| {
+            let near = (bound.speed_rpm - speed_rpm).abs() <= self.settings.speed_tolerance * speed_rpm;
+            near && bound.stage == stage
+        })?;
+        let sd_w = 0.5 * self.settings.c2_on * bound.power_w;
+        Some(NoLoad { power_w: bound.power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::UpperBound })
     }
 
     fn input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
@@ -131,7 +130,7 @@ impl Pipeline {
         if feed == Feed::Off {
             let sd_w = power_w * self.settings.c2_on.hypot(self.memory.signals.noise.sd()) / 2.0;
             self.memory.no_load.learn(point, sd_w, inputs.at_ns, &self.settings);
-        } else {
+        } else if power_w > 0.0 {
             self.memory.upper_bound = Some(point);
         }
     }
@@ -152,8 +151,9 @@ impl Pipeline {
         let absent =
             matches!(verdict.because, Some(NoEstimate::Input { .. } | NoEstimate::Contradiction | NoEstimate::NotYet));
         let turning = verdict.state.spindle_on() != Some(false) && !absent;
+        let steady = memory.signals.steady(Pace::Settling, &self.settings) == Some(true);
         match (inputs.power, filtered_w) {
-            (Ok(power_w), Some(level_w)) if turning && verdict.state != State::Cutting => {
+            (Ok(power_w), Some(level_w)) if turning && steady && verdict.state != State::Cutting => {
                 memory.signals.noise.push(power_w, level_w);
             }
             _ => memory.signals.noise.interrupt(),
@@ -174,7 +174,7 @@ impl Pipeline {
         let agreement_w = signals.agreement_w(level_w, settings);
         if let Some(means) = signals.window.stationary(agreement_w, settings) {
             let level_w = means.older_w.max(means.newer_w);
-            if level_w < bound.power_w * (1.0 - settings.c2_off) {
+            if level_w > 0.0 && level_w < bound.power_w * (1.0 - settings.c2_off) {
                 bound.power_w = level_w;
             }
         }
@@ -183,15 +183,28 @@ impl Pipeline {
     fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) {
         let memory = &mut self.memory;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
-        let idles = matches!(verdict.state, State::Idle | State::Rapid) && rested;
-        let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, idles) else {
+        let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
+        let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, running) else {
             memory.learner.stop();
             return;
         };
-        let tick = IdleTick { at_ns: inputs.at_ns, power_w, speed_rpm, stage: memory.signals.stage() };
+        let rapid = verdict.state == State::Rapid;
+        let tick = IdleTick { at_ns: inputs.at_ns, power_w, speed_rpm, stage: memory.signals.stage(), rapid };
         let known = no_load.ok().filter(|known| known.origin != NoLoadOrigin::UpperBound);
-        let seen = memory.learner.step(tick, known, &mut memory.signals.noise, &self.settings);
+        let noise = &mut memory.signals.noise;
+        let seen = if verdict.state == State::Cutting {
+            memory.learner.cut();
+            None
+        } else if rested {
+            memory.learner.idle(tick, known, noise, &self.settings)
+        } else {
+            memory.learner.stop();
+            known.and_then(|known| memory.learner.fed(tick, known, noise, &self.settings))
+        };
         if let Some(seen) = seen {
+            if std::env::var("LRN").is_ok() {
+                println!("learn {:?} known {:?} {:?}", seen, known, verdict.state);
+            }
             memory.no_load.learn(seen.point, seen.sd_w, seen.at_ns, &self.settings);
         }
     }
@@ -210,7 +223,11 @@ impl Pipeline {
             value,
             sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
         });
-        let reference = if steady == Err(NoEstimate::MachineOff) { Err(NoEstimate::MachineOff) } else { no_load };
+        let reference = match (steady, no_load) {
+            (Err(NoEstimate::MachineOff), _) => Err(NoEstimate::MachineOff),
+            (_, Ok(rough)) if !rough.is_estimate() => Err(self.refusal(inputs)),
+            (_, known) => known,
+        };
         let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference));
         Estimates {
             at_ns: inputs.at_ns,
@@ -222,12 +239,20 @@ impl Pipeline {
             no_load_power_w: reference.map(|known| Estimate { value: known.power_w, sd: known.sd_w }),
             cutting_power_w,
             load_loss_w,
-            visible_cutting_power_w: self.least_visible(reference),
+            visible_cutting_power_w: self.least_visible(reference.and(no_load)),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.visibility(inputs, no_load, verdict),
             gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
         }
+    }
+
+    /// Why the table gives no estimate at this speed.
+    fn refusal(&self, inputs: &Inputs) -> NoEstimate {
+        let speed_rpm = inputs.speed.unwrap_or(0.0);
+        let table = &self.memory.no_load;
+        let refused = table.at(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
+        refused.err().unwrap_or(NoEstimate::NotLearned)
     }
 
     /// Does the balance of a steady spindle hold at this tick?

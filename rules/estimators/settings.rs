@@ -109,7 +109,7 @@ settings! {
     c2_off "1" 0.002 0.5 0.02 false
     "Cutting ends when the spindle power stays below no-load power plus this share of it; below c2_on"
     cutting_evidence "1" 2.0 50.0 5.0 false
-    "Sum of excesses, in standard deviations of the noise, that begins or ends cutting; one sample counts for half of it at most"
+    "Sum of excesses, in standard deviations of the noise, that begins or ends cutting; one sample counts for a third of it at most"
     window_samples "samples" 5.0 100.0 10.0 true
     "Length of each of the two windows that must agree before the spindle counts as settled"
     filter_samples "samples" 3.0 50.0 5.0 true
@@ -120,7 +120,7 @@ settings! {
     "Below this the spindle counts as standing still"
     speed_tolerance "1" 0.002 0.2 0.02 false
     "Speeds closer than this share are the same speed to the no-load table"
-    speed_rate_per_s "1/s" 0.01 2.0 0.1 false
+    speed_rate_per_s "1/s" 0.01 2.0 0.05 false
     "Relative change of speed per second above which the spindle counts as changing speed"
     feed_min_mm_min "mm/min" 0.0 100.0 0.5 false
     "Above this the feed counts as on"
@@ -136,7 +136,7 @@ settings! {
     "How long a missing input may last before the state becomes unknown"
     gap_s "s" 0.1 600.0 2.0 false
     "A longer pause between samples, or time running backwards, makes the detector begin anew; what it has learned stays"
-    learn_guard_s "s" 0.0 30.0 0.5 false
+    learn_guard_s "s" 0.0 30.0 0.3 false
     "How long the feed must have been off before, and stay off after, power that is learned as no-load power"
     relearn_up_s "s" 0.0 3600.0 10.0 false
     "How long power above the known no-load power must last with the feed off before it replaces it"

@@ -4,17 +4,35 @@ use super::filter::{AntiPulse, count};
 use super::inputs::Inputs;
 use super::noise::Noise;
 use super::settings::Settings;
-use super::window::Window;
+use super::window::{Means, Window};
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
 
-/// Speeds remembered to judge steadiness: four samples, 0.3 s at 10 Hz.
-const SPEEDS: usize = 4;
+/// Speeds remembered to judge whether a change of speed is over: 0.5 s at 10 Hz.
+const SPEEDS: usize = 6;
+
+/// Speeds looked at to notice a change: 0.3 s at 10 Hz.
+const LATEST_SPEEDS: usize = 4;
+
+/// A change of speed is over when the remembered speeds differ by less than this, relative: what remains accelerates
+/// masses with a few percent of no-load power.
+const SETTLED_SPEED: f64 = 0.003;
 
 /// Speed differences below this are the resolution of the display, rpm.
 const SPEED_RESOLUTION_RPM: f64 = 3.0;
 
-/// How much faster the speed may change while cutting: constant cutting speed (G96) drives it with the diameter.
+/// What the steadiness of the speed is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pace {
+    /// Before it may count as settled.
+    Settling,
+    /// While it idles.
+    Idling,
+    /// While cutting: constant cutting speed (G96) drives it with the diameter.
+    Cutting,
+}
+
+/// How much faster the speed may change in a cut than while idling.
 const CUTTING_RATE: f64 = 3.0;
 
 /// Is the feed on?
@@ -39,6 +57,8 @@ pub(super) struct Signals {
     fed_ns: Option<TimeNs>,
     worked_ns: Option<TimeNs>,
     last_ns: Option<TimeNs>,
+    /// Least filtered power since the speed is steady, W.
+    least_w: Option<f64>,
 }
 
 /// What has to begin anew at this tick.
@@ -62,6 +82,7 @@ impl Signals {
             fed_ns: None,
             worked_ns: None,
             last_ns: None,
+            least_w: None,
         }
     }
 
@@ -93,10 +114,24 @@ impl Signals {
     }
 
     /// Takes the power of a tick and returns the filtered one.
-    pub(super) fn push_power(&mut self, power_w: f64) -> Option<f64> {
+    pub(super) fn push_power(&mut self, power_w: f64, settings: &Settings) -> Option<f64> {
         let filtered_w = self.filter.push(power_w)?;
         self.window.push(filtered_w);
+        if self.steady(Pace::Settling, settings) == Some(true) {
+            self.least_w = Some(self.least_w.map_or(filtered_w, |least| least.min(filtered_w)));
+        } else {
+            self.least_w = None;
+        }
         Some(filtered_w)
+    }
+
+    /// The level a start has settled at, or a lower one that it passed before: power at a steady speed is never below
+    /// no-load power, so both are upper bounds.
+    pub(super) fn least_level_w(&self, means: Means, settings: &Settings) -> f64 {
+        let level_w = means.lower_w();
+        let noise = self.noise.sd() * self.filter.noise_gain();
+        let passed_w = self.least_w.map_or(level_w, |least| least * (1.0 + noise));
+        if passed_w < level_w * (1.0 - settings.c2_on.max(2.0 * self.noise.sd())) { passed_w } else { level_w }
     }
 
     /// Forgets the recent power and speed.
@@ -110,6 +145,7 @@ impl Signals {
         self.filter.clear();
         self.window.clear();
         self.noise.interrupt();
+        self.least_w = None;
     }
 
     fn push_speed(&mut self, inputs: &Inputs) {
@@ -123,19 +159,23 @@ impl Signals {
         }
     }
 
-    /// Does the spindle hold its speed? `None` until enough samples are in. `loaded` allows the drift of constant
-    /// cutting speed.
-    pub(super) fn steady(&self, loaded: bool, settings: &Settings) -> Option<bool> {
-        let known = &self.speeds[SPEEDS - self.speeds_seen..];
+    /// Does the spindle hold its speed? `None` until enough samples are in.
+    pub(super) fn steady(&self, pace: Pace, settings: &Settings) -> Option<bool> {
+        let wanted = if pace == Pace::Settling { SPEEDS } else { LATEST_SPEEDS };
+        let known = &self.speeds[SPEEDS - self.speeds_seen.min(wanted)..];
         let (least, greatest) =
             known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), (_, speed)| {
                 (least.min(*speed), greatest.max(*speed))
             });
         let span_s = seconds(known.first()?.0, known.last()?.0);
-        let rate = settings.speed_rate_per_s * if loaded { CUTTING_RATE } else { 1.0 };
-        let allowed_rpm = (rate * span_s * greatest.abs().max(least.abs())).max(SPEED_RESOLUTION_RPM);
+        let allowed = match pace {
+            Pace::Settling => SETTLED_SPEED,
+            Pace::Idling => settings.speed_rate_per_s * span_s,
+            Pace::Cutting => CUTTING_RATE * settings.speed_rate_per_s * span_s,
+        };
+        let allowed_rpm = (allowed * greatest.abs().max(least.abs())).max(SPEED_RESOLUTION_RPM);
         let unsteady = greatest - least > allowed_rpm;
-        if unsteady { Some(false) } else { (self.speeds_seen == SPEEDS).then_some(true) }
+        if unsteady { Some(false) } else { (known.len() == wanted).then_some(true) }
     }
 
     /// Gear stage in force.

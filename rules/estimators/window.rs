@@ -25,6 +25,14 @@ pub struct Means {
     pub newer_w: f64,
 }
 
+impl Means {
+    /// The lower one: a start-up decays, and a cut that has just begun raises the newer one.
+    #[must_use]
+    pub fn lower_w(self) -> f64 {
+        self.older_w.min(self.newer_w)
+    }
+}
+
 impl Window {
     /// Two windows of `length` values each.
     #[must_use]

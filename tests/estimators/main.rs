@@ -12,4 +12,5 @@ mod properties;
 mod score;
 #[path = "../support/scoring/mod.rs"]
 mod scoring;
+mod simulated;
 mod transitions;

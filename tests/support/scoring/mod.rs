@@ -122,6 +122,11 @@ impl Score {
         share(self.fed_false, self.other)
     }
 
+    /// Share of cutting seen minus share of other time called cutting: 1 is perfect, 0 is a guess (Youden).
+    pub(crate) fn judgement(&self) -> f64 {
+        self.cut_seen() - self.false_cut()
+    }
+
     /// Time between a true edge and the same edge of the detector, late or early, at this quantile, s.
     pub(crate) fn delay_s(&self, quantile: f64) -> f64 {
         at_quantile(&self.delays_s, quantile)

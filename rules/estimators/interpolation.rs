@@ -1,0 +1,210 @@
+//! No-load power between, and a little beyond, the known speeds of a gear stage.
+//!
+//! Law: quadratic Lagrange interpolation on three adjacent known speeds,
+//! `Pu(n) = sum_k Pu_k prod_(j != k) (n - n_j) / (n_k - n_j)`.
+//! Source: power separation on a lathe (CJK6136), equation 4.
+//! Choice of the three: they hold n between them, with the least sum of distances to n; a tie goes to the slower speeds
+//! (400 rpm among 200, 300, 500, 600 takes 200, 300, 500). A quadratic through a slope break errs, so the difference to
+//! the other choice counts as uncertainty. Where the speeds lie so unevenly that a quadratic would amplify noise, a
+//! straight line serves; two known speeds make a line, one serves only itself.
+
+use super::no_load::Stage;
+
+/// Within known speeds, a quadratic that amplifies noise more than this gives way to the straight line.
+const INSIDE_GAIN_LIMIT: f64 = 1.5;
+
+/// No-load power goes with this power of the speed where nothing better is known: dry friction 1, viscous 1.6 to 2.
+const EXPONENT: f64 = 1.3;
+
+/// Known speeds must span this logarithmic range to show an exponent of their own.
+const EXPONENT_SPAN: f64 = 0.2;
+
+/// Speeds to extrapolate from stand apart by this much in the logarithm.
+const APART: f64 = 0.1;
+
+/// An extrapolating quadratic that amplifies noise more than this gives way to the straight line, if that is calm.
+const NOISE_GAIN_OUTSIDE: f64 = 3.0 + 1e-9;
+
+/// Weights of the quadratic through three distinct speeds, at `speed_rpm`.
+#[must_use]
+pub fn lagrange(speeds_rpm: [f64; 3], speed_rpm: f64) -> [f64; 3] {
+    let [a, b, c] = speeds_rpm;
+    let n = speed_rpm;
+    [
+        (n - b) * (n - c) / ((a - b) * (a - c)),
+        (n - a) * (n - c) / ((b - a) * (b - c)),
+        (n - a) * (n - b) / ((c - a) * (c - b)),
+    ]
+}
+
+/// By how much weights amplify independent noise: the root of the sum of their squares.
+#[must_use]
+pub fn noise_gain(weights: &[f64]) -> f64 {
+    weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt()
+}
+
+/// Position of the first of the three adjacent speeds to use, among at least three ascending ones.
+#[must_use]
+pub fn triple(speeds_rpm: &[f64], speed_rpm: f64) -> usize {
+    let distance = |first: usize| speeds_rpm[first..first + 3].iter().map(|s| (s - speed_rpm).abs()).sum::<f64>();
+    let mut best = 0;
+    for first in 1..speeds_rpm.len().saturating_sub(2) {
+        if distance(first) < distance(best) {
+            best = first;
+        }
+    }
+    best
+}
+
+/// Weights on known powers, by position.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weights {
+    pub(super) at: [usize; 3],
+    pub(super) weight: [f64; 3],
+}
+
+impl Weights {
+    pub(super) fn one(at: usize, weight: f64) -> Self {
+        Self { at: [at; 3], weight: [weight, 0.0, 0.0] }
+    }
+
+    fn line(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
+        Self::through(speeds_rpm, [first, first + 1], n)
+    }
+
+    fn through(speeds_rpm: &[f64], [first, second]: [usize; 2], n: f64) -> Self {
+        let (a, b) = (speeds_rpm[first], speeds_rpm[second]);
+        let share = (n - a) / (b - a);
+        Self { at: [first, second, first], weight: [1.0 - share, share, 0.0] }
+    }
+
+    fn quadratic(speeds_rpm: &[f64], first: usize, n: f64) -> Self {
+        let three = [speeds_rpm[first], speeds_rpm[first + 1], speeds_rpm[first + 2]];
+        Self { at: [first, first + 1, first + 2], weight: lagrange(three, n) }
+    }
+
+    pub(super) fn calm(&self) -> bool {
+        noise_gain(&self.weight) <= INSIDE_GAIN_LIMIT
+    }
+
+    pub(super) fn of(&self, powers_w: &[f64]) -> f64 {
+        self.at.iter().zip(self.weight).map(|(at, weight)| powers_w[*at] * weight).sum()
+    }
+}
+
+impl Stage {
+    /// Weights for `n` and those of another form, whose difference is the doubt in the interpolation itself.
+    pub(super) fn forms(&self, n: f64) -> Option<(Weights, Weights)> {
+        let speeds = &self.speeds_rpm;
+        let interval = speeds.partition_point(|known| *known < n).saturating_sub(1).min(self.len().checked_sub(2)?);
+        let line = Weights::line(speeds, interval, n);
+        if self.len() == 2 {
+            return Some((line, self.by_law(n)));
+        }
+        if !self.inside(n) {
+            return self.outside_forms(n);
+        }
+        // Both triples that hold the interval, the nearer one first; a tie goes to the slower speeds.
+        let last = self.len() - 3;
+        let (low, high) = (interval.saturating_sub(1), interval.min(last));
+        let nearer = low + triple(&speeds[low..high + 3], n);
+        let further = low + high - nearer;
+        let calm = |first: usize| Some(Weights::quadratic(speeds, first, n)).filter(Weights::calm);
+        match (calm(nearer), calm(further).filter(|_| further != nearer)) {
+            (Some(quadratic), other) => Some((quadratic, other.unwrap_or(line))),
+            (None, Some(quadratic)) => Some((quadratic, line)),
+            (None, None) => Some((line, self.by_law(n))),
+        }
+    }
+
+    /// Beyond the known speeds: the last three that stand well apart, or two of them where the quadratic would amplify
+    /// noise and the step is short.
+    fn outside_forms(&self, n: f64) -> Option<(Weights, Weights)> {
+        let (speeds, last) = (&self.speeds_rpm, self.len() - 1);
+        let inward = |k: usize| if n > speeds[last] { last.checked_sub(k) } else { Some(k).filter(|k| *k <= last) };
+        let apart = |from: usize, at: usize| (speeds[at] / speeds[from]).ln().abs() >= APART;
+        let first = inward(0)?;
+        let next = |after: usize| {
+            (1..=last).filter_map(inward).find(|at| {
+                let beyond = (speeds[*at] - speeds[after]).signum() != (n - speeds[first]).signum();
+                beyond && apart(after, *at)
+            })
+        };
+        let Some(second) = next(first) else {
+            return Some((Weights::quadratic(speeds, triple(speeds, n), n), self.by_law(n)));
+        };
+        let line = Weights::through(speeds, [first, second], n);
+        let quadratic = match next(second) {
+            Some(third) => {
+                Weights { at: [first, second, third], weight: lagrange([first, second, third].map(|at| speeds[at]), n) }
+            }
+            None => Weights::quadratic(speeds, triple(speeds, n), n),
+        };
+        if noise_gain(&quadratic.weight) > NOISE_GAIN_OUTSIDE && line.calm() {
+            return Some((line, self.by_law(n)));
+        }
+        Some((quadratic, line))
+    }
+
+    /// Position of the known speed nearest in ratio, and the logarithm of that ratio.
+    pub(super) fn nearest(&self, n: f64) -> Option<(usize, f64)> {
+        let distance = |at: usize| (self.speeds_rpm[at] / n).ln().abs();
+        let ratios = (0..self.len()).map(|at| (at, distance(at)));
+        ratios.min_by(|(_, a), (_, b)| a.total_cmp(b))
+    }
+
+    /// A power law through the nearest known power, with the exponent that the slowest and fastest known speeds show.
+    pub(super) fn by_law(&self, n: f64) -> Weights {
+        let Some((nearest, _)) = self.nearest(n) else { return Weights::one(0, 0.0) };
+        let last = self.len() - 1;
+        let span = (self.speeds_rpm[last] / self.speeds_rpm[0]).ln();
+        let shown = (self.powers_w[last] / self.powers_w[0]).ln() / span;
+        let exponent = if span > EXPONENT_SPAN { shown.clamp(0.5, 2.5) } else { EXPONENT };
+        Weights::one(nearest, (n / self.speeds_rpm[nearest]).powf(exponent))
+    }
+
+    pub(super) fn inside(&self, n: f64) -> bool {
+        self.speeds_rpm.first().is_some_and(|first| *first <= n)
+            && self.speeds_rpm.last().is_some_and(|last| n <= *last)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stage(points: &[(f64, f64)]) -> Stage {
+        let mut stage = Stage::default();
+        stage.speeds_rpm.extend(points.iter().map(|(speed, _)| speed));
+        stage.powers_w.extend(points.iter().map(|(_, power)| power));
+        stage
+    }
+
+    #[test]
+    fn speeds_that_lie_close_together_do_not_amplify_noise() {
+        let speeds = [1200.0, 1230.0, 1260.0, 1300.0, 1600.0];
+        let known = stage(&speeds.map(|speed| (speed, speed / 2.0)));
+        for n in [1100.0, 1215.0, 1245.0, 1280.0, 1350.0, 1450.0, 1550.0] {
+            let (weights, other) = known.forms(n).expect("five speeds");
+            assert!(noise_gain(&weights.weight) <= INSIDE_GAIN_LIMIT, "{n}: {weights:?}");
+            assert!((weights.of(&known.powers_w) - n / 2.0).abs() < 1e-9, "{n}: a straight line stays one");
+            assert!(other.of(&known.powers_w) > 0.0);
+        }
+        let (far, _) = known.forms(1000.0).expect("five speeds");
+        assert!(noise_gain(&far.weight) > 3.0, "too far for a straight line: the table refuses");
+    }
+
+    #[test]
+    fn the_triple_holds_the_speed_between_its_own() {
+        let known = stage(&[(1200.0, 700.0), (1240.0, 710.0), (1280.0, 720.0), (1600.0, 1000.0)]);
+        let (weights, _) = known.forms(1330.0).expect("four speeds");
+        let used: Vec<f64> = weights.at.iter().map(|at| known.speeds_rpm[*at]).collect();
+        assert!(used.contains(&1280.0) && used.contains(&1600.0), "{used:?}");
+    }
+
+    #[test]
+    fn one_speed_serves_only_itself() {
+        assert!(stage(&[(600.0, 400.0)]).forms(700.0).is_none());
+        assert!(stage(&[]).forms(700.0).is_none());
+    }
+}

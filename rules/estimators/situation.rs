@@ -1,0 +1,85 @@
+//! What the inputs of a tick say before any estimation.
+
+use super::estimate::{NoEstimate, NoLoadOrigin};
+use super::inputs::Inputs;
+use super::no_load::NoLoad;
+use super::settings::Settings;
+use super::signals::{Feed, Signals};
+use adapters::{Absence, ChannelId};
+
+/// Everything the detector looks at in one tick.
+pub(super) struct Tick<'a> {
+    pub(super) inputs: &'a Inputs,
+    pub(super) signals: &'a Signals,
+    pub(super) settings: &'a Settings,
+    pub(super) filtered_w: Option<f64>,
+    /// No-load power at this speed, or why there is none.
+    pub(super) no_load: Result<NoLoad, NoEstimate>,
+}
+
+/// What the inputs say before any estimation.
+pub(super) enum Situation {
+    Off,
+    Rest,
+    Turning,
+    Missing(NoEstimate),
+}
+
+impl Tick<'_> {
+    pub(super) fn feed(&self) -> Feed {
+        self.signals.feed(self.inputs, self.settings)
+    }
+
+    pub(super) fn powered(&self) -> Option<bool> {
+        self.inputs.total.ok().map(|total| total.abs() >= self.settings.off_power_w)
+    }
+
+    /// `powered_before` keeps a single pulse of the meter from switching the machine on.
+    pub(super) fn situation(&self, crossing_zero: bool, powered_before: bool) -> Situation {
+        let no_power = self.powered() == Some(false);
+        let meter_is_on = self.powered() == Some(true) && powered_before;
+        match self.inputs.speed {
+            Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
+            Err(Absence::MachineOff) => Situation::Off,
+            Err(_) if no_power => Situation::Off,
+            Err(absence) => missing("spindle_speed_rpm", absence),
+            Ok(speed) if speed.abs() < self.settings.spindle_min_rpm && !crossing_zero => {
+                if no_power {
+                    Situation::Off
+                } else {
+                    Situation::Rest
+                }
+            }
+            Ok(_) if no_power => Situation::Missing(NoEstimate::Contradiction),
+            Ok(_) => match (self.inputs.power, self.inputs.stage) {
+                (Err(absence), _) => missing("spindle_power_w", absence),
+                (_, Err(absence)) => missing("gear_stage", absence),
+                _ => Situation::Turning,
+            },
+        }
+    }
+
+    /// Excess over no-load power above which a load counts as visible, W.
+    pub(super) fn visible_excess_w(&self) -> Option<f64> {
+        self.no_load.ok().map(|no_load| visible_excess_w(no_load, self.signals, self.settings))
+    }
+
+    /// Excess over no-load power below which a load has ended, W.
+    pub(super) fn ending_excess_w(&self) -> Option<f64> {
+        let share = (self.settings.c2_off / self.settings.c2_on).min(1.0);
+        self.visible_excess_w().map(|excess_w| share * excess_w)
+    }
+}
+
+/// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
+pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
+    let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
+    // An error of interpolation stays as long as the speed; drift of a measured power is corrected at the next chance.
+    let doubt = if no_load.origin == NoLoadOrigin::Measured { 1.0 } else { 2.0 };
+    (relative * no_load.power_w).max(doubt * no_load.sd_w)
+}
+
+fn missing(channel: &str, absence: Absence) -> Situation {
+    let reason = |channel| NoEstimate::Input { channel, absence };
+    Situation::Missing(ChannelId::of(channel).map_or(NoEstimate::NotYet, reason))
+}

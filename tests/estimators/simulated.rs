@@ -1,0 +1,91 @@
+//! Scored on the built-in simulated machine, side by side with the plain reading of the source:
+//! `cargo test --release --test estimators -- --ignored --nocapture simulated` (20 seeds; two run by default).
+//!
+//! It is hard on a detector: most speeds are never run without feed, bearings warm up all the time, meter pulses of either
+//! sign last longer than a tick, and slow spindles cut before their power has settled.
+
+use crate::plain_reading::PlainReading;
+use crate::score::{assert_better, header, line};
+use crate::scoring::{Judged, Score};
+use adapters::clock::SECOND_NS;
+use adapters::merge::{Delay, Lockstep};
+use adapters::simulated::{CutLevel, Simulated, SimulatedSettings};
+use adapters::{ChannelId, Sample};
+use rules::estimators::{Pipeline, Settings, State};
+
+const SCENARIOS: [(&str, f64, f64, bool, f64); 8] = [
+    ("fast start, heavy cuts", 0.3, 0.8, false, 0.0),
+    ("slow start, heavy cuts", 2.0, 0.8, false, 0.0),
+    ("fast start, cuts of 5 %", 0.3, 0.05, false, 0.0),
+    ("slow start, cuts of 5 %", 2.0, 0.05, false, 0.0),
+    ("speed changes, fast", 0.3, 0.4, true, 0.0),
+    ("speed changes, slow", 2.0, 0.4, true, 0.0),
+    ("dropouts, heavy cuts", 0.3, 0.8, false, 60.0),
+    ("dropouts, slow, 5 %", 2.0, 0.05, true, 60.0),
+];
+
+fn settings(
+    (_, tau_s, share, speed_changes, dropouts_per_h): (&str, f64, f64, bool, f64),
+    seed: u64,
+) -> SimulatedSettings {
+    let mut settings = SimulatedSettings { seed, tau_s, speed_changes, ..SimulatedSettings::default() };
+    settings.cut = CutLevel::OfNoLoad(share);
+    settings.meter.dropouts_per_h = dropouts_per_h;
+    settings
+}
+
+fn run(settings: SimulatedSettings, course_s: i64) -> (Vec<Judged>, Vec<Judged>) {
+    let machine = Simulated::new("simulated://lathe", settings, 0);
+    let sources: Vec<Box<dyn adapters::Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
+    let mut merge = Lockstep::new(sources, Delay::default());
+    let (mut product, mut plain) = (Pipeline::new(Settings::default()), PlainReading::new());
+    let mut sample = Sample::empty(0);
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));
+    for tick in 10..course_s * 10 {
+        merge.sample_into(&mut sample, tick * SECOND_NS / 10);
+        let truth = machine.truth(sample.at_ns);
+        let state = State::from_word(truth.state.word()).expect("the same words");
+        let absent = inputs.iter().any(|channel| sample.number(*channel).is_err());
+        let estimates = *product.infer(&sample);
+        plain.step(&sample);
+        let judged = |said, said_no_load_w| Judged {
+            time_s: sample.at_ns as f64 / SECOND_NS as f64,
+            truth: state,
+            said,
+            missing: absent && state != State::Off,
+            true_no_load_w: truth.no_load_power_w,
+            said_no_load_w,
+        };
+        ours.push(judged(estimates.state, estimates.no_load_power_w.ok().map(|estimate| estimate.value)));
+        theirs.push(judged(plain.state, plain.no_load_w));
+    }
+    (ours, theirs)
+}
+
+/// Courses of `course_s` seconds: power-up, warm-up and several parts.
+fn score(seeds: u64, course_s: i64) {
+    header(&format!("simulated lathe, {seeds} courses of {} min each", course_s / 60));
+    for scenario in SCENARIOS {
+        let (mut product, mut plain) = (Score::default(), Score::default());
+        for seed in 1..=seeds {
+            let (ours, theirs) = run(settings(scenario, seed), course_s);
+            product.add(&ours);
+            plain.add(&theirs);
+        }
+        line(scenario.0, "product", &product);
+        line("", "plain", &plain);
+        assert_better(scenario.0, &product, &plain);
+    }
+}
+
+#[test]
+fn simulated_machine_scored_on_two_seeds() {
+    score(2, 1200);
+}
+
+#[test]
+#[ignore = "20 seeds of every scenario: about a minute in release"]
+fn simulated_machine_scored_on_twenty_seeds() {
+    score(20, 2400);
+}
