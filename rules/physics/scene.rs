@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use thiserror::Error;
 
+/// Relative change of the spindle speed from one row to the next that starts a new pass.
+const PASS_JUMP: f64 = 0.05;
+
 /// The parts that columns play for the effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
@@ -217,15 +220,22 @@ impl Scene {
         }
     }
 
-    /// Stretches with the tool in the work, within a run.
+    /// Stretches with the tool in the work, within a run; a jump of the spindle speed while engaged (surface speed held
+    /// on another diameter) starts a new one.
     fn find_passes(&self) -> Vec<Range<usize>> {
         let Some(engaged) = self.role(Role::Engaged) else { return Vec::new() };
+        let speed = self.role(Role::Speed);
+        let jumps = |row: usize| speed.is_some_and(|n| (n[row] - n[row - 1]).abs() > PASS_JUMP * n[row - 1].abs());
         let mut passes: Vec<Range<usize>> = Vec::new();
         for run in &self.runs {
             let mut start = None;
             for row in run.clone() {
                 match (engaged[row] > 0.5, start) {
                     (true, None) => start = Some(row),
+                    (true, Some(first)) if jumps(row) => {
+                        passes.push(first..row);
+                        start = Some(row);
+                    }
                     (false, Some(first)) => {
                         passes.push(first..row);
                         start = None;

@@ -51,13 +51,25 @@ pub struct Design {
 #[must_use]
 pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
     let mut all = Vec::new();
+    let recursive = reads_output(model);
     for effect in CATALOGUE {
-        if wanted(*effect, model) {
+        let shifts_time = ["clock_lag", "meter_window"].contains(&effect.doc().kind);
+        if wanted(*effect, model) && !(recursive && shifts_time) {
             all.extend(effect.forms(scene).iter().filter_map(|form| design(*effect, form, scene, frame)));
         }
     }
     all.extend(model.hypotheses.iter().filter_map(|part| hypothesis(part, scene, frame)));
     all
+}
+
+/// Does the model predict the output from its own past? Then a shift in time explains anything and means nothing.
+fn reads_output(model: &Model) -> bool {
+    let reads = |part: &Part| match &part.body {
+        Body::Linear(terms) => terms.iter().any(|term| term.input() == Some(model.output.as_str())),
+        Body::Expression(expression) => expression.inputs().contains(&model.output),
+        _ => false,
+    };
+    model.parts.iter().any(reads)
 }
 
 fn wanted(effect: &dyn Effect, model: &Model) -> bool {

@@ -6,6 +6,7 @@ use super::gate::p_value;
 use super::model::Part;
 use super::noise::count;
 use super::scan::{Bank, Score, price};
+use crate::physics::{OutputKind, Scene};
 
 /// Effects that may be found at once.
 const EFFECTS_MAX: usize = 4;
@@ -156,6 +157,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
+        if !fit.parts[self.base.parts.len()..].iter().all(|part| plausible(part, &fit.parts, self.data.scene)) {
+            return None;
+        }
         let prices: f64 = members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum();
         let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - prices;
         information.is_finite().then_some(Hypothesis { members, fit, information })
@@ -200,4 +204,27 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         best
     }
+}
+
+/// Could this part be what its name says, beside the others? A lag below a quarter of the sampling period cannot be
+/// resolved; a lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess
+/// over dry friction at creep speed.
+fn plausible(part: &Part, beside: &[Part], scene: &Scene) -> bool {
+    let value = |name: &str| part.parameter(name).map(|parameter| parameter.value);
+    let resolved = |name: &str| value(name).is_none_or(|seconds| seconds.abs() >= 0.25 * scene.period_s());
+    let acts = value("share").is_none_or(|share| share.abs() >= 0.2);
+    match part.kind.as_str() {
+        "clock_lag" | "engagement_timing" | "override_delay" => resolved("delay_s") && acts,
+        "meter_window" => resolved("window_s") && acts,
+        "saturation" => acts,
+        "stribeck" if scene.output_kind() == OutputKind::Force => has_dry_friction(beside),
+        _ => true,
+    }
+}
+
+fn has_dry_friction(parts: &[Part]) -> bool {
+    parts.iter().any(|part| {
+        let sign = |parameter: &super::model::Parameter| parameter.name.starts_with("sign(");
+        part.kind == "dry_friction" || part.parameters.iter().any(sign)
+    })
 }

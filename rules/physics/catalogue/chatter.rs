@@ -1,6 +1,6 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
-use crate::physics::cut::{cut_times, cutting_rows};
+use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::quantile;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
@@ -56,7 +56,7 @@ impl Effect for Chatter {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(depth) = scene.column("depth_of_cut_mm") else { return Vec::new() };
+        let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| cut(scene).is_some()) else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let depths = || depth.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(depth, _)| *depth);
         let limits = [0.4, 0.55, 0.7, 0.85].into_iter().filter_map(|share| quantile(depths(), share));

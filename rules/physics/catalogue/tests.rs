@@ -14,7 +14,7 @@ const PUBLIC: &str = "no_load_power cutting_power load_loss offset copper_loss i
     clock_lag meter_window saturation engagement_timing recipe_error constant_load_control override_delay";
 
 /// Kinds whose forms another part finds (the scatter, a search over frequencies) or that need more than 1 Hz.
-const WITHOUT_FORMS: [&str; 3] = ["chatter", "ripple_alias", "runout"];
+const WITHOUT_FORMS: [&str; 2] = ["ripple_alias", "runout"];
 
 pub(super) fn set(recording: &mut Recording, name: &str, law: impl Fn(usize) -> f64) {
     let values = (0..recording.rows()).map(law).collect();
