@@ -82,6 +82,8 @@ pub(crate) enum Expect {
     Nothing,
     /// Real, and in no catalogue.
     Unknown,
+    /// In no catalogue, but a listed law follows it as closely as the noise allows: that name is no mistake.
+    Near,
 }
 
 impl Expect {
@@ -91,6 +93,7 @@ impl Expect {
             Self::Class => "class",
             Self::Nothing => "nothing",
             Self::Unknown => "unknown",
+            Self::Near => "near",
         }
     }
 }
@@ -137,6 +140,11 @@ pub(crate) struct Case {
 }
 
 impl Case {
+    /// Planted in a real recording, which has missing physics of its own and no clean output.
+    pub(crate) fn injected(&self) -> bool {
+        self.clean.is_empty()
+    }
+
     /// Recorded minus clean output of the rows that were neither spoilt nor missing.
     pub(crate) fn noise_of_rows(&self) -> Vec<f64> {
         let Some((_, Column::Number(output, _))) = self.table.columns.last() else { return Vec::new() };

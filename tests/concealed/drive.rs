@@ -195,12 +195,12 @@ fn part(name: &'static str, form: &'static str, contribution: Vec<f64>) -> Part 
 fn dry(dice: &mut Dice, ride: &Ride, _: &[f64]) -> Part {
     let (force, creep, wave) = (dice.uniform(14.0, 30.0), dice.uniform(0.0006, 0.002), dice.uniform(0.0, 6.0));
     let law = |x: f64, v: f64, _| force * (v / creep).tanh() * (1.0 + 0.04 * (9.0 * x + wave).sin());
-    Part { parameters: vec![("dry_friction_n", force)], ..part("dry_friction", "hyperbolic tangent", ride.force(law)) }
+    Part { parameters: vec![("level", force)], ..part("dry_friction", "hyperbolic tangent", ride.force(law)) }
 }
 
 fn offset(dice: &mut Dice, ride: &Ride, _: &[f64]) -> Part {
     let force = dice.sign() * dice.uniform(5.0, 20.0);
-    Part { parameters: vec![("offset_n", force)], ..part("offset", "constant", ride.force(|_, _, _| force)) }
+    Part { parameters: vec![("level", force)], ..part("offset", "constant", ride.force(|_, _, _| force)) }
 }
 
 /// Another level forwards than backwards, none at rest.

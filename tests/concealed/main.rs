@@ -104,12 +104,23 @@ fn effects_have_the_wished_size() {
 fn campaign() {
     let threads = std::env::var("CONCEALED_THREADS").ok().and_then(|t| t.parse().ok()).unwrap_or(2);
     let outcomes = score::run(&wanted("10"), threads);
+    println!("{}", score::headline::table(&outcomes));
     println!("{}", score::tally::table(&outcomes));
     println!("{}", score::tally::by_effect(&outcomes));
-    println!("{}", real::table());
-    println!("{}", score::endurance::million_rows());
+    if std::env::var("CONCEALED_FILTER").is_err() {
+        println!("{}", real::table());
+        println!("{}\n", score::endurance::long_recordings());
+    }
     println!("not right, kept below {}:", score::tool::workshop().0.display());
     println!("{}", score::tally::failures(&outcomes));
+}
+
+/// Real machines with withheld truth, and long recordings.
+#[test]
+#[ignore = "minutes; run with --ignored --nocapture real_machines"]
+fn real_machines() {
+    println!("{}", real::table());
+    println!("{}", score::endurance::long_recordings());
 }
 
 /// Floors that every build must reach on a few cases of every kind.

@@ -1,6 +1,7 @@
 //! Disturbance of the meter. None of it is Gaussian ARMA(1,1) with the parameters a tool might assume.
 
 use crate::dice::Dice;
+use crate::least_squares::{mean, rms};
 
 /// A kind of disturbance.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -155,12 +156,14 @@ fn heavy(moments: &[Moment], dice: &mut Dice) -> Vec<f64> {
     moments.iter().map(step).collect()
 }
 
-/// The nominal law itself is wrong by 0.4 % rms of the output.
+/// The nominal law itself is wrong: by 0.4 % of the mean output, root mean square.
 fn wiggle(moments: &[Moment], values: &mut [Option<f64>], dice: &mut Dice) {
     let (wave_rpm, phase, feed) = (dice.uniform(500.0, 1100.0), dice.uniform(0.0, 6.3), dice.uniform(1.0, 2.5));
+    let clean: Vec<f64> = moments.iter().map(|m| m.clean).collect();
+    let size = 0.004 * std::f64::consts::SQRT_2 * mean(&clean) / rms(&clean).max(1e-12);
     for (m, v) in moments.iter().zip(values) {
         let angle = std::f64::consts::TAU * m.speed_rpm / wave_rpm + feed * m.ln_thickness + phase;
-        *v = v.map(|v| v + 0.004 * std::f64::consts::SQRT_2 * m.clean * angle.sin());
+        *v = v.map(|v| v + size * m.clean * angle.sin());
     }
 }
 

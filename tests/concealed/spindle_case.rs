@@ -89,7 +89,8 @@ impl Wish {
         let loudest = NOISE_SHARE.1 * level;
         let (mut low, mut high) = (least * level, loudest);
         if laws.is_empty() || self.rho == 0.0 {
-            return self.swallowed(stage, laws, level * dice.log_uniform(0.006, 0.035));
+            let least = if self.noise == Noise::Dirty { 0.016 } else { 0.006 };
+            return self.swallowed(stage, laws, level * dice.log_uniform(least, 0.035));
         }
         let mut units = Vec::new();
         for law in &laws {
@@ -146,6 +147,9 @@ impl Wish {
         for (value, &i) in spoiled.values.iter_mut().zip(&rows) {
             *value = value.map(|v| v + day.jitter_w[i] * unrest.normal());
         }
+        if laws.iter().any(|law| law.entry.name == "saturation") {
+            clip(&mut spoiled.values, &clean, sd, &mut unrest);
+        }
         let style = Style::draw(self, &mut dice("style"));
         let mut table = table(self, &style, stage, &record, &spoiled.values);
         if self.current {
@@ -172,7 +176,7 @@ impl Wish {
 
     /// Where another law of the generator follows the effect as closely as the noise allows, only a class is right.
     fn compare(&self, case: &mut Case, stage: &Stage, laws: &[Seeded], day: &Day, rows: &[usize], moments: &[Moment]) {
-        if self.expect != Expect::Named {
+        if !matches!(self.expect, Expect::Named | Expect::Unknown) {
             return;
         }
         for (i, one) in case.hidden.iter().enumerate() {
@@ -180,13 +184,20 @@ impl Wish {
             let span = case.tangent.iter().cloned().chain(others).collect();
             let (sd, noise, record) = (case.noise_sd, self.noise, day.record.as_slice());
             let court = Court { stage, laws, record, rows, span, remainder: &one.remainder, sd, noise, moments };
-            case.rivals.extend(court.rivals().into_iter().take(3));
+            let rivals = court.rivals().into_iter().enumerate();
+            case.rivals.extend(rivals.filter(|(k, r)| *k < 3 || r.evidence < ENOUGH).map(|(_, r)| r));
         }
         if case.rivals.iter().any(|rival| rival.evidence < ENOUGH) {
-            case.expect = Expect::Class;
+            case.expect = if self.expect == Expect::Unknown { Expect::Near } else { Expect::Class };
             case.group = format!("alike-{}", case.group);
         }
     }
+}
+
+/// An input that is full passes neither signal nor noise; a little of the converter's own noise remains.
+fn clip(values: &mut [Option<f64>], clean: &[f64], sd: f64, dice: &mut Dice) {
+    let ceiling = clean.iter().copied().fold(f64::MIN, f64::max);
+    values.iter_mut().for_each(|value| *value = value.map(|v| v.min(ceiling) + 0.05 * sd * dice.normal()));
 }
 
 fn moments(process: Process, record: &[Tick], clean: &[f64]) -> Vec<Moment> {

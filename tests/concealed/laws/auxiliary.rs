@@ -35,6 +35,7 @@ pub(crate) fn conveyor(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         }
         Terms::power(if on { strength * on_w } else { 0.0 })
     })
+    .with("level", strength * on_w)
 }
 
 /// Friction of the feed axis: a tangent through zero and a bent viscous part.
@@ -84,5 +85,5 @@ pub(crate) fn gravity(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
         let power_w = kg * 9.81 * s.tick.velocity_mm_min / 60_000.0;
         Terms::power(strength * if power_w > 0.0 { power_w } else { returned * power_w })
     })
-    .with("weight_n", strength * kg * 9.81)
+    .with("weight", strength * kg * 9.81)
 }

@@ -26,7 +26,6 @@ fn delayed(ticks: &[Tick], power: &[f64], delay_s: impl Fn(f64) -> f64) -> Vec<f
 pub(crate) fn lag(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (delay_s, ppm) = (strength * dice.uniform(0.5, 1.6), dice.uniform(-100.0, 100.0));
     Planted::meter(move |ticks, power| delayed(ticks, power, |t| (delay_s + ppm * 1e-6 * t).max(0.0)))
-        .with("lag_s", delay_s)
 }
 
 /// The meter's answer is always the same time old.
@@ -50,7 +49,6 @@ pub(crate) fn boxcar(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
             })
             .collect()
     })
-    .with("window_s", steps as f64 * STEP_S)
 }
 
 /// Two first-order filters in a row, as in a transducer with a damped output.
@@ -104,6 +102,7 @@ pub(crate) fn gain_step(dice: &mut Dice, plan: &Plan, strength: f64) -> Planted 
         let factor = |run: usize| if run >= from { 1.0 + strength * gain } else { 1.0 };
         ticks.iter().zip(power).map(|(tick, p)| p * factor(tick.run)).collect()
     })
+    .with("gain", strength * gain)
 }
 
 /// A gain that was always wrong: the refit of the nominal law takes all of it.
@@ -127,7 +126,7 @@ pub(crate) fn supply(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     Planted::meter(move |ticks, power| {
         ticks.iter().zip(power).map(|(tick, p)| p * (tick.supply_v / 400.0).powf(exponent)).collect()
     })
-    .with("supply_exponent", exponent)
+    .with("exponent", exponent)
 }
 
 /// Power that follows the mains at the fans and the drive's own supply more than in the cut.

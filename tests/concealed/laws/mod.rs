@@ -117,7 +117,7 @@ fn of_the_record() -> Vec<Entry> {
         new("saturation", "ceiling", meters::ceiling).reach(0.4, 2.5),
         new("saturation", "soft ceiling", meters::soft_ceiling).reach(0.4, 2.5),
         new("engagement_timing", "flag late or early", record::engagement_timing).reach(0.4, 1.3),
-        new("engagement_timing", "late at the exit", record::late_exit).reach(0.4, 1.3),
+        new("engagement_timing", "debounced", record::debounced_flag).reach(0.4, 1.3),
         new("recipe_error", "depth of one operation", record::wrong_depth).reach(0.5, 1.6).columns(&["operation"]),
         new("recipe_error", "edited offset", record::edited_offset).reach(0.4, 1.6).columns(&["operation"]),
         new("override_delay", "delay and lag", record::override_delay).needs(OVERRIDES).reach(0.6, 1.4),

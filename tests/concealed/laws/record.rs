@@ -23,22 +23,27 @@ pub(crate) fn engagement_timing(dice: &mut Dice, _: &Plan, strength: f64) -> Pla
             }
         }
     })
-    .with("engagement_late_s", steps as f64 * STEP_S)
+    .with("late_s", steps as f64 * STEP_S)
 }
 
-/// The flag is on time at the entry and stays on too long at the exit.
-pub(crate) fn late_exit(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
-    let steps = (strength * dice.uniform(1.0, 3.0) / STEP_S).round() as usize;
+/// The flag passes a debounce of the controller: late on and later off, by times of its own.
+pub(crate) fn debounced_flag(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
+    let on_s = strength * dice.uniform(0.8, 1.6);
+    let (on, off) = ((on_s / STEP_S) as usize, (on_s * dice.uniform(1.0, 1.5) / STEP_S) as usize);
     Planted::clerk(move |world, record| {
-        let mut last: Option<usize> = None;
+        let (mut counted, mut flag, mut cut) = (0, false, Tick::default());
         for i in 0..world.len() {
             if world[i].engaged {
-                last = Some(i);
-            } else if let Some(end) = last.filter(|end| i - end <= steps && world[*end].run == world[i].run) {
-                record[i].engaged = true;
-                record[i].depth_mm = world[end].depth_mm;
-                record[i].feed_mm_rev = world[end].feed_mm_rev;
-                record[i].diameter_mm = world[end].diameter_mm;
+                cut = world[i];
+            }
+            counted = if world[i].engaged == flag { 0 } else { counted + 1 };
+            if counted > if flag { off } else { on } {
+                (flag, counted) = (!flag, 0);
+            }
+            record[i].engaged = flag;
+            if flag && !world[i].engaged {
+                (record[i].depth_mm, record[i].feed_mm_rev, record[i].diameter_mm) =
+                    (cut.depth_mm, cut.feed_mm_rev, cut.diameter_mm);
             }
         }
     })
@@ -65,7 +70,7 @@ pub(crate) fn wrong_depth(dice: &mut Dice, plan: &Plan, strength: f64) -> Plante
     Planted::clerk(move |_, record| {
         record.iter_mut().filter(|t| t.operation == operation).for_each(|t| t.depth_mm /= real);
     })
-    .with("recipe_factor", real)
+    .with("gain", real - 1.0)
 }
 
 /// The axis follows an override or a command behind time; the record holds the command.
@@ -85,7 +90,6 @@ pub(crate) fn override_delay(dice: &mut Dice, _: &Plan, strength: f64) -> Plante
             world[i].feed_mm_rev = if world[i].engaged { real } else { commanded };
         }
     })
-    .with("override_delay_s", delay_s)
 }
 
 /// Only the program's feed is recorded, while a controller changes the real one.

@@ -44,13 +44,22 @@ fn repeated(case: &Case, rows: usize) -> Case {
     long
 }
 
-/// One line: rows, seconds and what was said.
-pub(crate) fn million_rows() -> String {
+/// Lines of rows, seconds and what was said; a million rows only when a tenth of them took less than a tenth of a minute.
+pub(crate) fn long_recordings() -> String {
     let Some(case) = template() else { return "no template for the long recording".into() };
-    let long = repeated(&case, 1_000_000);
+    let (tenth, seconds) = timed(&case, 100_000);
+    if seconds > 6.0 {
+        return format!("{tenth}\n1000000 rows: not tried, a tenth of them took {seconds:.1} s");
+    }
+    format!("{tenth}\n{}", timed(&case, 1_000_000).0)
+}
+
+fn timed(case: &Case, rows: usize) -> (String, f64) {
+    let long = repeated(case, rows);
     let outcome = Outcome::of(&long, &tool::ask(&long));
     tool::discard(&long);
-    format!("{} rows in {:.1} s: {} -> {}", long.clean.len(), outcome.seconds, outcome.truth, outcome.said)
+    let line = format!("{} rows in {:.1} s: {} -> {}", long.clean.len(), outcome.seconds, outcome.truth, outcome.said);
+    (line, if outcome.broken { f64::INFINITY } else { outcome.seconds })
 }
 
 /// Whether the same question asked twice gives the same bytes; the reason when it does not.

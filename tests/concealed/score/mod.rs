@@ -3,6 +3,7 @@
 pub(crate) mod answer;
 mod checks;
 pub(crate) mod endurance;
+pub(crate) mod headline;
 pub(crate) mod outcome;
 pub(crate) mod tally;
 pub(crate) mod tool;

@@ -73,6 +73,7 @@ impl Outcome {
             Expect::Class => !self.reported || (self.gave_names && self.in_class),
             Expect::Nothing => !self.reported,
             Expect::Unknown => answer.verdict == "unexplained",
+            Expect::Near => !self.certain || answer.missing.iter().all(|m| near(case, &m.effect)),
         };
         self.judge_place(case, answer);
         self.judge_fit(case, answer);
@@ -86,7 +87,7 @@ impl Outcome {
         };
         self.named = match case.hidden.as_slice() {
             [] => false,
-            [one] => missing.first().is_some_and(|name| accepts(one, name)),
+            [one] if !case.injected() => missing.first().is_some_and(|name| accepts(one, name)),
             many => many.iter().all(|h| missing.iter().any(|name| accepts(h, name))),
         };
         self.in_class = !case.hidden.is_empty() && case.hidden.iter().all(class);
@@ -94,7 +95,10 @@ impl Outcome {
     }
 
     fn judge_place(&mut self, case: &Case, answer: &Answer) {
-        let claimed = answer.rows.effects();
+        let claimed = match case.hidden.first().filter(|_| case.injected()) {
+            Some(one) => answer.rows.filled(&format!("effect_{}", one.name)).unwrap_or_default(),
+            None => answer.rows.effects(),
+        };
         if !self.reported || case.hidden.iter().any(|h| h.contribution.len() != claimed.len()) || case.hidden.is_empty()
         {
             return;
@@ -147,6 +151,11 @@ fn truth(case: &Case) -> String {
     if names.is_empty() { "nothing".into() } else { names.join(" + ") }
 }
 
+/// Whether `name` follows the hidden effect as closely as the noise allows.
+fn near(case: &Case, name: &str) -> bool {
+    case.rivals.iter().any(|rival| rival.name == name && rival.evidence < crate::nearest::ENOUGH)
+}
+
 fn accepts(hidden: &Hiding, name: &str) -> bool {
     hidden.name == name || hidden.also.iter().any(|also| also == name)
 }
@@ -185,29 +194,30 @@ pub(crate) fn area(claimed: &[f64], truth: &[f64]) -> Option<f64> {
     (count > 0 && others > 0).then(|| (ranks - least) / (count as f64 * others as f64))
 }
 
-/// Parameters of the truth that an estimate of the same effect and unit exists for.
+/// Parameters of the truth, and the estimates of the same effect that state the same quantity.
+const SAME: [(&str, &[&str]); 8] = [
+    ("inertia_kg_m2", &["inertia_kg_m2"]),
+    ("lag_s", &["lag_s", "delay_s"]),
+    ("late_s", &["delay_s"]),
+    ("level", &["level"]),
+    ("weight", &["weight"]),
+    ("gain", &["gain"]),
+    ("exponent", &["exponent"]),
+    ("mass_kg", &["mass_kg", "per_m_s2"]),
+];
+
+/// Intervals that hold the true value, of all that can be compared.
 fn coverage(case: &Case, answer: &Answer) -> (usize, usize) {
     let mut covered = (0, 0);
     for hidden in &case.hidden {
         let Some(found) = answer.missing.iter().find(|m| accepts(hidden, &m.effect)) else { continue };
         for (name, value) in &hidden.parameters {
-            let unit = unit_of(name);
-            if let Some(e) = found.parameters.iter().find(|e| e.unit == unit) {
+            let names = SAME.iter().find(|(own, _)| own == name).map_or(&[][..], |(_, names)| names);
+            if let Some(e) = found.parameters.iter().find(|e| names.contains(&e.name.as_str())) {
                 covered.1 += 1;
                 covered.0 += usize::from(e.low <= *value && *value <= e.high);
             }
         }
     }
     covered
-}
-
-/// Unit in the writing of the diagnosis, from the last words of a true parameter's name.
-fn unit_of(name: &str) -> &'static str {
-    match name {
-        n if n.ends_with("_kg_m2") => "kg m2",
-        n if n.ends_with("_kg") => "kg",
-        n if n.ends_with("_s") => "s",
-        n if n.ends_with("_n") => "N",
-        _ => "1",
-    }
 }

@@ -1,8 +1,8 @@
 //! Runs the built binary as a child process on files that hold no truth.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Instant;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::case::Case;
 use crate::score::answer::Answer;
@@ -27,7 +27,8 @@ pub(crate) fn ask(case: &Case) -> Result<Answer, String> {
 pub(crate) fn diagnose(model: &Path, recordings: &[PathBuf], out: &Path) -> Result<Answer, String> {
     let (json, rows) = (out.join("diagnosis.json"), out.join("rows.csv"));
     let start = Instant::now();
-    let output = Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cnc-gateway"));
+    command
         .arg("diagnose")
         .arg("--model")
         .arg(model)
@@ -36,17 +37,37 @@ pub(crate) fn diagnose(model: &Path, recordings: &[PathBuf], out: &Path) -> Resu
         .arg("--json")
         .arg(&json)
         .arg("--rows")
-        .arg(&rows)
-        .output()
-        .map_err(|e| format!("the binary did not start: {e}"))?;
+        .arg(&rows);
+    let status = within(&mut command, &out.join("stderr.txt"))?;
     let seconds = start.elapsed().as_secs_f64();
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        let last: Vec<&str> = said.lines().take(3).collect();
-        return Err(format!("{}: {}", output.status, last.join(" / ")));
+    if !status.success() {
+        let said = std::fs::read_to_string(out.join("stderr.txt")).unwrap_or_default();
+        let first: Vec<&str> = said.lines().take(3).collect();
+        return Err(format!("{status}: {}", first.join(" / ")));
     }
     let read = |path: &Path| std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()));
     Answer::read(&read(&json)?, &read(&rows)?, seconds)
+}
+
+/// Longest that one question may take.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// Runs a child to its end, or stops it when it takes too long; what it complains of goes to `complaints`.
+fn within(command: &mut Command, complaints: &Path) -> Result<ExitStatus, String> {
+    let file = std::fs::File::create(complaints).map_err(|e| e.to_string())?;
+    let started = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(file).spawn();
+    let mut child = started.map_err(|e| format!("the binary did not start: {e}"))?;
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
+            return Ok(status);
+        }
+        if start.elapsed() > PATIENCE {
+            let stopped = child.kill().and_then(|()| child.wait());
+            return Err(format!("no answer within {} s ({stopped:?})", PATIENCE.as_secs()));
+        }
+        std::thread::sleep(Duration::from_millis(4));
+    }
 }
 
 /// Removes a case that needs no second look.
