@@ -1,5 +1,7 @@
 //! What this process costs: memory and processor time, from the system's own accounts.
 
+use std::time::Duration;
+
 /// Memory and processor time of this process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usage {
@@ -26,6 +28,14 @@ pub fn read() -> Option<Usage> {
 
 /// Linux reports processor time to user space in hundredths of a second on every architecture.
 const TICKS_PER_S: f64 = 100.0;
+
+/// Processor time of the calling thread so far; `None` where the system does not keep it. Unlike the time on the wall
+/// it does not count what other programs take.
+#[must_use]
+pub fn thread_cpu() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split(' ').next()?.parse().ok().map(Duration::from_nanos)
+}
 
 #[cfg(test)]
 mod tests {

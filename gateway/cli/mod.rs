@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
+mod bench;
 mod check;
 mod diagnose;
 mod effects;
@@ -78,6 +79,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Run recordings through the same pipeline as fast as possible.
     Replay(replay::ReplayArguments),
+    /// Measure how many ticks per second this computer can do, and what each stage costs.
+    Bench(bench::BenchArguments),
     /// Ask what the box remembers: query, export, info.
     History(history::HistoryArguments),
     /// Run a model over a recording's inputs.
@@ -106,6 +109,7 @@ pub fn main() -> ExitCode {
 fn dispatch(arguments: Arguments) -> CommandResult {
     match arguments.command.unwrap_or(Command::Run(arguments.run)) {
         Command::Run(run) => run::run(run),
+        Command::Bench(bench) => bench::run(&bench),
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),
         Command::History(history) => history::run(history),

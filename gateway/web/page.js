@@ -76,6 +76,7 @@ function showNow() {
   at("job").replaceChildren(...job.flatMap(([key, found]) => [make("dt", "", text(key)), make("dd", "", found.value)]));
   at("tiles").replaceChildren(...TILES.map(tile).filter(Boolean));
   at("clock").textContent = dateTime(status.at_ms);
+  at("clock").dataset.ms = status.at_ms;
   at("machine").textContent = status.machine;
   document.title = `${stateName(status.state.word)} · ${status.machine}`;
 }

@@ -9,29 +9,29 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// The program under test.
-pub fn program() -> Command {
+pub(crate) fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cnc-gateway"));
     command.env_remove("RUST_LOG");
     command
 }
 
 /// Runs the program to its end.
-pub fn run(arguments: &[&str]) -> Output {
+pub(crate) fn run(arguments: &[&str]) -> Output {
     program().args(arguments).output().expect("the program starts")
 }
 
 /// Standard output as text.
-pub fn stdout(output: &Output) -> String {
+pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// Standard error as text.
-pub fn stderr(output: &Output) -> String {
+pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Asks until `ready` gives something; fails after `limit`.
-pub fn wait_for<T>(what: &str, limit: Duration, mut ready: impl FnMut() -> Option<T>) -> T {
+pub(crate) fn wait_for<T>(what: &str, limit: Duration, mut ready: impl FnMut() -> Option<T>) -> T {
     let until = Instant::now() + limit;
     loop {
         if let Some(found) = ready() {
@@ -43,21 +43,21 @@ pub fn wait_for<T>(what: &str, limit: Duration, mut ready: impl FnMut() -> Optio
 }
 
 /// A running gateway; killed when dropped.
-pub struct Gateway {
+pub(crate) struct Gateway {
     child: Child,
     said: Arc<Mutex<Vec<String>>>,
 }
 
 impl Gateway {
     /// `run` in `data_dir` on a free port, with further arguments.
-    pub fn start(data_dir: &Path, arguments: &[&str]) -> Self {
+    pub(crate) fn start(data_dir: &Path, arguments: &[&str]) -> Self {
         let mut command = program();
         command.arg("run").arg("--data-dir").arg(data_dir).args(["--listen", "127.0.0.1:0"]).args(arguments);
         Self::spawn(command)
     }
 
     /// Any command; its lines are collected.
-    pub fn spawn(mut command: Command) -> Self {
+    pub(crate) fn spawn(mut command: Command) -> Self {
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
         let said = Arc::new(Mutex::new(Vec::new()));
         collect(child.stdout.take().expect("piped"), &said);
@@ -66,17 +66,17 @@ impl Gateway {
     }
 
     /// Process number.
-    pub fn pid(&self) -> u32 {
+    pub(crate) fn pid(&self) -> u32 {
         self.child.id()
     }
 
     /// Everything it has said so far.
-    pub fn said(&self) -> String {
+    pub(crate) fn said(&self) -> String {
         self.said.lock().expect("no panic in between").join("\n")
     }
 
     /// Waits for a line that holds `part`.
-    pub fn wait_said(&mut self, part: &str) -> String {
+    pub(crate) fn wait_said(&mut self, part: &str) -> String {
         wait_for(&format!("{part:?}; it said:\n{}", self.said()), Duration::from_secs(30), || {
             let said = self.said();
             if let Some(status) = self.child.try_wait().expect("a child") {
@@ -87,26 +87,27 @@ impl Gateway {
     }
 
     /// `127.0.0.1:PORT` of the page, from what it says.
-    pub fn address(&mut self) -> String {
+    pub(crate) fn address(&mut self) -> String {
         let line = self.wait_said("live page: http://");
         let (_, rest) = line.split_once("http://").expect("an address");
         rest.trim_end_matches('/').to_owned()
     }
 
     /// Sends a signal by name: `TERM`, `INT`, `HUP`, `KILL`.
-    pub fn signal(&self, name: &str) {
-        let sent = Command::new("kill").args([&format!("-{name}"), &self.pid().to_string()]).status().expect("kill runs");
+    pub(crate) fn signal(&self, name: &str) {
+        let sent =
+            Command::new("kill").args([&format!("-{name}"), &self.pid().to_string()]).status().expect("kill runs");
         assert!(sent.success());
     }
 
     /// Waits for its end.
-    pub fn wait(&mut self) -> ExitStatus {
+    pub(crate) fn wait(&mut self) -> ExitStatus {
         let child = &mut self.child;
         wait_for("the end of the process", Duration::from_secs(20), || child.try_wait().expect("a child"))
     }
 
     /// SIGTERM and a clean end.
-    pub fn stop(mut self) -> String {
+    pub(crate) fn stop(mut self) -> String {
         self.signal("TERM");
         let status = self.wait();
         assert!(status.success(), "ended with {status}:\n{}", self.said());
@@ -114,8 +115,13 @@ impl Gateway {
         self.said()
     }
 
+    /// Has it ended?
+    pub(crate) fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_some()
+    }
+
     /// SIGKILL.
-    pub fn kill(mut self) {
+    pub(crate) fn kill(mut self) {
         self.child.kill().expect("killed");
         self.child.wait().expect("a child");
     }
@@ -139,29 +145,29 @@ fn collect(stream: impl Read + Send + 'static, said: &Arc<Mutex<Vec<String>>>) {
 
 /// An answer.
 #[derive(Debug)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// Status code.
-    pub status: u16,
+    pub(crate) status: u16,
     /// Header lines.
-    pub head: String,
+    pub(crate) head: String,
     /// Body.
-    pub body: String,
+    pub(crate) body: String,
 }
 
 impl Answer {
     /// The body as JSON.
-    pub fn json(&self) -> serde_json::Value {
+    pub(crate) fn json(&self) -> serde_json::Value {
         serde_json::from_str(&self.body).unwrap_or_else(|error| panic!("{error}: {}", self.body))
     }
 }
 
 /// `GET path` at `address`.
-pub fn get(address: &str, path: &str) -> Answer {
+pub(crate) fn get(address: &str, path: &str) -> Answer {
     request(address, &format!("GET {path} HTTP/1.0\r\nHost: {address}\r\n\r\n"))
 }
 
 /// Sends a request as it is and reads until the server closes.
-pub fn request(address: &str, text: &str) -> Answer {
+pub(crate) fn request(address: &str, text: &str) -> Answer {
     let mut stream = TcpStream::connect(address).expect("it listens");
     stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a limit");
     stream.write_all(text.as_bytes()).expect("sent");
@@ -174,7 +180,7 @@ pub fn request(address: &str, text: &str) -> Answer {
 }
 
 /// The real recordings beside the checkout, or by `CNC_GATEWAY_SHARED`; says so when they are absent.
-pub fn shared(file: &str) -> Option<PathBuf> {
+pub(crate) fn shared(file: &str) -> Option<PathBuf> {
     let root = std::env::var_os("CNC_GATEWAY_SHARED").map(PathBuf::from);
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
     let path = root.unwrap_or(beside).join("data").join(file);

@@ -1,0 +1,9 @@
+//! The whole box: real child processes, sockets, files, signals and a browser.
+
+mod browser;
+mod http;
+mod kill;
+mod lives;
+mod page;
+mod process;
+mod replay;
