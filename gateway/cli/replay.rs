@@ -27,7 +27,7 @@ pub(super) struct ReplayArguments {
 /// Replays and prints the summary.
 pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
     let ReplayArguments { files, history, scripts, json } = arguments;
-    let plan = Plan { files, history, progress: std::io::stderr().is_terminal() };
+    let plan = Plan { files, history, progress: std::io::stderr().is_terminal(), talk: true };
     let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
     let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
     if json {

@@ -7,6 +7,7 @@ use super::house::House;
 use super::keeper::Keeper;
 use super::mailbox::{Delivery, Job, Mailbox};
 use super::options::{Options, WhenFull};
+use super::record_sql::close_state;
 use super::status::Shared;
 use rusqlite::Connection;
 use std::sync::Arc;
@@ -81,6 +82,9 @@ impl Thread {
 
     fn accept(&mut self, delivery: Delivery) {
         self.keeper.reasons = delivery.reasons;
+        // Records before rows: a row that is durable must never be without what happened at it.
+        self.keeper.records.extend(delivery.records);
+        self.pace.last_ticket = delivery.last_ticket;
         for batch in delivery.batches {
             self.keeper.ingest(&batch);
             self.mailbox.recycle(batch);
@@ -88,8 +92,6 @@ impl Thread {
                 self.commit();
             }
         }
-        self.keeper.records.extend(delivery.records);
-        self.pace.last_ticket = delivery.last_ticket;
         match delivery.job {
             Some((number, Job::Flush)) => self.pace.flushing = Some(number),
             Some((number, Job::Maintain(now_ns))) => {
@@ -193,6 +195,10 @@ impl Thread {
     fn finish(self) {
         if let Some(number) = self.pace.maintaining {
             self.mailbox.finish(number);
+        }
+        // A clean end ends the state that the machine was in; after a failure the next start does it.
+        if let Some(newest_ns) = self.keeper.newest_ns() {
+            let _ = close_state(&self.db, newest_ns, "stop");
         }
         // What is committed is in the log already; a failing last checkpoint loses nothing.
         let _ = self.db.close();

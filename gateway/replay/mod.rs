@@ -40,6 +40,8 @@ pub struct Plan {
     pub history: Option<PathBuf>,
     /// Show a progress bar on a terminal.
     pub progress: bool,
+    /// Tell on standard error where storing begins.
+    pub talk: bool,
 }
 
 /// Stores what is not stored yet, and counts everything.
@@ -120,6 +122,10 @@ impl OneFile<'_> {
         let writer = self.plan.history.as_ref().map(|path| open(path, &origin)).transpose()?;
         let source = Replay::new(origin, &read.recording, before.origin_ns.unwrap_or(next_ns.max(before.free_ns)));
         let rows = source.rows() as u64;
+        if let (Some(path), true) = (&self.plan.history, self.plan.talk) {
+            // Not on standard output, which belongs to the summary.
+            eprintln!("{}: storing in {} from row {} on", file.display(), path.display(), before.rows() + 1);
+        }
         let bar = self.bar(rows, file);
         let mut sink = Sink { writer, before, counts: Counts::default() };
         let last_ns = self.through(source, &mut sink, &bar);

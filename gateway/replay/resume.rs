@@ -48,10 +48,11 @@ pub(super) struct Before {
 impl Before {
     /// Reads what `path` holds of the recording called `origin`.
     pub(super) fn read(path: &Path, origin: &str) -> Result<Self, HistoryError> {
-        let reader = match Reader::open(path) {
-            Err(HistoryError::Missing { .. }) => return Ok(Self::default()),
-            other => other?,
-        };
+        // A replay that was killed before its first commit leaves an empty file.
+        if std::fs::metadata(path).map_or(0, |metadata| metadata.len()) == 0 {
+            return Ok(Self::default());
+        }
+        let reader = Reader::open(path)?;
         let free_ns = reader.span()?.map_or(0, |(_, newest_ns)| newest_ns + PAUSE_NS);
         let (rows, first_ns, last_ns) = stored(&reader, origin)?;
         if rows == 0 {
@@ -59,6 +60,11 @@ impl Before {
         }
         let records = records(&reader, Span::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
         Ok(Self { origin_ns: Some(first_ns), free_ns, rows, records, state_open: true })
+    }
+
+    /// How many rows are there.
+    pub(super) fn rows(&self) -> u64 {
+        self.rows
     }
 
     /// Is the row with this number (from 1) there?

@@ -180,7 +180,7 @@ impl Health {
 
 /// A length of time in words.
 fn span(ns: i64) -> String {
-    let seconds = ns / SECOND_NS;
+    let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
     match seconds {
         0..=119 => format!("{seconds} s"),
         120..=7199 => format!("{} min", seconds / 60),

@@ -75,7 +75,7 @@ fn whatever_is_asked_is_answered_and_the_tick_goes_on() {
         ("/api/v1/samples?chanels=x", 400, "did you mean channels?"),
         ("/api/v1/states?limit=0", 400, "from 1 to 10000"),
         ("/api/v1/states?limit=5&limit=6", 400, "once"),
-        ("/api/v1/states?from=9999-12-31T00:00:00Z", 400, "1678"),
+        ("/api/v1/states?from=2300-01-01", 400, "1678"),
         ("/api/v2/status", 404, "openapi"),
         ("/web/../../Cargo.toml", 404, "openapi"),
         ("/web/%2e%2e%2fCargo.toml", 404, "openapi"),
