@@ -7,6 +7,7 @@ use super::record_sql;
 use super::{pyramid, tail};
 use rusqlite::{Connection, params};
 use std::collections::VecDeque;
+use std::ops::Range;
 
 /// Rows kept in the tail although they are in a block already, so that `recent_samples` always has something to show:
 /// two minutes at 10 Hz.
@@ -22,8 +23,13 @@ struct Entry {
     end_row: i64,
 }
 
+/// An entry of the tail stays below this, so that it never needs a page of its own beyond the leaf it lies in.
+const ENTRY_BYTES: usize = 3_800;
+/// Entries are padded to multiples of this: one that is as long as the one it replaces is written over it in place.
+const ENTRY_STEP: usize = 256;
+
 /// Which slots of the crash tail hold what, oldest first.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct TailSlots {
     used: VecDeque<Entry>,
 }
@@ -37,68 +43,74 @@ impl TailSlots {
         Ok(Self { used: used.and_then(Iterator::collect).doing("reading the crash tail")? })
     }
 
-    /// How many of the oldest entries are in blocks and not needed to show the last rows up to `next_row`.
-    fn spare(&self, sealed_row: i64, next_row: i64) -> usize {
-        let spare = |entry: &&Entry| entry.end_row <= sealed_row && entry.end_row <= next_row - TAIL_ROWS;
-        self.used.iter().take_while(spare).count()
+    /// Takes out the oldest entry if its rows are in blocks and not needed to show the last rows up to `next_row`.
+    fn take_spare(&mut self, sealed_row: i64, next_row: i64) -> Option<i64> {
+        let spare = |entry: &mut Entry| entry.end_row <= sealed_row.min(next_row - TAIL_ROWS);
+        self.used.pop_front_if(spare).map(|entry| entry.slot)
     }
 
-    /// The slot for the next entry when `spare` entries go: one of theirs, or a new one.
-    fn next(&self, spare: usize) -> i64 {
-        match self.used.front() {
-            Some(oldest) if spare > 0 => oldest.slot,
-            _ => self.used.iter().map(|entry| entry.slot + 1).max().unwrap_or(0),
-        }
-    }
-
-    fn took(&mut self, slot: i64, spare: usize, end_row: i64) {
-        self.used.drain(..spare);
-        self.used.push_back(Entry { slot, end_row });
+    fn new_slot(&self) -> i64 {
+        self.used.iter().map(|entry| entry.slot + 1).max().unwrap_or(0)
     }
 }
 
-/// Makes the oldest of what is in `keeper` durable, or changes nothing. False when something is left: records and the
-/// crash tail go with the last blocks.
+/// Makes the oldest of what is in `keeper` durable, or changes nothing. False when something is left: records and, if
+/// `with_tail`, the rows of the running minute go with the last blocks.
 pub(crate) fn commit(
     db: &mut Connection,
     keeper: &mut Keeper,
     slots: &mut TailSlots,
     origin: &str,
+    with_tail: bool,
 ) -> Result<bool, HistoryError> {
     let writing = db.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).doing("beginning a commit")?;
     keeper.segments.iter().try_for_each(|segment| insert_segment(&writing, segment, origin))?;
     let blocks = keeper.blocks.len().min(BLOCKS_MAX);
     keeper.blocks.iter().take(blocks).try_for_each(|block| insert_block(&writing, block))?;
     let last = blocks == keeper.blocks.len();
-    let tail =
-        if last && keeper.in_tail < keeper.open.len() { Some(replace_tail(&writing, keeper, slots)?) } else { None };
+    let mut replaced = slots.clone();
+    if last && with_tail {
+        put_tail(&writing, keeper, &mut replaced)?;
+    }
     if last {
         keeper.records.iter().try_for_each(|record| record_sql::store(&writing, record).doing("storing a record"))?;
     }
     writing.commit().doing("making samples durable")?;
     keeper.segments.clear();
     keeper.blocks.drain(..blocks);
-    if let Some((slot, spare)) = tail {
-        slots.took(slot, spare, keeper.next_row);
-        keeper.in_tail = keeper.open.len();
-    }
+    *slots = replaced;
     if last {
         keeper.records.clear();
+    }
+    if last && with_tail {
+        keeper.in_tail = keeper.open.len();
     }
     Ok(last)
 }
 
-/// Writes the rows that the crash tail lacks over the oldest entry that is not needed; its slot, and how many went.
-fn replace_tail(db: &Connection, keeper: &Keeper, slots: &TailSlots) -> Result<(i64, usize), HistoryError> {
-    let spare = slots.spare(keeper.open_row(), keeper.next_row);
-    let slot = slots.next(spare);
-    for entry in slots.used.iter().take(spare).skip(1) {
+/// Writes the rows that the crash tail lacks, over its oldest entries where those are not needed any more.
+fn put_tail(db: &Connection, keeper: &Keeper, slots: &mut TailSlots) -> Result<(), HistoryError> {
+    let mut from = keeper.in_tail;
+    let mut count = keeper.open.len() - from;
+    while from < keeper.open.len() {
+        count = count.min(keeper.open.len() - from);
+        let body = tail::to_text(&keeper.open, from..from + count, &keeper.series, &keeper.reasons);
+        if body.len() > ENTRY_BYTES && count > 1 {
+            count = (count * ENTRY_BYTES / body.len()).clamp(1, count - 1);
+            continue;
+        }
+        let slot = slots.take_spare(keeper.open_row(), keeper.next_row).unwrap_or_else(|| slots.new_slot());
+        let padded = body.len().next_multiple_of(ENTRY_STEP);
+        insert_tail(db, keeper, slot, from..from + count, &format!("{body:padded$}"))?;
+        from += count;
+        slots.used.push_back(Entry { slot, end_row: keeper.open_row() + from as i64 });
+    }
+    while let Some(slot) = slots.take_spare(keeper.open_row(), keeper.next_row) {
         db.prepare_cached("DELETE FROM tail WHERE slot = ?1")
-            .and_then(|mut delete| delete.execute([entry.slot]))
+            .and_then(|mut delete| delete.execute([slot]))
             .doing("shortening the crash tail")?;
     }
-    insert_tail(db, keeper, slot)?;
-    Ok((slot, spare))
+    Ok(())
 }
 
 fn insert_segment(db: &Connection, segment: &Segment, origin: &str) -> Result<(), HistoryError> {
@@ -136,9 +148,13 @@ pub(crate) fn put_block(db: &Connection, block: &Block) -> Result<(), rusqlite::
     .map(drop)
 }
 
-fn insert_tail(db: &Connection, keeper: &Keeper, slot: i64) -> Result<(), HistoryError> {
-    let fresh = keeper.in_tail..keeper.open.len();
-    let body = tail::to_text(&keeper.open, fresh.clone(), &keeper.series, &keeper.reasons);
+fn insert_tail(
+    db: &Connection,
+    keeper: &Keeper,
+    slot: i64,
+    rows: Range<usize>,
+    body: &str,
+) -> Result<(), HistoryError> {
     db.prepare_cached(
         "INSERT OR REPLACE INTO tail (slot, segment, first_row, rows, start_ns, end_ns, body)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
@@ -147,10 +163,10 @@ fn insert_tail(db: &Connection, keeper: &Keeper, slot: i64) -> Result<(), Histor
         insert.execute(params![
             slot,
             keeper.segment,
-            keeper.open_row() + fresh.start as i64,
-            fresh.len() as i64,
-            keeper.open.at_ns[fresh.start],
-            keeper.open.at_ns[fresh.end - 1],
+            keeper.open_row() + rows.start as i64,
+            rows.len() as i64,
+            keeper.open.at_ns[rows.start],
+            keeper.open.at_ns[rows.end - 1],
             body
         ])
     })

@@ -50,6 +50,8 @@ pub(crate) struct Keeper {
     /// Number of the next row that arrives.
     pub(crate) next_row: i64,
     last_ns: Option<TimeNs>,
+    /// Time of the newest row in a block.
+    sealed_ns: Option<TimeNs>,
     fresh: bool,
     /// Rows dropped because the disk took nothing for too long.
     pub(crate) lost_rows: u64,
@@ -72,6 +74,7 @@ impl Keeper {
             opened_row: end.next_row,
             next_row: end.next_row,
             last_ns: end.last_ns,
+            sealed_ns: end.last_ns,
             fresh: true,
             lost_rows: 0,
         })
@@ -92,9 +95,10 @@ impl Keeper {
         self.next_row - self.open.len() as i64
     }
 
-    /// The time of the newest row.
-    pub(crate) fn newest_ns(&self) -> Option<TimeNs> {
-        self.open.at_ns.last().copied().or(self.blocks.back().map(|block| block.end_ns)).or(self.last_ns)
+    /// Right after a commit: the time of the newest durable row, and the number of the row after it.
+    pub(crate) fn durable(&self) -> (Option<TimeNs>, i64) {
+        let in_tail = self.in_tail.checked_sub(1).map(|row| self.open.at_ns[row]);
+        (in_tail.or(self.sealed_ns), self.open_row() + self.in_tail as i64)
     }
 
     /// Takes a batch on: rows of the same minute gather, a new minute or a clock that went back seals what is there.
@@ -160,6 +164,7 @@ impl Keeper {
         }
         let first_row = self.open_row();
         let block = self.encoder.encode(&self.open, &self.series, &self.reasons, self.segment, first_row);
+        self.sealed_ns = Some(block.end_ns);
         self.open.clear();
         self.in_tail = 0;
         if self.is_full() {

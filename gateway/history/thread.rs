@@ -89,7 +89,8 @@ impl Thread {
             self.keeper.ingest(&batch);
             self.mailbox.recycle(batch);
             if self.keeper.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
-                self.commit();
+                // The next regular commit adds what the running minute has by then.
+                self.commit(false);
             }
         }
         match delivery.job {
@@ -105,26 +106,28 @@ impl Thread {
     fn commit_if_due(&mut self, closing: bool) {
         let urgent = self.pace.failures == 0 && (closing || self.pace.flushing.is_some());
         if urgent || Instant::now() >= self.pace.next_commit {
-            self.commit();
+            self.commit(true);
         } else if closing {
             std::thread::sleep(self.pace.next_commit.saturating_duration_since(Instant::now()));
         }
     }
 
-    fn commit(&mut self) {
+    fn commit(&mut self, with_tail: bool) {
         let began = Instant::now();
         let wait = self.options.group_commit;
         if !self.keeper.is_dirty() {
             self.pace.next_commit = began + wait;
             return self.acknowledge();
         }
-        match self.attempt() {
+        match self.attempt(with_tail) {
             Ok(()) => {
                 let took = u64::try_from(began.elapsed().as_micros()).unwrap_or(u64::MAX);
                 self.shared.commit_us.store(took, Ordering::Relaxed);
                 self.shared.commits.fetch_add(1, Ordering::Relaxed);
                 self.pace.failures = 0;
-                self.pace.next_commit = began + wait;
+                if with_tail {
+                    self.pace.next_commit = began + wait;
+                }
                 self.shared.recovered();
                 self.acknowledge();
                 self.tidy();
@@ -140,27 +143,29 @@ impl Thread {
     }
 
     /// One commit; on a full disk a second one after making room.
-    fn attempt(&mut self) -> Result<(), HistoryError> {
-        match self.commit_all() {
+    fn attempt(&mut self, with_tail: bool) -> Result<(), HistoryError> {
+        match self.commit_all(with_tail) {
             Err(error) if error.is_full() => {
                 let waiting: u64 = self.keeper.blocks.iter().map(|block| block.bytes() as u64).sum();
                 self.house.make_room(&mut self.db, 2 * waiting + 65_536)?;
-                self.commit_all()
+                self.commit_all(with_tail)
             }
             done => done,
         }
     }
 
-    fn commit_all(&mut self) -> Result<(), HistoryError> {
-        while !commit(&mut self.db, &mut self.keeper, &mut self.slots, &self.options.origin)? {}
+    fn commit_all(&mut self, with_tail: bool) -> Result<(), HistoryError> {
+        let Self { db, keeper, slots, options, .. } = self;
+        while !commit(db, keeper, slots, &options.origin, with_tail)? {}
         Ok(())
     }
 
     fn acknowledge(&mut self) {
-        if let Some(newest_ns) = self.keeper.newest_ns() {
-            self.shared.acknowledged_ns.store(newest_ns, Ordering::Release);
+        let (through_ns, next_row) = self.keeper.durable();
+        if let Some(through_ns) = through_ns {
+            self.shared.acknowledged_ns.store(through_ns, Ordering::Release);
         }
-        let rows = u64::try_from(self.keeper.next_row - self.keeper.opened_row).unwrap_or(0);
+        let rows = u64::try_from(next_row - self.keeper.opened_row).unwrap_or(0);
         self.shared.rows.store(rows.saturating_sub(self.keeper.lost_rows), Ordering::Relaxed);
         self.shared.acknowledged_record.store(self.pace.last_ticket, Ordering::Release);
         if let Some(number) = self.pace.flushing.take() {

@@ -233,6 +233,35 @@ fn queries() {
     timed("GROUP BY minute, one quantity", 3, || grouped(&db, 60_000_000_000));
 }
 
+/// A year of summaries, from one tick every ten seconds: as many minutes, hours and days as at 10 Hz.
+#[test]
+#[ignore = "a measurement: half a minute"]
+fn a_year() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (path, machine) = (dir.path().join("y.db"), Machine::new());
+    let writer = Writer::open(&path, Options { extras: Vec::new(), ..options() }).expect("opens");
+    let mut sample = Sample::empty(0);
+    for tick in 0..365 * 8_640 {
+        machine.fill_quantities(tick, &mut sample);
+        sample.at_ns = START_NS + tick * 10 * SECOND_NS;
+        writer.sample(&sample, &[]);
+    }
+    drop(writer);
+    let reader = Reader::open(&path).expect("opens");
+    println!("365 days of summaries of 20 quantities, {:.0} MB:", used_bytes(&path) / 1e6);
+    let one = Query::default().of(["spindle_power_w"]);
+    let hour_ns = 3_600 * SECOND_NS;
+    timed("the year by day, all 20 quantities", 5, || reader.overview(&Query::default(), DAY_NS).expect("answers"));
+    timed("the year by hour, one quantity (8 760 points)", 5, || reader.overview(&one, hour_ns).expect("answers"));
+    timed("the year by hour, all 20 quantities", 5, || reader.overview(&Query::default(), hour_ns).expect("answers"));
+    timed("the year by minute, one quantity (525 600 points)", 1, || {
+        reader.overview(&one, 60 * SECOND_NS).expect("answers")
+    });
+    timed("the year by day in plain SQL (view day_summaries)", 3, || {
+        first_row(&reader, "SELECT count(mean) FROM day_summaries WHERE name = 'spindle_power_w'")
+    });
+}
+
 fn grouped(db: &rusqlite::Connection, width_ns: i64) -> usize {
     let text = format!(
         "SELECT at_ns / {width_ns}, count(*), min(spindle_power_w), max(spindle_power_w), avg(spindle_power_w)
