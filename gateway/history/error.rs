@@ -124,4 +124,10 @@ impl HistoryError {
             _ => false,
         }
     }
+
+    /// Does another program hold the file locked?
+    #[must_use]
+    pub fn is_locked(&self) -> bool {
+        matches!(self, Self::Sqlite { error, .. } if error.sqlite_error_code() == Some(rusqlite::ErrorCode::DatabaseBusy))
+    }
 }

@@ -16,8 +16,8 @@ const LOOK_EVERY: Duration = Duration::from_secs(5);
 const STEPS_MAX: usize = 8;
 /// Bytes of a page, `SQLite`'s default.
 const PAGE_BYTES: u64 = 4_096;
-/// Pages in the write-ahead log before it is copied back: 1 MB, fewer where the reserve is smaller.
-const LOG_PAGES_MAX: u64 = 256;
+/// Pages in the write-ahead log before it is copied back: 4 MB, fewer where the reserve is smaller.
+const LOG_PAGES_MAX: u64 = 1_000;
 const LOG_PAGES_MIN: u64 = 8;
 /// Free pages are given back to the disk in steps of this many.
 const VACUUM_PAGES: u32 = 256;

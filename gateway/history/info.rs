@@ -156,7 +156,7 @@ impl Reader {
 }
 
 const UNSEALED: &str = "SELECT sum(rows) FROM tail
-    WHERE first_row >= (SELECT coalesce(max(first_row + rows), 0) FROM blocks)";
+    WHERE first_row >= coalesce((SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1), 0)";
 
 /// A time as a person reads it.
 pub(crate) fn utc(at_ns: TimeNs) -> String {

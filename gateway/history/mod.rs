@@ -1,4 +1,38 @@
 //! What the box remembers: samples as compressed column blocks, everything else as ordinary tables, in one `SQLite` file.
+//!
+//! # Layout, and why
+//! A row per sample is the obvious layout and the wrong one. The rows of a minute are one database row instead: a small
+//! directory, and one stream per series (scaled integers, differences, zigzag varints, zstd); every night ten of them
+//! become one. Each minute adds its summary to minutes, hours and days, from which long ranges are drawn. The running
+//! minute lies in a crash tail of JSON texts that any `SQLite` client can read.
+//!
+//! Measured on one day at 10 Hz with 20 quantities (`cargo test --release --test history figures -- --ignored
+//! --nocapture --test-threads 1`, functions in `tests/history/figures.rs`; synthetic signals, so real machines may
+//! differ by a factor of two):
+//!
+//! | | row per sample | blocks with summaries, fresh | after compaction |
+//! |---|---|---|---|
+//! | readings as meters quantise them, bytes per tick | 139.5 | 15.5 | 11.6 |
+//! | the same, gigabytes per year | 44.0 | 4.9 | 3.7 |
+//! | interpolated readings, bytes per tick | 160.6 | 16.9 | 14.8 |
+//! | the same, gigabytes per year | 50.7 | 5.3 | 4.7 |
+//! | written to the disk at one commit a second, MB per day | 843 | see `write_amplification` | |
+//!
+//! # What comes back
+//! A decimal of at most 9 significant digits and 9 places comes back bit for bit; any other number (interpolated,
+//! estimated) rounded to the resolution of its unit ([`decimals_of_unit`]), the same in the tail, the blocks and every
+//! answer; publish [`as_stored`] and the page shows the same digits. [`Fidelity::Exact`] keeps every bit. Each missing
+//! value keeps its reason. The age of a value within its tick is not stored.
+//!
+//! # Durability
+//! One thread writes; commits are grouped (at most [`Options::group_commit`] late) and end in an fsync. What
+//! [`Writer::acknowledged_through_ns`] and [`Writer::acknowledged_record`] have reached survives a killed process and a
+//! power cut. A full disk costs the oldest raw samples and nothing else; a clock that goes back begins a new segment.
+//!
+//! # Who does what
+//! `mailbox` takes in, `keeper` gathers and seals, `commit` makes durable, `house` keeps order, all on `thread`;
+//! [`Reader`] answers on connections of its own: `walk` goes through a range, `query`, `overview`, `list`, `sql` and
+//! `export` ask.
 
 mod block;
 mod commit;
@@ -48,7 +82,7 @@ pub use reason::Reasons;
 pub use record::{Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, Record, StateChange};
 pub use rounding::rounded;
 pub use rusqlite::types::Value as SqlValue;
-pub use series::{Series, decimals_of_unit};
+pub use series::{Series, as_stored, decimals_of_unit};
 pub use space::{DiskRoom, disk_room};
 pub use status::Status;
 pub use writer::Writer;

@@ -165,7 +165,7 @@ impl Default for Options {
             retention: Retention::default(),
             extras: Vec::new(),
             origin: "live".to_owned(),
-            reserve_bytes: 4_000_000,
+            reserve_bytes: 8_192_000,
         }
     }
 }

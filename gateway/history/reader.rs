@@ -51,7 +51,7 @@ impl Reader {
                    UNION ALL SELECT NULL, max(end_ns) FROM blocks WHERE start_ns >=
                      (SELECT max(start_ns) FROM blocks) - 600000000000
                    UNION ALL SELECT min(start_ns), max(end_ns) FROM tail
-                     WHERE first_row >= (SELECT coalesce(max(first_row + rows), 0) FROM blocks))",
+                     WHERE first_row >= coalesce((SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1), 0))",
                 [],
                 |row| Ok((row.get(0)?, row.get(1)?)),
             )

@@ -2,7 +2,8 @@
 
 use super::error::HistoryError;
 use super::options::{ExtraSeries, Fidelity, Options, SeriesKind};
-use super::rounding::PLACES_MAX;
+use super::rounding::{PLACES_MAX, rounded};
+use adapters::ChannelId;
 use adapters::channel::{CHANNELS, Channel, Kind};
 use std::sync::Arc;
 
@@ -72,6 +73,13 @@ pub fn decimals_of_unit(unit: &str) -> u8 {
         "mm/rev" => 5,
         _ => 4,
     }
+}
+
+/// The number that the history keeps of `number` on `channel`. Publish this one, and the page, the API and `history
+/// query` show the same digits.
+#[must_use]
+pub fn as_stored(channel: ChannelId, number: f64) -> f64 {
+    rounded(number, decimals_of_unit(channel.channel().unit))
 }
 
 /// Every series a writer stores, channels first. The `id` is still 0.

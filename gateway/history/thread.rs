@@ -216,5 +216,10 @@ fn degraded_text(error: &HistoryError) -> String {
                 room on the disk of the history."
             .to_owned();
     }
+    if error.is_locked() {
+        return "Another program holds a transaction open on the history; new samples wait in memory. Close that \
+                transaction."
+            .to_owned();
+    }
     error.to_string()
 }

@@ -148,37 +148,43 @@ fn speed() {
             .collect();
         let extras: Vec<_> = (0..20_000).map(extra_values).collect();
         let writer = Writer::open(&dir.path().join(format!("{what}.db")), options()).expect("opens");
-        let (ticks, cpu) = (600_000usize, cpu_s());
-        let (mut handing, began) = (Duration::ZERO, Instant::now());
+        let ticks = 1_000_000usize;
         let mut sample = samples[0].clone();
-        for first in (0..ticks).step_by(200) {
-            for tick in first..first + 200 {
+        let mut pass = |writer: Option<&Writer>| {
+            let (began, own, all) = (Instant::now(), cpu_s("thread-self"), cpu_s("self"));
+            for tick in 0..ticks {
                 let index = tick % samples.len();
                 sample.clone_from(&samples[index]);
                 sample.at_ns = Machine::at_ns(tick as i64);
-                let before = Instant::now();
-                writer.sample(black_box(&sample), &extras[index]);
-                handing += before.elapsed();
+                if let Some(writer) = writer {
+                    writer.sample(black_box(&sample), &extras[index]);
+                }
             }
-        }
-        writer.flush().expect("durable");
-        let wall = began.elapsed().as_secs_f64();
-        let handing_us = handing.as_secs_f64() * 1e6 / ticks as f64;
+            if let Some(writer) = writer {
+                writer.flush().expect("durable");
+            }
+            let us = |seconds: f64| seconds * 1e6 / ticks as f64;
+            (began.elapsed(), us(cpu_s("thread-self") - own), us(cpu_s("self") - all))
+        };
+        let (_, empty_us, _) = pass(None);
+        let (wall, own_us, all_us) = pass(Some(&writer));
         println!(
-            "{what}: {ticks} ticks (24 channels, 4 estimates) durable in {wall:.2} s = {:.0} ticks/s; handing in (waiting \
-             for the writer included) {handing_us:.2} us/tick; {:.2} us/tick of CPU in all",
-            ticks as f64 / wall,
-            cpu.zip(cpu_s()).map_or(f64::NAN, |(before, after)| (after - before) * 1e6 / ticks as f64)
+            "{what}: {ticks} ticks (24 channels, 4 estimates) durable in {:.2} s = {:.0} ticks/s; processor time per tick: \
+             {:.2} us handing in, {:.2} us in the history thread",
+            wall.as_secs_f64(),
+            ticks as f64 / wall.as_secs_f64(),
+            own_us - empty_us,
+            all_us - own_us
         );
     }
 }
 
-/// Processor seconds this process has used.
-fn cpu_s() -> Option<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
-    let ticks: f64 = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
-    Some(ticks / 100.0)
+/// Processor seconds used so far by `self`, the process, or `thread-self`.
+fn cpu_s(whose: &str) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{whose}/stat")).expect("Linux tells");
+    let fields: Vec<f64> =
+        stat.rsplit(')').next().unwrap_or("").split_whitespace().map(|word| word.parse().unwrap_or(0.0)).collect();
+    (fields[11] + fields[12]) / 100.0
 }
 
 fn timed<T>(name: &str, times: u32, mut work: impl FnMut() -> T) -> T {

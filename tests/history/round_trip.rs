@@ -2,7 +2,7 @@
 
 use crate::machine::{Machine, QUANTITIES, extra_values, extras};
 use adapters::Sample;
-use gateway::history::{Chunk, Options, Query, Reader, WhenFull, Writer};
+use gateway::history::{Chunk, Fidelity, Options, Query, Reader, WhenFull, Writer, as_stored};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -85,4 +85,55 @@ fn what_goes_in_comes_out() {
         .expect("counts");
     assert!(blocks < 12, "{blocks} blocks instead of 36");
     assert_eq!(Reader::open(&path).and_then(|reader| reader.check()).expect("checks"), Vec::<String>::new());
+}
+
+/// Every number of `series` in the file.
+fn numbers(path: &Path, series: &str) -> Vec<f64> {
+    let reader = Reader::open(path).expect("opens");
+    let recording = reader.recording(&Query::default().of([series])).expect("reads");
+    recording.numbers(series).expect("a quantity").present().collect()
+}
+
+#[test]
+fn long_fractions_are_rounded_once_or_kept_to_the_bit() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let machine = Machine::new().interpolated();
+    let channel = adapters::ChannelId::of("spindle_power_w").expect("in the table");
+    for (fidelity, name) in [(Fidelity::Resolution, "r.db"), (Fidelity::Exact, "e.db")] {
+        let path = dir.path().join(name);
+        let writer = Writer::open(&path, Options { fidelity, ..options() }).expect("opens");
+        write(&writer, &machine, 0..1_000);
+        writer.flush().expect("durable");
+        let expected: Vec<f64> = (0..1_000)
+            .map(|row| machine.quantity(row, 10))
+            .map(|watts| if fidelity == Fidelity::Exact { watts } else { as_stored(channel, watts) })
+            .collect();
+        assert!(numbers(&path, "spindle_power_w") == expected, "{fidelity:?}, one block and the tail");
+        write(&writer, &machine, 1_000..1_200);
+        writer.flush().expect("durable");
+        assert!(numbers(&path, "spindle_power_w")[..1_000] == expected, "{fidelity:?}, sealed");
+    }
+}
+
+#[test]
+fn a_program_that_holds_the_file_costs_nothing() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let path = dir.path().join("h.db");
+    let machine = Machine::new();
+    let writer = Writer::open(&path, options()).expect("opens");
+    write(&writer, &machine, 0..500);
+    writer.flush().expect("durable");
+    let other = rusqlite::Connection::open(&path).expect("opens");
+    other.execute_batch("BEGIN IMMEDIATE").expect("holds the file");
+    write(&writer, &machine, 500..3_000);
+    while writer.status().degraded.is_none() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let status = writer.status();
+    assert!(status.degraded.is_some_and(|text| text.contains("Another program")));
+    assert_eq!(status.acknowledged_through_ns, Some(Machine::at_ns(499)), "nothing is promised meanwhile");
+    other.execute_batch("ROLLBACK").expect("lets go");
+    writer.flush().expect("durable");
+    assert_eq!(writer.status().degraded, None);
+    assert_eq!(verify(&path, &machine, 0), 3_000);
 }

@@ -149,7 +149,7 @@ impl Reader {
         let tail: Option<TimeNs> = self
             .db
             .query_row(
-                "SELECT min(start_ns) FROM tail WHERE first_row >= (SELECT coalesce(max(first_row + rows), 0) FROM blocks)
+                "SELECT min(start_ns) FROM tail WHERE first_row >= coalesce((SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1), 0)
                  AND end_ns >= ?1 AND start_ns < ?2",
                 [query.range().start, query.range().end],
                 |row| row.get(0),
