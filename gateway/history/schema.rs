@@ -1,6 +1,7 @@
 //! Opening the file: what it must be, and the tables it gets when it is new.
 
 use super::error::{Doing, HistoryError};
+use super::lock::beside;
 use super::options::SeriesKind;
 use super::series::Series;
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
@@ -52,7 +53,15 @@ pub(crate) fn open_for_reading(path: &Path) -> Result<Connection, HistoryError> 
 }
 
 /// A write-ahead log needs a writable directory even to read; on a read-only disk nobody can be writing either.
+/// What a crash left in the log cannot be read that way, and is not silently left out.
 fn open_on_read_only_disk(path: &Path) -> Result<Connection, HistoryError> {
+    if std::fs::metadata(beside(path, "-wal")).is_ok_and(|log| log.len() > 0) {
+        return Err(HistoryError::Question(format!(
+            "{}: the gateway did not close this history and its directory is read-only, so its newest part cannot be \
+             read; copy the file together with the one ending in -wal to a writable directory",
+            path.display()
+        )));
+    }
     let name: String = path.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let db =

@@ -139,6 +139,13 @@ fn fill_a_little() {
     let Some(disk) = disk() else { return };
     let writer = Writer::open(&disk.join("h.db"), options()).expect("opens");
     write(&writer, &Machine::new(), 0..1_000);
+    writer.flush().expect("durable");
+    // As after a crash: the database and its log, copied while it is open.
+    let copied = disk.join("copied");
+    std::fs::create_dir(&copied).expect("creates");
+    for name in ["h.db", "h.db-wal"] {
+        std::fs::copy(disk.join(name), copied.join(name)).expect("copies");
+    }
 }
 
 #[test]
@@ -152,6 +159,8 @@ fn read_only_disk() {
     }
     let info = Reader::open(&path).and_then(|reader| reader.info()).expect("readable");
     assert_eq!(info.samples, 1_000);
+    let error = Reader::open(&disk.join("copied/h.db")).expect_err("refused").to_string();
+    assert!(error.contains("-wal to a writable directory"), "{error}");
 }
 
 #[test]
