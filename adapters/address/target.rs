@@ -57,6 +57,8 @@ pub struct SimulatedTarget {
     pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with (depth of cut, diameter, operation)?
     pub annotations: bool,
+    /// Flank wear of every edge at the start, mm.
+    pub wear_mm: f64,
 }
 
 /// A recording.
@@ -222,6 +224,7 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         dropouts_per_h: keys.number("dropouts_per_h", 1.0, 0.0, 3600.0),
         speed_changes: keys.choice("speed_changes", &[("no", false), ("yes", true)]),
         annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),
+        wear_mm: keys.number("wear_mm", 0.005, 0.0, 0.29),
     };
     match body.strip_prefix("//").unwrap_or(body) {
         "lathe" => Ok(Target::Simulated(target)),

@@ -4,7 +4,7 @@ use super::cutting::{self, Circumstances, Load};
 use super::frame::Frame;
 use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
 use super::plant::{Plant, Spin};
-use super::program::{Control, Cut, Motion, Planner};
+use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
 use super::settings::SimulatedSettings;
 use crate::address::SimulatedMachine;
 use crate::clock::{SECOND_NS, TimeNs};
@@ -49,11 +49,15 @@ pub(super) struct Machine {
 }
 
 impl Machine {
-    pub(super) fn new(settings: SimulatedSettings, origin_ns: TimeNs) -> Self {
+    /// A machine at work, or on an experiment in place of its day.
+    pub(super) fn new(settings: SimulatedSettings, origin_ns: TimeNs, experiment: Option<&[ExperimentStep]>) -> Self {
         let frame = Frame::of(settings.machine);
         let rng = |stream: u64| Pcg64Mcg::seed_from_u64(settings.seed.wrapping_mul(31).wrapping_add(stream));
         let planner = Planner::new(settings, rng(1));
-        let lathe = settings.machine == SimulatedMachine::Lathe;
+        let planner = match experiment {
+            Some(steps) => planner.of_experiment(steps.to_vec()),
+            None => planner,
+        };
         let mut machine = Self {
             settings,
             frame,
@@ -61,7 +65,7 @@ impl Machine {
             steps: 0,
             remembered: VecDeque::with_capacity(REMEMBERED),
             plant: Plant::new(frame, settings.tau_s, settings.start_peak_w, rng(2)),
-            control: Control::new(planner, rng(3), lathe, frame.rapid_mm_min),
+            control: Control::new(planner, rng(3), frame, settings.wear_mm),
             overrides: VecDeque::new(),
             override_pct: 100,
             cut: Cut::default(),
@@ -140,6 +144,9 @@ impl Machine {
         }
         let since_s = seconds(at_ns - self.origin_ns);
         self.control.step(&self.plant, self.override_pct, since_s, STEP_S);
+        if let Some(percent) = self.control.override_request.take() {
+            self.override_pct = percent;
+        }
         self.plant.spin(&self.control.demand, STEP_S);
         self.engage();
         self.power(since_s);

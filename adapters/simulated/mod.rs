@@ -30,6 +30,7 @@ pub use actuator::SimulatedOverride;
 pub use controller::SimulatedController;
 pub use meter::{MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
+pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub use settings::{CutLevel, DaySettings, DeviceSettings, MeterSettings, SimulatedSettings};
 
 use crate::clock::TimeNs;
@@ -50,7 +51,18 @@ impl Simulated {
     /// A machine whose day begins at `origin_ns`. `name` is the address.
     #[must_use]
     pub fn new(name: &str, settings: SimulatedSettings, origin_ns: TimeNs) -> Self {
-        let machine = Arc::new(Mutex::new(Machine::new(settings, origin_ns)));
+        Self::of(name, settings, origin_ns, None)
+    }
+
+    /// A machine that is switched on at `origin_ns` and runs these steps in place of its day: program
+    /// [`EXPERIMENT_PROGRAM`], whose block numbers count the steps from 1.
+    #[must_use]
+    pub fn experiment(name: &str, settings: SimulatedSettings, origin_ns: TimeNs, steps: &[ExperimentStep]) -> Self {
+        Self::of(name, settings, origin_ns, Some(steps))
+    }
+
+    fn of(name: &str, settings: SimulatedSettings, origin_ns: TimeNs, steps: Option<&[ExperimentStep]>) -> Self {
+        let machine = Arc::new(Mutex::new(Machine::new(settings, origin_ns, steps)));
         Self { name: Arc::from(name), settings, origin_ns, machine }
     }
 

@@ -3,6 +3,9 @@
 use crate::address::{SimulatedMachine, SimulatedTarget};
 use std::time::Duration;
 
+/// Wear land of an edge that has just been changed.
+pub(super) const FRESH_EDGE_MM: f64 = 0.005;
+
 /// How heavy the cuts are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CutLevel {
@@ -97,6 +100,8 @@ pub struct SimulatedSettings {
     pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with?
     pub annotations: bool,
+    /// Flank wear of every edge at the start, mm.
+    pub wear_mm: f64,
     /// The controller's clock and line.
     pub controller: DeviceSettings,
     /// The meter.
@@ -115,6 +120,7 @@ impl Default for SimulatedSettings {
             cut: CutLevel::Planned(1.0),
             speed_changes: false,
             annotations: true,
+            wear_mm: FRESH_EDGE_MM,
             controller: DeviceSettings {
                 period: Duration::from_millis(100),
                 refresh: Duration::from_millis(8),
@@ -184,6 +190,7 @@ impl SimulatedSettings {
             cut: CutLevel::Planned(target.cut_pct / 100.0),
             speed_changes: target.speed_changes,
             annotations: target.annotations,
+            wear_mm: target.wear_mm,
             meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
             ..base
         }

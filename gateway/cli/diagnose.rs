@@ -20,6 +20,9 @@ pub(super) struct DiagnoseArguments {
     /// Write the diagnosis as JSON (diagnosis/1); without a path, or with -, to standard output in place of the words.
     #[arg(long, value_name = "D.json", num_args = 0..=1, default_missing_value = "-")]
     json: Option<PathBuf>,
+    /// Write the diagnosis as one self-contained page.
+    #[arg(long, value_name = "D.html")]
+    html: Option<PathBuf>,
     /// Write recorded and simulated output and each added effect, row by row.
     #[arg(long, value_name = "D.csv")]
     rows: Option<PathBuf>,
@@ -32,7 +35,10 @@ pub(super) struct DiagnoseArguments {
     /// Directory of further hypotheses: .toml files with [[effect]] entries.
     #[arg(long, value_name = "DIR")]
     effects_dir: Option<PathBuf>,
-    /// Language of the words.
+    /// Write the experiment that tells the explanations apart as a recording plan.
+    #[arg(long, value_name = "PLAN.csv")]
+    experiment: Option<PathBuf>,
+    /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
     lang: super::effects::Lang,
 }
@@ -82,8 +88,10 @@ fn note_refusals(diagnosis: &mut Diagnosis, given: &Given) {
 fn outputs(arguments: &DiagnoseArguments) -> Outputs {
     Outputs {
         json: arguments.json.clone(),
+        html: arguments.html.clone(),
         rows: arguments.rows.clone(),
         accept: arguments.accept.clone(),
+        experiment: arguments.experiment.clone(),
         language: Language::from(arguments.lang),
     }
 }

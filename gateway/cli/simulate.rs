@@ -1,8 +1,10 @@
-//! `cnc-gateway simulate`: a model over a recording's inputs, with each part's contribution.
+//! `cnc-gateway simulate`: a model over a recording's inputs, or the simulated machine over a plan.
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandResult, Outcome};
-use crate::twin::{put, read_model, read_recordings, simulation};
+use crate::twin::{execute, put, read_model, read_recordings, simulation};
+use adapters::address::{Address, Target};
+use adapters::simulated::SimulatedSettings;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -10,10 +12,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(super) struct SimulateArguments {
     /// What the simulation believes (model/1).
-    #[arg(long, value_name = "M.toml")]
-    model: PathBuf,
+    #[arg(long, value_name = "M.toml", required_unless_present = "machine")]
+    model: Option<PathBuf>,
     /// Recordings whose inputs are taken, as for diagnose.
-    #[arg(long, value_name = "R.csv", num_args = 1.., required = true)]
+    #[arg(long, value_name = "R.csv", num_args = 1.., required_unless_present = "machine")]
     recording: Vec<String>,
     /// Write the simulated output and each part's contribution, row by row.
     #[arg(long, value_name = "OUT.csv")]
@@ -21,12 +23,39 @@ pub(super) struct SimulateArguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// Let the simulated machine carry out a plan in place of a model: lathe, mill, or lathe?wear_mm=0.2&seed=3.
+    #[arg(long, value_name = "MACHINE", requires_all = ["plan", "out"], conflicts_with_all = ["model", "recording", "rows"])]
+    machine: Option<String>,
+    /// The plan: a recording of commanded inputs, as diagnose --experiment writes it.
+    #[arg(long, value_name = "PLAN.csv")]
+    plan: Option<String>,
+    /// Where the simulated machine's recording goes.
+    #[arg(long, value_name = "REC.csv")]
+    out: Option<PathBuf>,
+    /// Rows per second of the simulated machine's recording.
+    #[arg(long, value_name = "HZ", default_value_t = 2.0, value_parser = rate)]
+    rate: f64,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse::<f64>().ok().filter(|rate| (0.01..=100.0).contains(rate));
+    rate.ok_or_else(|| "give a rate from 0.01 to 100 rows per second".to_owned())
 }
 
 /// Simulates and prints.
 pub(super) fn simulate(arguments: SimulateArguments) -> CommandResult {
+    match (&arguments.machine, &arguments.model) {
+        (Some(machine), _) => experiment(machine, &arguments),
+        (None, Some(path)) => model(path, &arguments),
+        (None, None) => {
+            Err(CannotRun::new("nothing to simulate", "give --model and --recording, or --machine and --plan"))
+        }
+    }
+}
+
+fn model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let mut problems = Vec::new();
-    let model = read_model(&arguments.model).map_err(|wrong| problems.extend(wrong));
+    let model = read_model(path).map_err(|wrong| problems.extend(wrong));
     let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
     let (Ok(model), Ok(given)) = (model, given) else { return Err(cannot_use(&problems)) };
     given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
@@ -38,4 +67,27 @@ pub(super) fn simulate(arguments: SimulateArguments) -> CommandResult {
     let text = if arguments.json { format!("{:#}\n", simulation.json()) } else { simulation.text() };
     put(Path::new("-"), &text).map_err(say)?;
     Ok(Outcome::Fine)
+}
+
+fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
+    let mut problems = Vec::new();
+    let settings = settings(machine).map_err(|wrong| problems.push(wrong));
+    let plan: Vec<String> = arguments.plan.iter().cloned().collect();
+    let given = read_recordings(&plan).map_err(|wrong| problems.extend(wrong));
+    let (Ok(settings), Ok(given)) = (settings, given) else { return Err(cannot_use(&problems)) };
+    let recording =
+        execute::execute(settings, &given.recording, arguments.rate).map_err(|wrong| cannot_use(&[wrong]))?;
+    let out = arguments.out.as_deref().unwrap_or(Path::new("-"));
+    put(out, &execute::csv(&recording)).map_err(|problem| CannotRun::new(problem, ""))?;
+    eprintln!("{} rows of {machine} in {}", recording.rows(), out.display());
+    Ok(Outcome::Fine)
+}
+
+fn settings(machine: &str) -> Result<SimulatedSettings, String> {
+    let text = if machine.starts_with("simulated:") { machine.to_owned() } else { format!("simulated://{machine}") };
+    let address: Address = text.parse().map_err(|error| format!("--machine {machine}: {error}"))?;
+    match address.target() {
+        Target::Simulated(target) => Ok(SimulatedSettings::of(target)),
+        _ => Err(format!("--machine {machine}: give lathe or mill")),
+    }
 }

@@ -1,7 +1,9 @@
-//! Where a diagnosis goes: words, JSON, rows, the accepted model.
+//! Where a diagnosis goes: words, JSON, a page, rows, the accepted model, the next experiment.
 
 use adapters::Recording;
 use rules::physics::explain::Language;
+use rules::twin::page::{PageInput, page};
+use rules::twin::plan::plan;
 use rules::twin::{Diagnosis, diagnosis::Verdict, report, text, write_model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,10 +13,14 @@ use std::path::{Path, PathBuf};
 pub struct Outputs {
     /// The diagnosis as JSON.
     pub json: Option<PathBuf>,
+    /// The page.
+    pub html: Option<PathBuf>,
     /// Row by row.
     pub rows: Option<PathBuf>,
     /// The extended model.
     pub accept: Option<PathBuf>,
+    /// The next experiment as a plan.
+    pub experiment: Option<PathBuf>,
     /// Language of the words.
     pub language: Language,
 }
@@ -23,7 +29,7 @@ impl Outputs {
     /// Files that cannot be written, before any work is done.
     #[must_use]
     pub fn trouble(&self) -> Vec<String> {
-        let paths = [&self.json, &self.rows, &self.accept].into_iter().flatten();
+        let paths = [&self.json, &self.html, &self.rows, &self.accept, &self.experiment].into_iter().flatten();
         paths.filter(|path| !is_stdout(path)).filter_map(|path| trouble_of(path)).collect()
     }
 
@@ -37,8 +43,17 @@ impl Outputs {
         } else {
             put(Path::new("-"), &text::report(diagnosis, self.language))?;
         }
+        if let Some(path) = &self.html {
+            put(path, &page(&PageInput { diagnosis, recording, language: self.language }))?;
+        }
         if let Some(path) = &self.rows {
             put(path, &rows(diagnosis, recording))?;
+        }
+        if let Some(path) = &self.experiment {
+            match plan(diagnosis, recording) {
+                Ok(plan) => put(path, &plan.csv(self.language))?,
+                Err(reason) => eprintln!("note: {reason}"),
+            }
         }
         match &self.accept {
             Some(_) if diagnosis.verdict == Verdict::CannotTell => {

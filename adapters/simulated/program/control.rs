@@ -1,6 +1,8 @@
 //! The simulated control: works through blocks, moves the axes, obeys the feed override.
 
+use super::super::frame::Frame;
 use super::super::plant::{Demand, Plant};
+use super::super::settings::FRESH_EDGE_MM;
 use super::{Action, Block, Cut, Planner, Rate};
 use crate::words::{execution, mode};
 use rand::Rng;
@@ -56,16 +58,18 @@ pub(in super::super) struct Control {
     pub(in super::super) wear_mm: [f64; TOOLS],
     pub(in super::super) part_count: u32,
     pub(in super::super) alarm: &'static str,
+    /// The operator turned the override to this.
+    pub(in super::super) override_request: Option<u8>,
     pub(in super::super) hardness: f64,
 }
 
 impl Control {
-    pub(in super::super) fn new(planner: Planner, rng: Pcg64Mcg, lathe: bool, rapid_mm_min: f64) -> Self {
+    pub(in super::super) fn new(planner: Planner, rng: Pcg64Mcg, frame: &Frame, wear_mm: f64) -> Self {
         Self {
             planner,
             rng,
-            lathe,
-            rapid_mm_min,
+            lathe: frame.lathe,
+            rapid_mm_min: frame.rapid_mm_min,
             blocks: VecDeque::new(),
             block: None,
             path: None,
@@ -81,9 +85,10 @@ impl Control {
             holding: false,
             tool: 1,
             edges: [0; TOOLS],
-            wear_mm: [0.005; TOOLS],
+            wear_mm: [wear_mm; TOOLS],
             part_count: 0,
             alarm: "",
+            override_request: None,
             hardness: 1.0,
         }
     }
@@ -186,6 +191,7 @@ impl Control {
             Action::NewEdge => self.new_edge(),
             Action::PartDone => self.part_count += 1,
             Action::Alarm(text) => self.alarm = text,
+            Action::Override(percent) => self.override_request = Some(percent),
             Action::Hardness(hardness) => self.hardness = hardness,
         }
         true
@@ -216,7 +222,7 @@ impl Control {
     fn new_edge(&mut self) {
         let index = self.tool_index();
         self.edges[index] += 1;
-        self.wear_mm[index] = 0.005;
+        self.wear_mm[index] = FRESH_EDGE_MM;
     }
 
     fn rapid(&mut self, dt_s: f64) -> bool {

@@ -1,11 +1,13 @@
 //! Part programmes: blocks that the simulated control works through.
 
 mod control;
+mod experiment;
 mod lathe;
 mod mill;
 mod planner;
 
 pub(super) use control::{Control, Motion};
+pub use experiment::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub(super) use planner::Planner;
 
 use crate::words::{execution, mode};
@@ -64,6 +66,8 @@ pub(super) enum Action {
     Alarm(&'static str),
     /// The material of the parts to come, against the plan.
     Hardness(f64),
+    /// The operator turns the feed override.
+    Override(u8),
 }
 
 /// One block with what the control shows while it runs.
@@ -92,18 +96,22 @@ impl<'a> Writer<'a> {
         Self { blocks, mode: mode::AUTOMATIC, execution: execution::ACTIVE, program, operation: "", number: 0 }
     }
 
+    /// The next blocks have this number.
+    pub(super) fn renumber(&mut self, number: u16) {
+        self.number = number;
+    }
+
+    /// Appends an action under the present block number.
+    pub(super) fn same(&mut self, action: Action) -> &mut Self {
+        let (mode, execution, program, number) = (self.mode, self.execution, self.program, self.number);
+        self.blocks.push_back(Block { mode, execution, program, number, operation: self.operation, action });
+        self
+    }
+
     /// Appends an action; the block number grows by ten.
     pub(super) fn put(&mut self, action: Action) -> &mut Self {
         self.number += 10;
-        self.blocks.push_back(Block {
-            mode: self.mode,
-            execution: self.execution,
-            program: self.program,
-            number: self.number,
-            operation: self.operation,
-            action,
-        });
-        self
+        self.same(action)
     }
 
     /// Appends an action that no program has: the operator, or the machine itself.

@@ -1,6 +1,7 @@
 //! What the day holds: power-up, warm-up, parts in lots, pauses, small trouble, worn edges, the night.
 
 use super::super::settings::SimulatedSettings;
+use super::experiment::{self, ExperimentStep};
 use super::{Action, Block, Writer, lathe, mill};
 use crate::address::SimulatedMachine;
 use crate::words::{execution, mode};
@@ -19,16 +20,26 @@ pub(in super::super) struct Planner {
     day: u32,
     up_since_s: Option<f64>,
     lunch_taken: bool,
+    /// In place of the day: an experiment, and then nothing any more.
+    experiment: Option<Vec<ExperimentStep>>,
 }
 
 impl Planner {
     pub(in super::super) fn new(settings: SimulatedSettings, rng: Pcg64Mcg) -> Self {
-        Self { settings, rng, parts: 0, day: 0, up_since_s: None, lunch_taken: false }
+        Self { settings, rng, parts: 0, day: 0, up_since_s: None, lunch_taken: false, experiment: None }
+    }
+
+    /// Runs these steps once in place of the day.
+    pub(in super::super) fn of_experiment(self, steps: Vec<ExperimentStep>) -> Self {
+        Self { experiment: Some(steps), ..self }
     }
 
     /// Appends the next piece of the day. `wear_mm` is that of the worst edge, with its tool.
     pub(in super::super) fn refill(&mut self, blocks: &mut VecDeque<Block>, since_s: f64, worst: Option<(u8, f64)>) {
         let mut out = Writer::new(blocks, 0);
+        if let Some(steps) = &mut self.experiment {
+            return experiment::write(&mut out, &std::mem::take(steps));
+        }
         let Some(up_since_s) = self.up_since_s else {
             self.up_since_s = Some(since_s);
             self.morning(&mut out);

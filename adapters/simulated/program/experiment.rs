@@ -1,0 +1,110 @@
+//! Experiments: stretches of commanded speed, feed and auxiliaries, run once.
+
+use super::{Action, Cut, Rate, Writer};
+use crate::words::{execution, mode};
+
+/// Number of the program that an experiment runs under.
+pub const EXPERIMENT_PROGRAM: u16 = 9100;
+
+/// From the main switch to the first step: the control starts and the drives settle.
+const START_S: f64 = 20.0;
+
+/// A cut of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExperimentCut {
+    /// Feed, mm/min.
+    pub feed_mm_min: f64,
+    /// Depth of cut, mm.
+    pub depth_mm: f64,
+    /// Diameter of the work, mm.
+    pub diameter_mm: f64,
+}
+
+/// What is commanded over a stretch of time. A change of the spindle speed takes its time on top.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExperimentStep {
+    /// How long, s.
+    pub seconds: f64,
+    /// Spindle speed, rpm; 0 is a stop.
+    pub spindle_rpm: f64,
+    /// Gear stage from 1; `None` takes the one that programs use at this speed.
+    pub gear_stage: Option<u8>,
+    /// The cut, if there is one.
+    pub cut: Option<ExperimentCut>,
+    /// Velocity of Z without a cut, mm/min, signed.
+    pub axis_mm_min: f64,
+    /// Coolant pump.
+    pub coolant_on: bool,
+    /// Hydraulic pump.
+    pub hydraulics_on: bool,
+    /// Feed override, %.
+    pub override_pct: u8,
+    /// A fresh edge before the step.
+    pub new_edge: bool,
+}
+
+/// Switches the machine on and writes every step.
+pub(super) fn write(out: &mut Writer<'_>, steps: &[ExperimentStep]) {
+    if steps.is_empty() {
+        return;
+    }
+    (out.mode, out.execution) = (mode::MANUAL, execution::READY);
+    out.put(Action::Mains(true)).put(Action::Wait(START_S)).put(Action::Drives(true));
+    (out.mode, out.execution, out.program, out.operation) =
+        (mode::AUTOMATIC, execution::ACTIVE, EXPERIMENT_PROGRAM, "experiment");
+    let mut place = Place { stage: 1, z_mm: 160.0 };
+    for (index, step) in steps.iter().enumerate() {
+        out.renumber(u16::try_from(index + 1).unwrap_or(u16::MAX));
+        write_step(out, step, &mut place);
+    }
+}
+
+/// Where the steps so far have left the machine.
+struct Place {
+    stage: u8,
+    z_mm: f64,
+}
+
+fn write_step(out: &mut Writer<'_>, step: &ExperimentStep, place: &mut Place) {
+    out.same(Action::Hydraulics(step.hydraulics_on)).same(Action::Coolant(step.coolant_on));
+    out.same(Action::Override(step.override_pct));
+    if step.new_edge {
+        out.same(Action::NewEdge);
+    }
+    let wanted = step.gear_stage.unwrap_or(if step.spindle_rpm.abs() <= 1000.0 { 1 } else { 2 });
+    if step.spindle_rpm == 0.0 {
+        out.same(Action::Stop);
+    } else {
+        if wanted != place.stage {
+            out.same(Action::Stop);
+            place.stage = wanted;
+        }
+        out.same(Action::Spindle(step.spindle_rpm, wanted));
+    }
+    match step.cut {
+        Some(cut) => place.z_mm = write_cut(out, &cut, step),
+        None if step.axis_mm_min != 0.0 => {
+            let rate = Rate::PerMinute(step.axis_mm_min.abs());
+            place.z_mm += step.axis_mm_min / 60.0 * step.seconds;
+            out.same(Action::Feed { to: [200.0, 0.0, place.z_mm], rate, cut: None, locked: false });
+        }
+        None => {
+            out.same(Action::Wait(step.seconds));
+        }
+    }
+}
+
+/// Writes a cut along Z from zero; where it ends.
+fn write_cut(out: &mut Writer<'_>, cut: &ExperimentCut, step: &ExperimentStep) -> f64 {
+    let length_mm = cut.feed_mm_min * f64::from(step.override_pct) / 100.0 * step.seconds / 60.0;
+    out.same(Action::Rapid([cut.diameter_mm, 0.0, 0.0]));
+    let planned = Cut {
+        depth_mm: cut.depth_mm,
+        diameter_from_mm: cut.diameter_mm,
+        diameter_to_mm: cut.diameter_mm,
+        ..Cut::default()
+    };
+    let rate = Rate::PerMinute(cut.feed_mm_min);
+    out.same(Action::Feed { to: [cut.diameter_mm, 0.0, -length_mm], rate, cut: Some(planned), locked: false });
+    -length_mm
+}

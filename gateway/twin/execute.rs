@@ -1,0 +1,240 @@
+//! The simulated machine carries out an experiment: a recording plan in, a recording out.
+
+use adapters::address::SimulatedMachine;
+use adapters::channel::{ChannelId, Kind};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::driver::Pull;
+use adapters::merge::{Delay, Lockstep};
+use adapters::recording::{Cells, Numbers, Words};
+use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings};
+use adapters::{Recording, Sample, Value};
+use std::fmt::Write as _;
+
+/// When the machine is switched on: 2026-01-01, so that the same plan gives the same recording.
+const ORIGIN_NS: TimeNs = 1_767_225_600 * SECOND_NS;
+/// An experiment takes no longer than this, s.
+const SECONDS_MAX: f64 = 48.0 * 3600.0;
+/// Steps of a plan, at most.
+const STEPS_MAX: usize = 2000;
+
+/// The steps of a plan, and the run that each belongs to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steps {
+    steps: Vec<ExperimentStep>,
+    runs: Vec<String>,
+}
+
+impl Steps {
+    /// Consecutive rows that command the same are one step.
+    ///
+    /// # Errors
+    /// What the plan lacks, or why it is too long.
+    pub fn of(plan: &Recording) -> Result<Self, String> {
+        if plan.numbers("spindle_programmed_rpm").is_none() {
+            return Err(
+                "the plan has no column spindle_programmed_rpm; `diagnose --experiment` writes plans".to_owned()
+            );
+        }
+        let mut found = Self { steps: Vec::new(), runs: Vec::new() };
+        let mut last_tool: Option<String> = None;
+        for run in plan.runs() {
+            for row in run.rows {
+                let mut step = step(plan, row);
+                let tool = plan.words("tool").and_then(|words| words.get(row)).map(str::to_owned);
+                step.new_edge = tool.is_some() && last_tool.is_some() && tool != last_tool;
+                last_tool = tool.or(last_tool);
+                found.add(step, &run.name);
+            }
+        }
+        let seconds: f64 = found.steps.iter().map(|step| step.seconds).sum();
+        if seconds > SECONDS_MAX || found.steps.len() > STEPS_MAX {
+            return Err(format!(
+                "the plan takes {:.1} h in {} steps; the simulated machine carries out at most {:.0} h in {STEPS_MAX} steps",
+                seconds / 3600.0,
+                found.steps.len(),
+                SECONDS_MAX / 3600.0
+            ));
+        }
+        Ok(found)
+    }
+
+    fn add(&mut self, step: ExperimentStep, run: &str) {
+        match self.steps.last_mut() {
+            Some(last)
+                if self.runs.last().is_some_and(|name| name == run)
+                    && (ExperimentStep { seconds: last.seconds, ..step })
+                        == (ExperimentStep { new_edge: false, ..*last }) =>
+            {
+                last.seconds += step.seconds;
+            }
+            _ => {
+                self.steps.push(step);
+                self.runs.push(run.to_owned());
+            }
+        }
+    }
+}
+
+fn step(plan: &Recording, row: usize) -> ExperimentStep {
+    let number = |name: &str| plan.numbers(name).and_then(|numbers| numbers.get(row));
+    let next_s = plan.time_s.get(row + 1).filter(|next_s| **next_s > plan.time_s[row]);
+    let before_s = (row > 0).then(|| plan.time_s[row] - plan.time_s[row - 1]).filter(|step_s| *step_s > 0.0);
+    let cut = (number("engaged").unwrap_or(0.0) > 0.5).then(|| ExperimentCut {
+        feed_mm_min: number("feed_programmed_mm_min").unwrap_or(0.0),
+        depth_mm: number("depth_of_cut_mm").unwrap_or(1.0),
+        diameter_mm: number("diameter_mm").unwrap_or(60.0),
+    });
+    let axis = number("axis_velocity_mm_min").or_else(|| number("z_axis_velocity_mm_min"));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what the register holds")]
+    let percent = number("feed_override_pct").unwrap_or(100.0).clamp(0.0, 254.0) as u8;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what a machine has")]
+    let stage = number("gear_stage").map(|stage| stage.clamp(1.0, 9.0) as u8);
+    ExperimentStep {
+        seconds: next_s.map(|next_s| next_s - plan.time_s[row]).or(before_s).unwrap_or(1.0),
+        spindle_rpm: number("spindle_programmed_rpm").unwrap_or(0.0),
+        gear_stage: stage,
+        cut: cut.filter(|cut| cut.feed_mm_min > 0.0),
+        axis_mm_min: axis.unwrap_or(0.0),
+        coolant_on: number("coolant_on").unwrap_or(0.0) > 0.5,
+        hydraulics_on: number("hydraulics_on").unwrap_or(0.0) > 0.5,
+        override_pct: percent,
+        new_edge: false,
+    }
+}
+
+/// The simulated machine runs the plan from a cold start; what a gateway at `rate_hz` records of it.
+///
+/// # Errors
+/// See [`Steps::of`].
+pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> Result<Recording, String> {
+    let steps = Steps::of(plan)?;
+    let name = match settings.machine {
+        SimulatedMachine::Lathe => "simulated://lathe",
+        SimulatedMachine::Mill => "simulated://mill",
+    };
+    let machine = Simulated::experiment(name, settings, ORIGIN_NS, &steps.steps);
+    let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
+    let mut table = Table::new(name, &steps.runs);
+    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz);
+    Ok(table.finish())
+}
+
+/// The recording under construction.
+struct Table<'a> {
+    name: &'static str,
+    names: &'a [String],
+    samples: Vec<(f64, usize, Sample)>,
+    first_ns: Option<TimeNs>,
+}
+
+impl<'a> Table<'a> {
+    fn new(name: &'static str, names: &'a [String]) -> Self {
+        Self { name, names, samples: Vec::new(), first_ns: None }
+    }
+
+    /// Samples from the first step to the end of the last one.
+    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64) {
+        #[expect(clippy::cast_possible_truncation, reason = "between a millisecond and a thousand seconds")]
+        let period_ns = (SECOND_NS as f64 / rate_hz.clamp(0.001, 1000.0)) as i64;
+        let mut sample = Sample::empty(0);
+        let mut now_ns = ORIGIN_NS;
+        let mut begun = false;
+        let limit_ns = ORIGIN_NS + (SECOND_NS as f64 * 2.0 * SECONDS_MAX) as i64;
+        while now_ns < limit_ns {
+            lockstep.sample_into(&mut sample, now_ns);
+            match step_of(&sample) {
+                Some(step) => {
+                    begun = true;
+                    self.add(&sample, step);
+                }
+                None if begun && ended(&sample) => break,
+                None => {}
+            }
+            now_ns += period_ns;
+        }
+    }
+
+    fn add(&mut self, sample: &Sample, step: usize) {
+        let first_ns = *self.first_ns.get_or_insert(sample.at_ns);
+        let time_s = (sample.at_ns - first_ns) as f64 / SECOND_NS as f64;
+        self.samples.push((time_s, step, sample.clone()));
+    }
+
+    fn finish(self) -> Recording {
+        let time_s = self.samples.iter().map(|(time_s, ..)| *time_s).collect();
+        let mut recording = Recording::new(self.name, time_s, None);
+        let run = |step: usize| self.names.get(step - 1).map_or("", String::as_str);
+        recording.set_column("run", Cells::Words(self.samples.iter().map(|(_, step, _)| run(*step)).collect()));
+        for id in ChannelId::all() {
+            if let Some(cells) = self.cells(id) {
+                recording.set_column(id.name(), cells);
+            }
+        }
+        recording
+            .set_column("engaged", Cells::Numbers(self.samples.iter().map(|(.., sample)| engaged(sample)).collect()));
+        recording
+    }
+
+    fn cells(&self, id: ChannelId) -> Option<Cells> {
+        let values = || self.samples.iter().map(|(.., sample)| sample.slot(id).value.as_ref().ok());
+        values().flatten().next()?;
+        if id.channel().kind == Kind::Text {
+            return Some(Cells::Words(
+                values().map(|value| value.and_then(Value::as_text).unwrap_or("")).collect::<Words>(),
+            ));
+        }
+        Some(Cells::Numbers(values().map(|value| value.and_then(Value::as_number)).collect::<Numbers>()))
+    }
+}
+
+fn text<'a>(sample: &'a Sample, name: &str) -> Option<&'a str> {
+    sample.text(ChannelId::of(name)?)
+}
+
+fn number(sample: &Sample, name: &str) -> Option<f64> {
+    sample.number(ChannelId::of(name)?).ok()
+}
+
+/// The step in progress, from 1.
+fn step_of(sample: &Sample) -> Option<usize> {
+    let program = text(sample, "program")?;
+    let block = text(sample, "block")?.strip_prefix('N')?.parse().ok()?;
+    (program == format!("O{EXPERIMENT_PROGRAM}") && block > 0).then_some(block)
+}
+
+fn ended(sample: &Sample) -> bool {
+    text(sample, "program").is_some_and(|program| program != format!("O{EXPERIMENT_PROGRAM}"))
+}
+
+/// In the cut, as the program says it: a depth is planned and the axis feeds.
+fn engaged(sample: &Sample) -> Option<f64> {
+    let (depth, feed) = (number(sample, "depth_of_cut_mm")?, number(sample, "feed_mm_min")?);
+    let rapid = number(sample, "rapid").unwrap_or(0.0) > 0.5;
+    Some(f64::from(u8::from(depth > 0.0 && feed > 0.0 && !rapid)))
+}
+
+/// A recording as CSV.
+#[must_use]
+pub fn csv(recording: &Recording) -> String {
+    let mut text = String::from("time_s");
+    recording.columns().iter().for_each(|column| text.push_str(&format!(",{}", column.name)));
+    text.push('\n');
+    for row in 0..recording.rows() {
+        let _ = write!(text, "{}", recording.time_s[row]);
+        for column in recording.columns() {
+            let _ = match &column.cells {
+                Cells::Numbers(numbers) => {
+                    write!(text, ",{}", numbers.get(row).map(|x| six(x).to_string()).unwrap_or_default())
+                }
+                Cells::Words(words) => write!(text, ",{}", super::simulation::quoted(words.get(row).unwrap_or(""))),
+            };
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Six decimals are finer than any of the simulated instruments.
+fn six(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
+}
