@@ -38,6 +38,9 @@ pub(super) struct DiagnoseArguments {
     /// Write the experiment that tells the explanations apart as a recording plan.
     #[arg(long, value_name = "PLAN.csv")]
     experiment: Option<PathBuf>,
+    /// Tell the leading hypotheses of the search on standard error.
+    #[arg(long)]
+    search: bool,
     /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
     lang: super::effects::Lang,
@@ -56,6 +59,9 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
     examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let mut diagnosis = twin::diagnose(&given.recording, &model, arguments.seed).map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
+    if arguments.search {
+        eprintln!("search: {}", diagnosis.debug);
+    }
     outputs(&arguments).write(&diagnosis, &given.recording).map_err(|problem| CannotRun::new(problem, ""))?;
     Ok(Outcome::Fine)
 }

@@ -143,7 +143,6 @@ impl State {
     /// Gauss-Newton step under a weak prior around the nominal values, so that a parameter the recording does not
     /// touch stays where the file put it.
     fn step(&self, data: &Data<'_>, nominal: &[Part], noise: Arma, tangent: &[Vec<f64>]) -> Vec<f64> {
-        let size = self.free.len();
         let whitened = |column: &[f64]| data.frame.whiten(column, noise);
         let mut target = whitened(&self.residual);
         let sigma = (dot(&target, &target) / count(target.len().max(1))).sqrt();
@@ -160,9 +159,30 @@ impl State {
                 .for_each(|(other, column)| column.push(if other == index { weight } else { 0.0 }));
             target.push(weight * (start - now));
         }
-        let Solution { mut coefficients, .. } = least_squares(&columns, &target);
-        coefficients.truncate(size);
-        coefficients
+        self.within_ranges(&mut columns, &target)
+    }
+
+    /// Solves with the parameters at rest that stand at the end of their range and would leave it: a step that is cut
+    /// off there afterwards need not lead downwards any more.
+    fn within_ranges(&self, columns: &mut [Vec<f64>], target: &[f64]) -> Vec<f64> {
+        let mut resting = vec![false; self.free.len()];
+        loop {
+            let Solution { mut coefficients, .. } = least_squares(columns, target);
+            coefficients.truncate(self.free.len());
+            resting.iter().zip(&mut coefficients).filter(|(rests, _)| **rests).for_each(|(_, step)| *step = 0.0);
+            let leaves = |index: usize| !resting[index] && self.leaves_range(index, coefficients[index]);
+            let Some(index) = (0..self.free.len()).find(|index| leaves(*index)) else { return coefficients };
+            resting[index] = true;
+            columns[index].fill(0.0);
+        }
+    }
+
+    /// Does the parameter stand at the end of its range that the step points beyond?
+    fn leaves_range(&self, index: usize, step: f64) -> bool {
+        let free = self.free[index];
+        let parameter = &self.parts[free.part].parameters[free.parameter];
+        let (low, high) = parameter.range;
+        (parameter.value <= low && step < 0.0) || (parameter.value >= high && step > 0.0)
     }
 
     fn try_step(
