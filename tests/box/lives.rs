@@ -141,7 +141,8 @@ fn a_full_disk_is_told_polling_goes_on_and_storing_too_when_there_is_room() {
     let directory = tempfile::tempdir().expect("a directory");
     let disk = directory.path().join("disk");
     fs::create_dir(&disk).expect("created");
-    let script = "mount -t tmpfs -o size=24m tmpfs \"$1\" && exec \"$2\" run --data-dir \"$1\" --listen 127.0.0.1:0 --speed 60";
+    let script =
+        "mount -t tmpfs -o size=24m tmpfs \"$1\" && exec \"$2\" run --data-dir \"$1\" --listen 127.0.0.1:0 --speed 60";
     let mut command = Command::new("unshare");
     command.args(["-rm", "sh", "-c", script, "sh"]).arg(&disk).arg(env!("CARGO_BIN_EXE_cnc-gateway"));
     let mut gateway = Gateway::spawn(command);
@@ -149,7 +150,11 @@ fn a_full_disk_is_told_polling_goes_on_and_storing_too_when_there_is_room() {
     let rows = |address: &str| get(address, "/api/v1/status").json()["history"]["rows"].as_u64();
     wait_for("the first samples", Duration::from_secs(30), || rows(&address).filter(|rows| *rows > 0));
     // The disk is in a name space of its own; this is the way to it.
-    let hog = Path::new("/proc").join(gateway.pid().to_string()).join("root").join(disk.strip_prefix("/").expect("absolute")).join("hog");
+    let hog = Path::new("/proc")
+        .join(gateway.pid().to_string())
+        .join("root")
+        .join(disk.strip_prefix("/").expect("absolute"))
+        .join("hog");
     let mut file = fs::File::create(&hog).expect("created");
     let filled = std::iter::repeat_with(|| file.write_all(&[1; 1 << 16])).take(1000).find_map(Result::err);
     assert_eq!(filled.map(|error| error.kind()), Some(std::io::ErrorKind::StorageFull));

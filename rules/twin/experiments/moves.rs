@@ -112,8 +112,8 @@ fn levels((low, high): (f64, f64), count: u32) -> Vec<f64> {
     let middle = upward.len() / 2;
     let (first, second) = upward.split_at(middle);
     let mut mixed = Vec::new();
-    for index in 0..second.len() {
-        mixed.push(second[index]);
+    for (index, level) in second.iter().enumerate() {
+        mixed.push(*level);
         mixed.extend(first.get(index));
     }
     mixed
