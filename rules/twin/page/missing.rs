@@ -10,6 +10,9 @@ use std::fmt::Write as _;
 /// Share swallowed by the baseline above which the effect's whole size is uncertain.
 const HIDDEN_SHARE: f64 = 0.95;
 
+/// Error with the effect, as a share of the error without it, above which there is no gain to speak of.
+const NO_GAIN: f64 = 0.995;
+
 /// The section; empty where nothing is missing.
 pub(super) fn section(data: &Data<'_>) -> String {
     let missing = &data.diagnosis.missing;
@@ -67,15 +70,18 @@ fn parameters(data: &Data<'_>, missing: &Missing) -> String {
 fn parameter(data: &Data<'_>, effect: &str, e: &Estimate) -> String {
     let [value, low, high] = aligned(e);
     let meaning = data.tongue.parameter(effect, &e.name);
-    let meaning = if meaning.is_empty() { meaning } else { format!("<small>{meaning}</small>") };
     let unit = unit_text(&e.unit);
     let unit = if unit.is_empty() { "\u{2013}".to_owned() } else { unit };
     let interval = match e.low.is_finite() && e.high.is_finite() {
         true => format!("{low} … {high}"),
         false => data.say("not determined by this recording", "此记录无法确定").to_owned(),
     };
+    let (class, about) = match meaning.is_empty() {
+        true => ("", String::new()),
+        false => (" class=\"told\"", format!("<tr class=\"about\"><td colspan=\"4\">{meaning}</td></tr>")),
+    };
     format!(
-        "<tr><td><code>{}</code>{meaning}</td><td class=\"n\">{value}</td><td class=\"n\">{interval}</td><td>{unit}</td></tr>",
+        "<tr{class}><td><code>{}</code></td><td class=\"n\">{value}</td><td class=\"n\">{interval}</td><td>{unit}</td></tr>{about}",
         escape(&e.name)
     )
 }
@@ -131,6 +137,11 @@ fn chance_text(p: f64) -> String {
 fn gain(data: &Data<'_>, missing: &Missing) -> String {
     let unit = data.unit();
     let text = match (missing.held_out_rmse_before, missing.held_out_rmse_after, data.tongue.0) {
+        (Some(before), Some(after), _) if after > NO_GAIN * before => format!(
+            "{} ({}).",
+            data.say("On held-out runs it makes no difference to the error", "在留出的运行上，它不改变误差"),
+            with_unit(&number(after), &unit)
+        ),
         (Some(before), Some(after), Language::En) => format!(
             "On held-out runs the error is {} without this effect and {} with it.",
             with_unit(&number(before), &unit),
@@ -171,8 +182,11 @@ fn absorbed(data: &Data<'_>, missing: &Missing) -> String {
     fact(data.say("How hidden it was", "隐藏程度"), &(bar + text.as_str()))
 }
 
-fn percent(x: f64) -> String {
+/// A share in percent; what is less than a tenth of a percent from none or all is told so.
+pub(super) fn percent(x: f64) -> String {
     let text = match x {
+        x if x <= 0.0 => "0".to_owned(),
+        x if x >= 100.0 => "100".to_owned(),
         x if x <= 0.1 => "&lt;\u{202f}0.1".to_owned(),
         x if x >= 99.9 => "&gt;\u{202f}99.9".to_owned(),
         x => fixed(x, i32::from(!(1.0..=99.0).contains(&x))),

@@ -142,6 +142,7 @@ fn faulty(data: &Data<'_>, fault: &Fault) -> String {
         "spikes" => data.say("isolated spikes", "孤立尖峰"),
         "quantisation" => data.say("recorded in coarse steps", "量化步长较粗"),
         "duplicate_time" => data.say("time stands still or runs backwards", "时间停滞或倒退"),
+        "refused_rows" => data.say("rows refused while reading", "读取时被拒绝的行"),
         other => other,
     };
     format!(

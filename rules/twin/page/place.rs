@@ -49,7 +49,7 @@ pub(super) fn capital(text: &str) -> String {
 
 fn facts(data: &Data<'_>, region: &Region) -> String {
     let unit = data.unit();
-    let share = with_unit(&fixed(100.0 * region.share, 0), "%");
+    let share = super::missing::percent(100.0 * region.share);
     let size = size(data, &region.effect);
     let mut facts = match data.tongue.0 {
         Language::En => vec![format!("{share} of what is missing lies here")],

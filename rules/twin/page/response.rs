@@ -54,11 +54,12 @@ fn drawn(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -
     if turns(cells.iter().filter(|(x, ..)| x.rows >= ROWS_MIN).map(|(_, law, _)| law.mean())) > TURNS_MAX {
         return String::new();
     }
-    // The line breaks where no rows lie between.
+    // The line is whole where rows lie along it, dashed between.
     let pieces = cells.split(|(x, ..)| x.rows < ROWS_MIN).filter(|piece| !piece.is_empty());
     let line: Vec<Vec<(f64, f64)>> =
         pieces.map(|piece| piece.iter().map(|(x, law, _)| (x.mean(), law.mean())).collect()).collect();
     cells.retain(|(x, ..)| x.rows >= ROWS_MIN);
+    let between: Vec<(f64, f64)> = cells.iter().map(|(x, law, _)| (x.mean(), law.mean())).collect();
     let points = cells.iter().map(|(x, _, seen)| vec![(x.mean(), seen.mean())]).collect();
     let spread = cells.iter().map(|(x, _, seen)| {
         let (mean, half) = (seen.mean(), seen.half_width());
@@ -79,6 +80,7 @@ fn drawn(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -
         y_unit: data.unit(),
         curves: vec![
             curve("spread", "", spread),
+            curve("gap", "", vec![between]),
             curve("law", data.say("fitted law", "拟合公式"), line),
             curve("points", data.say("recording", "记录"), points),
         ],
@@ -87,8 +89,8 @@ fn drawn(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -
         low: true,
     };
     let note = data.say(
-        "Line: the fitted law. Points: what the recording shows once everything else is taken off, mean with its 95 % interval.",
-        "线：拟合公式。点：扣除其他影响后记录所显示的均值及其95 %区间。",
+        "Line: the fitted law, dashed where no rows lie. Points: what the recording shows once everything else is taken off, mean with its 95 % interval.",
+        "线：拟合公式（虚线处无数据）。点：扣除其他影响后记录所显示的均值及其95 %区间。",
     );
     format!("{}<p class=\"note\">{note}</p>", plot.html())
 }

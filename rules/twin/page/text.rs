@@ -36,6 +36,9 @@ const ENDINGS: [(&str, &str); 27] = [
     ("_l", "l"),
 ];
 
+/// Words of a condition that are listed.
+const WORDS_MAX: usize = 8;
+
 /// Text that came from data, safe between tags and in attributes.
 pub(super) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
@@ -73,6 +76,18 @@ impl Tongue {
             [] => String::new(),
             [one] => one.clone(),
             [first @ .., end] => format!("{}{joint}{end}", first.join(self.say(", ", "、"))),
+        }
+    }
+
+    /// Words in a row; of many the first, and how many more.
+    fn some(self, words: &[String]) -> String {
+        let Some(more) = words.len().checked_sub(WORDS_MAX).filter(|more| *more > 1) else {
+            return self.list(words, (" or ", "或"));
+        };
+        let first = words[..WORDS_MAX].join(self.say(", ", "、"));
+        match self.0 {
+            Language::En => format!("{first} or one of {more} more"),
+            Language::Zh => format!("{first}等（另有{more}个）"),
         }
     }
 
@@ -122,7 +137,7 @@ impl Tongue {
         match condition {
             Condition::Equals { column, words } => {
                 let words: Vec<String> = words.iter().map(|word| escape(word)).collect();
-                format!("{}{}{}", self.column(column), self.say(" is ", "为"), self.list(&words, (" or ", "或")))
+                format!("{}{}{}", self.column(column), self.say(" is ", "为"), self.some(&words))
             }
             Condition::Range { column, min, max } => self.range(column, *min, *max),
         }

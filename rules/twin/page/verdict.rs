@@ -85,7 +85,10 @@ fn headline(data: &Data<'_>) -> String {
 fn lead(data: &Data<'_>) -> String {
     let diagnosis = data.diagnosis;
     match diagnosis.verdict {
-        Verdict::CannotTell => escape(&diagnosis.summary),
+        Verdict::CannotTell => {
+            let needed = diagnosis.summary.strip_prefix("Cannot tell: ").unwrap_or(&diagnosis.summary);
+            super::place::capital(&escape(needed))
+        }
         Verdict::NoMismatch => data
             .say(
                 "Beyond the noise nothing is left that any effect could explain. What the fitted parameters of the model can imitate would not show either.",
