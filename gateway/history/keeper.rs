@@ -95,6 +95,11 @@ impl Keeper {
         self.next_row - self.open.len() as i64
     }
 
+    /// The time of the newest row.
+    pub(crate) fn newest_ns(&self) -> Option<TimeNs> {
+        self.open.at_ns.last().copied().or(self.blocks.back().map(|block| block.end_ns)).or(self.last_ns)
+    }
+
     /// Right after a commit: the time of the newest durable row, and the number of the row after it.
     pub(crate) fn durable(&self) -> (Option<TimeNs>, i64) {
         let in_tail = self.in_tail.checked_sub(1).map(|row| self.open.at_ns[row]);
