@@ -95,7 +95,7 @@ impl Browser {
 
     /// Waits until an expression is true.
     pub(crate) fn wait_until(&mut self, expression: &str) {
-        let until = Instant::now() + Duration::from_secs(30);
+        let until = Instant::now() + Duration::from_secs(90);
         while self.value(expression) != json!(true) {
             assert!(
                 Instant::now() < until,
