@@ -92,7 +92,7 @@ impl Kept {
     }
 }
 
-/// See the [module](self).
+/// What a replay ends with: rows, seconds per state, parts, alarms, refused rows, visibility of the cut.
 #[derive(Debug)]
 pub struct Summary {
     /// The recordings.
