@@ -54,8 +54,9 @@ impl TailSlots {
     }
 }
 
-/// Makes the oldest of what is in `keeper` durable, or changes nothing. False when something is left: records and, if
-/// `with_tail`, the rows of the running minute go with the last blocks.
+/// Makes the oldest of what is in `keeper` durable, or changes nothing. False when blocks are left; with the last of
+/// them go, if `with_tail`, the rows of the running minute. Records go with their rows: what a kill leaves behind is the
+/// history up to one moment, with everything before it and nothing after it.
 pub(crate) fn commit(
     db: &mut Connection,
     keeper: &mut Keeper,
@@ -72,20 +73,30 @@ pub(crate) fn commit(
     if last && with_tail {
         put_tail(&writing, keeper, &mut replaced)?;
     }
-    if last {
-        keeper.records.iter().try_for_each(|record| record_sql::store(&writing, record).doing("storing a record"))?;
-    }
+    let records = keeper.records_through(rows_end(keeper, blocks, with_tail));
+    let storing = keeper.records.iter().take(records);
+    storing
+        .map(|posted| record_sql::store(&writing, &posted.record))
+        .collect::<Result<(), _>>()
+        .doing("storing a record")?;
     writing.commit().doing("making samples durable")?;
     keeper.segments.clear();
     keeper.blocks.drain(..blocks);
     *slots = replaced;
-    if last {
-        keeper.records.clear();
-    }
+    keeper.forget_records(records);
     if last && with_tail {
         keeper.in_tail = keeper.open.len();
     }
     Ok(last)
+}
+
+/// Number of the row after the last one that a commit of the first `blocks` blocks makes durable.
+fn rows_end(keeper: &Keeper, blocks: usize, with_tail: bool) -> i64 {
+    match keeper.blocks.get(blocks) {
+        Some(left) => left.first_row,
+        None if with_tail => keeper.next_row,
+        None => keeper.open_row() + keeper.in_tail as i64,
+    }
 }
 
 /// Writes the rows that the crash tail lacks, over its oldest entries where those are not needed any more.

@@ -74,6 +74,11 @@ impl House {
         Ok(used)
     }
 
+    /// Is the disk short of room, so that the file may not grow?
+    pub(crate) fn is_short(&self) -> bool {
+        self.ceiling.is_some()
+    }
+
     fn limit(&self) -> u64 {
         self.ceiling.unwrap_or(u64::MAX).min(self.retention.max_bytes)
     }

@@ -2,6 +2,7 @@
 
 use super::block::{Block, Encoder, LEVEL_FRESH};
 use super::error::HistoryError;
+use super::mailbox::Posted;
 use super::pyramid::MINUTE_NS;
 use super::reason::Reasons;
 use super::record::{Event, Record};
@@ -43,7 +44,9 @@ pub(crate) struct Keeper {
     pub(crate) in_tail: usize,
     pub(crate) segments: VecDeque<Segment>,
     pub(crate) blocks: VecDeque<Block>,
-    pub(crate) records: VecDeque<Record>,
+    pub(crate) records: VecDeque<Posted>,
+    /// Ticket of the newest record that is durable.
+    pub(crate) durable_ticket: u64,
     pub(crate) segment: i64,
     /// Number of the first row after opening.
     pub(crate) opened_row: i64,
@@ -70,6 +73,7 @@ impl Keeper {
             segments: VecDeque::new(),
             blocks: VecDeque::new(),
             records: VecDeque::new(),
+            durable_ticket: 0,
             segment: end.segment,
             opened_row: end.next_row,
             next_row: end.next_row,
@@ -93,6 +97,23 @@ impl Keeper {
     /// Number of the first row of the running minute.
     pub(crate) fn open_row(&self) -> i64 {
         self.next_row - self.open.len() as i64
+    }
+
+    /// Rows taken on since opening, up to but without row `row`.
+    pub(crate) fn rows_through(&self, row: i64) -> u64 {
+        u64::try_from(row - self.opened_row).unwrap_or(0)
+    }
+
+    /// How many of the records belong to rows before row `row`.
+    pub(crate) fn records_through(&self, row: i64) -> usize {
+        let rows = self.rows_through(row);
+        self.records.partition_point(|posted| posted.after_rows <= rows)
+    }
+
+    /// The first `count` records are durable.
+    pub(crate) fn forget_records(&mut self, count: usize) {
+        let newest = self.records.drain(..count).map(|posted| posted.ticket).max();
+        self.durable_ticket = self.durable_ticket.max(newest.unwrap_or(0));
     }
 
     /// The time of the newest row.
@@ -153,13 +174,16 @@ impl Keeper {
 
     fn note_step(&mut self, last_ns: TimeNs, at_ns: TimeNs) {
         let back_s = (last_ns - at_ns) as f64 / SECOND_NS as f64;
-        self.records.push_back(Record::Event(Event {
+        let record = Record::Event(Event {
             at_ns,
             kind: "clock_went_back".to_owned(),
             source: "history".to_owned(),
             text: format!("The clock went back by {back_s:.3} s. Samples continue in a new segment."),
             detail: format!("{{\"before_ns\":{last_ns},\"after_ns\":{at_ns}}}"),
-        }));
+        });
+        let after_rows = self.rows_through(self.next_row);
+        let place = self.records.partition_point(|posted| posted.after_rows <= after_rows);
+        self.records.insert(place, Posted { record, ticket: 0, after_rows });
     }
 
     /// Turns the open rows into a block.

@@ -25,13 +25,25 @@ pub(crate) enum Job {
     Maintain(TimeNs),
 }
 
+/// A record on its way to the disk.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Posted {
+    pub(crate) record: Record,
+    /// Counts the records that were handed in; zero for one that the writer made itself.
+    pub(crate) ticket: u64,
+    /// So many rows had been taken on before it: it becomes durable with the last of them, not before, not after.
+    pub(crate) after_rows: u64,
+}
+
 #[derive(Debug)]
 struct Post {
     current: Rows,
     full: VecDeque<Rows>,
     free: Vec<Rows>,
     queued_rows: usize,
-    records: VecDeque<Record>,
+    /// Rows taken on since opening.
+    taken_rows: u64,
+    records: VecDeque<Posted>,
     /// Records handed in so far; the number of the newest is its ticket.
     last_ticket: u64,
     /// Records that the writer holds but has not made durable.
@@ -49,8 +61,7 @@ struct Post {
 /// What the writer takes out in one go.
 pub(crate) struct Delivery {
     pub(crate) batches: VecDeque<Rows>,
-    pub(crate) records: VecDeque<Record>,
-    pub(crate) last_ticket: u64,
+    pub(crate) records: VecDeque<Posted>,
     pub(crate) reasons: Reasons,
     pub(crate) job: Option<(u64, Job)>,
     pub(crate) closing: bool,
@@ -85,6 +96,7 @@ impl Mailbox {
             full: VecDeque::new(),
             free: Vec::new(),
             queued_rows: 0,
+            taken_rows: 0,
             records: VecDeque::new(),
             last_ticket: 0,
             held_records: 0,
@@ -130,6 +142,7 @@ impl Mailbox {
         let Post { current, reasons, .. } = &mut *post;
         current.push(sample, extras, reasons);
         post.queued_rows += 1;
+        post.taken_rows += 1;
         if post.current.len() >= BATCH_ROWS.min(self.queue_rows) {
             post.close_batch();
             self.arrived.notify_one();
@@ -148,9 +161,10 @@ impl Mailbox {
             post.dropped_records += 1;
             return None;
         }
-        post.records.push_back(record);
         post.last_ticket += 1;
-        Some(post.last_ticket)
+        let (ticket, after_rows) = (post.last_ticket, post.taken_rows);
+        post.records.push_back(Posted { record, ticket, after_rows });
+        Some(ticket)
     }
 
     /// Asks for a job and returns its number.
@@ -261,7 +275,6 @@ impl Post {
         Delivery {
             batches,
             records,
-            last_ticket: self.last_ticket,
             reasons: self.reasons.clone(),
             job: if job_too { self.jobs.pop_front() } else { None },
             closing: self.closing,

@@ -150,6 +150,9 @@ pub struct Options {
     pub extras: Vec<ExtraSeries>,
     /// Why this history is opened, for the segment table: `live`, or the name of the recording that is replayed.
     pub origin: String,
+    /// The rows that follow come right after those that the history holds of the same origin: the state that was left
+    /// open stays open. For a recording whose replay was broken off; a live machine has moved on in the meantime.
+    pub goes_on: bool,
     /// Room reserved on disk so that a full disk can still be tidied up, bytes.
     pub reserve_bytes: u64,
 }
@@ -165,6 +168,7 @@ impl Default for Options {
             retention: Retention::default(),
             extras: Vec::new(),
             origin: "live".to_owned(),
+            goes_on: false,
             reserve_bytes: 8_192_000,
         }
     }

@@ -12,12 +12,14 @@ use super::{schema, tail};
 use adapters::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension};
 
-/// Brings the file into order and says where it ends.
-pub(crate) fn recover(db: &mut Connection) -> Result<End, HistoryError> {
+/// Brings the file into order and says where it ends. If the last rows came from `goes_on`, the state they ended in is
+/// left open.
+pub(crate) fn recover(db: &mut Connection, goes_on: Option<&str>) -> Result<End, HistoryError> {
     let repairing = db.transaction().doing("beginning to recover")?;
     let end = end_of_blocks(&repairing)?;
     let end = seal_tail(&repairing, end)?;
-    if let Some(last_ns) = end.last_ns {
+    let last_origin = last_origin(&repairing)?;
+    if let Some(last_ns) = end.last_ns.filter(|_| goes_on.is_none() || goes_on != last_origin.as_deref()) {
         close_state(&repairing, last_ns, "stop").doing("ending the last state")?;
     }
     repairing.commit().doing("recovering")?;
@@ -38,6 +40,13 @@ fn end_of_blocks(db: &Connection) -> Result<End, HistoryError> {
         next_row: last.map_or(0, |(row, _)| row),
         last_ns: last.map(|(_, end_ns)| end_ns),
     })
+}
+
+/// Where the newest rows came from.
+fn last_origin(db: &Connection) -> Result<Option<String>, HistoryError> {
+    db.query_row("SELECT origin FROM segments ORDER BY id DESC LIMIT 1", [], |row| row.get(0))
+        .optional()
+        .doing("looking for the last segment")
 }
 
 /// One entry of the crash tail whose rows are in no block.

@@ -2,7 +2,7 @@
 
 use adapters::clock::TimeNs;
 use serde::Serialize;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// A moment's figures.
@@ -32,6 +32,8 @@ pub struct Status {
     pub commits: u64,
     /// Duration of the last commit, fsync included, milliseconds.
     pub last_commit_ms: f64,
+    /// The disk is short of room: every new sample takes the place of the oldest raw one.
+    pub short_of_room: bool,
     /// Why nothing is becoming durable at the moment, in words; `None` when all is well.
     pub degraded: Option<String>,
     /// The last error, also when it is over.
@@ -49,6 +51,7 @@ pub(crate) struct Shared {
     pub(crate) retired: AtomicU64,
     pub(crate) commits: AtomicU64,
     pub(crate) commit_us: AtomicU64,
+    pub(crate) short_of_room: AtomicBool,
     words: Mutex<Words>,
 }
 
@@ -72,6 +75,7 @@ impl Default for Shared {
             retired: AtomicU64::new(0),
             commits: AtomicU64::new(0),
             commit_us: AtomicU64::new(0),
+            short_of_room: AtomicBool::new(false),
             words: Mutex::new(Words::default()),
         }
     }
@@ -107,6 +111,7 @@ impl Shared {
             retired_samples: self.retired.load(Ordering::Relaxed),
             commits: self.commits.load(Ordering::Relaxed),
             last_commit_ms: self.commit_us.load(Ordering::Relaxed) as f64 / 1000.0,
+            short_of_room: self.short_of_room.load(Ordering::Relaxed),
             degraded: words.degraded.clone(),
             last_error: words.last_error.clone(),
             ..Status::default()

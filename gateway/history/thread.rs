@@ -37,14 +37,13 @@ pub(crate) struct Thread {
 pub(crate) struct Pace {
     next_commit: Instant,
     failures: usize,
-    last_ticket: u64,
     flushing: Option<u64>,
     maintaining: Option<u64>,
 }
 
 impl Default for Pace {
     fn default() -> Self {
-        Self { next_commit: Instant::now(), failures: 0, last_ticket: 0, flushing: None, maintaining: None }
+        Self { next_commit: Instant::now(), failures: 0, flushing: None, maintaining: None }
     }
 }
 
@@ -61,30 +60,35 @@ impl Thread {
     pub(crate) fn run(mut self) {
         let _guard = StopGuard(self.mailbox.clone());
         loop {
-            let delivery = self.take();
+            let rows_too = self.takes_rows();
+            let delivery = self.take(rows_too);
             let closing = delivery.closing && delivery.batches.is_empty();
             self.accept(delivery);
             self.commit_if_due(closing);
             self.maintain();
-            if closing && (!self.keeper.is_dirty() || self.pace.failures >= LAST_ATTEMPTS) {
+            let done = rows_too && !self.keeper.is_dirty();
+            if closing && (done || self.pace.failures >= LAST_ATTEMPTS) {
                 return self.finish();
             }
         }
     }
 
-    fn take(&mut self) -> Delivery {
+    /// While nothing becomes durable, a recording waits and a live machine goes on.
+    fn takes_rows(&self) -> bool {
+        !(self.keeper.is_full() && self.options.when_full == WhenFull::Wait)
+    }
+
+    fn take(&mut self, rows_too: bool) -> Delivery {
         let until_commit = self.pace.next_commit.saturating_duration_since(Instant::now());
         let limit = if self.house.is_busy() { Duration::ZERO } else { until_commit };
-        let rows_too = !(self.keeper.is_full() && self.options.when_full == WhenFull::Wait);
-        let job_too = self.pace.flushing.is_none() && self.pace.maintaining.is_none();
+        // A flush promises everything before it, so it cannot come before its rows.
+        let job_too = rows_too && self.pace.flushing.is_none() && self.pace.maintaining.is_none();
         self.mailbox.take(limit, rows_too, job_too)
     }
 
     fn accept(&mut self, delivery: Delivery) {
         self.keeper.reasons = delivery.reasons;
-        // Records before rows: a row that is durable must never be without what happened at it.
         self.keeper.records.extend(delivery.records);
-        self.pace.last_ticket = delivery.last_ticket;
         for batch in delivery.batches {
             self.keeper.ingest(&batch);
             self.mailbox.recycle(batch);
@@ -167,7 +171,7 @@ impl Thread {
         }
         let rows = u64::try_from(next_row - self.keeper.opened_row).unwrap_or(0);
         self.shared.rows.store(rows.saturating_sub(self.keeper.lost_rows), Ordering::Relaxed);
-        self.shared.acknowledged_record.store(self.pace.last_ticket, Ordering::Release);
+        self.shared.acknowledged_record.store(self.keeper.durable_ticket, Ordering::Release);
         if let Some(number) = self.pace.flushing.take() {
             self.mailbox.finish(number);
         }
@@ -179,6 +183,7 @@ impl Thread {
             Err(error) => self.shared.degraded(&degraded_text(&error)),
         }
         self.shared.retired.store(self.house.retired, Ordering::Relaxed);
+        self.shared.short_of_room.store(self.house.is_short(), Ordering::Relaxed);
     }
 
     fn maintain(&mut self) {

@@ -50,7 +50,7 @@ impl Writer {
         let mut series = stored_series(&options)?;
         schema::register(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
-        let end = recover(&mut db)?;
+        let end = recover(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(Shared::default());
         let house = House::new(path, options.retention, options.reserve_bytes);

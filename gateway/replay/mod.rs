@@ -119,7 +119,7 @@ impl OneFile<'_> {
     fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(Counts, TimeNs), CannotRun> {
         let origin = origin_of(file).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""))?;
         let before = self.before(&origin)?;
-        let writer = self.plan.history.as_ref().map(|path| open(path, &origin)).transpose()?;
+        let writer = self.plan.history.as_ref().map(|path| open(path, &origin, before.rows() > 0)).transpose()?;
         let source = Replay::new(origin, &read.recording, before.origin_ns.unwrap_or(next_ns.max(before.free_ns)));
         let rows = source.rows() as u64;
         if let (Some(path), true) = (&self.plan.history, self.plan.talk) {
@@ -168,9 +168,9 @@ impl OneFile<'_> {
     }
 }
 
-fn open(path: &Path, origin: &str) -> Result<Writer, CannotRun> {
-    let options =
-        Options { when_full: WhenFull::Wait, extras: stored_series(), origin: origin.to_owned(), ..Options::default() };
+fn open(path: &Path, origin: &str, goes_on: bool) -> Result<Writer, CannotRun> {
+    let origin = origin.to_owned();
+    let options = Options { when_full: WhenFull::Wait, extras: stored_series(), origin, goes_on, ..Options::default() };
     Writer::open(path, options).map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 

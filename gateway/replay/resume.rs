@@ -42,7 +42,8 @@ pub(super) struct Before {
     pub(super) free_ns: TimeNs,
     rows: u64,
     records: Vec<Record>,
-    state_open: bool,
+    /// A state was ended although the recording goes on in it.
+    state_ended: bool,
 }
 
 impl Before {
@@ -59,7 +60,7 @@ impl Before {
             return Ok(Self { free_ns, ..Self::default() });
         }
         let records = records(&reader, Span::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
-        Ok(Self { origin_ns: Some(first_ns), free_ns, rows, records, state_open: true })
+        Ok(Self { origin_ns: Some(first_ns), free_ns, rows, records, state_ended: !state_open(&reader)? })
     }
 
     /// How many rows are there.
@@ -77,12 +78,13 @@ impl Before {
         row < self.rows || self.records.contains(record)
     }
 
-    /// Opening a history ends the state that a broken-off replay was in; this begins it again at the first new row.
+    /// Somebody else has written this history in between and ended the state that the replay was in; this begins it
+    /// again at the first new row.
     pub(super) fn continued(&mut self, row: u64, sample: &Sample, estimates: &Estimates) -> Option<Record> {
-        if !self.state_open || row <= self.rows {
+        if !self.state_ended || row <= self.rows {
             return None;
         }
-        self.state_open = false;
+        self.state_ended = false;
         if estimates.since_ns >= sample.at_ns {
             return None;
         }
@@ -109,6 +111,16 @@ fn stored(reader: &Reader, origin: &str) -> Result<(u64, TimeNs, TimeNs), Histor
         ControlFlow::Continue(())
     })?;
     Ok(found)
+}
+
+/// Is there a state that has not ended?
+fn state_open(reader: &Reader) -> Result<bool, HistoryError> {
+    let mut open = false;
+    reader.sql("SELECT 1 FROM states WHERE until_ns IS NULL", |_, _| {
+        open = true;
+        ControlFlow::Break(())
+    })?;
+    Ok(open)
 }
 
 /// Everything recorded in this time, as it was handed in.

@@ -165,7 +165,7 @@ impl Health {
             add(what, "stop the other program, or choose another port with --listen");
         }
         if let Some(what) = self.kept.status().error {
-            add(what, "polling goes on; nothing that was acknowledged is lost");
+            add(what, "polling goes on");
         }
         if self.behind_ns > 0 {
             let what = format!("the wall clock is {} behind the box", span(self.behind_ns));

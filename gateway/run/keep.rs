@@ -1,7 +1,9 @@
 //! The history of a running box: opened at the start, or again and again while the disk does not let it.
 
 use crate::config;
-use crate::history::{DiskRoom, HistoryError, Options, Reader, Record, Retention, Writer, disk_room};
+use crate::history::{
+    self, AlarmClear, DiskRoom, HistoryError, Options, Reader, Record, Retention, Span, Writer, disk_room,
+};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Store, stored_series};
 use crate::status::HistoryStatus;
@@ -12,8 +14,14 @@ use std::time::{Duration, Instant};
 
 /// Pause between two tries to open a history that cannot be opened.
 const RETRY: Duration = Duration::from_secs(10);
+/// So many alarms are looked through for some that stand.
+const ALARMS_MAX: u32 = 10_000;
 /// A rate of growth is told after this much machine time.
 const RATE_AFTER_S: f64 = 600.0;
+
+/// Said while the disk is short of room.
+const SHORT: &str = "The disk is all but full: each new sample takes the place of the oldest raw one. Free some room on the disk \
+                     of the history.";
 
 /// The history, open or not.
 #[derive(Debug)]
@@ -61,6 +69,7 @@ impl Kept {
     fn try_open(&mut self) -> Result<(), HistoryError> {
         let writer = Writer::open(&self.path, self.options.clone())?;
         self.rows_before = rows_in(&self.path);
+        end_alarms(&self.path, &writer);
         self.bytes_before = size(&self.path);
         self.writer = Some(writer);
         self.closed = None;
@@ -95,13 +104,13 @@ impl Kept {
                 Err(error) => self.put_off(&error),
             }
         }
-        let degraded = self.writer.as_ref().and_then(|writer| writer.status().degraded);
-        if degraded != self.told {
-            match &degraded {
+        let trouble = self.writer.as_ref().and_then(|writer| trouble(&writer.status()));
+        if trouble != self.told {
+            match &trouble {
                 Some(text) => Notice::new(Severity::Error, "history_degraded", text.clone()).say(),
-                None => Notice::new(Severity::Info, "history_recovered", "the history is being written again").say(),
+                None => Notice::new(Severity::Info, "history_recovered", "the history is being written as usual").say(),
             }
-            self.told = degraded;
+            self.told = trouble;
         }
     }
 
@@ -140,7 +149,7 @@ impl Kept {
             bytes: writer.bytes,
             lasts_days: self.lasts_days(writer.bytes),
             lost: self.lost + writer.dropped_samples + writer.lost_samples,
-            error: closed.or(writer.degraded),
+            error: closed.or_else(|| trouble(&writer)),
         }
     }
 
@@ -167,6 +176,23 @@ impl Store for Kept {
     fn record(&mut self, record: Record) {
         if let Some(writer) = &self.writer {
             writer.record(record);
+        }
+    }
+}
+
+/// What the writer has to tell: nothing becomes durable, or only at the cost of what is old.
+fn trouble(status: &history::Status) -> Option<String> {
+    let short = || status.short_of_room.then(|| SHORT.to_owned());
+    status.degraded.clone().or_else(short)
+}
+
+/// Alarms that stood when the box stopped end then; what still holds is raised again.
+fn end_alarms(path: &Path, writer: &Writer) {
+    let Ok(reader) = Reader::open(path) else { return };
+    let Ok(Some((_, newest_ns))) = reader.span() else { return };
+    for alarm in reader.alarms(Span::newest(ALARMS_MAX)).unwrap_or_default() {
+        if alarm.cleared_ns.is_none() {
+            writer.record(AlarmClear { at_ns: newest_ns, code: alarm.code, source: alarm.source });
         }
     }
 }

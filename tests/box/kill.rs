@@ -59,7 +59,6 @@ fn recording(directory: &Path) -> std::path::PathBuf {
 }
 
 #[test]
-#[ignore = "open: fails since the crash tail is written over in place"]
 fn a_replay_killed_twenty_times_ends_as_if_nothing_had_happened() {
     let directory = tempfile::tempdir().expect("a directory");
     let recording = recording(directory.path());
@@ -90,12 +89,11 @@ fn a_replay_killed_twenty_times_ends_as_if_nothing_had_happened() {
     assert_eq!(expected.lines().count(), found.lines().count());
     // Where it was killed a new segment begins, which export writes as another run; the values must be the same.
     assert!(without_run(&expected) == without_run(&found), "the samples differ");
-    for kind in ["parts", "decisions", "alarms"] {
+    for kind in ["states", "parts", "decisions", "alarms"] {
         let records =
             |database: &Path| answer(&["history", "query", "--history", text(database), "--records", kind, "--json"]);
         assert_eq!(records(&whole), records(&killed), "{kind}");
     }
-    assert_eq!(seconds_per_state(&whole), seconds_per_state(&killed));
     println!("{KILLS} kills, {} rows, undisturbed {storing:?}", expected.lines().count() - 1);
 }
 
@@ -128,16 +126,6 @@ fn without_run(table: &str) -> Vec<String> {
         cells.collect::<Vec<_>>().join(",")
     };
     table.lines().map(cut).collect()
-}
-
-/// Whole tenths of seconds per state, however many intervals they are cut into.
-fn seconds_per_state(database: &Path) -> Vec<(String, i64)> {
-    let sql = "SELECT state, CAST(round(sum(until_ns - since_ns) / 1e8) AS INTEGER) AS tenths FROM states GROUP BY state ORDER BY state";
-    let answer: Value =
-        serde_json::from_str(&answer(&["history", "query", "--history", text(database), "--json", "--sql", sql]))
-            .expect("JSON");
-    let rows = answer["rows"].as_array().expect("rows");
-    rows.iter().map(|row| (row["state"].to_string(), row["tenths"].as_i64().unwrap_or(0))).collect()
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The whole box: real child processes, sockets, files, signals and a browser.
 
 mod browser;
+mod cost;
 mod http;
 mod kill;
 mod lives;

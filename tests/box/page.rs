@@ -8,7 +8,6 @@ use serde_json::Value;
 const SHOWN: [&str; 3] = ["spindle_power_w", "spindle_speed_rpm", "feed_mm_min"];
 
 #[test]
-#[ignore = "open: the box takes longer than 20 s to end after the page was open"]
 fn the_page_shows_what_the_history_holds() {
     if !browser::is_there() {
         return;

@@ -77,7 +77,7 @@ impl Gateway {
 
     /// Waits for a line that holds `part`.
     pub(crate) fn wait_said(&mut self, part: &str) -> String {
-        wait_for(&format!("{part:?}; it said:\n{}", self.said()), Duration::from_secs(30), || {
+        wait_for(&format!("{part:?}; it said:\n{}", self.said()), Duration::from_secs(90), || {
             let said = self.said();
             if let Some(status) = self.child.try_wait().expect("a child") {
                 assert!(said.contains(part), "it ended with {status} and had said:\n{said}");
@@ -103,7 +103,7 @@ impl Gateway {
     /// Waits for its end.
     pub(crate) fn wait(&mut self) -> ExitStatus {
         let child = &mut self.child;
-        wait_for("the end of the process", Duration::from_secs(20), || child.try_wait().expect("a child"))
+        wait_for("the end of the process", Duration::from_secs(120), || child.try_wait().expect("a child"))
     }
 
     /// SIGTERM and a clean end.
