@@ -74,11 +74,8 @@ pub(crate) fn commit(
         put_tail(&writing, keeper, &mut replaced)?;
     }
     let records = keeper.records_through(rows_end(keeper, blocks, with_tail));
-    let storing = keeper.records.iter().take(records);
-    storing
-        .map(|posted| record_sql::store(&writing, &posted.record))
-        .collect::<Result<(), _>>()
-        .doing("storing a record")?;
+    let mut storing = keeper.records.iter().take(records);
+    storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
     writing.commit().doing("making samples durable")?;
     keeper.segments.clear();
     keeper.blocks.drain(..blocks);
