@@ -202,9 +202,6 @@ impl Pipeline {
             known.and_then(|known| memory.learner.fed(tick, known, noise, &self.settings))
         };
         if let Some(seen) = seen {
-            if std::env::var("LRN").is_ok() {
-                println!("learn {:?} known {:?} {:?}", seen, known, verdict.state);
-            }
             memory.no_load.learn(seen.point, seen.sd_w, seen.at_ns, &self.settings);
         }
     }
