@@ -6,8 +6,9 @@
 //!
 //! Power below the known one is believed once the next block confirms it (warm-up lowers no-load power). Power visibly
 //! above it may be a light cut that nobody reported, and is believed only in rapid traverse or after it has lasted.
-//! Under feed nothing is learned, except that no-load power cannot be above what is measured.
+//! Under feed nothing is learned, except that no-load power cannot be above what is measured (see `bound`).
 
+use super::bound::{self, Normal};
 use super::estimate::NoLoadOrigin;
 use super::filter::count;
 use super::no_load::{NoLoad, NoLoadPoint};
@@ -225,25 +226,30 @@ impl Learner {
 
     /// Takes a tick of power under feed: no-load power cannot be above it. Yields an observation where it lies clearly
     /// below what is known. A block begins with the feed, so that the first holds the approach alone.
-    pub(super) fn fed(
-        &mut self,
-        tick: IdleTick,
-        known: NoLoad,
-        noise: &Noise,
-        settings: &Settings,
-    ) -> Option<Observation> {
+    pub(super) fn fed(&mut self, tick: IdleTick, known: NoLoad, noise: &Noise) -> Option<Observation> {
         let seen = self.fed.push(tick, noise)?;
         let noise_w = noise.sd() * seen.point.power_w * (MIDDLE_HALF / count(self.fed.length)).sqrt();
-        let sd_w = noise_w.hypot(0.5 * settings.c2_on * seen.point.power_w);
         let below_w = known.power_w - seen.point.power_w;
         // Far below is no drift: a spindle that brakes, or a meter that fails.
         let near = known.origin != NoLoadOrigin::Measured || below_w < FAR_BELOW * known.power_w;
-        (near && below_w > 2.0 * noise_w).then_some(Observation { sd_w, ..seen })
+        if !near || below_w <= 2.0 * noise_w {
+            return None;
+        }
+        let before = Normal { mean: known.power_w, sd: known.sd_w };
+        let after = bound::below(before, seen.point.power_w, noise_w);
+        // A speed that is known already is updated, any other is taken over as it is.
+        let Normal { mean, sd } =
+            if known.origin == NoLoadOrigin::Measured { bound::as_measurement(before, after) } else { after };
+        let point = NoLoadPoint { power_w: mean, ..seen.point };
+        (mean > 0.0).then_some(Observation { point, sd_w: sd, ..seen })
     }
 
     fn plausible(&mut self, seen: &Observation, known: Option<NoLoad>, settings: &Settings) -> bool {
-        // What is known of other speeds says too little to contradict a settled power at this one.
-        let Some(known) = known.filter(|known| known.origin == NoLoadOrigin::Measured) else { return seen.confirmed };
+        // What is known of other speeds says too little to contradict a settled power at this one. Rapid traverse is short,
+        // so one block of it is enough: a start-up that still decayed is corrected from above.
+        let Some(known) = known.filter(|known| known.origin == NoLoadOrigin::Measured) else {
+            return seen.confirmed || seen.rapid;
+        };
         let limit_w = known.power_w * settings.c2_off + 2.0 * known.sd_w.hypot(seen.sd_w);
         let above_w = seen.point.power_w - known.power_w;
         if above_w <= limit_w {

@@ -16,6 +16,7 @@
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 
+mod bound;
 mod cutting;
 mod detector;
 mod estimate;

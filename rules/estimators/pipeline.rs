@@ -199,7 +199,7 @@ impl Pipeline {
             memory.learner.idle(tick, known, noise, &self.settings)
         } else {
             memory.learner.stop();
-            known.and_then(|known| memory.learner.fed(tick, known, noise, &self.settings))
+            known.and_then(|known| memory.learner.fed(tick, known, noise))
         };
         if let Some(seen) = seen {
             memory.no_load.learn(seen.point, seen.sd_w, seen.at_ns, &self.settings);

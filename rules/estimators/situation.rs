@@ -1,6 +1,6 @@
 //! What the inputs of a tick say before any estimation.
 
-use super::estimate::{NoEstimate, NoLoadOrigin};
+use super::estimate::NoEstimate;
 use super::inputs::Inputs;
 use super::no_load::NoLoad;
 use super::settings::Settings;
@@ -74,9 +74,7 @@ impl Tick<'_> {
 /// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
 pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
     let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
-    // An error of interpolation stays as long as the speed; drift of a measured power is corrected at the next chance.
-    let doubt = if no_load.origin == NoLoadOrigin::Measured { 1.0 } else { 2.0 };
-    (relative * no_load.power_w).max(doubt * no_load.sd_w)
+    (relative * no_load.power_w).max(no_load.sd_w)
 }
 
 fn missing(channel: &str, absence: Absence) -> Situation {
