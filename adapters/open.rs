@@ -152,6 +152,15 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
     Ok((replay, Refused { rows: read.refused, problems: read.problems }))
 }
 
+/// Why nothing can be read at this address, whatever is there: this build has no driver for it.
+#[must_use]
+pub fn missing_driver(address: &Address) -> Option<OpenError> {
+    match address.target() {
+        Target::Simulated(_) | Target::Replay(_) => None,
+        other => Some(not_built(address, other)),
+    }
+}
+
 fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",

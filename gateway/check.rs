@@ -4,6 +4,7 @@
 use crate::config::{self, Config, Problem};
 use crate::reload::read_directory;
 use adapters::address::{FanucBackend, Target};
+use adapters::open::missing_driver;
 use adapters::recording::{RecordingError, read_path};
 use rules::{script, twin};
 use serde::Serialize;
@@ -61,7 +62,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
             report.read.extend(open_to_all(&config));
             check_scripts(&config, &mut report);
             check_model(&config, &mut report);
-            check_sources(&config, &mut report);
+            check_sources(&name, &config, &mut report);
         }
         Err(problems) => report.problems = problems,
     }
@@ -132,8 +133,15 @@ fn check_model(config: &Config, report: &mut Report) {
     }
 }
 
-fn check_sources(config: &Config, report: &mut Report) {
+fn check_sources(name: &str, config: &Config, report: &mut Report) {
     for source in &config.sources {
+        if let Some(error) = missing_driver(&source.address) {
+            report.problems.push(Problem::of(
+                name,
+                error.to_string(),
+                "name a source that is there, or wait for the driver",
+            ));
+        }
         match source.address.target() {
             Target::Replay(replay) => check_recording(&replay.file, report),
             Target::Fanuc { backend: FanucBackend::Vendor(library), .. } | Target::HncNet { library, .. } => {

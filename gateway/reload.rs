@@ -273,6 +273,37 @@ pub fn load_now(directory: &Path, host: &mut Host) -> Result<usize, Vec<Problem>
     put_in_charge(read_directory(directory).and_then(|files| compile(&files)), host)
 }
 
+/// What is in charge after a start at which something was wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Fallback {
+    /// All files but those with problems, so many.
+    Others(usize),
+    /// The shipped scripts, from memory.
+    Shipped,
+}
+
+/// At the start there is no last good set: puts in charge every file that is right by itself, or the shipped scripts
+/// where none can be used, so that the box is never without its alarms. The host goes on saying what is wrong.
+pub fn load_rest(directory: &Path, problems: &[Problem], host: &mut Host) -> Fallback {
+    let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
+    let files: Vec<ScriptFile> = read_directory(directory).unwrap_or_default();
+    let good: Vec<ScriptFile> = files.into_iter().filter(|file| !bad(file)).collect();
+    let fallback = match compile(&good) {
+        Ok(set) if !set.is_empty() => {
+            let count = set.len();
+            host.install(set);
+            Fallback::Others(count)
+        }
+        _ => {
+            // The shipped scripts compile, which is tested; if they did not, the box would go on without any.
+            let _none_in_charge = host.load(&shipped());
+            Fallback::Shipped
+        }
+    };
+    host.refuse(problems.to_vec());
+    fallback
+}
+
 fn put_in_charge(loaded: Loaded, host: &mut Host) -> Result<usize, Vec<Problem>> {
     match loaded {
         Ok(set) => {

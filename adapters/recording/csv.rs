@@ -32,11 +32,22 @@ impl fmt::Display for RowProblem {
     }
 }
 
+/// What to do about a file that cannot be read.
+fn next_step(error: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind::{InvalidData, InvalidInput, IsADirectory, UnexpectedEof};
+    match error.kind() {
+        UnexpectedEof => "The file ends too early: copy it again.",
+        InvalidData | InvalidInput => "The file is damaged, or neither CSV in UTF-8 nor gzip: copy or export it again.",
+        IsADirectory => "Name a file in it.",
+        _ => "Check the path and the permissions.",
+    }
+}
+
 /// Why a recording cannot be read at all.
 #[derive(Debug, Error)]
 pub enum RecordingError {
     /// The file cannot be opened or read.
-    #[error("{file}: {error}. Check the path and the permissions.")]
+    #[error("{file}: {error}. {}", next_step(.error))]
     Io {
         /// The file.
         file: String,

@@ -71,6 +71,9 @@ pub struct Info {
     pub dropped: Vec<Dropped>,
 }
 
+/// A rate of growth is told after ten minutes.
+const RATE_AFTER_DAYS: f64 = 600.0 / 86_400.0;
+
 static TABLES: [&str; 11] =
     ["states", "parts", "events", "alarms", "decisions", "commands", "models", "diagnoses", "minutes", "hours", "days"];
 
@@ -129,7 +132,8 @@ impl Reader {
         let (Some(bytes), Some(first_ns), Some(last_ns)) = week else { return Ok(None) };
         let days = (last_ns - first_ns) as f64 / DAY_NS as f64;
         let all_to_samples = used_bytes as f64 / (sample_bytes as f64).max(1.0);
-        Ok((days > 0.0).then(|| bytes as f64 / days * all_to_samples))
+        // The first minutes hold mostly what is there only once.
+        Ok((days >= RATE_AFTER_DAYS).then(|| bytes as f64 / days * all_to_samples))
     }
 
     fn number(&self, select: &str) -> Result<Option<i64>, HistoryError> {
@@ -192,6 +196,9 @@ impl fmt::Display for Info {
         if let (Some(max), Some(days)) = (self.max_bytes, self.limit_reached_days) {
             let max = megabytes(max as f64);
             writeln!(f, "the limit of {max} is reached in {days:.0} days; then the oldest raw samples go first")?;
+        }
+        if self.bytes_per_day.is_none() && self.samples > 0 {
+            writeln!(f, "how long the disk lasts can be told after ten minutes of samples")?;
         }
         for TableRows { table, rows } in self.tables.iter().filter(|table| table.rows > 0) {
             writeln!(f, "{table}: {rows}")?;

@@ -60,6 +60,12 @@ impl Motion {
         }
     }
 
+    /// One line per word: how many rows, and in which states they were, most frequent first.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let wide = self.rows.keys().map(|word| word.chars().count()).max().unwrap_or(0);
+        self.rows.iter().map(|(word, counts)| line(word, wide, counts)).collect()
+    }
+
     /// Rows per word and state, where the recording has such words; states that never occur are left out.
     #[must_use]
     pub fn json(&self) -> Option<Value> {
@@ -70,4 +76,14 @@ impl Motion {
         let words = self.rows.iter().map(|(word, counts)| (word.to_string(), Value::Object(row(counts))));
         (!self.rows.is_empty()).then(|| Value::Object(words.collect()))
     }
+}
+
+fn line(word: &str, wide: usize, counts: &[u64; State::ALL.len()]) -> String {
+    let all: u64 = counts.iter().sum();
+    let mut states: Vec<(State, u64)> = State::ALL.into_iter().zip(*counts).filter(|(_, count)| *count > 0).collect();
+    states.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    #[expect(clippy::cast_precision_loss, reason = "a share")]
+    let share = |(state, count): &(State, u64)| format!("{} {:.0} %", state.word(), 100.0 * *count as f64 / all as f64);
+    let shares: Vec<String> = states.iter().map(share).collect();
+    format!("{word:<wide$} {all:>8} rows: {}", shares.join(", "))
 }

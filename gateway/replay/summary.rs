@@ -47,6 +47,9 @@ impl Counts {
     }
 }
 
+/// Words of the machine described in words.
+const WORDS_SHOWN: usize = 20;
+
 /// One recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSummary {
@@ -170,6 +173,11 @@ impl fmt::Display for Summary {
             writeln!(f, "spindle on and off: {right} of {edges} edges right at the very row")?;
         }
         writeln!(f, "{}", self.visibility)?;
+        let words = self.motion.lines();
+        if !words.is_empty() {
+            writeln!(f, "what the machine itself calls its motion, and the states of these rows:")?;
+        }
+        words.iter().take(WORDS_SHOWN).try_for_each(|line| writeln!(f, "  {line}"))?;
         if let Some(Kept { path, stored, already }) = &self.kept {
             writeln!(f, "{}: {stored} rows stored, {already} were there already", path.display())?;
         }

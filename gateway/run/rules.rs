@@ -5,7 +5,7 @@ use super::tick::Wishes;
 use crate::config::Config;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::reload::{Reloader, furnish, load_now};
+use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
 use adapters::clock::TimeNs;
 use rules::script::{Host, Problem, shipped};
 use std::sync::atomic::Ordering;
@@ -23,7 +23,12 @@ pub fn load(config: &Config) -> (Host, Watched) {
     let mut host = Host::new();
     if directory.is_dir() {
         if let Err(problems) = load_now(directory, &mut host) {
-            told.push(refused(&problems, "no script is in charge until this is put right"));
+            let consequence = match load_rest(directory, &problems, &mut host) {
+                Fallback::Others(1) => "the other script is in charge".to_owned(),
+                Fallback::Others(count) => format!("the other {count} are in charge"),
+                Fallback::Shipped => "the shipped scripts are in charge as delivered".to_owned(),
+            };
+            told.push(refused(&problems, &consequence));
         }
     } else if host.load(&shipped()).is_ok() {
         told.push(Notice::new(

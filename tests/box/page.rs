@@ -1,47 +1,79 @@
 //! The live page in a real browser, against a real box: what it shows is what the history holds.
 
 use super::browser::{self, Browser};
-use super::process::{Gateway, run, stdout};
+use super::process::{Gateway, get, run, stdout};
 use serde_json::Value;
+use std::time::{Duration, Instant};
 
 /// Texts that hold no number the history could know.
 const SHOWN: [&str; 3] = ["spindle_power_w", "spindle_speed_rpm", "feed_mm_min"];
 
+/// The five states of a machine's day.
+const FIVE: [&str; 5] = ["off", "standby", "spindle_start", "idle", "cutting"];
+
 #[test]
 fn the_page_shows_what_the_history_holds() {
+    page_and_history_agree("2400", 12);
+}
+
+/// `cargo test --release --test box page -- --ignored --nocapture`
+#[test]
+#[ignore = "takes ten minutes"]
+fn after_ten_accelerated_minutes_the_page_shows_what_the_history_holds() {
+    page_and_history_agree("36000", 200);
+}
+
+/// Runs `for_s` seconds of machine time at sixty times real time and compares `wanted` moments of the page.
+fn page_and_history_agree(for_s: &str, wanted: usize) {
     if !browser::is_there() {
         return;
     }
     let directory = tempfile::tempdir().expect("a directory");
     let data = directory.path().join("data");
-    let mut gateway = Gateway::start(&data, &["--speed", "60", "--for", "2400"]);
+    let began = Instant::now();
+    let mut gateway = Gateway::start(&data, &["--speed", "60", "--for", for_s]);
     let address = gateway.address();
+    assert_eq!(get(&address, "/").status, 200);
+    println!("first page after {:?}", began.elapsed());
     let mut browser = Browser::start(directory.path());
     browser.open(&format!("http://{address}/"));
     browser.wait_until("document.body?.dataset.connected === 'true'");
     browser.wait_until("document.getElementById('state').dataset.word === 'cutting'");
     languages(&mut browser);
-    let shots = shots(&mut browser);
+    let shots = shots(&mut browser, wanted);
     chart(&mut browser);
-    // The machine's forty minutes are over: the box ends by itself, and everything shown must be in the history.
-    assert!(gateway.wait().success(), "{}", gateway.said());
-    assert!(shots.len() >= 10, "{} different moments were seen", shots.len());
+    // The machine's time is over: the box ends by itself, and everything shown must be in the history.
+    assert!(gateway.wait_at_most(Duration::from_secs(900)).success(), "{}", gateway.said());
     let database = data.join("history.db");
-    for (at_ms, shown) in shots {
-        compare(database.to_str().expect("a path"), at_ms, &shown);
+    let database = database.to_str().expect("a path");
+    for (at_ms, shown) in &shots {
+        compare(database, *at_ms, shown);
     }
+    let seconds = seconds_per_state(database);
+    assert!(FIVE.iter().all(|word| seconds.iter().any(|(state, _)| state == word)), "{seconds:?}");
+    println!("{} moments of the page agree with the history; seconds per state: {seconds:?}", shots.len());
     browser.wait_until("document.body.dataset.connected === 'false'");
 }
 
+fn seconds_per_state(database: &str) -> Vec<(String, f64)> {
+    let sql = "SELECT state, sum(until_ns - since_ns) / 1e9 AS seconds FROM states GROUP BY state";
+    let output = run(&["history", "query", "--history", database, "--json", "--sql", sql]);
+    let answer: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|error| panic!("{error}: {output:?}"));
+    let rows = answer["rows"].as_array().expect("rows");
+    rows.iter()
+        .map(|row| (row["state"].as_str().expect("a word").to_owned(), row["seconds"].as_f64().expect("s")))
+        .collect()
+}
+
 /// Several moments as the page shows them: its own time, state word and numbers.
-fn shots(browser: &mut Browser) -> Vec<(i64, Value)> {
+fn shots(browser: &mut Browser, wanted: usize) -> Vec<(i64, Value)> {
     let read = "(() => {
         const tile = (name) => document.querySelector(`[data-quantity=${name}] [data-value]`)?.dataset.value ?? null;
         return { at: Number(document.getElementById('clock').dataset.ms), word: document.getElementById('state').dataset.word,
                  spindle_power_w: tile('spindle_power_w'), spindle_speed_rpm: tile('spindle_speed_rpm'), feed_mm_min: tile('feed_mm_min') };
     })()";
     let mut shots: Vec<(i64, Value)> = Vec::new();
-    while shots.len() < 12 {
+    while shots.len() < wanted {
         let shot = browser.value(read);
         let at_ms = shot["at"].as_i64().expect("a time");
         if shots.last().is_none_or(|(last, _)| *last != at_ms) {

@@ -102,8 +102,13 @@ impl Gateway {
 
     /// Waits for its end.
     pub(crate) fn wait(&mut self) -> ExitStatus {
+        self.wait_at_most(Duration::from_secs(120))
+    }
+
+    /// Waits for its end, so long.
+    pub(crate) fn wait_at_most(&mut self, limit: Duration) -> ExitStatus {
         let child = &mut self.child;
-        wait_for("the end of the process", Duration::from_secs(120), || child.try_wait().expect("a child"))
+        wait_for("the end of the process", limit, || child.try_wait().expect("a child"))
     }
 
     /// SIGTERM and a clean end.

@@ -1,7 +1,7 @@
 //! Scripts on disk: delivered, edited, broken, mended, with a real directory and the real thread.
 
 use super::*;
-use gateway::reload::{Reloader, Watch, furnish, load_now, read_directory};
+use gateway::reload::{Fallback, Reloader, Watch, furnish, load_now, load_rest, read_directory};
 use rules::script::shipped;
 use std::fs;
 use std::path::Path;
@@ -124,4 +124,23 @@ fn a_directory_that_is_gone_is_told_and_changes_nothing() {
     let problems = load_now(Path::new("/nowhere/scripts"), &mut host).expect_err("it is not there");
     assert!(told(&problems).contains("name another one as `directory` under [scripts]"), "{}", told(&problems));
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
+}
+
+#[test]
+fn a_start_with_a_broken_file_puts_the_others_in_charge_and_with_none_left_the_shipped_ones() {
+    let directory = tempfile::tempdir().expect("a directory");
+    write(directory.path(), "a.rhai", "request_feed_override(90, \"good\");");
+    write(directory.path(), "b.rhai", "request_feed_override(70, ");
+    let mut host = Host::new();
+    let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
+    assert_eq!(load_rest(directory.path(), &problems, &mut host), Fallback::Others(1));
+    assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
+    assert_eq!(host.status().refused, problems, "and this is said");
+
+    fs::remove_file(directory.path().join("a.rhai")).expect("removed");
+    let mut host = Host::new();
+    let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
+    assert_eq!(load_rest(directory.path(), &problems, &mut host), Fallback::Shipped);
+    assert_eq!(host.status().scripts.len(), shipped().len());
+    assert!(!host.status().well());
 }
