@@ -118,6 +118,14 @@ pub(crate) fn rate(scene: &Scene, values: &[f64]) -> Vec<f64> {
     rates
 }
 
+/// Change of the spindle speed in rpm per second: as recorded, or from the speed where it is not.
+pub(crate) fn spindle_rate_rpm_per_s(scene: &Scene) -> Option<Vec<f64>> {
+    if let Some(recorded) = scene.column("spindle_acceleration_rpm_per_s") {
+        return Some(recorded.to_vec());
+    }
+    Some(rate(scene, scene.role(Role::Speed)?))
+}
+
 /// Both directions are visited, each in at least a fiftieth of the rows.
 pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
     let least = motion.len().div_ceil(50);

@@ -14,7 +14,7 @@ pub mod state;
 mod unit;
 
 pub use catalogue::{CATALOGUE, effect};
-pub use scene::{OutputKind, Role, Scene, SceneError};
+pub use scene::{LinearLaw, OutputKind, Role, Scene, SceneError};
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.

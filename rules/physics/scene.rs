@@ -1,8 +1,10 @@
 //! What an effect sees: the inputs of a recording by the part they play.
 
 use adapters::recording::{Recording, Words, with_derived};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Relative change of the spindle speed from one row to the next that starts a new pass.
@@ -141,7 +143,7 @@ pub struct Scene {
     runs: Vec<Range<usize>>,
     run_names: Vec<String>,
     clock_s: Vec<f64>,
-    latent: Option<Vec<f64>>,
+    latent: BTreeMap<&'static str, Vec<f64>>,
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
     absent: BTreeMap<String, Vec<bool>>,
@@ -153,7 +155,12 @@ pub struct Scene {
     passes: Vec<Range<usize>>,
     load: Option<Vec<f64>>,
     simulated: Option<Vec<f64>>,
+    laws: RefCell<BTreeMap<String, LinearLaw>>,
 }
+
+/// A formula over columns that is linear in its parameters: what it is with all of them at zero, then what one unit of
+/// each adds, per row; `None` for a formula that is not linear.
+pub type LinearLaw = Option<Arc<Vec<Vec<f64>>>>;
 
 impl Scene {
     /// Prepares a recording for a model with this output and these declared roles.
@@ -173,7 +180,7 @@ impl Scene {
             rows: recording.rows(),
             time_s: recording.time_s.clone(),
             clock_s: running_clock_s(&recording, &runs),
-            latent: None,
+            latent: BTreeMap::new(),
             period_s: median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
             usable: measured.iter().map(|value| value.is_some()).collect(),
@@ -186,6 +193,7 @@ impl Scene {
             passes: Vec::new(),
             load: None,
             simulated: None,
+            laws: RefCell::default(),
             runs,
         };
         scene.take_columns(&recording);
@@ -369,15 +377,26 @@ impl Scene {
         self.load = load;
     }
 
-    /// How present a hidden switch is in each row, 0 to 1, where a search has found one.
+    /// The state that nobody records of an effect of this kind, per row, where a search has found one: how present a
+    /// hidden switch is (0 to 1), the height of a wandering wave (unit of the output).
     #[must_use]
-    pub fn latent(&self) -> Option<&[f64]> {
-        self.latent.as_deref()
+    pub fn latent(&self, kind: &str) -> Option<&[f64]> {
+        self.latent.get(kind).map(Vec::as_slice)
     }
 
-    /// Sets the state of a hidden switch.
-    pub fn set_latent(&mut self, latent: Option<Vec<f64>>) {
-        self.latent = latent;
+    /// Sets the hidden state of an effect.
+    pub fn set_latent(&mut self, kind: &'static str, state: Vec<f64>) {
+        self.latent.insert(kind, state);
+    }
+
+    /// The columns of a formula over this recording, found by `find` once and kept: columns never change.
+    pub fn linear_law(&self, formula: &str, find: impl FnOnce() -> LinearLaw) -> LinearLaw {
+        if let Some(known) = self.laws.borrow().get(formula) {
+            return known.clone();
+        }
+        let found = find();
+        self.laws.borrow_mut().insert(formula.to_owned(), found.clone());
+        found
     }
 
     /// The output as the model simulates it, for effects of the measurement.

@@ -12,7 +12,8 @@ const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 fn reluctance(kind: &str) -> f64 {
     match kind {
         "gear_stage" | "field_weakening" | "entry_exit" | "chatter" | "recipe_error" => 6.0,
-        "zero_drift" | "saturation" => 10.0,
+        "zero_drift" => 14.0,
+        "saturation" => 10.0,
         "sensor_gain" | "built_up_edge" | "chip_thinning" | "engagement_timing" | "override_delay" => 3.0,
         "inverter_loss" | "iron_loss" | "direction_asymmetry" | "depth_taper" | "meter_window" => 2.0,
         _ => 0.0,
@@ -72,7 +73,9 @@ fn reads_output(model: &Model) -> bool {
     model.parts.iter().any(reads)
 }
 
-fn wanted(effect: &dyn Effect, model: &Model) -> bool {
+/// May the search propose this effect beside this model?
+#[must_use]
+pub fn wanted(effect: &dyn Effect, model: &Model) -> bool {
     let kind = effect.doc().kind;
     let listed = model.only.is_empty() || model.only.iter().any(|only| only == kind);
     let excluded = model.exclude.iter().any(|excluded| excluded == kind) || BUILDING.contains(&kind);

@@ -3,29 +3,22 @@
 use super::bind::bind;
 use super::designs::{Design, designs};
 use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
-use super::empirical::empirical_designs;
 use super::fit::{Data, Fit, fit};
 use super::frame::{Frame, Unit, held_out, units};
-use super::gate::p_value;
 use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::{Arma, count};
 use super::quality::{Fault, clean, median};
 use super::scan::Bank;
-use super::search::{Found, Hypothesis, P_MAX, Search};
+use super::search::{Found, Hypothesis, Search};
+use super::unknown::Unknown;
 use super::verdicts;
-use crate::physics::{Form, Scene};
+use crate::physics::Scene;
 use adapters::Recording;
 use std::collections::BTreeSet;
 
 /// Rows below which nothing is claimed.
 const ROWS_MIN: usize = 60;
-/// Size, in deviations of the ordinary noise, below which an effect is not claimed.
-const SIZE_DEVIATIONS: f64 = 0.3;
-/// Size, as a share of the mean output, below which an effect is not claimed.
-const SIZE_SHARE: f64 = 0.005;
-/// What an empirical form must explain on top, as a share of what is named, before the name is withdrawn.
-const UNKNOWN_SHARE: f64 = 0.25;
 
 /// Compares a model with a recording.
 ///
@@ -41,8 +34,8 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
     };
     let (mut found, designs) = case.search(&base, seed);
     let base = case.settle(base, &mut found);
-    let found = case.worth_claiming(found, &base);
     let unknown = case.unknown(&base, &found, seed);
+    let found = if unknown.is_none() { case.worth_claiming(found, &base) } else { found };
     let outcome = Outcome::new(&mut case, base, found, designs, unknown);
     Ok(verdicts::judge(&mut case, outcome))
 }
@@ -67,6 +60,8 @@ pub struct Case<'a> {
     pub recorded: Vec<f64>,
     /// Faults of the recording.
     pub faults: Vec<Fault>,
+    /// A wave that was followed, where there is one.
+    pub ripple: Option<super::ripple::Ripple>,
 }
 
 impl<'a> Case<'a> {
@@ -83,7 +78,7 @@ impl<'a> Case<'a> {
         let frame = Frame::new(&scene, &units, |unit| !held.contains(&unit));
         let held_frame = Frame::new(&scene, &units, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        Ok(Self { model, scene, parts, units, held, frame, held_frame, recorded, faults })
+        Ok(Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple: None })
     }
 
     fn too_little(&self) -> Option<String> {
@@ -140,64 +135,11 @@ impl<'a> Case<'a> {
         let _ = simulate(&base.parts, &mut self.scene);
         let mut designs = designs(&self.scene, &self.frame, self.model);
         designs.extend(self.hidden_switch(base));
+        designs.extend(self.hidden_ripple(base));
         let frame = self.frame.clone();
         let bank = Bank::new(&designs, &frame);
         let found = self.with_data(|data| Search::new(data, base, &bank, seed).run());
         (found, designs)
-    }
-
-    /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
-    fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
-        let effect = crate::physics::effect("auxiliary_switch")?;
-        let wanted = self.model.only.is_empty() || self.model.only.iter().any(|kind| kind == "auxiliary_switch");
-        if !wanted || self.model.exclude.iter().any(|kind| kind == "auxiliary_switch") {
-            return None;
-        }
-        let found = super::latent::find(&base.residual, &self.frame.stretches)?;
-        self.scene.set_latent(Some(self.switch_per_row(&found)));
-        let form = Form { name: "latent", ln_choices: 0.5 * super::latent::price(&found), ..Form::default() };
-        super::designs::design(effect, &form, &self.scene, &self.frame)
-    }
-
-    /// The state of a hidden switch in every row: as found where the rows were fitted, followed causally in held-out
-    /// runs.
-    fn switch_per_row(&self, found: &super::latent::Switching) -> Vec<f64> {
-        let mut state = vec![0.0; self.scene.rows()];
-        for group in 0..self.frame.len() {
-            self.frame.rows(group).for_each(|row| state[row] = found.state[group]);
-        }
-        let simulated = self.scene.simulated().unwrap_or_default();
-        let on = found.state.iter().sum::<f64>() / count(found.state.len());
-        for rows in self.held.iter().map(|unit| self.units[*unit].rows.clone()) {
-            let residual: Vec<f64> = rows.clone().map(|row| self.scene.recorded()[row] - simulated[row]).collect();
-            let deviation = 0.5 * found.level.abs();
-            let followed = super::latent::follow(&residual, found, deviation, on);
-            rows.zip(followed).for_each(|(row, on)| state[row] = on);
-        }
-        state
-    }
-
-    /// Drops members whose remaining part is too small to claim, smallest first.
-    fn worth_claiming(&mut self, mut found: Found, base: &Fit) -> Found {
-        while let Some(position) = self.smallest_unclaimable(&found.best, base) {
-            let Some(less) = self.without(&found.best, position) else { break };
-            found.best = less;
-            found.p_values.remove(position.min(found.p_values.len() - 1));
-        }
-        found
-    }
-
-    fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit) -> Option<usize> {
-        let deviation = ordinary_noise(&best.fit);
-        let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len());
-        (0..best.members.len()).find(|position| {
-            let without =
-                if best.members.len() == 1 { Some(base.clone()) } else { self.without(best, *position).map(|h| h.fit) };
-            without.is_some_and(|without| {
-                let size = distance(&without.residual, &best.fit.residual);
-                size < SIZE_DEVIATIONS * deviation && size < SIZE_SHARE * mean
-            })
-        })
     }
 
     /// The hypothesis with one member taken out and everything else refitted.
@@ -212,49 +154,10 @@ impl<'a> Case<'a> {
         Some(Hypothesis { members, fit, information })
     }
 
-    /// An empirical form where something real remains that the named effects do not explain.
-    fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
-        let _ = simulate(&found.best.fit.parts, &mut self.scene);
-        let designs = empirical_designs(&self.scene, &self.frame);
-        let frame = self.frame.clone();
-        let bank = Bank::new(&designs, &frame);
-        let on_top = self.best_empirical(&found.best.fit, &bank)?;
-        let needed = UNKNOWN_SHARE * found.best.information;
-        if on_top.information < needed.max(6.0) {
-            return None;
-        }
-        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed);
-        let size = distance(&found.best.fit.residual, &on_top.fit.residual);
-        let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len());
-        let small = size < SIZE_DEVIATIONS * ordinary_noise(&on_top.fit) && size < SIZE_SHARE * mean;
-        if p > P_MAX || small {
-            return None;
-        }
-        let alone = if found.best.members.is_empty() { on_top } else { self.best_empirical(base, &bank)? };
-        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
-    }
-
     /// Logarithm of the number of independent rows.
     #[must_use]
     pub fn ln_rows(&self, base: &Fit) -> f64 {
         (count(self.frame.len()) / base.noise.inflation()).max(20.0).ln()
-    }
-
-    /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    fn best_empirical(&mut self, from: &Fit, bank: &Bank<'_>) -> Option<Hypothesis> {
-        let ln_rows = self.ln_rows(from);
-        let designs = bank.designs;
-        let scores = bank.scan(from, ln_rows);
-        let best = scores
-            .iter()
-            .filter(|score| score.information.is_finite())
-            .max_by(|a, b| a.information.total_cmp(&b.information))?;
-        let mut parts = from.parts.clone();
-        parts.push(designs[best.design].part.clone());
-        let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
-        let information =
-            2.0 * (fit.log_likelihood - from.log_likelihood) - super::scan::price(&designs[best.design], ln_rows);
-        Some(Hypothesis { members: vec![best.design], fit, information })
     }
 
     /// Simulates every row with hidden states followed through the held-out units.
@@ -273,16 +176,6 @@ impl<'a> Case<'a> {
     }
 }
 
-/// What remains unexplained, described.
-pub struct Unknown {
-    /// The baseline and the empirical form, fitted together.
-    pub fit: Fit,
-    /// Information over the baseline.
-    pub information: f64,
-    /// The gate's answer.
-    pub p_value: f64,
-}
-
 /// Robust standard deviation of what remains, edges and spikes left aside.
 #[must_use]
 pub fn ordinary_noise(fit: &Fit) -> f64 {
@@ -291,7 +184,7 @@ pub fn ordinary_noise(fit: &Fit) -> f64 {
 }
 
 /// Root mean square distance.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count(a.len().max(1))).sqrt()
 }
 

@@ -5,7 +5,7 @@
 
 use super::designs::Design;
 use super::frame::Frame;
-use super::model::{Body, Parameter, Part};
+use super::model::{Body, Model, Parameter, Part};
 use crate::physics::{Entry, Role, Scene};
 
 /// By what the bent line is multiplied.
@@ -38,6 +38,12 @@ pub struct Empirical {
 
 /// Seconds since the first row of the run.
 const TIME_IN_RUN: &str = "time_in_run_s";
+/// Seconds since the tool went into the cut; zero outside it.
+const TIME_IN_CUT: &str = "time_in_cut_s";
+/// The cut as the model simulates it, in the unit of the output.
+const LOAD: &str = "simulated_cut";
+/// The same over the speed in thousands of turns a minute.
+const TORQUE: &str = "simulated_cut_per_krpm";
 /// Seconds as recorded.
 const TIME: &str = "time_s";
 
@@ -107,8 +113,28 @@ fn channel_values(scene: &Scene, channel: &str) -> Option<Vec<f64>> {
             }
             Some(values)
         }
+        TIME_IN_CUT => time_in_cut_s(scene),
+        LOAD => scene.load().map(<[f64]>::to_vec),
+        TORQUE => {
+            let (load, speed) = (scene.load()?, scene.role(Role::Speed)?);
+            let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
+            Some(load.iter().zip(speed).map(per_krpm).collect())
+        }
         _ => scene.column(channel).map(<[f64]>::to_vec),
     }
+}
+
+fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
+    let engaged = scene.role(Role::Engaged)?;
+    let mut values = vec![0.0; scene.rows()];
+    for run in scene.runs() {
+        let mut since = None;
+        for row in run.clone() {
+            since = if engaged[row] > 0.5 { since.or(Some(scene.time_s()[row])) } else { None };
+            values[row] = since.map_or(0.0, |since| scene.time_s()[row] - since);
+        }
+    }
+    Some(values)
 }
 
 fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
@@ -126,14 +152,16 @@ fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
 
 /// Every empirical form this scene offers.
 #[must_use]
-pub fn empirical_designs(scene: &Scene, frame: &Frame) -> Vec<Design> {
+pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
     let mut channels: Vec<String> =
         scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect();
-    channels.push(TIME_IN_RUN.to_owned());
-    channels.push(TIME.to_owned());
+    channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, LOAD, TORQUE].map(str::to_owned));
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
     let forms = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
-    forms.flatten().filter_map(|form| design(form, scene, frame)).collect()
+    // What always drifts has a name.
+    let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
+    let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
+    forms.flatten().filter(unnamed).filter_map(|form| design(form, scene, frame)).collect()
 }
 
 /// Measured outputs beside the simulated one must not explain it.

@@ -1,7 +1,7 @@
 //! A user's hypothesis as a rhai expression over columns and its own parameters.
 
 use super::model::Parameter;
-use crate::physics::Scene;
+use crate::physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::fmt;
 use std::sync::Arc;
@@ -53,9 +53,53 @@ impl Expression {
         &self.inputs
     }
 
-    /// Its value in every row; `None` when a column is missing or a row fails.
+    /// Its value in every row; `None` when a column is missing or a row fails. A formula that is linear in its
+    /// parameters is run through the script engine once only.
     #[must_use]
     pub fn evaluate(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        match scene.linear_law(&self.text, || self.linear_law(scene, parameters)) {
+            Some(law) => {
+                let mut sum = law.first()?.clone();
+                for (parameter, column) in parameters.iter().zip(&law[1..]) {
+                    sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += parameter.value * x);
+                }
+                Some(sum)
+            }
+            None => self.run(scene, parameters),
+        }
+    }
+
+    /// The formula as columns, if it is linear in its parameters: told by its values at zero, at each unit, and at two
+    /// mixtures of them.
+    fn linear_law(&self, scene: &Scene, parameters: &[Parameter]) -> LinearLaw {
+        let at = |values: &dyn Fn(usize) -> f64| {
+            let mut moved = parameters.to_vec();
+            moved.iter_mut().enumerate().for_each(|(index, parameter)| parameter.value = values(index));
+            self.run(scene, &moved)
+        };
+        let zero = at(&|_| 0.0)?;
+        let mut columns = vec![zero.clone()];
+        for index in 0..parameters.len() {
+            let unit = at(&|other| f64::from(u8::from(other == index)))?;
+            columns.push(unit.iter().zip(&zero).map(|(unit, zero)| unit - zero).collect());
+        }
+        let mixtures: [&dyn Fn(usize) -> f64; 2] =
+            [&|index| 0.7 + 0.6 * super::noise::count(index), &|index| parameters[index].value * -1.3];
+        let linear = mixtures.iter().all(|values| {
+            at(values).is_some_and(|got| {
+                got.iter().enumerate().all(|(row, got)| {
+                    let parts = (0..parameters.len()).map(|index| values(index) * columns[index + 1][row]);
+                    let (mut sum, mut size) = (zero[row], zero[row].abs());
+                    parts.for_each(|part| (sum, size) = (sum + part, size + part.abs()));
+                    (got - sum).abs() <= 1e-9 * size.max(f64::MIN_POSITIVE)
+                })
+            })
+        });
+        linear.then(|| Arc::new(columns))
+    }
+
+    /// Runs the script engine over every row.
+    fn run(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
         let inputs: Vec<(&str, &[f64])> =
             self.inputs.iter().map(|name| Some((name.as_str(), scene.column(name)?))).collect::<Option<_>>()?;
         let mut scope = Scope::new();

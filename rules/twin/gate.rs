@@ -18,26 +18,40 @@ const EXCEEDED_ENOUGH: usize = 5;
 /// Rows whose signs flip together.
 const BLOCK_ROWS: usize = 40;
 
-/// The p-value of the best hypothesis of the bank on top of `base`, resampling the innovations of `best`.
+/// The p-value of the best hypothesis of the bank on top of `base`, resampling the innovations of `best`; with
+/// `runs_too` the greater of two, the other from whole runs that flip.
 #[must_use]
-pub fn p_value(bank: &Bank<'_>, base: &Fit, best: &Fit, ln_rows: f64, seed: u64) -> f64 {
+pub fn p_value(bank: &Bank<'_>, base: &Fit, best: &Fit, ln_rows: f64, seed: u64, runs_too: bool) -> f64 {
     let setting = bank.nearest(best);
     let stage = bank.stage(base, setting);
     let innovations = bank.innovations(best, setting);
     let observed = best_score(bank, &stage, &stage.residual, ln_rows);
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut exceeded = 0;
-    for done in 1..=REPLICATES {
-        let mut replicate = flipped(&innovations, bank.frame(), &mut rng);
-        project_out(&stage.basis, &mut replicate);
-        if best_score(bank, &stage, &replicate, ln_rows) >= observed {
-            exceeded += 1;
-            if exceeded == EXCEEDED_ENOUGH {
-                return count(exceeded) / count(done);
+    let mut share_as_good = |blocks: Blocks| {
+        let mut exceeded = 0;
+        for done in 1..=REPLICATES {
+            let mut replicate = flipped(&innovations, bank.frame(), blocks, &mut rng);
+            project_out(&stage.basis, &mut replicate);
+            if best_score(bank, &stage, &replicate, ln_rows) >= observed {
+                exceeded += 1;
+                if exceeded == EXCEEDED_ENOUGH {
+                    return count(exceeded) / count(done);
+                }
             }
         }
-    }
-    count(1 + exceeded) / count(1 + REPLICATES)
+        count(1 + exceeded) / count(1 + REPLICATES)
+    };
+    let by_run = if runs_too { share_as_good(Blocks::Units) } else { 0.0 };
+    if by_run > super::search::P_MAX { by_run } else { by_run.max(share_as_good(Blocks::Rows)) }
+}
+
+/// What flips together: noise that remembers longer than the noise model knows shows only when whole runs flip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Blocks {
+    /// Rows within a stretch.
+    Rows,
+    /// Whole units of hold-out.
+    Units,
 }
 
 fn best_score(bank: &Bank<'_>, stage: &Stage, target: &[f64], ln_rows: f64) -> f64 {
@@ -51,8 +65,14 @@ fn best_score(bank: &Bank<'_>, stage: &Stage, target: &[f64], ln_rows: f64) -> f
 }
 
 /// Innovations with signs flipped block by block within stretches.
-fn flipped(innovations: &[f64], frame: &Frame, rng: &mut Pcg64Mcg) -> Vec<f64> {
+fn flipped(innovations: &[f64], frame: &Frame, blocks: Blocks, rng: &mut Pcg64Mcg) -> Vec<f64> {
     let mut out = innovations.to_vec();
+    if blocks == Blocks::Units {
+        let units = frame.unit.last().map_or(0, |last| last + 1);
+        let signs: Vec<f64> = (0..units).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect();
+        out.iter_mut().zip(&frame.unit).for_each(|(x, unit)| *x *= signs[*unit]);
+        return out;
+    }
     for rows in &frame.stretches {
         // A random first length moves the edges of the blocks from replicate to replicate.
         let mut left = rng.random_range(1..=BLOCK_ROWS);

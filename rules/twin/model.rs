@@ -142,7 +142,7 @@ impl Part {
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
         let clipped = matches!(&self.body, Body::Effect(_, form) if form.name == "clipped");
-        let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation", "ripple_alias"];
+        let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation"];
         clipped || acting.contains(&self.kind.as_str())
     }
 

@@ -350,7 +350,7 @@ fn form_name(name: &str) -> Option<&'static str> {
 }
 
 /// Every form name that an effect of the catalogue uses.
-pub(super) const FORM_NAMES: [&str; 24] = [
+pub(super) const FORM_NAMES: [&str; 26] = [
     "turning",
     "milling",
     "drilling",
@@ -365,6 +365,8 @@ pub(super) const FORM_NAMES: [&str; 24] = [
     "linear",
     "settling",
     "wander",
+    "restless",
+    "bent",
     "constant",
     "small",
     "boxcar",

@@ -16,6 +16,8 @@ const FITTED_SINGLES: usize = 6;
 const LEADERS: usize = 3;
 /// Partners fitted in full per leader.
 const PARTNERS: usize = 2;
+/// Information the first effect must bring.
+const FIRST_INFORMATION: f64 = 4.0;
 /// Information a further effect must bring.
 const STEP_INFORMATION: f64 = 6.0;
 /// The same as a share of what is already explained: below it a further effect more likely mends the form of another.
@@ -85,7 +87,8 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut refused_p = None;
         let mut best = path[0].clone();
         for next in path.drain(1..) {
-            let p = p_value(self.bank, &best.fit, &deepest.fit, self.ln_rows, self.seed);
+            let first = best.members.is_empty();
+            let p = p_value(self.bank, &best.fit, &deepest.fit, self.ln_rows, self.seed, first);
             if p > P_MAX {
                 refused_p = best.members.is_empty().then_some(p);
                 break;
@@ -105,7 +108,11 @@ impl<'a, 'b> Search<'a, 'b> {
             return None;
         }
         let next = self.grow(from)?;
-        let needed = if from.members.is_empty() { 0.0 } else { STEP_INFORMATION.max(STEP_SHARE * from.information) };
+        let needed = if from.members.is_empty() {
+            FIRST_INFORMATION
+        } else {
+            STEP_INFORMATION.max(STEP_SHARE * from.information)
+        };
         (next.information > from.information + needed).then(|| self.swapped(next))
     }
 

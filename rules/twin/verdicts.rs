@@ -5,6 +5,8 @@ use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Ro
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part};
+use super::noise::count;
+use super::ripple::Ripple;
 use crate::physics::{effect, unit_in};
 
 /// Information within which two explanations cannot be told apart.
@@ -150,6 +152,11 @@ fn texts(part: &Part) -> (String, String) {
 
 fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
     let covariance = fit.covariance(&case.frame);
+    let followed = case
+        .ripple
+        .iter()
+        .filter(|_| fit.parts[part].kind == "ripple_alias")
+        .flat_map(|ripple| wave_estimates(case, ripple));
     let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
     of_part
         .map(|(index, free)| {
@@ -163,7 +170,26 @@ fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
                 unit: unit_in(&parameter.unit, &case.scene),
             }
         })
+        .chain(followed)
         .collect()
+}
+
+/// Frequency and size of a wave that was followed.
+fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
+    let per_s = 1.0 / case.scene.period_s();
+    let (hz, half_hz) = (ripple.wave.frequency * per_s, INTERVAL * ripple.frequency_error * per_s);
+    let amplitude = std::f64::consts::SQRT_2 * ripple.deviation;
+    // A wave that renews itself over `turns` rows has been seen that many times less often than there are rows.
+    let seen = count(case.frame.len()) * (1.0 - ripple.wave.rho.powi(2));
+    let half = INTERVAL * amplitude / (2.0 * seen.max(1.0)).sqrt();
+    let estimate = |name: &str, value: f64, half: f64, unit: &str| Estimate {
+        name: name.to_owned(),
+        value,
+        low: value - half,
+        high: value + half,
+        unit: unit.to_owned(),
+    };
+    [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
 }
 
 /// Share of a contribution's variance that the baseline can imitate.

@@ -58,7 +58,10 @@ impl Effect for AuxiliarySwitch {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if form.name == "latent" {
-            return Some(vec![("level", scene.latent().map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec))]);
+            return Some(vec![(
+                "level",
+                scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec),
+            )]);
         }
         let (flag, _) = form.place.as_ref()?;
         Some(vec![("level", scene.column(flag)?.to_vec())])

@@ -1,6 +1,6 @@
 //! Braking power does not come back: it is burnt in a resistor, or the meter does not count it.
 
-use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, rate};
+use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::visits;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
@@ -73,7 +73,7 @@ impl Effect for Regeneration {
         driven_krpm(scene)?;
         let speed = scene.role(Role::Speed)?;
         let braking = |(rpm, rate): (&f64, f64)| (-rpm * rate * RAD_PER_S_OF_RPM.powi(2)).max(0.0);
-        Some(vec![("braking_kg_m2", speed.iter().zip(rate(scene, speed)).map(braking).collect())])
+        Some(vec![("braking_kg_m2", speed.iter().zip(spindle_rate_rpm_per_s(scene)?).map(braking).collect())])
     }
 }
 

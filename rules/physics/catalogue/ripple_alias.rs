@@ -10,8 +10,16 @@ pub struct RippleAlias;
 static DOC: EffectDoc = EffectDoc {
     kind: "ripple_alias",
     family: "measurement",
-    law: "y = cosine * cos(2 pi f t) + sine * sin(2 pi f t), f = |2 f_mains - k f_sampling|",
+    law: "y = cosine * cos(2 pi f t) + sine * sin(2 pi f t), f = |2 f_mains - k f_sampling|; as a candidate: scale * a wave near f whose phase wanders with the mains, followed row by row",
     parameters: &[
+        ParameterDoc {
+            name: "scale",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 3.0),
+            en: "size over that of the wave as it is followed",
+            zh: "相对于跟踪所得波动的比例",
+        },
         ParameterDoc {
             name: "cosine",
             unit: "output",
@@ -67,6 +75,12 @@ impl Effect for RippleAlias {
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        if form.name == "latent" {
+            return Some(vec![(
+                "scale",
+                scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec),
+            )]);
+        }
         let turn = 2.0 * PI * form.value("frequency_hz")?;
         let wave = |law: fn(f64) -> f64| scene.time_s().iter().map(|t| law(turn * t)).collect();
         Some(vec![("cosine", wave(f64::cos)), ("sine", wave(f64::sin))])
@@ -74,5 +88,9 @@ impl Effect for RippleAlias {
 
     fn default_form(&self, scene: &Scene) -> Form {
         Form::of(&[("frequency_hz", 0.1 / scene.period_s())])
+    }
+
+    fn has_hidden_state(&self) -> bool {
+        true
     }
 }

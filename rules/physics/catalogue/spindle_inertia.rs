@@ -1,6 +1,6 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
-use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, rate};
+use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::{greatest, visits};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
@@ -60,7 +60,7 @@ impl Effect for SpindleInertia {
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(speed) = scene.role(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
-        let rates = rate(scene, speed);
+        let Some(rates) = spindle_rate_rpm_per_s(scene) else { return Vec::new() };
         let least = RAMP_PER_S * greatest(speed);
         let ramps = visits(scene, |row| rates[row].abs() > least);
         if ramps >= 2 { vec![Form::plain()] } else { Vec::new() }
@@ -69,7 +69,7 @@ impl Effect for SpindleInertia {
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
         driven_krpm(scene)?;
         let speed = scene.role(Role::Speed)?;
-        let rates = rate(scene, speed).into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
+        let rates = spindle_rate_rpm_per_s(scene)?.into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);
         if scene.output_kind() == OutputKind::Force {
             return Some(vec![("per_rad_s2", rates.collect())]);
         }

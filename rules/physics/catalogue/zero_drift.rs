@@ -8,10 +8,22 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy)]
 pub struct ZeroDrift;
 
+/// A coefficient of a wander or a bend.
+const fn wave(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
+    let range = (f64::NEG_INFINITY, f64::INFINITY);
+    ParameterDoc { name, unit: "output", entry: Entry::Linear, range, en, zh }
+}
+
+/// Names of the cosines.
+const WAVES: [&str; 8] = ["c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8"];
+
+/// Where a bent drift may change its pace, as shares of the recording.
+const BENDS: [(&str, f64); 3] = [("bend_1", 0.25), ("bend_2", 0.5), ("bend_3", 0.75)];
+
 static DOC: EffectDoc = EffectDoc {
     kind: "zero_drift",
     family: "measurement",
-    law: "linear: y = drift * (share of the recording - 1/2); settling: y = settled * (1 - exp(-t/tau)); wander: y = sum of c_k cos(k pi share)",
+    law: "linear: y = drift * (share of the recording - 1/2); bent: the same with other paces from each quarter on; settling: y = settled * (1 - exp(-t/tau)); wander: y = sum of c_k cos(k pi share), k up to 4, restless: up to 8",
     parameters: &[
         ParameterDoc {
             name: "drift",
@@ -29,38 +41,25 @@ static DOC: EffectDoc = EffectDoc {
             en: "change once settled",
             zh: "稳定后的变化量",
         },
-        ParameterDoc {
-            name: "c1",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "wander with 1 half waves over the recording",
-            zh: "整个记录内1个半波的缓变",
-        },
-        ParameterDoc {
-            name: "c2",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "wander with 2 half waves over the recording",
-            zh: "整个记录内2个半波的缓变",
-        },
-        ParameterDoc {
-            name: "c3",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "wander with 3 half waves over the recording",
-            zh: "整个记录内3个半波的缓变",
-        },
-        ParameterDoc {
-            name: "c4",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "wander with 4 half waves over the recording",
-            zh: "整个记录内4个半波的缓变",
-        },
+        wave(
+            "bend_1",
+            "change of pace at a quarter of the recording, over its whole length",
+            "记录四分之一处速率的变化",
+        ),
+        wave("bend_2", "change of pace at the middle of the recording, over its whole length", "记录中点处速率的变化"),
+        wave(
+            "bend_3",
+            "change of pace at three quarters of the recording, over its whole length",
+            "记录四分之三处速率的变化",
+        ),
+        wave("c1", "wander with 1 half waves over the recording", "整个记录内1个半波的缓变"),
+        wave("c2", "wander with 2 half waves over the recording", "整个记录内2个半波的缓变"),
+        wave("c3", "wander with 3 half waves over the recording", "整个记录内3个半波的缓变"),
+        wave("c4", "wander with 4 half waves over the recording", "整个记录内4个半波的缓变"),
+        wave("c5", "wander with 5 half waves over the recording", "整个记录内5个半波的缓变"),
+        wave("c6", "wander with 6 half waves over the recording", "整个记录内6个半波的缓变"),
+        wave("c7", "wander with 7 half waves over the recording", "整个记录内7个半波的缓变"),
+        wave("c8", "wander with 8 half waves over the recording", "整个记录内8个半波的缓变"),
         ParameterDoc {
             name: "tau_s",
             unit: "s",
@@ -103,7 +102,7 @@ impl Effect for ZeroDrift {
         let mut forms = vec![Form { name: "linear", ..Form::plain() }];
         let grid = [600.0, 1200.0, 2400.0, 4800.0].into_iter().filter(|tau_s| *tau_s < 0.5 * whole_s);
         forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::of(&[("tau_s", tau_s)]) }));
-        forms.push(Form { name: "wander", ..Form::plain() });
+        forms.extend(["bent", "wander", "restless"].map(|name| Form { name, ..Form::plain() }));
         forms
     }
 
@@ -115,9 +114,16 @@ impl Effect for ZeroDrift {
                 let elapsed_s = recording_elapsed_s(scene);
                 Some(vec![("settled", elapsed_s.iter().map(|t| 1.0 - (-t / tau_s).exp()).collect())])
             }
-            "wander" => {
+            "wander" | "restless" => {
+                let most = if form.name == "wander" { 4 } else { WAVES.len() };
                 let wave = |k: f64| share.iter().map(|share| (k * PI * share).cos()).collect();
-                Some(vec![("c1", wave(1.0)), ("c2", wave(2.0)), ("c3", wave(3.0)), ("c4", wave(4.0))])
+                Some(WAVES[..most].iter().zip(1..).map(|(name, k)| (*name, wave(f64::from(k)))).collect())
+            }
+            "bent" => {
+                let bend = |at: f64| share.iter().map(|share| (share - at).max(0.0)).collect();
+                let mut columns = vec![("drift", share.iter().map(|share| share - 0.5).collect())];
+                columns.extend(BENDS.iter().map(|(name, at)| (*name, bend(*at))));
+                Some(columns)
             }
             _ => Some(vec![("drift", share.iter().map(|share| share - 0.5).collect())]),
         }

@@ -1,0 +1,137 @@
+//! Hypotheses whose state nobody records: it is read from what the baseline leaves where rows are fitted, and followed
+//! from earlier rows in held-out runs.
+
+use super::designs::Design;
+use super::diagnose::Case;
+use super::fit::Fit;
+use super::noise::count;
+use super::quality::median;
+use crate::physics::{Form, OutputKind, Role};
+
+/// Rows of a spell in the cut from which a frequency can be read.
+const SPELL_ROWS_MIN: usize = 8;
+
+impl Case<'_> {
+    /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
+    pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
+        let effect = crate::physics::effect("auxiliary_switch")?;
+        if !super::designs::wanted(effect, self.model) {
+            return None;
+        }
+        let found = super::latent::find(&base.residual, &self.frame.stretches)?;
+        let state = self.switch_per_row(&found);
+        self.scene.set_latent("auxiliary_switch", state);
+        let form = Form { name: "latent", ln_choices: 0.5 * super::latent::price(&found), ..Form::default() };
+        super::designs::design(effect, &form, &self.scene, &self.frame)
+    }
+
+    /// The ripple of the mains folded by sampling, as a hypothesis, where what the baseline leaves has a wandering line.
+    pub(super) fn hidden_ripple(&mut self, base: &Fit) -> Option<Design> {
+        let effect = crate::physics::effect("ripple_alias")?;
+        let electric = self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a");
+        // Averaged rows have no phase any more.
+        let sampled =
+            self.frame.len() == (0..self.frame.len()).map(|group| self.frame.rows(group).len()).sum::<usize>();
+        if !electric || !sampled || !super::designs::wanted(effect, self.model) {
+            return None;
+        }
+        let found = super::ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
+        if !self.keeps_its_frequency(&base.residual, &found.wave) {
+            return None;
+        }
+        let wave = self.wave_per_row(&found);
+        self.scene.set_latent("ripple_alias", wave);
+        // The wave is read from the residual it explains: what it seems to gain beyond its likelihood is no gain.
+        let left: Vec<f64> = base.residual.iter().zip(&found.values).map(|(x, wave)| x - wave).collect();
+        let (likelihood, _) = super::noise::fit_near(&left, &self.frame, found.wave.noise);
+        let seeming = 2.0 * (likelihood - base.log_likelihood);
+        let ln_choices = 0.5 * (seeming - found.gain + super::ripple::price(self.frame.len()));
+        let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
+        let form = Form { name: "latent", ln_choices: ln_choices.max(0.0), shape, ..Form::default() };
+        let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
+        design.freedom = 1;
+        for parameter in design.part.parameters.iter_mut().filter(|parameter| parameter.name == "frequency_hz") {
+            parameter.fixed = true;
+        }
+        self.ripple = Some(found);
+        Some(design)
+    }
+
+    /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a
+    /// screw, an insert or the work is not.
+    fn keeps_its_frequency(&self, residual: &[f64], wave: &super::ripple::Wave) -> bool {
+        let paces = [self.scene.column("feed_mm_min"), self.scene.role(Role::Speed)];
+        paces.into_iter().flatten().all(|pace| {
+            let spells = self.spells_in_the_cut(pace);
+            let paces: Vec<f64> = spells.iter().map(|(_, pace)| *pace).collect();
+            let Some(middle) = median(paces) else { return true };
+            let part = |fast: bool| -> Vec<std::ops::Range<usize>> {
+                let wanted = |(_, pace): &&(std::ops::Range<usize>, f64)| {
+                    if fast { *pace > 1.1 * middle } else { *pace <= 0.9 * middle }
+                };
+                spells.iter().filter(wanted).map(|(groups, _)| groups.clone()).collect()
+            };
+            let (slow, fast) = (part(false), part(true));
+            super::ripple::same_frequency(residual, &slow, &fast, wave)
+        })
+    }
+
+    /// Stretches of the cut at one pace, with that pace.
+    fn spells_in_the_cut(&self, pace: &[f64]) -> Vec<(std::ops::Range<usize>, f64)> {
+        let engaged = self.scene.role(Role::Engaged);
+        let cutting = |group: usize| self.frame.rows(group).all(|row| engaged.is_none_or(|e| e[row] > 0.5));
+        let of = |group: usize| pace[self.frame.rows(group).start];
+        let mut spells: Vec<(std::ops::Range<usize>, f64)> = Vec::new();
+        for stretch in &self.frame.stretches {
+            for group in stretch.clone().filter(|group| cutting(*group)) {
+                match spells.last_mut() {
+                    Some((rows, pace))
+                        if rows.end == group
+                            && group > stretch.start
+                            && (of(group) - *pace).abs() < 0.05 * pace.abs() =>
+                    {
+                        rows.end = group + 1;
+                    }
+                    _ => spells.push((group..group + 1, of(group))),
+                }
+            }
+        }
+        spells.retain(|(rows, _)| rows.len() >= SPELL_ROWS_MIN);
+        spells
+    }
+
+    /// The wave in every row: as smoothed where the rows were fitted, expected from earlier rows in held-out runs.
+    fn wave_per_row(&self, found: &super::ripple::Ripple) -> Vec<f64> {
+        let mut wave = vec![0.0; self.scene.rows()];
+        for group in 0..self.frame.len() {
+            self.frame.rows(group).for_each(|row| wave[row] = found.values[group]);
+        }
+        let simulated = self.scene.simulated().unwrap_or_default();
+        let recorded = self.scene.recorded();
+        for groups in &self.held_frame.stretches {
+            let rows: Vec<usize> = groups.clone().flat_map(|group| self.held_frame.rows(group)).collect();
+            let residual: Vec<f64> = rows.iter().map(|row| recorded[*row] - simulated[*row]).collect();
+            let expected = super::ripple::follow(&residual, &found.wave);
+            rows.iter().zip(expected).for_each(|(row, expected)| wave[*row] = expected);
+        }
+        wave
+    }
+
+    /// The state of a hidden switch in every row: as found where the rows were fitted, followed causally in held-out
+    /// runs.
+    fn switch_per_row(&self, found: &super::latent::Switching) -> Vec<f64> {
+        let mut state = vec![0.0; self.scene.rows()];
+        for group in 0..self.frame.len() {
+            self.frame.rows(group).for_each(|row| state[row] = found.state[group]);
+        }
+        let simulated = self.scene.simulated().unwrap_or_default();
+        let on = found.state.iter().sum::<f64>() / count(found.state.len());
+        for rows in self.held.iter().map(|unit| self.units[*unit].rows.clone()) {
+            let residual: Vec<f64> = rows.clone().map(|row| self.scene.recorded()[row] - simulated[row]).collect();
+            let deviation = 0.5 * found.level.abs();
+            let followed = super::latent::follow(&residual, found, deviation, on);
+            rows.zip(followed).for_each(|(row, on)| state[row] = on);
+        }
+        state
+    }
+}

@@ -1,0 +1,407 @@
+//! A wave that nobody records: the ripple of the mains, folded by slow sampling, wanders in phase and size, so it is a
+//! state and not a sum of a cosine and a sine over the whole recording.
+//!
+//! State: a vector that turns by `2 pi f` per row, shrinks by `rho` and is renewed by noise (Harvey, Forecasting,
+//! structural time series models and the Kalman filter, 1989, section 2.3.3), beside ARMA(1,1) noise. The likelihood
+//! is that of the Kalman filter; the wave is read by its smoother where rows are fitted and by its prediction of the
+//! next row in held-out runs.
+
+use super::linear::dot;
+use super::noise::{Arma, PHI_MAX, count, whiten};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Rows of a segment of the first look at the spectrum.
+const SEGMENT_ROWS: usize = 64;
+/// Power of the strongest line over the mean of the spectrum below which nobody looks closer.
+const PEAK_MIN: f64 = 1.5;
+/// Lowest and highest frequency, in turns per row: below, passes of a repeated part make lines of their own.
+const FREQUENCIES: (f64, f64) = (0.04, 0.49);
+/// Turns after which a wave has lost its phase: less is slow noise, not a wave.
+const TURNS_MIN: f64 = 1.2;
+/// Information that a wave must bring after every price: the resampling of the search cannot judge a followed state.
+const INFORMATION_MIN: f64 = 4.0;
+/// Twice the gain in log-likelihood from which a part of a recording is said to show the wave.
+const SEEN: f64 = 12.0;
+/// Rounds of refinement.
+const ROUNDS: usize = 60;
+
+/// A wandering wave on top of ARMA(1,1) noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// Turns per row.
+    pub frequency: f64,
+    /// Share of the state that remains from row to row.
+    pub rho: f64,
+    /// Stationary variance of the wave over the variance of an innovation of the noise.
+    pub size: f64,
+    /// The noise beside it.
+    pub noise: Arma,
+}
+
+/// What was found in a residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ripple {
+    /// The wave.
+    pub wave: Wave,
+    /// Twice the gain in log-likelihood over the noise alone.
+    pub gain: f64,
+    /// The wave per row of the residual, given all rows of its stretch.
+    pub values: Vec<f64>,
+    /// Standard deviation of the wave, in the residual's unit.
+    pub deviation: f64,
+    /// Standard error of the frequency, in turns per row.
+    pub frequency_error: f64,
+}
+
+/// The price of a wave: frequency, memory and size, and the choice among the frequencies that can be told apart.
+#[must_use]
+pub fn price(rows: usize) -> f64 {
+    3.0 * count(rows.max(2)).ln() + 2.0 * (count(SEGMENT_ROWS) / 2.0).ln()
+}
+
+/// Finds a wave in a residual with these unbroken stretches and this noise, if there is one worth its price.
+#[must_use]
+pub fn find(residual: &[f64], stretches: &[Range<usize>], noise: Arma) -> Option<Ripple> {
+    // A strong wave looks like memory: with less of it the line stands out.
+    let less = Arma { phi: 0.5 * noise.phi, theta: 0.5 * noise.theta };
+    let frequency = strongest(&whiten(residual, stretches, less), stretches)?;
+    let score = |wave: &Wave| likelihood(residual, stretches, wave);
+    let without = score(&Wave { frequency, rho: 0.9, size: 0.0, noise });
+    let starts = [(0.9, 0.5), (0.97, 0.5), (0.97, 2.0)];
+    let start = starts.map(|(rho, size)| Wave { frequency, rho, size, noise: Arma { phi: noise.phi * 0.8, ..noise } });
+    let scored = start.into_iter().map(|wave| (score(&wave), wave));
+    let best = refined(scored.fold((f64::NEG_INFINITY, start[0]), |a, b| if b.0 > a.0 { b } else { a }), &score);
+    let gain = 2.0 * (best.0 - without);
+    if gain < price(residual.len()) + INFORMATION_MIN || !is_wave(&best.1) {
+        return None;
+    }
+    let values = smoothed(residual, stretches, &best.1);
+    let deviation = (best.1.size * variance(residual, stretches, &best.1)).sqrt();
+    Some(Ripple { gain, values, deviation, frequency_error: frequency_error(best, &score), wave: best.1 })
+}
+
+/// Do two sets of stretches agree on the frequency of a wave? Also where one of them is too short to say.
+#[must_use]
+pub fn same_frequency(residual: &[f64], one: &[Range<usize>], other: &[Range<usize>], wave: &Wave) -> bool {
+    match (frequency_in(residual, one, wave), frequency_in(residual, other, wave)) {
+        (Some((a, error_a)), Some((b, error_b))) => (a - b).abs() < 0.004 + 3.0 * error_a.hypot(error_b),
+        _ => true,
+    }
+}
+
+/// Likeliest frequency in some stretches, and its standard error; `None` where they tell nothing of the wave.
+fn frequency_in(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> Option<(f64, f64)> {
+    let rows: usize = stretches.iter().map(ExactSizeIterator::len).sum();
+    if rows < SEGMENT_ROWS {
+        return None;
+    }
+    let score = |wave: &Wave| {
+        let (sum, logs) = errors(residual, stretches, wave);
+        -0.5 * (count(rows) * (sum / count(rows)).max(f64::MIN_POSITIVE).ln() + logs)
+    };
+    let without = score(&Wave { size: 0.0, ..*wave });
+    let tries = (0..240).map(|step| Wave { frequency: 0.01 + 0.002 * count(step), ..*wave });
+    let scored = tries.map(|wave| (score(&wave), wave));
+    let best = scored.fold((f64::NEG_INFINITY, *wave), |a, b| if b.0 > a.0 { b } else { a });
+    (2.0 * (best.0 - without) > SEEN).then(|| (best.1.frequency, frequency_error(best, &score)))
+}
+
+/// Does it keep its phase for long enough to be called a wave?
+fn is_wave(wave: &Wave) -> bool {
+    let inside = wave.frequency > FREQUENCIES.0 && wave.frequency < FREQUENCIES.1;
+    inside && wave.frequency / (1.0 - wave.rho).max(1e-6) >= TURNS_MIN
+}
+
+/// The frequency of the strongest line of the mean spectrum of half-overlapping segments, if it stands out.
+fn strongest(innovations: &[f64], stretches: &[Range<usize>]) -> Option<f64> {
+    let bins = 2 * SEGMENT_ROWS;
+    let frequency = |bin: usize| 0.5 * count(bin) / count(bins);
+    let usable = |bin: &usize| frequency(*bin) > FREQUENCIES.0 && frequency(*bin) < FREQUENCIES.1;
+    let mut power = vec![0.0; bins];
+    let mut segments = 0;
+    for rows in stretches {
+        let mut start = rows.start;
+        while start + SEGMENT_ROWS <= rows.end {
+            let segment = &innovations[start..start + SEGMENT_ROWS];
+            (0..bins).filter(usable).for_each(|bin| power[bin] += power_at(segment, frequency(bin)));
+            segments += 1;
+            start += SEGMENT_ROWS / 2;
+        }
+    }
+    let used: Vec<usize> = (0..bins).filter(usable).collect();
+    let mean = used.iter().map(|bin| power[*bin]).sum::<f64>() / count(used.len());
+    let best = used.into_iter().max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+    // A spectrum that falls from its lowest bin on has memory, not a line.
+    let stands_out = best > (0..bins).find(usable)? && power[best] > PEAK_MIN * mean;
+    (segments >= 4 && stands_out).then(|| frequency(best))
+}
+
+/// Power of a tapered segment at one frequency.
+fn power_at(segment: &[f64], frequency: f64) -> f64 {
+    let (mut cosine, mut sine) = (0.0, 0.0);
+    for (row, x) in segment.iter().enumerate() {
+        let taper = (0.5 * TAU * (count(row) + 0.5) / count(segment.len())).sin();
+        let (s, c) = (TAU * frequency * count(row)).sin_cos();
+        cosine += x * taper * c;
+        sine += x * taper * s;
+    }
+    cosine * cosine + sine * sine
+}
+
+/// Pattern search over frequency, memory, size and noise.
+fn refined(mut best: (f64, Wave), score: &impl Fn(&Wave) -> f64) -> (f64, Wave) {
+    let mut step = 1.0;
+    for _ in 0..ROUNDS {
+        let mut moved = false;
+        for index in 0..5 {
+            for direction in [1.0, -1.0] {
+                let wave = nudged(&best.1, index, direction * step);
+                let got = score(&wave);
+                if got > best.0 + 1e-6 {
+                    best = (got, wave);
+                    moved = true;
+                    break;
+                }
+            }
+        }
+        if !moved {
+            step *= 0.5;
+            if step < 0.02 {
+                break;
+            }
+        }
+    }
+    best
+}
+
+fn nudged(wave: &Wave, index: usize, step: f64) -> Wave {
+    let mut new = *wave;
+    match index {
+        0 => new.frequency = (wave.frequency + 0.004 * step).clamp(0.005, 0.495),
+        1 => new.rho = (1.0 - (1.0 - wave.rho) * (-0.5 * step).exp()).clamp(0.5, 0.999),
+        2 => new.size = (wave.size * (0.7 * step).exp()).clamp(1e-3, 1e4),
+        3 => new.noise.phi = (wave.noise.phi + 0.2 * step * (1.0 - wave.noise.phi).max(0.02)).clamp(-0.5, PHI_MAX),
+        _ => new.noise.theta = (wave.noise.theta + 0.15 * step).clamp(-0.98, 0.9),
+    }
+    new
+}
+
+/// From the curvature of the likelihood over the frequency.
+fn frequency_error(best: (f64, Wave), score: &impl Fn(&Wave) -> f64) -> f64 {
+    let step = 0.002;
+    let at = |d: f64| score(&Wave { frequency: best.1.frequency + d, ..best.1 });
+    let curvature = (2.0 * best.0 - at(step) - at(-step)) / (step * step);
+    if curvature > 0.0 { (1.0 / curvature).sqrt() } else { step }
+}
+
+/// Logarithm of the likelihood, up to a constant, the variance profiled.
+fn likelihood(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> f64 {
+    let (sum, logs) = errors(residual, stretches, wave);
+    let rows = count(residual.len());
+    -0.5 * (rows * (sum / rows).max(f64::MIN_POSITIVE).ln() + logs)
+}
+
+/// Sum of the squares of what was not expected, over its variance, and of the logarithms of that variance.
+fn errors(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> (f64, f64) {
+    let longest = stretches.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    let gains = Gains::new(wave, longest);
+    let (mut sum, mut logs) = (0.0, 0.0);
+    for rows in stretches {
+        let mut state = [0.0; 4];
+        for (index, x) in residual[rows.clone()].iter().enumerate() {
+            let gain = gains.at(index);
+            let error = gains.update(&mut state, *x, gain);
+            sum += error * error / gain.variance;
+            logs += gain.ln_variance;
+        }
+    }
+    (sum, logs)
+}
+
+/// Variance of an innovation of the noise.
+fn variance(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> f64 {
+    errors(residual, stretches, wave).0 / count(residual.len())
+}
+
+/// The wave expected in each row, from earlier rows of the stretch only.
+#[must_use]
+pub fn follow(residual: &[f64], wave: &Wave) -> Vec<f64> {
+    let gains = Gains::new(wave, residual.len());
+    let mut state = [0.0; 4];
+    let step = |(index, x): (usize, &f64)| {
+        let expected = state[0];
+        gains.update(&mut state, *x, gains.at(index));
+        expected
+    };
+    residual.iter().enumerate().map(step).collect()
+}
+
+/// The wave given all rows of each stretch (backward recursion of de Jong, Biometrika 76, 1989).
+fn smoothed(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> Vec<f64> {
+    let longest = stretches.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    let gains = Gains::new(wave, longest);
+    let turned_back = transposed(&gains.turn);
+    let mut values = vec![0.0; residual.len()];
+    for rows in stretches {
+        let mut state = [0.0; 4];
+        let mut steps = Vec::with_capacity(rows.len());
+        for (index, x) in residual[rows.clone()].iter().enumerate() {
+            let before = state;
+            let error = gains.update(&mut state, *x, gains.at(index));
+            steps.push((before, error, gains.at(index)));
+        }
+        let mut back: Vector = [0.0; 4];
+        for (row, (state, error, gain)) in rows.clone().zip(steps).rev() {
+            let turned = apply(&turned_back, &back);
+            let observed = error / gain.variance - dot(&gain.along, &turned);
+            back = turned;
+            back[0] += observed;
+            back[2] += observed;
+            values[row] = state[0] + dot(&gain.covariance, &back);
+        }
+    }
+    values
+}
+
+type Vector = [f64; 4];
+type Matrix = [[f64; 4]; 4];
+
+/// Change of the variance from row to row below which the filter has settled.
+const SETTLED: f64 = 1e-9;
+
+/// Kalman filter over wave (two numbers) and ARMA(1,1) noise (two numbers); what is observed is the sum of the first of
+/// each, without further noise. Its gains do not depend on the data: they are computed once, until they settle.
+struct Gains {
+    turn: Matrix,
+    gains: Vec<Gain>,
+}
+
+/// The gain of one row.
+struct Gain {
+    /// How far the state moves per unit of what was not expected.
+    along: Vector,
+    /// Variance of what was not expected.
+    variance: f64,
+    /// Its logarithm.
+    ln_variance: f64,
+    /// Covariance of the wave with the whole state before the row.
+    covariance: Vector,
+}
+
+impl Gains {
+    fn new(wave: &Wave, rows: usize) -> Self {
+        let (turn, renewal, mut covariance) = system(wave);
+        let back = transposed(&turn);
+        let mut gains: Vec<Gain> = Vec::new();
+        for _ in 0..rows {
+            let sum_along: Vector = std::array::from_fn(|i| covariance[i][0] + covariance[i][2]);
+            let variance = (sum_along[0] + sum_along[2]).max(1e-12);
+            let along = sum_along.map(|x| x / variance);
+            let settled = gains.last().is_some_and(|last| (last.variance - variance).abs() < SETTLED * variance);
+            gains.push(Gain { along, variance, ln_variance: variance.ln(), covariance: covariance[0] });
+            if settled {
+                break;
+            }
+            let left: Matrix =
+                std::array::from_fn(|i| std::array::from_fn(|j| covariance[i][j] - along[i] * sum_along[j]));
+            covariance = sum(&product(&product(&turn, &left), &back), &renewal);
+        }
+        Self { turn, gains }
+    }
+
+    fn at(&self, row: usize) -> &Gain {
+        &self.gains[row.min(self.gains.len() - 1)]
+    }
+
+    /// Takes a row into the state; returns what was not expected.
+    fn update(&self, state: &mut Vector, x: f64, gain: &Gain) -> f64 {
+        let error = x - state[0] - state[2];
+        let moved: Vector = std::array::from_fn(|i| state[i] + gain.along[i] * error);
+        *state = apply(&self.turn, &moved);
+        error
+    }
+}
+
+/// Transition, covariance of the renewal and of the start.
+fn system(wave: &Wave) -> (Matrix, Matrix, Matrix) {
+    let Arma { phi, theta } = wave.noise;
+    let (sine, cosine) = (TAU * wave.frequency).sin_cos();
+    let mut turn = [[0.0; 4]; 4];
+    turn[0] = [wave.rho * cosine, wave.rho * sine, 0.0, 0.0];
+    turn[1] = [-wave.rho * sine, wave.rho * cosine, 0.0, 0.0];
+    turn[2] = [0.0, 0.0, phi, 1.0];
+    let mut renewal = [[0.0; 4]; 4];
+    let renewed = wave.size * (1.0 - wave.rho * wave.rho);
+    (renewal[0][0], renewal[1][1]) = (renewed, renewed);
+    (renewal[2][2], renewal[2][3], renewal[3][2], renewal[3][3]) = (1.0, theta, theta, theta * theta);
+    let mut start = renewal;
+    (start[0][0], start[1][1]) = (wave.size, wave.size);
+    start[2][2] = 1.0 + (phi + theta).powi(2) / (1.0 - phi * phi);
+    (turn, renewal, start)
+}
+
+fn apply(matrix: &Matrix, vector: &Vector) -> Vector {
+    std::array::from_fn(|i| dot(&matrix[i], vector))
+}
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn transposed(a: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+fn sum(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn normal(rows: usize, seed: u64) -> Vec<f64> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+        (0..rows).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    #[test]
+    fn a_wandering_wave_is_found_and_followed() {
+        let (noise, steps) = (normal(1500, 1), normal(1500, 2));
+        let mut phase = 0.0;
+        let wave: Vec<f64> = steps
+            .iter()
+            .map(|step| {
+                phase += TAU * 0.17 + 0.1 * step;
+                f64::sin(phase)
+            })
+            .collect();
+        let residual: Vec<f64> = noise.iter().zip(&wave).map(|(noise, wave)| noise + wave).collect();
+        let all = [0..500, 500..1500];
+        let found = find(&residual, &all, Arma::WHITE).expect("a wave");
+        assert!((found.wave.frequency - 0.17).abs() < 0.01, "{:?}", found.wave);
+        let left = |estimate: &[f64]| estimate.iter().zip(&wave).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 1500.0;
+        assert!(left(&found.values) < 0.25 && left(&follow(&residual, &found.wave)) < 0.42, "{}", left(&found.values));
+    }
+
+    #[test]
+    fn noise_slow_noise_and_steps_are_no_wave() {
+        let all = [0..1000, 1000..2000];
+        for seed in 10..20 {
+            let white = normal(2000, seed);
+            let mut slow = 0.0;
+            let coloured: Vec<f64> = white
+                .iter()
+                .map(|x| {
+                    slow = 0.9 * slow + x;
+                    slow
+                })
+                .collect();
+            assert_eq!(find(&white, &all, Arma::WHITE), None);
+            assert_eq!(find(&coloured, &all, Arma { phi: 0.9, theta: 0.0 }), None);
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Size: what is too small to be claimed, however surely it is there.
+
+use super::diagnose::{Case, distance, ordinary_noise};
+use super::fit::Fit;
+use super::noise::count;
+use super::search::{Found, Hypothesis};
+
+/// Size, in deviations of the ordinary noise, below which an effect is not claimed.
+const SIZE_DEVIATIONS: f64 = 0.3;
+/// Size, as a share of the mean output, below which an effect is not claimed.
+const SIZE_SHARE: f64 = 0.005;
+/// Information from which even such a size is beyond doubt.
+const SMALL_INFORMATION: f64 = 100.0;
+/// Share of the mean output below which an output counts as that share.
+const OUTPUT_FLOOR: f64 = 0.1;
+
+impl Case<'_> {
+    /// Drops members whose remaining part is too small to claim, smallest first.
+    pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit) -> Found {
+        while let Some(position) = self.smallest_unclaimable(&found.best, base) {
+            let Some(less) = self.without(&found.best, position) else { break };
+            found.best = less;
+            found.p_values.remove(position.min(found.p_values.len() - 1));
+        }
+        found
+    }
+
+    fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit) -> Option<usize> {
+        let deviation = ordinary_noise(&best.fit);
+        (0..best.members.len()).find(|position| {
+            let without =
+                if best.members.len() == 1 { Some(base.clone()) } else { self.without(best, *position).map(|h| h.fit) };
+            without.is_some_and(|without| {
+                let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
+                self.negligible(&without.residual, &best.fit.residual, deviation, gained)
+            })
+        })
+    }
+
+    /// Is the difference of two residuals too small to claim: everywhere a share of the output by which a model or a
+    /// class 0.5 meter is wrong anyway, and not beyond all doubt, or small on the whole and lost in the noise?
+    pub(super) fn negligible(&self, one: &[f64], other: &[f64], deviation: f64, information: f64) -> bool {
+        let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len().max(1));
+        let of_output = |x: f64| x.abs() + OUTPUT_FLOOR * mean;
+        let mut shares: Vec<f64> =
+            one.iter().zip(other).zip(&self.recorded).map(|((a, b), x)| (a - b).abs() / of_output(*x)).collect();
+        shares.sort_by(|a, b| b.total_cmp(a));
+        let size = |rows: usize| (shares[..rows].iter().map(|x| x * x).sum::<f64>() / count(rows.max(1))).sqrt();
+        // On the whole, in the fifth and in the twentieth of the rows where it is greatest.
+        let sizes = [(1, 1.0), (5, 1.6), (20, 2.2)];
+        let small = sizes.iter().all(|(part, times)| size((shares.len() / part).max(1)) < times * SIZE_SHARE);
+        small && information < SMALL_INFORMATION
+            || distance(one, other) < (SIZE_DEVIATIONS * deviation).min(SIZE_SHARE * mean)
+    }
+}

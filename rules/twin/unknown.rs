@@ -1,0 +1,108 @@
+//! Unknown: something real remains, and no named effect is what it is.
+//!
+//! The yardstick is a bent line over one channel (`empirical`). Names are withdrawn where such a line explains clearly
+//! more than all of them, or much on top of them in a way that leaves the names little to explain; and where nothing is
+//! named, a line that explains enough is an alarm without a name.
+
+use super::diagnose::{Case, ordinary_noise};
+use super::empirical::empirical_designs;
+use super::fit::{Fit, fit};
+use super::gate::p_value;
+use super::model::{Body, simulate};
+use super::scan::Bank;
+use super::search::{Found, Hypothesis, P_MAX};
+use crate::physics::Role;
+
+/// What an empirical form must explain on top, as a share of what is named, before the name is withdrawn.
+const UNKNOWN_SHARE: f64 = 0.12;
+/// The same in units of information.
+const UNKNOWN_INFORMATION: f64 = 8.0;
+/// The same where nothing is named: an alarm without a name must not be a false one either.
+const NOTHING_NAMED_INFORMATION: f64 = 20.0;
+/// Share of what is named that must be left to the names when an empirical form stands beside them.
+const STANDS_SHARE: f64 = 0.6;
+/// By how much a bent line over one channel must explain more than all that is named, as a share of it, before the
+/// names are withdrawn: whatever bends over a channel nobody named is not what was named.
+const BETTER_SHARE: f64 = 0.1;
+/// The same in units of information.
+const BETTER_INFORMATION: f64 = 15.0;
+
+/// What remains unexplained, described.
+pub struct Unknown {
+    /// The baseline and the empirical form, fitted together.
+    pub fit: Fit,
+    /// Information over the baseline.
+    pub information: f64,
+    /// The gate's answer.
+    pub p_value: f64,
+}
+
+impl Case<'_> {
+    /// An empirical form where something real remains that the named effects do not explain.
+    pub(super) fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
+        let _ = simulate(&found.best.fit.parts, &mut self.scene);
+        let designs = empirical_designs(&self.scene, &self.frame, self.model);
+        let frame = self.frame.clone();
+        let bank = Bank::new(&designs, &frame);
+        let on_top = self.best_empirical(&found.best.fit, &bank)?;
+        let alone = if found.best.members.is_empty() { on_top.clone() } else { self.best_empirical(base, &bank)? };
+        let named = found.best.information;
+        let least = if found.best.members.is_empty() { NOTHING_NAMED_INFORMATION } else { UNKNOWN_INFORMATION };
+        let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
+        let anything = !found.best.members.is_empty();
+        let better = anything
+            && alone.information > named + (BETTER_SHARE * named).max(BETTER_INFORMATION)
+            && !self.is_friction(&alone, &bank, &found.best.fit);
+        // Names that explain as much beside the empirical form as without it are not put in doubt by it.
+        let stands = |given: f64| anything && named + on_top.information - given > STANDS_SHARE * named;
+        let doubted = remains && !self.with_empirical(base, &on_top, &bank).is_some_and(stands);
+        if !(doubted || better) {
+            return None;
+        }
+        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, found.best.members.is_empty());
+        let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
+        let noise = ordinary_noise(&to.fit);
+        let small = self.negligible(&from.residual, &to.fit.residual, noise, to.information);
+        if small || !better && p > P_MAX {
+            return None;
+        }
+        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
+    }
+
+    /// Information of one empirical form over the baseline.
+    fn with_empirical(&mut self, base: &Fit, empirical: &Hypothesis, bank: &Bank<'_>) -> Option<f64> {
+        let design = &bank.designs[*empirical.members.first()?];
+        let mut parts = base.parts.clone();
+        parts.push(design.part.clone());
+        let fitted = self.with_data(|data| fit(data, &parts, base.noise))?;
+        Some(2.0 * (fitted.log_likelihood - base.log_likelihood) - super::scan::price(design, self.ln_rows(base)))
+    }
+
+    /// Is a bent line over the velocity of the axis no more than the shape of a friction that has been named? No law of
+    /// friction fits a real axis to its noise.
+    fn is_friction(&self, empirical: &Hypothesis, bank: &Bank<'_>, named: &Fit) -> bool {
+        let friction = ["dry_friction", "viscous_friction", "stribeck", "axis_friction"];
+        let of_velocity = empirical.members.iter().all(|member| match &bank.designs[*member].part.body {
+            Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
+            _ => false,
+        });
+        of_velocity && named.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
+    }
+
+    /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
+    fn best_empirical(&mut self, from: &Fit, bank: &Bank<'_>) -> Option<Hypothesis> {
+        let ln_rows = self.ln_rows(from);
+        let designs = bank.designs;
+        let scores = bank.scan(from, ln_rows);
+        let best = scores
+            .iter()
+            .filter(|score| score.information.is_finite())
+            .max_by(|a, b| a.information.total_cmp(&b.information))?;
+        let mut parts = from.parts.clone();
+        parts.push(designs[best.design].part.clone());
+        let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
+        let information =
+            2.0 * (fit.log_likelihood - from.log_likelihood) - super::scan::price(&designs[best.design], ln_rows);
+        Some(Hypothesis { members: vec![best.design], fit, information })
+    }
+}
