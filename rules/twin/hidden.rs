@@ -59,7 +59,7 @@ impl Case<'_> {
 
     /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a
     /// screw, an insert or the work is not.
-    fn keeps_its_frequency(&self, residual: &[f64], wave: &super::ripple::Wave) -> bool {
+    fn keeps_its_frequency(&self, residual: &[f64], wave: &super::wave::Wave) -> bool {
         let paces = [self.scene.column("feed_mm_min"), self.scene.role(Role::Speed)];
         paces.into_iter().flatten().all(|pace| {
             let spells = self.spells_in_the_cut(pace);
@@ -111,7 +111,7 @@ impl Case<'_> {
         for groups in &self.held_frame.stretches {
             let rows: Vec<usize> = groups.clone().flat_map(|group| self.held_frame.rows(group)).collect();
             let residual: Vec<f64> = rows.iter().map(|row| recorded[*row] - simulated[*row]).collect();
-            let expected = super::ripple::follow(&residual, &found.wave);
+            let expected = super::wave::follow(&residual, &found.wave);
             rows.iter().zip(expected).for_each(|(row, expected)| wave[*row] = expected);
         }
         wave

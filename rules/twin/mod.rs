@@ -44,6 +44,7 @@ pub mod term;
 pub mod text;
 pub mod unknown;
 pub mod verdicts;
+pub mod wave;
 pub mod words;
 
 pub use diagnose::diagnose;
