@@ -11,9 +11,10 @@ mod replay;
 mod run;
 mod simulate;
 
+use crate::config::Log;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use rules::script::{Host, shipped};
 use std::fmt;
 use std::io::Write;
@@ -59,16 +60,30 @@ pub type CommandResult = Result<Outcome, CannotRun>;
 #[derive(Debug, Parser)]
 #[command(name = "cnc-gateway", version, args_conflicts_with_subcommands = true)]
 struct Arguments {
-    /// Engineer's log on standard error: off, text or json. The operator's lines on standard output stay.
-    #[arg(long, global = true, value_enum, default_value_t = LogFormat::Off, value_name = "FORM")]
-    log: LogFormat,
-    /// Least level of the engineer's log: error, warn, info, debug or trace.
-    #[arg(long, global = true, default_value = "info", value_name = "LEVEL")]
-    log_level: tracing::Level,
+    #[command(flatten)]
+    log: LogArguments,
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     run: run::RunArguments,
+}
+
+/// The engineer's log, where the command line says something about it.
+#[derive(Debug, Clone, Copy, Args)]
+struct LogArguments {
+    /// Engineer's log on standard error: off, text or json. The operator's lines on standard output stay.
+    #[arg(long, global = true, value_enum, value_name = "FORM")]
+    log: Option<LogFormat>,
+    /// Least level of the engineer's log: error, warn, info, debug or trace.
+    #[arg(long, global = true, value_name = "LEVEL")]
+    log_level: Option<tracing::Level>,
+}
+
+impl LogArguments {
+    /// Starts the log; `config` is what the configuration says.
+    fn start(self, config: &Log) {
+        log::start(self.log.unwrap_or(config.format), self.log_level.unwrap_or(config.level));
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -95,7 +110,6 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    log::start(arguments.log, arguments.log_level);
     match dispatch(arguments) {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::No) => ExitCode::from(1),
@@ -107,8 +121,12 @@ pub fn main() -> ExitCode {
 }
 
 fn dispatch(arguments: Arguments) -> CommandResult {
-    match arguments.command.unwrap_or(Command::Run(arguments.run)) {
-        Command::Run(run) => run::run(run),
+    let command = arguments.command.unwrap_or(Command::Run(arguments.run));
+    if !matches!(command, Command::Run(_)) {
+        arguments.log.start(&Log { format: LogFormat::Off, level: tracing::Level::INFO });
+    }
+    match command {
+        Command::Run(run) => run::run(run, arguments.log),
         Command::Bench(bench) => bench::run(&bench),
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),

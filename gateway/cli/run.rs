@@ -1,6 +1,6 @@
 //! `cnc-gateway run`: the box, live.
 
-use super::{CannotRun, CommandResult, Outcome};
+use super::{CannotRun, CommandResult, LogArguments, Outcome};
 use crate::config;
 use crate::run::{self, Plan, open::MachineSpeed};
 use clap::Args;
@@ -46,8 +46,10 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Runs the box until it is told to stop.
-pub(super) fn run(arguments: RunArguments) -> CommandResult {
-    run::run(plan(arguments)?)?;
+pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
+    let plan = plan(arguments)?;
+    log.start(&plan.config.log);
+    run::run(plan)?;
     Ok(Outcome::Fine)
 }
 

@@ -2,8 +2,10 @@
 
 use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
-use super::{Config, Gate, GateMode, Gateway, History, Http, Language, Log, Scripts, Source, Twin};
+use super::{Config, Gate, GateMode, Gateway, History, Http, Log, Scripts, Source, Twin};
+use crate::log::LogFormat;
 use adapters::channel::nearest;
+use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -19,17 +21,31 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         history: history(reading, &gateway.data_dir)?,
         http: Http { listen: text(reading, "http", "listen")?, enabled: flag(reading, "http", "enabled")? },
         twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
-        log: Log { level: text(reading, "log", "level")?, json: text(reading, "log", "format")? == "json" },
+        log: log(reading)?,
         gateway,
         sources: sources?,
     })
+}
+
+fn log(reading: &Reading<'_>) -> Option<Log> {
+    let format = match text(reading, "log", "format")?.as_str() {
+        "text" => LogFormat::Text,
+        "json" => LogFormat::Json,
+        _ => LogFormat::Off,
+    };
+    // The words of the key are those of the levels.
+    Some(Log { level: text(reading, "log", "level")?.parse().ok()?, format })
 }
 
 fn gateway(reading: &Reading<'_>, base: &Path) -> Option<Gateway> {
     Some(Gateway {
         name: text(reading, "gateway", "name")?,
         tick_hz: number(reading, "gateway", "tick_hz")?,
-        language: if text(reading, "gateway", "language")? == "zh" { Language::Zh } else { Language::En },
+        language: match text(reading, "gateway", "language")?.as_str() {
+            "en" => Some(Language::En),
+            "zh" => Some(Language::Zh),
+            _ => None,
+        },
         data_dir: base.join(text(reading, "gateway", "data_dir")?),
     })
 }

@@ -105,10 +105,10 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         ("gateway", "language"),
-        OneOf(&["en", "zh"]),
-        Default("\"en\""),
-        "Language of messages to the operator",
-        "操作者界面语言",
+        OneOf(&["auto", "en", "zh"]),
+        Default("\"auto\""),
+        "Language in which the page opens; auto takes that of the browser, and the reader may switch",
+        "页面打开时的语言；auto 取浏览器语言，读者可切换",
     ),
     key(
         ("gateway", "data_dir"),
@@ -244,14 +244,14 @@ pub const KEYS: &[Key] = &[
         ("log", "level"),
         OneOf(&["error", "warn", "info", "debug", "trace"]),
         Default("\"info\""),
-        "Least important message that is written",
+        "Least important message of the engineer's log; --log-level goes before it",
         "日志级别",
     ),
     key(
         ("log", "format"),
-        OneOf(&["text", "json"]),
-        Default("\"text\""),
-        "Text for people, json for log collectors",
+        OneOf(&["off", "text", "json"]),
+        Default("\"off\""),
+        "Engineer's log on standard error: text for people, json for log collectors; --log goes before it",
         "日志格式",
     ),
 ];

@@ -13,9 +13,12 @@ mod read;
 
 pub use problem::Problem;
 
+use crate::log::LogFormat;
 use adapters::Address;
+use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use tracing::Level;
 
 /// What every environment variable that overrides a key begins with.
 pub const ENVIRONMENT_PREFIX: &str = "CNC_GATEWAY__";
@@ -55,19 +58,10 @@ pub struct Gateway {
     pub name: String,
     /// Ticks per second, 0.1 to 1000.
     pub tick_hz: f64,
-    /// Language of operator messages.
-    pub language: Language,
+    /// Language in which the page opens; `None`: that of the browser.
+    pub language: Option<Language>,
     /// Directory of everything the gateway writes.
     pub data_dir: PathBuf,
-}
-
-/// Language of operator messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Language {
-    /// English.
-    En,
-    /// Chinese.
-    Zh,
 }
 
 /// One `[[source]]`.
@@ -168,10 +162,10 @@ pub struct Twin {
 /// `[log]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Log {
-    /// `error`, `warn`, `info`, `debug` or `trace`.
-    pub level: String,
-    /// Lines of JSON instead of text.
-    pub json: bool,
+    /// Least important message.
+    pub level: Level,
+    /// Text, JSON, or none at all.
+    pub format: LogFormat,
 }
 
 /// Reads the file, or without one the built-in configuration, and overlays the environment.

@@ -141,7 +141,7 @@ pub(crate) fn find<'a>(known: &'a [Series], name: &str) -> Result<&'a Series, Hi
     known.iter().find(|series| *series.name == *name).ok_or_else(|| {
         let hint = nearest(name, known.iter().map(|series| &*series.name));
         let hint = hint.map_or_else(
-            || "`cnc-gateway history info` lists what is stored".to_owned(),
+            || "`cnc-gateway history query --sql 'SELECT name, unit FROM series'` lists what is stored".to_owned(),
             |near| format!("did you mean {near}?"),
         );
         HistoryError::Question(format!("this history has no series {name}; {hint}"))

@@ -22,6 +22,7 @@ use axum::Router;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, get};
+use rules::physics::explain::Language;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -48,13 +49,14 @@ pub struct Shared {
     live: watch::Receiver<Option<Published>>,
     listeners: Arc<Semaphore>,
     history: PathBuf,
+    language: Option<Language>,
 }
 
 impl Shared {
-    /// What the tick publishes, and where the history is.
+    /// What the tick publishes, where the history is, and the language in which the page opens if not the browser's.
     #[must_use]
-    pub fn new(live: watch::Receiver<Option<Published>>, history: PathBuf) -> Self {
-        Self { live, listeners: Arc::new(Semaphore::new(live::LISTENERS_MAX)), history }
+    pub fn new(live: watch::Receiver<Option<Published>>, history: PathBuf, language: Option<Language>) -> Self {
+        Self { live, listeners: Arc::new(Semaphore::new(live::LISTENERS_MAX)), history, language }
     }
 
     fn status(&self) -> Result<Arc<Status>, ApiProblem> {

@@ -1,11 +1,14 @@
 //! The live page: three kinds of file, part of the binary, nothing from elsewhere.
 
-use axum::extract::Path;
+use axum::extract::{Path, State};
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 
+use super::Shared;
 use super::problem::ApiProblem;
+use rules::physics::explain::Language;
 
+const INDEX: &str = include_str!("../web/index.html");
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
@@ -23,19 +26,24 @@ const FILES: [(&str, &str, &str); 5] = [
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'";
 
 /// `GET /`
-pub(super) async fn page() -> Response {
-    file(HTML, include_str!("../web/index.html"))
+pub(super) async fn page(State(shared): State<Shared>) -> Response {
+    let chosen = match shared.language {
+        None => return file(HTML, INDEX),
+        Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",
+        Some(Language::Zh) => "<html lang=\"zh-CN\" data-opens=\"zh\">",
+    };
+    file(HTML, INDEX.replacen("<html lang=\"en\">", chosen, 1))
 }
 
 /// `GET /web/{file}`
 pub(super) async fn web(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, content)) => file(kind, content),
+        Some((_, kind, content)) => file(kind, *content),
         None => ApiProblem::not_found(&format!("/web/{name}")).into_response(),
     }
 }
 
-fn file(kind: &'static str, content: &'static str) -> Response {
+fn file(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),

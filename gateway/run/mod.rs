@@ -153,7 +153,7 @@ async fn serve(
     wishes: &Arc<Wishes>,
     report: watch::Sender<Option<String>>,
 ) {
-    let shared = Shared::new(live.clone(), plan.config.history.path.clone());
+    let shared = Shared::new(live.clone(), plan.config.history.path.clone(), plan.config.gateway.language);
     let server = match address(plan) {
         Ok(Some(address)) => Some(Server::start(address, listener, shared, report)),
         _ => None,

@@ -247,7 +247,11 @@ function listen() {
   stream.onerror = () => connected(false);
 }
 
-at("language").onclick = () => switchLanguage(current() === "zh" ? "en" : "zh");
+at("language").onclick = () => {
+  const next = current() === "zh" ? "en" : "zh";
+  localStorage.setItem("language", next);
+  switchLanguage(next);
+};
 connected(false);
 vocabulary = await (await fetch("/api/v1/channels")).json();
 switchLanguage(current());

@@ -33,7 +33,7 @@ const TEXTS = {
   },
 };
 
-let language = localStorage.getItem("language") ?? (navigator.language.startsWith("zh") ? "zh" : "en");
+let language = localStorage.getItem("language") ?? document.documentElement.dataset.opens ?? (navigator.language.startsWith("zh") ? "zh" : "en");
 
 export const current = () => language;
 export const text = (key) => TEXTS[language][key] ?? key;
@@ -42,7 +42,6 @@ export const own = (thing) => thing?.[language] ?? thing?.en ?? "";
 
 export function setLanguage(next) {
   language = next;
-  localStorage.setItem("language", next);
   document.documentElement.lang = next === "zh" ? "zh-CN" : "en";
   for (const element of document.querySelectorAll("[data-text]")) element.textContent = text(element.dataset.text);
 }

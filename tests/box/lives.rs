@@ -239,3 +239,23 @@ fn a_clock_that_jumps_is_told_and_followed_forward_only() {
     assert!(status["problems"].to_string().contains("wall clock"), "{status}");
     gateway.stop();
 }
+
+#[test]
+fn language_and_log_are_those_of_the_configuration() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = directory.path().join("cnc-gateway.toml");
+    let text = "[gateway]\nlanguage = \"zh\"\n[log]\nformat = \"json\"\n[http]\nlisten = \"127.0.0.1:0\"\n\
+                [[source]]\naddress = \"simulated://lathe\"\n";
+    fs::write(&config, text).expect("written");
+    let mut command = program();
+    command.args(["run", "--config"]).arg(&config);
+    let mut gateway = Gateway::spawn(command);
+    let line = gateway.wait_said("\"code\":\"serving\"");
+    let event: Value = serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line}"));
+    assert_eq!(event["level"], "INFO");
+    let address =
+        event["message"].as_str().expect("text").trim_start_matches("live page: http://").trim_end_matches('/');
+    let page = get(address, "/").body;
+    assert!(page.contains("<html lang=\"zh-CN\" data-opens=\"zh\">"), "{page}");
+    gateway.stop();
+}
