@@ -1,18 +1,21 @@
 //! The cut as effects see it.
 
 use super::{OutputKind, Role, Scene};
+use std::borrow::Cow;
 
 /// Tool in the work, 0 to 1; 1 everywhere when no channel tells (then depth and feed must tell).
 pub(crate) fn engaged(scene: &Scene) -> Vec<f64> {
     scene.role(Role::Engaged).map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec)
 }
 
-/// How hard the cut is: the load, or else the tool being in the work. `None` for displacements and without both.
-pub(crate) fn cut(scene: &Scene) -> Option<&[f64]> {
+/// How hard the cut is, in the output's unit: the load, or else what the output usually has in the cut beyond what it
+/// has out of it, while the tool is in the work. `None` for displacements and without both.
+pub(crate) fn cut(scene: &Scene) -> Option<Cow<'_, [f64]>> {
     if scene.output_kind() == OutputKind::Displacement {
         return None;
     }
-    scene.load().or_else(|| scene.role(Role::Engaged))
+    let usual = || scene.role(Role::Engaged).map(|engaged| engaged.iter().map(|x| x * scene.usual_cut()).collect());
+    scene.load().map(Cow::Borrowed).or_else(usual)
 }
 
 /// Rows in which the tool cuts.

@@ -11,6 +11,7 @@ mod excitation;
 pub mod explain;
 mod scene;
 pub mod state;
+mod tool_load;
 mod unit;
 
 pub use catalogue::{CATALOGUE, effect};

@@ -4,7 +4,7 @@ use adapters::recording::{Recording, Words, with_derived};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
 /// Relative change of the spindle speed from one row to the next that starts a new pass.
@@ -156,6 +156,8 @@ pub struct Scene {
     load: Option<Vec<f64>>,
     simulated: Option<Vec<f64>>,
     laws: RefCell<BTreeMap<String, LinearLaw>>,
+    feed_load_growth: OnceLock<Option<Vec<f64>>>,
+    usual_cut: OnceLock<f64>,
 }
 
 /// A formula over columns that is linear in its parameters: what it is with all of them at zero, then what one unit of
@@ -194,6 +196,8 @@ impl Scene {
             load: None,
             simulated: None,
             laws: RefCell::default(),
+            feed_load_growth: OnceLock::new(),
+            usual_cut: OnceLock::new(),
             runs,
         };
         scene.take_columns(&recording);
@@ -228,14 +232,23 @@ impl Scene {
         }
     }
 
-    /// Stretches with the tool in the work, within a run; a jump of the spindle speed while engaged (surface speed held
-    /// on another diameter) starts a new one.
+    /// Stretches with the tool in the work, within a run; another word in `pass`, a jump of the spindle speed while
+    /// engaged (surface speed held on another diameter) or of what holds an axis in its place (another diameter at the
+    /// same speed) starts a new one.
     fn find_passes(&self) -> Vec<Range<usize>> {
         let Some(engaged) = self.role(Role::Engaged) else { return Vec::new() };
         let speed = self.role(Role::Speed);
-        let jumps = |row: usize| speed.is_some_and(|n| (n[row] - n[row - 1]).abs() > PASS_JUMP * n[row - 1].abs());
+        let named = self.words("pass");
+        let moved = super::tool_load::moved_rows(self);
+        let steps = |row: usize| {
+            speed.is_some_and(|n| (n[row] - n[row - 1]).abs() > PASS_JUMP * n[row - 1].abs())
+                || named.is_some_and(|pass| pass.get(row) != pass.get(row - 1))
+                || moved.get(row).is_some_and(|moved| *moved)
+        };
         let mut passes: Vec<Range<usize>> = Vec::new();
         for run in &self.runs {
+            // What takes several rows to change has changed at the last of them.
+            let jumps = |row: usize| steps(row) && (row + 1 == run.end || !steps(row + 1));
             let mut start = None;
             for row in run.clone() {
                 match (engaged[row] > 0.5, start) {
@@ -397,6 +410,28 @@ impl Scene {
         let found = find();
         self.laws.borrow_mut().insert(formula.to_owned(), found.clone());
         found
+    }
+
+    /// What the output usually has in the cut beyond what it usually has out of it; of all where it is never out. One
+    /// where nothing tells.
+    #[must_use]
+    pub fn usual_cut(&self) -> f64 {
+        *self.usual_cut.get_or_init(|| {
+            let Some(engaged) = self.role(Role::Engaged) else { return 1.0 };
+            let middle = |cutting: bool| {
+                let rows = (0..self.rows).filter(|row| self.usable[*row] && (engaged[*row] > 0.5) == cutting);
+                super::excitation::quantile(rows.map(|row| self.recorded[row].abs()), 0.5)
+            };
+            let usual = middle(true).unwrap_or(1.0) - middle(false).unwrap_or(0.0);
+            if usual > 0.0 { usual } else { 1.0 }
+        })
+    }
+
+    /// Growth of the feed drives' load since each tool's edge was new, relative, from that tool's earlier rows only;
+    /// `None` when no feed drive tells.
+    #[must_use]
+    pub fn feed_load_growth(&self) -> Option<&[f64]> {
+        self.feed_load_growth.get_or_init(|| super::tool_load::growth(self)).as_deref()
     }
 
     /// The output as the model simulates it, for effects of the measurement.

@@ -95,7 +95,8 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
     let usable = columns.iter().all(|column| column.iter().all(|x| x.is_finite()));
     usable.then(|| Design {
         kind: effect.doc().kind.to_owned(),
-        freedom: names.len() + form.shape.len(),
+        // That the tools wear is told by the feed drive already; only what it costs here is open.
+        freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() },
         ln_choices: form.ln_choices,
         reluctance: reluctance(effect.doc().kind),
         part,

@@ -3,7 +3,8 @@
 //! A long recording is reduced by averaging groups of neighbouring rows *after* every law has been evaluated at full
 //! rate, so that edges keep their shape.
 
-use super::noise::{Arma, whiten};
+use super::levels::Levels;
+use super::noise::{Arma, count, log_likelihood, whiten};
 use super::quality::median;
 use crate::physics::Scene;
 use std::collections::BTreeSet;
@@ -62,6 +63,11 @@ pub struct Frame {
     pub unit: Vec<usize>,
     /// Weight of each group's innovation; empty while all weigh the same.
     weights: Vec<f64>,
+    /// How quiet the pass of each group is: inverse of its noise, with a geometric mean of one; empty while all are
+    /// taken to be alike.
+    pub quiet: Vec<f64>,
+    /// Levels of their own that passes and tools have, where they have been found.
+    pub levels: Option<Levels>,
 }
 
 /// Innovations beyond this many robust standard deviations lose weight.
@@ -71,15 +77,57 @@ impl Frame {
     /// Innovations of a column within unbroken stretches, weighted.
     #[must_use]
     pub fn whiten(&self, column: &[f64], noise: Arma) -> Vec<f64> {
-        let mut white = whiten(column, &self.stretches, noise);
+        let mut white = self.unweighted(column, noise);
         white.iter_mut().zip(&self.weights).for_each(|(e, weight)| *e *= weight);
         white
+    }
+
+    fn unweighted(&self, column: &[f64], noise: Arma) -> Vec<f64> {
+        let mut white = self.evened(column, noise);
+        if let Some(levels) = &self.levels {
+            levels.whiten(self, &mut white, noise);
+        }
+        white
+    }
+
+    /// Innovations of a column divided by how restless its pass is.
+    #[must_use]
+    pub fn evened(&self, column: &[f64], noise: Arma) -> Vec<f64> {
+        let mut white = whiten(column, &self.stretches, noise);
+        white.iter_mut().zip(&self.quiet).for_each(|(e, quiet)| *e *= quiet);
+        white
+    }
+
+    /// Logarithm of the likelihood, up to a constant, of innovations of this noise with this sum of squares.
+    #[must_use]
+    pub fn log_likelihood(&self, rss: f64, noise: Arma) -> f64 {
+        let levels = self.levels.as_ref().map_or(0.0, |levels| levels.log_determinant(self, noise));
+        log_likelihood(rss, self.len(), self.stretches.len(), noise) + levels
+    }
+
+    /// The same groups with the noise starting anew at both ends of each of these ranges of rows.
+    #[must_use]
+    pub fn broken_at(&self, ranges: &[Range<usize>]) -> Self {
+        let edges: BTreeSet<usize> = ranges.iter().flat_map(|rows| [rows.start, rows.end]).collect();
+        let mut stretches: Vec<Range<usize>> = Vec::new();
+        for stretch in &self.stretches {
+            let mut start = stretch.start;
+            for group in stretch.start + 1..stretch.end {
+                let reached = self.groups[group - 1].start + 1..=self.groups[group].start;
+                if edges.range(reached).next().is_some() {
+                    stretches.push(start..group);
+                    start = group;
+                }
+            }
+            stretches.push(start..stretch.end);
+        }
+        Self { stretches, ..self.clone() }
     }
 
     /// Gives every group the weight that Huber's rule gives its innovation: one within six robust standard deviations,
     /// falling beyond, so that a single row can say only so much for or against anything.
     pub fn weigh(&mut self, residual: &[f64], noise: Arma) {
-        let innovations = whiten(residual, &self.stretches, noise);
+        let innovations = self.unweighted(residual, noise);
         let spread = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
         let limit = HEAVY_DEVIATIONS * spread;
         self.weights =
@@ -90,7 +138,14 @@ impl Frame {
     #[must_use]
     pub fn new(scene: &Scene, units: &[Unit], takes: impl Fn(usize) -> bool) -> Self {
         let size = scene.rows().div_ceil(GROUPS_MAX).max(1);
-        let mut frame = Self { groups: Vec::new(), stretches: Vec::new(), unit: Vec::new(), weights: Vec::new() };
+        let mut frame = Self {
+            groups: Vec::new(),
+            stretches: Vec::new(),
+            unit: Vec::new(),
+            weights: Vec::new(),
+            quiet: Vec::new(),
+            levels: None,
+        };
         for (index, unit) in units.iter().enumerate().filter(|(index, _)| takes(*index)) {
             for stretch in unbroken(scene, unit.rows.clone()) {
                 frame.add_stretch(index, stretch, size);
@@ -136,7 +191,7 @@ impl Frame {
             if rows.len() == 1 {
                 column[rows.start]
             } else {
-                column[rows.clone()].iter().sum::<f64>() / super::noise::count(rows.len())
+                column[rows.clone()].iter().sum::<f64>() / count(rows.len())
             }
         };
         self.groups.iter().map(mean).collect()

@@ -12,6 +12,7 @@
 //! 6. Every fit is shown on runs that took no part in fitting, choosing or stopping.
 
 pub mod bind;
+mod corroborated;
 pub mod designs;
 pub mod diagnose;
 pub mod diagnosis;
@@ -26,6 +27,7 @@ pub mod hidden;
 pub mod holdout;
 pub mod inputs;
 pub mod latent;
+mod levels;
 pub mod linear;
 pub mod locate;
 pub mod model;

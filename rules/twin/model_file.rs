@@ -350,7 +350,7 @@ fn form_name(name: &str) -> Option<&'static str> {
 }
 
 /// Every form name that an effect of the catalogue uses.
-pub(super) const FORM_NAMES: [&str; 26] = [
+pub(super) const FORM_NAMES: [&str; 27] = [
     "turning",
     "milling",
     "drilling",
@@ -377,6 +377,7 @@ pub(super) const FORM_NAMES: [&str; 26] = [
     "both",
     "stage",
     "threshold",
+    "followed",
 ];
 
 fn has_table(table: &Table<'_>) -> bool {

@@ -117,7 +117,7 @@ pub fn fit(residual: &[f64], stretches: &[Range<usize>]) -> Arma {
 pub fn fit_near(residual: &[f64], frame: &Frame, start: Arma) -> (f64, Arma) {
     let score = |noise: Arma| {
         let e = frame.whiten(residual, noise);
-        log_likelihood(dot(&e, &e), residual.len(), frame.stretches.len(), noise)
+        frame.log_likelihood(dot(&e, &e), noise)
     };
     let mut best = (score(start), start);
     for noise in GRID.iter().step_by(3) {

@@ -8,7 +8,7 @@ use super::designs::Design;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
-use super::noise::{Arma, count, log_likelihood};
+use super::noise::{Arma, count};
 use std::cell::OnceCell;
 
 /// Share of a column's length that must lie outside what the fit can absorb: below it the hypothesis leaves no trace.
@@ -80,7 +80,7 @@ impl<'a> Bank<'a> {
     pub fn nearest(&self, fit: &Fit) -> usize {
         let likelihood = |noise: Arma| {
             let e = self.frame.whiten(&fit.residual, noise);
-            log_likelihood(dot(&e, &e), self.frame.len(), self.frame.stretches.len(), noise)
+            self.frame.log_likelihood(dot(&e, &e), noise)
         };
         let scored = SETTINGS.iter().map(|noise| likelihood(*noise)).enumerate();
         scored.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best }).0
@@ -100,7 +100,7 @@ impl<'a> Bank<'a> {
                 let rss = stage.rss - self.explained(&stage, index, &stage.residual);
                 // The fit's own noise lies between the settings: at the nearest one the gain is over that setting.
                 let rows = count(self.frame.len());
-                let likelihood = log_likelihood(rss, self.frame.len(), self.frame.stretches.len(), SETTINGS[setting]);
+                let likelihood = self.frame.log_likelihood(rss, SETTINGS[setting]);
                 let here = if setting == own {
                     rows * (stage.rss / rss.max(f64::MIN_POSITIVE)).ln()
                 } else {

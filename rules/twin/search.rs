@@ -60,7 +60,9 @@ pub struct Search<'a, 'b> {
     pub ln_rows: f64,
     /// Seed of the resampling.
     pub seed: u64,
-    tried: Vec<Hypothesis>,
+    pub(super) tried: Vec<Hypothesis>,
+    /// How many of the first members stand already.
+    standing: usize,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
@@ -69,7 +71,7 @@ impl<'a, 'b> Search<'a, 'b> {
     pub fn new(data: &'a mut Data<'b>, base: &'a Fit, bank: &'a Bank<'a>, seed: u64) -> Self {
         let rows = count(data.frame.len());
         let ln_rows = (rows / base.noise.inflation()).max(20.0).ln();
-        Self { data, base, bank, ln_rows, seed, tried: Vec::new() }
+        Self { data, base, bank, ln_rows, seed, tried: Vec::new(), standing: 0 }
     }
 
     /// Runs the search: grows as far as information is gained, then lets the gate decide how much of it is real.
@@ -78,12 +80,14 @@ impl<'a, 'b> Search<'a, 'b> {
     /// noise against an earlier one.
     #[must_use]
     pub fn run(mut self) -> Found {
-        let mut path = vec![Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 }];
+        let nothing = Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 };
+        let (first, mut p_values) = self.corroborated(&nothing).unwrap_or((nothing, Vec::new()));
+        self.standing = first.members.len();
+        let mut path = vec![first];
         while let Some(next) = self.next_step(&path[path.len() - 1]) {
             path.push(next);
         }
         let deepest = path[path.len() - 1].clone();
-        let mut p_values = Vec::new();
         let mut refused_p = None;
         let mut best = path[0].clone();
         for next in path.drain(1..) {
@@ -154,7 +158,7 @@ impl<'a, 'b> Search<'a, 'b> {
         fitted
     }
 
-    fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
+    pub(super) fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
         let mut parts = from.fit.parts.clone();
         parts.push(self.bank.designs[design].part.clone());
         let mut members = from.members.clone();
@@ -174,7 +178,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Replaces members one by one where another explains more beside the rest.
     fn swapped(&mut self, mut best: Hypothesis) -> Hypothesis {
-        for position in 0..best.members.len() {
+        for position in self.standing..best.members.len() {
             if best.members.len() < 2 {
                 break;
             }
@@ -199,12 +203,12 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Drops members that have become superfluous.
     fn pruned(&mut self, mut best: Hypothesis) -> Hypothesis {
-        let mut position = 0;
+        let mut position = self.standing;
         while best.members.len() > 1 && position < best.members.len() {
             match self.without(&best, position) {
                 Some(less) if less.information + STEP_INFORMATION > best.information => {
                     best = less;
-                    position = 0;
+                    position = self.standing;
                 }
                 _ => position += 1,
             }

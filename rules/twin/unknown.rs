@@ -41,7 +41,16 @@ impl Case<'_> {
     /// An empirical form where something real remains that the named effects do not explain.
     pub(super) fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
         let _ = simulate(&found.best.fit.parts, &mut self.scene);
-        let designs = empirical_designs(&self.scene, &self.frame, self.model);
+        let mut designs = empirical_designs(&self.scene, &self.frame, self.model);
+        if self.frame.levels.is_some() {
+            // Tools are draws, not points on a curve over time, and each wears along its own: what grows with the use of
+            // a tool has been asked for by name.
+            let named = ["time_s", "time_in_run_s", "cutting_time_min"];
+            designs.retain(|design| match &design.part.body {
+                Body::Empirical(form) => !named.contains(&form.channel.as_str()),
+                _ => true,
+            });
+        }
         let frame = self.frame.clone();
         let bank = Bank::new(&designs, &frame);
         let on_top = self.best_empirical(&found.best.fit, &bank)?;

@@ -11,7 +11,7 @@ pub struct EntryExit;
 static DOC: EffectDoc = EffectDoc {
     kind: "entry_exit",
     family: "cutting",
-    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass",
+    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: entry alone",
     parameters: &[
         ParameterDoc {
             name: "entry",
@@ -69,7 +69,13 @@ impl Effect for EntryExit {
         }
         let longest_s = scene.passes().iter().map(|pass| length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
-        [1.0, 3.0, 10.0, 30.0].into_iter().filter(told).map(|length_s| Form::of(&[("length_s", length_s)])).collect()
+        let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
+        let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
+        // Over a good part of a pass nearly anything bends: only where another drive settles as well.
+        let shown = scene.feed_load_growth().is_some();
+        let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
+        forms.extend(long.map(|length_s| Form { name: "settling", ..Form::of(&[("length_s", length_s)]) }));
+        forms
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -82,6 +88,9 @@ impl Effect for EntryExit {
                 exit[row] = (-(time_s[pass.end - 1] - time_s[row]) / over_s).exp();
             }
         }
+        if form.name == "settling" {
+            return Some(vec![("entry", cut_times(scene, |row| entry[row])?)]);
+        }
         Some(vec![("entry", cut_times(scene, |row| entry[row])?), ("exit", cut_times(scene, |row| exit[row])?)])
     }
 
@@ -89,6 +98,9 @@ impl Effect for EntryExit {
         Form::of(&[("length_s", 1.0)])
     }
 }
+
+/// Sampling periods from which on the entry is more than an edge: tool, chip and work settle over a good part of a pass.
+const SETTLING_PERIODS: f64 = 8.0;
 
 fn length_s(scene: &Scene, pass: &Range<usize>) -> f64 {
     scene.time_s()[pass.end - 1] - scene.time_s()[pass.start]
