@@ -5,13 +5,14 @@
 
 use super::gate::p_value;
 use super::scan::Bank;
-use super::search::{Hypothesis, Search};
+use super::search::{Hypothesis, P_MAX, Search};
 
 /// Kinds that describe what happens within a pass.
 const WITHIN_A_PASS: [&str; 2] = ["entry_exit", "depth_taper"];
 
-/// The p-value that must not be exceeded: the cause is beyond doubt, the question is whether this output shows it.
-const SHOWN_P_MAX: f64 = 0.05;
+/// The p-value of wear that must not be exceeded beside a settling that stands at half of [`P_MAX`]: that the tools wear
+/// is beyond doubt, the question is whether this output shows it.
+const SHOWN_P_MAX: f64 = 0.04;
 
 impl Search<'_, '_> {
     /// The hypothesis of the causes that the feed drives show, as far as this output shows them too, with their
@@ -26,14 +27,14 @@ impl Search<'_, '_> {
         if let (Some(both), Some(settled), Some(worn)) = (&both, &settled, &worn) {
             let of_wear = self.p_of(settled, both, &wear);
             let of_settling = self.p_of(worn, both, &settling);
-            if of_wear <= SHOWN_P_MAX && of_settling <= SHOWN_P_MAX {
+            if of_wear <= SHOWN_P_MAX && of_settling <= 0.5 * P_MAX {
                 return Some((both.clone(), vec![of_settling, of_wear]));
             }
         }
         let alone = |found: Option<Hypothesis>, designs: &[usize]| {
             let found = found?;
             let p = self.p_of(from, &found, designs);
-            (p <= SHOWN_P_MAX).then(|| (found, vec![p]))
+            (p <= P_MAX).then(|| (found, vec![p]))
         };
         alone(settled, &settling).or_else(|| alone(worn, &wear))
     }
