@@ -15,7 +15,8 @@ impl Case<'_> {
     /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
     pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
         let effect = crate::physics::effect("auxiliary_switch")?;
-        if !super::designs::wanted(effect, self.model) {
+        // Consumers draw power; they do not move the tool against the work.
+        if self.scene.output_kind() == OutputKind::Displacement || !super::designs::wanted(effect, self.model) {
             return None;
         }
         let found = super::latent::find(&base.residual, &self.frame.stretches)?;

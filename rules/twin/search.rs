@@ -17,7 +17,7 @@ const LEADERS: usize = 3;
 /// Partners fitted in full per leader.
 const PARTNERS: usize = 2;
 /// Information the first effect must bring.
-const FIRST_INFORMATION: f64 = 4.0;
+const FIRST_INFORMATION: f64 = 10.0;
 /// Information a further effect must bring.
 const STEP_INFORMATION: f64 = 6.0;
 /// The same as a share of what is already explained: below it a further effect more likely mends the form of another.
