@@ -3,8 +3,10 @@
 #[path = "support/axis.rs"]
 mod axis;
 
+use adapters::{ChannelId, Sample, Slot, Value};
 use axis::{MODEL, Noise, recording};
-use serde_json::Value;
+use gateway::history::{Options, Query, Reader, WhenFull, Writer};
+use serde_json::Value as Json;
 use std::path::Path;
 use std::process::{Command, Output};
 use tempfile::TempDir;
@@ -37,7 +39,7 @@ fn read(directory: &TempDir, name: &str) -> String {
     std::fs::read_to_string(directory.path().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-fn json(text: &str) -> Value {
+fn json(text: &str) -> Json {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text}"))
 }
 
@@ -56,6 +58,74 @@ fn the_missing_friction_is_named_and_everything_is_written() {
     assert!((level - 20.0).abs() < 1.0, "{level}");
     let accepted = read(&bench, "new.toml");
     assert!(accepted.contains("dry_friction"), "{accepted}");
+}
+
+#[test]
+fn the_page_is_written_beside_the_words() {
+    let bench = bench();
+    let output = gateway(bench.path(), &["diagnose", "--model", "m.toml", "--recording", "r.csv", "--html", "d.html"]);
+    assert!(text(&output.stdout).contains("dry_friction"));
+    let page = read(&bench, "d.html");
+    assert!(page.starts_with("<!doctype html>") && page.contains("dry friction"), "{}", &page[..200]);
+}
+
+#[test]
+fn gzip_says_the_same_as_csv() {
+    let bench = bench();
+    let csv = gateway(bench.path(), &["diagnose", "--model", "m.toml", "--recording", "r.csv", "--json"]);
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut packed, read(&bench, "r.csv").as_bytes()).expect("memory");
+    std::fs::write(bench.path().join("r.csv.gz"), packed.finish().expect("memory")).expect("writable");
+    let gzip = gateway(bench.path(), &["diagnose", "--model", "m.toml", "--recording", "r.csv.gz", "--json"]);
+    assert_eq!(text(&csv.stdout), text(&gzip.stdout));
+}
+
+/// A history of a spindle that takes 30 W more than the model says whenever the coolant runs.
+fn spindle_history(path: &Path) {
+    let writer = Writer::open(path, Options { when_full: WhenFull::Wait, ..Options::default() }).expect("a history");
+    let mut noise = Noise::new(3);
+    for row in 0..900_i64 {
+        let mut sample = Sample::empty(1_800_000_000_000_000_000 + row * 1_000_000_000);
+        let coolant = f64::from(u8::from(row / 37 % 3 == 1));
+        let speed = 400.0 + 200.0 * ((row / 60 % 5) as f64);
+        let power = 80.0 + 0.3 * speed + 30.0 * coolant + noise.normal();
+        let mut set = |name, value| {
+            let channel = ChannelId::of(name).expect("a channel");
+            sample.set(channel, Slot { value: Ok(value), age_ns: 0 });
+        };
+        set("spindle_speed_rpm", Value::Number(speed));
+        set("spindle_power_w", Value::Number((power * 100.0).round() / 100.0));
+        set("coolant_on", Value::Number(coolant));
+        set("run", Value::Text(format!("{}", row / 150).into()));
+        writer.sample(&sample, &[]);
+    }
+    writer.flush().expect("durable");
+    drop(writer);
+}
+
+#[test]
+fn a_history_and_its_exports_say_the_same() {
+    let bench = bench();
+    spindle_history(&bench.path().join("h.db"));
+    let reader = Reader::open(&bench.path().join("h.db")).expect("readable");
+    for name in ["h.csv", "h.parquet"] {
+        reader.export(&Query::default(), &bench.path().join(name)).expect("exported");
+    }
+    let model = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_power\"\n\
+                 parameters = { p0_w = 80.0, p1_w_per_rpm = 0.3, p2_w_per_rpm2 = 0.0 }\n";
+    write(&bench, "spindle.toml", model);
+    let said = |source: &str| {
+        let output = gateway(bench.path(), &["diagnose", "--model", "spindle.toml", "--recording", source, "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{source}: {}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let all = ["h.csv", "h.parquet", "history:h.db?from=2027-01-15"].map(said);
+    assert_eq!(json(&all[0])["missing"][0]["effect"], "auxiliary_switch", "{}", all[0]);
+    assert_eq!(all[0], all[1]);
+    assert_eq!(all[0], all[2]);
+    let part = said("history:h.db?from=2027-01-15T08:00:00Z&to=2027-01-15T08:10:00Z");
+    let rows = json(&part)["fit"]["rows"].as_u64().expect("a number");
+    assert!((550..=600).contains(&rows), "{rows} of 600 in ten minutes");
 }
 
 #[test]
