@@ -29,6 +29,7 @@ pub mod inputs;
 pub mod latent;
 mod levels;
 pub mod linear;
+pub mod live;
 pub mod locate;
 pub mod model;
 pub mod model_file;

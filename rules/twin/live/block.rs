@@ -1,0 +1,54 @@
+//! Seconds of settled work, gathered into blocks of one kind of work each.
+
+use super::learn::Block;
+use super::regime::Regime;
+use crate::twin::noise::count;
+use std::collections::BTreeMap;
+
+/// Seconds in a block.
+pub const BLOCK_SECONDS: usize = 30;
+/// Seconds older than this are no longer put together with new ones.
+const OLDEST_S: f64 = 3600.0;
+/// Seconds at each end of the sorted residuals that are left out of the mean: pulses and moments of transition.
+const TRIMMED: usize = 3;
+
+/// One second of settled work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Second {
+    /// When, s.
+    pub at_s: f64,
+    /// Simulated output.
+    pub expected: f64,
+    /// Recorded minus simulated.
+    pub residual: f64,
+}
+
+/// Seconds that do not make a block yet, by regime and work.
+#[derive(Debug, Clone, Default)]
+pub struct Gathering {
+    open: BTreeMap<(Regime, usize), Vec<Second>>,
+}
+
+impl Gathering {
+    /// Takes a second; gives the block that it completes.
+    pub fn add(&mut self, regime: Regime, work: usize, second: Second) -> Option<Block> {
+        let open = self.open.entry((regime, work)).or_default();
+        open.retain(|kept| second.at_s - kept.at_s <= OLDEST_S);
+        open.push(second);
+        if open.len() < BLOCK_SECONDS {
+            return None;
+        }
+        let seconds = std::mem::take(open);
+        let mut residuals: Vec<f64> = seconds.iter().map(|second| second.residual).collect();
+        residuals.sort_by(f64::total_cmp);
+        let inner = &residuals[TRIMMED..BLOCK_SECONDS - TRIMMED];
+        let (first, last) = (seconds.first()?, seconds.last()?);
+        Some(Block {
+            from_s: first.at_s,
+            to_s: last.at_s,
+            residual: inner.iter().sum::<f64>() / count(inner.len()),
+            expected: seconds.iter().map(|second| second.expected).sum::<f64>() / count(seconds.len()),
+            work,
+        })
+    }
+}

@@ -1,0 +1,143 @@
+//! What the model expects of the newest second, from the inputs of that second and of those before.
+
+use super::second::Row;
+use super::window::{CuttingTimes, Memory, Window};
+use crate::physics::Scene;
+use crate::twin::model::{Model, Part, simulate};
+use crate::twin::{bind::bind, inputs::rows_with_inputs};
+use adapters::Absence;
+use adapters::recording::{Cells, Numbers};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Laws with a memory are told after half an hour at the earliest, and between two evaluations their long past stands.
+const WARM_S: f64 = 1800.0;
+
+/// Kinds that describe a stretch of a past recording and say nothing about the present.
+const OF_THE_PAST: [&str; 2] = ["zero_drift", "auxiliary_switch"];
+
+/// Why there is no expected output, or no residual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoTwin {
+    /// No second is complete yet.
+    NotYet,
+    /// The machine is switched off.
+    MachineOff,
+    /// An input of the model has no value.
+    InputMissing,
+    /// The measured output has no value.
+    OutputMissing,
+    /// A law with a memory of hours has not seen enough yet.
+    WarmingUp,
+}
+
+impl NoTwin {
+    /// The word in JSON and in the history.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotYet => "not_yet_read",
+            Self::MachineOff => "machine_off",
+            Self::InputMissing => "input_missing",
+            Self::OutputMissing => "output_missing",
+            Self::WarmingUp => "warming_up",
+        }
+    }
+}
+
+impl fmt::Display for NoTwin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotYet => "no second is complete yet",
+            Self::MachineOff => "the machine is switched off",
+            Self::InputMissing => "an input of the model has no value",
+            Self::OutputMissing => "the measured output has no value",
+            Self::WarmingUp => "the model has a memory of hours and has not seen half an hour yet",
+        })
+    }
+}
+
+/// The comparison of one second, in the unit of the output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compared {
+    /// What the model expects.
+    pub expected: Result<f64, NoTwin>,
+    /// Recorded minus expected.
+    pub residual: Result<f64, NoTwin>,
+}
+
+impl Compared {
+    /// Neither, for this reason.
+    #[must_use]
+    pub fn none(reason: NoTwin) -> Self {
+        Self { expected: Err(reason), residual: Err(reason) }
+    }
+}
+
+/// A model over the last rows.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    model: Model,
+    memory: Memory,
+    window: Window,
+    parts: Option<Vec<Part>>,
+    why: Option<String>,
+}
+
+impl Simulation {
+    /// `minutes` is what the tools have cut before.
+    #[must_use]
+    pub fn new(mut model: Model, minutes: CuttingTimes) -> Self {
+        model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
+        let memory = model.parts.iter().map(|part| Memory::of(&part.kind)).max().unwrap_or(Memory::Moment);
+        Self { model, memory, window: Window::new(memory, minutes), parts: None, why: None }
+    }
+
+    /// Engaged minutes of each tool so far.
+    #[must_use]
+    pub fn minutes(&self) -> &CuttingTimes {
+        self.window.minutes()
+    }
+
+    /// What the model lacks, in words, while it cannot be simulated.
+    #[must_use]
+    pub fn why(&self) -> Option<&str> {
+        self.why.as_deref()
+    }
+
+    /// Takes a second and compares it.
+    pub fn step(&mut self, row: Row) -> Compared {
+        let (off, no_output) = (row.off || row.no_output == Some(Absence::MachineOff), row.no_output);
+        let recorded = row.number(&self.model.output);
+        self.window.push(row);
+        if off {
+            return Compared::none(NoTwin::MachineOff);
+        }
+        if self.memory == Memory::Shift && self.window.span_s() < WARM_S {
+            return Compared::none(NoTwin::WarmingUp);
+        }
+        let Some(expected) = self.expected() else {
+            return Compared::none(NoTwin::InputMissing);
+        };
+        let recorded = recorded.filter(|_| no_output.is_none()).ok_or(NoTwin::OutputMissing);
+        Compared { expected: Ok(expected), residual: recorded.map(|recorded| recorded - expected) }
+    }
+
+    fn expected(&mut self) -> Option<f64> {
+        let mut recording = self.window.recording();
+        if recording.numbers(&self.model.output).is_none() {
+            recording.set_column(&self.model.output, Cells::Numbers(Numbers::default()));
+        }
+        let mut scene = Scene::new(&recording, &self.model.output, &self.model.roles).ok()?;
+        let parts = match self.parts.take() {
+            Some(parts) => parts,
+            None => bind(&self.model, &scene).map_err(|lacking| self.why = Some(lacking.join("; "))).ok()?,
+        };
+        let known = rows_with_inputs(&scene, &parts).last().copied().unwrap_or(false);
+        let total = simulate(&parts, &mut scene).and_then(|simulated| simulated.total.last().copied());
+        self.parts = Some(parts);
+        self.why = None;
+        total.filter(|total| known && total.is_finite())
+    }
+}

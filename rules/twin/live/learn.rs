@@ -1,0 +1,125 @@
+//! What is usual: learned once from a healthy stretch, per regime, and then held fast.
+//!
+//! Every kind of work (program, tool, operation) keeps its own usual deviation from the simulation, because a model
+//! fits one cut better than another; the noise around it is shared within the regime.
+
+use super::chart::{Healthy, Point};
+use crate::twin::noise::{self, Arma, PHI_MAX, count};
+use crate::twin::quality::median;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Blocks of a kind of work from which its usual deviation is known.
+pub const WORK_BLOCKS: usize = 4;
+/// The band is this many times the greatest deviation that was seen while learning,
+const BAND_FACTOR: f64 = 1.3;
+/// and wider by this over the number of independent levels that were seen: few of them do not show the range.
+const BAND_FEW: f64 = 5.0;
+/// Blocks over which deviations are averaged for the band.
+const BAND_BLOCKS: usize = 10;
+/// The band is at least this share of the mean output of the regime.
+const BAND_SHARE: f64 = 0.02;
+
+/// One block while learning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Block {
+    /// When it began and ended, s.
+    pub from_s: f64,
+    /// See `from_s`.
+    pub to_s: f64,
+    /// Recorded minus simulated.
+    pub residual: f64,
+    /// Simulated.
+    pub expected: f64,
+    /// Which kind of work.
+    pub work: usize,
+}
+
+/// What was learned of a regime.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Learned {
+    /// The noise and what counts as a change.
+    pub healthy: Healthy,
+    /// Usual residual of each kind of work.
+    pub usual: BTreeMap<usize, f64>,
+    /// Mean residual.
+    pub bias: f64,
+    /// Mean simulated output.
+    pub expected: f64,
+    /// From how many blocks.
+    pub blocks: usize,
+}
+
+/// Learns from blocks in the order of time. `None` when no kind of work has enough of them.
+#[must_use]
+pub fn learn(blocks: &[Block]) -> Option<Learned> {
+    let usual = usual(blocks);
+    let known: Vec<(&Block, f64)> =
+        blocks.iter().filter_map(|block| Some((block, block.residual - usual.get(&block.work)?))).collect();
+    if known.len() < 2 * BAND_BLOCKS {
+        return None;
+    }
+    let deviations: Vec<f64> = known.iter().map(|(_, deviation)| *deviation).collect();
+    let n = count(known.len());
+    let expected = known.iter().map(|(block, _)| block.expected).sum::<f64>() / n;
+    let bias = known.iter().map(|(block, _)| block.residual).sum::<f64>() / n;
+    let healthy = healthy(&deviations, expected, count(usual.len()));
+    Some(Learned { healthy, usual, bias, expected, blocks: known.len() })
+}
+
+/// Mean residual of each kind of work that was seen often enough.
+fn usual(blocks: &[Block]) -> BTreeMap<usize, f64> {
+    let mut sums: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
+    for block in blocks {
+        let sum = sums.entry(block.work).or_default();
+        *sum = (sum.0 + block.residual, sum.1 + 1);
+    }
+    let enough = sums.into_iter().filter(|(_, (_, blocks))| *blocks >= WORK_BLOCKS);
+    enough.map(|(work, (sum, blocks))| (work, sum / count(blocks))).collect()
+}
+
+fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
+    let n = count(deviations.len());
+    let all = [0..deviations.len()];
+    let noise = cautious(noise::fit(deviations, &all), n);
+    let innovations = noise::whiten(deviations, &all, noise);
+    let rms = (innovations.iter().map(|e| e * e).sum::<f64>() / (n - works).max(1.0)).sqrt();
+    let robust = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
+    let level = deviations.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    // Never nothing: a series that is constant to the last digit has the resolution of its meter.
+    let floor = (1e-6 * expected.abs()).max(1e-9 * level).max(f64::MIN_POSITIVE);
+    let sd = rms.max(robust).max(floor) * (1.0 + 2.0 / (2.0 * n).sqrt());
+    let gain = (1.0 + noise.theta) / (1.0 - noise.phi);
+    Healthy {
+        phi: noise.phi,
+        theta: noise.theta,
+        sd,
+        mean_variance: (sd * gain).powi(2) * works.max(1.0) / n,
+        band: band(deviations, expected, n / noise.inflation()),
+    }
+}
+
+/// Memory as long as the data allow: short stretches make it look shorter than it is, and a memory that is believed
+/// too short turns every slow excursion into a change.
+fn cautious(noise: Arma, n: f64) -> Arma {
+    let Arma { phi, theta } = noise;
+    let bias = (1.0 + 3.0 * phi.max(0.0)) / n;
+    let error = ((1.0 - phi * phi).max(0.0) / n).sqrt();
+    Arma { phi: (phi + bias + error).min(PHI_MAX), theta }
+}
+
+fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / count(part.len());
+    let greatest = deviations.windows(BAND_BLOCKS).map(|part| mean(part).abs()).fold(0.0, f64::max);
+    let factor = BAND_FACTOR * (1.0 + BAND_FEW / independent.max(BAND_FEW));
+    (factor * greatest).max(BAND_SHARE * expected.abs())
+}
+
+impl Learned {
+    /// The deviation of a block from what is usual for its work; `None` for work that is new.
+    #[must_use]
+    pub fn deviation(&self, block: &Block) -> Option<Point> {
+        let deviation = block.residual - self.usual.get(&block.work)?;
+        Some(Point { from_s: block.from_s, to_s: block.to_s, deviation })
+    }
+}

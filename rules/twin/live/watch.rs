@@ -1,0 +1,244 @@
+//! Notices when machine and simulation begin to differ: learns what is usual, then holds every block against it.
+
+use super::block::{Gathering, Second};
+use super::chart::{Chart, Onset};
+use super::learn::{Block, Learned, WORK_BLOCKS, learn};
+use super::regime::{Regime, Settling};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Blocks from which a regime is learned, at least.
+const LEARN_BLOCKS: usize = 120;
+/// Settled seconds, over all regimes, before anything is learned: parts, lots and the warm-up must have been seen.
+const LEARN_SETTLED_S: f64 = 5.0 * 3600.0;
+/// Blocks kept while learning; beyond, what there is must do.
+const BLOCKS_MAX: usize = 4000;
+/// Kinds of work told apart; the rest is one.
+const WORKS_MAX: usize = 128;
+/// A mean difference beyond this share of the output is a difference from the beginning.
+const BIAS_SHARE: f64 = 0.05;
+
+/// Something that has been noticed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Notice {
+    /// What is usual has been learned; from now on it is watched.
+    Learned(Regime),
+    /// Machine and simulation begin to differ.
+    Begins(Mismatch),
+    /// They agree again.
+    Ends(Regime),
+}
+
+/// A difference between machine and simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Mismatch {
+    /// Where.
+    pub regime: Regime,
+    /// Since when; `None`: ever since the comparison began.
+    pub onset: Option<Onset>,
+    /// Mean difference in the unit of the output.
+    pub mean: f64,
+    /// Mean simulated output in this regime.
+    pub expected: f64,
+}
+
+impl Mismatch {
+    /// Difference over simulated output, %; `None` where nothing is simulated.
+    #[must_use]
+    pub fn percent(&self) -> Option<f64> {
+        (self.expected.abs() > 1e-9).then(|| 100.0 * self.mean / self.expected.abs())
+    }
+}
+
+/// What a regime is at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stage {
+    /// Learning: blocks so far, and blocks that are needed.
+    Learning(usize, usize),
+    /// Watching: differences up to this size, in the unit of the output, are usual.
+    Watching(f64),
+    /// They differ.
+    Differing(Mismatch),
+}
+
+/// What is remembered across a restart.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Memory {
+    works: Vec<String>,
+    settled_s: f64,
+    regimes: Vec<(Regime, RegimeMemory)>,
+}
+
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct RegimeMemory {
+    blocks: Vec<Block>,
+    learned: Option<Learned>,
+    differing: Option<Mismatch>,
+}
+
+/// One regime.
+#[derive(Debug, Clone, Default)]
+struct Watched {
+    /// While learning; afterwards blocks of work that is new.
+    blocks: Vec<Block>,
+    learned: Option<Learned>,
+    chart: Option<Chart>,
+    differing: Option<Mismatch>,
+}
+
+/// See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Watch {
+    settling: Settling<Second>,
+    gathering: Gathering,
+    works: Vec<String>,
+    settled_s: f64,
+    regimes: BTreeMap<Regime, Watched>,
+}
+
+impl Default for Watch {
+    fn default() -> Self {
+        Self::new(Memory::default())
+    }
+}
+
+impl Watch {
+    /// Goes on from what was learned before.
+    #[must_use]
+    pub fn new(memory: Memory) -> Self {
+        let regimes = memory.regimes.into_iter().map(|(regime, before)| (regime, Watched::of(before)));
+        Self {
+            settling: Settling::new(),
+            gathering: Gathering::default(),
+            works: memory.works,
+            settled_s: memory.settled_s,
+            regimes: regimes.collect(),
+        }
+    }
+
+    /// What to remember across a restart.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        let of = |(regime, watched): (&Regime, &Watched)| {
+            let Watched { blocks, learned, differing, .. } = watched.clone();
+            (*regime, RegimeMemory { blocks, learned, differing })
+        };
+        Memory {
+            works: self.works.clone(),
+            settled_s: self.settled_s,
+            regimes: self.regimes.iter().map(of).collect(),
+        }
+    }
+
+    /// Every regime that has been seen, with its stage.
+    pub fn stages(&self) -> impl Iterator<Item = (Regime, Stage)> {
+        self.regimes.iter().map(|(regime, watched)| (*regime, watched.stage()))
+    }
+
+    /// Takes a second without a comparison: absent inputs, machine off.
+    pub fn skip(&mut self) {
+        self.settling.interrupt();
+    }
+
+    /// Takes a second with what the machine does and its speed.
+    pub fn step(&mut self, what: Option<(Regime, String)>, speed: f64, second: Second) -> Option<Notice> {
+        let (regime, work, second) = self.settling.add(what, speed, second)?;
+        self.settled_s += 1.0;
+        let work = self.number_of(work);
+        let block = self.gathering.add(regime, work, second)?;
+        let may_learn = self.settled_s >= LEARN_SETTLED_S;
+        self.regimes.entry(regime).or_default().step(regime, block, may_learn)
+    }
+
+    fn number_of(&mut self, work: String) -> usize {
+        if let Some(number) = self.works.iter().position(|known| *known == work) {
+            return number;
+        }
+        if self.works.len() < WORKS_MAX {
+            self.works.push(work);
+        }
+        self.works.len() - 1
+    }
+}
+
+impl Watched {
+    fn of(memory: RegimeMemory) -> Self {
+        let chart = memory.learned.as_ref().map(|learned| Chart::new(learned.healthy));
+        Self { blocks: memory.blocks, learned: memory.learned, chart, differing: memory.differing }
+    }
+
+    fn stage(&self) -> Stage {
+        match (&self.differing, &self.learned) {
+            (Some(mismatch), _) => Stage::Differing(*mismatch),
+            (None, Some(learned)) => Stage::Watching(learned.healthy.band),
+            (None, None) => Stage::Learning(self.blocks.len(), LEARN_BLOCKS),
+        }
+    }
+
+    fn step(&mut self, regime: Regime, block: Block, may_learn: bool) -> Option<Notice> {
+        if self.learned.is_none() {
+            self.blocks.push(block);
+            let enough = self.blocks.len() >= LEARN_BLOCKS && may_learn || self.blocks.len() >= BLOCKS_MAX;
+            let surplus = self.blocks.len().saturating_sub(BLOCKS_MAX);
+            self.blocks.drain(..surplus);
+            return if enough { self.learn(regime) } else { None };
+        }
+        let point = match self.learned.as_ref().and_then(|learned| learned.deviation(&block)) {
+            Some(point) => point,
+            None => return self.learn_work(block),
+        };
+        let chart = self.chart.as_mut()?;
+        let found = chart.step(point);
+        match (&self.differing, found) {
+            (None, Some(onset)) => self.begin(regime, onset),
+            (Some(Mismatch { onset: Some(_), .. }), _) if chart.is_back() => self.end(regime),
+            _ => None,
+        }
+    }
+
+    fn learn(&mut self, regime: Regime) -> Option<Notice> {
+        let learned = learn(&self.blocks)?;
+        self.blocks.clear();
+        self.chart = Some(Chart::new(learned.healthy));
+        let (bias, expected) = (learned.bias, learned.expected);
+        let apart = bias.abs() > (BIAS_SHARE * expected.abs()).max(learned.healthy.band);
+        self.learned = Some(learned);
+        if !apart {
+            return Some(Notice::Learned(regime));
+        }
+        let mismatch = Mismatch { regime, onset: None, mean: bias, expected };
+        self.differing = Some(mismatch);
+        Some(Notice::Begins(mismatch))
+    }
+
+    /// New work first shows what is usual for it, less what differs at the time.
+    fn learn_work(&mut self, block: Block) -> Option<Notice> {
+        let work = block.work;
+        self.blocks.push(block);
+        let of_work = || self.blocks.iter().filter(|block| block.work == work);
+        if of_work().count() < 2 * WORK_BLOCKS {
+            return None;
+        }
+        let differs = self.differing.filter(|mismatch| mismatch.onset.is_some()).map_or(0.0, |mismatch| mismatch.mean);
+        let mean = of_work().map(|block| block.residual).sum::<f64>() / crate::twin::noise::count(2 * WORK_BLOCKS);
+        self.blocks.retain(|block| block.work != work);
+        if let Some(learned) = &mut self.learned {
+            learned.usual.insert(work, mean - differs);
+        }
+        None
+    }
+
+    fn begin(&mut self, regime: Regime, onset: Onset) -> Option<Notice> {
+        let learned = self.learned.as_ref()?;
+        let mismatch = Mismatch { regime, onset: Some(onset), mean: onset.mean, expected: learned.expected };
+        self.differing = Some(mismatch);
+        // What follows is held against the level from here on, so that its return is seen.
+        Some(Notice::Begins(mismatch))
+    }
+
+    fn end(&mut self, regime: Regime) -> Option<Notice> {
+        self.differing = None;
+        self.chart = self.learned.as_ref().map(|learned| Chart::new(learned.healthy));
+        Some(Notice::Ends(regime))
+    }
+}

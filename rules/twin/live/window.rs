@@ -1,0 +1,150 @@
+//! The last rows, as a recording that a model can be simulated over: every second of the last moments and, for laws
+//! with a memory of hours, one row per half minute of the shift before them.
+
+use super::second::Row;
+use adapters::channel::{ChannelId, Kind};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::recording::{Cells, Numbers, Recording, Words};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+/// Seconds kept one by one.
+const FINE_ROWS: usize = 12;
+/// The same for laws that look back to the beginning of a pass.
+const PASS_ROWS: usize = 180;
+/// Seconds per row further back.
+const COARSE_S: i64 = 30;
+/// Rows further back: eight hours.
+const COARSE_ROWS: usize = 960;
+/// Tools whose cutting time is counted; the one used longest ago is forgotten first.
+const TOOLS_MAX: usize = 64;
+/// A longer step from one second to the next is a pause in which nothing is cut.
+const STEP_MAX_S: f64 = 3.0;
+
+/// How far back a model looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Memory {
+    /// Only the moment.
+    Moment,
+    /// The pass.
+    Pass,
+    /// The shift: heat.
+    Shift,
+}
+
+impl Memory {
+    /// How far back the law of this kind looks.
+    #[must_use]
+    pub fn of(kind: &str) -> Self {
+        match kind {
+            "bearing_warm_up" | "preload_growth" | "spindle_growth" | "screw_growth" | "coolant_temperature"
+            | "ambient_drift" => Self::Shift,
+            "depth_taper" | "entry_exit" | "engagement_timing" | "meter_window" | "clock_lag" | "override_delay"
+            | "built_up_edge" | "regeneration" => Self::Pass,
+            _ => Self::Moment,
+        }
+    }
+}
+
+/// Engaged minutes of each tool.
+pub type CuttingTimes = BTreeMap<String, (f64, TimeNs)>;
+
+/// See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Window {
+    memory: Memory,
+    fine: VecDeque<(Row, Option<f64>)>,
+    coarse: VecDeque<(Row, Option<f64>)>,
+    minutes: CuttingTimes,
+}
+
+impl Window {
+    /// An empty window; `minutes` is what the tools have cut before.
+    #[must_use]
+    pub fn new(memory: Memory, minutes: CuttingTimes) -> Self {
+        Self { memory, fine: VecDeque::new(), coarse: VecDeque::new(), minutes }
+    }
+
+    /// Engaged minutes of each tool so far.
+    #[must_use]
+    pub fn minutes(&self) -> &CuttingTimes {
+        &self.minutes
+    }
+
+    /// Seconds between the first row and the last.
+    #[must_use]
+    pub fn span_s(&self) -> f64 {
+        let first = self.coarse.front().or(self.fine.front());
+        first.zip(self.fine.back()).map_or(0.0, |(first, last)| seconds(last.0.at_ns - first.0.at_ns))
+    }
+
+    /// Appends a second.
+    pub fn push(&mut self, row: Row) {
+        let minutes = self.cut_on(&row);
+        self.fine.push_back((row, minutes));
+        let kept = if self.memory == Memory::Moment { FINE_ROWS } else { PASS_ROWS };
+        while self.fine.len() > kept {
+            let Some(old) = self.fine.pop_front() else { break };
+            if self.memory == Memory::Shift {
+                self.remember(old);
+            }
+        }
+    }
+
+    /// One row of every half minute is kept.
+    fn remember(&mut self, old: (Row, Option<f64>)) {
+        let due = self.coarse.back().is_none_or(|(last, _)| old.0.at_ns - last.at_ns >= COARSE_S * SECOND_NS);
+        if due {
+            self.coarse.push_back(old);
+            self.coarse.drain(..self.coarse.len().saturating_sub(COARSE_ROWS));
+        }
+    }
+
+    /// Adds the second to the cutting time of its tool.
+    fn cut_on(&mut self, row: &Row) -> Option<f64> {
+        let engaged = row.engaged()?;
+        let step_s = self.fine.back().map_or(0.0, |(last, _)| seconds(row.at_ns - last.at_ns));
+        let tool = row.word("tool").unwrap_or("");
+        if !self.minutes.contains_key(tool) && self.minutes.len() >= TOOLS_MAX {
+            let oldest = self.minutes.iter().min_by_key(|(_, (_, used_ns))| *used_ns).map(|(tool, _)| tool.clone());
+            oldest.map(|tool| self.minutes.remove(&tool));
+        }
+        let entry = self.minutes.entry(tool.to_owned()).or_insert((0.0, row.at_ns));
+        if (0.0..=STEP_MAX_S).contains(&step_s) {
+            *entry = (entry.0 + engaged * step_s / 60.0, row.at_ns);
+        }
+        Some(entry.0)
+    }
+
+    /// The rows as a recording with every channel that had a value in any of them.
+    #[must_use]
+    pub fn recording(&self) -> Recording {
+        let rows: Vec<&(Row, Option<f64>)> = self.coarse.iter().chain(&self.fine).collect();
+        let start_ns = rows.first().map_or(0, |(row, _)| row.at_ns);
+        let time_s = rows.iter().map(|(row, _)| seconds(row.at_ns - start_ns)).collect();
+        let mut recording = Recording::new("live", time_s, Some(start_ns));
+        for id in ChannelId::all() {
+            let index = id.index();
+            if id.channel().kind == Kind::Text {
+                if rows.iter().any(|(row, _)| row.words.contains_key(&index)) {
+                    let word = |row: &Row| row.words.get(&index).map_or(Arc::from(""), Arc::clone);
+                    let words: Vec<Arc<str>> = rows.iter().map(|(row, _)| word(row)).collect();
+                    recording.set_column(id.name(), Cells::Words(words.iter().map(|word| &**word).collect::<Words>()));
+                }
+            } else if rows.iter().any(|(row, _)| row.numbers[index].is_some()) {
+                let numbers = rows.iter().map(|(row, _)| row.numbers[index]).collect::<Numbers>();
+                recording.set_column(id.name(), Cells::Numbers(numbers));
+            }
+        }
+        let derived = |of: &dyn Fn(&(Row, Option<f64>)) -> Option<f64>| rows.iter().map(|row| of(row)).collect();
+        recording.set_column("engaged", Cells::Numbers(derived(&|(row, _)| row.engaged())));
+        recording.set_column("cutting_time_min", Cells::Numbers(derived(&|(_, minutes)| *minutes)));
+        recording
+    }
+}
+
+fn seconds(ns: i64) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "microseconds suffice beyond a hundred days")]
+    let seconds = ns as f64 / SECOND_NS as f64;
+    seconds
+}
