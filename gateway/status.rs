@@ -227,6 +227,9 @@ pub struct Status {
     pub estimates: Vec<EstimateStatus>,
     /// Alarms that stand.
     pub alarms: Vec<AlarmStatus>,
+    /// The simulation beside the machine, where a model is configured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<crate::twin::status::TwinStatus>,
     /// Finished parts since the start.
     pub parts: u64,
     /// The way of an override to the machine.

@@ -23,11 +23,11 @@ const SERIES_MAX: usize = 32;
 /// Channels shown when nobody asks for others.
 const CHANNELS_DEFAULT: [&str; 3] = ["spindle_speed_rpm", "feed_mm_min", "spindle_power_w"];
 
-type Answer = Result<Json<Value>, ApiProblem>;
-type Given = Pairs<Vec<(String, String)>>;
+pub(super) type Answer = Result<Json<Value>, ApiProblem>;
+pub(super) type Given = Pairs<Vec<(String, String)>>;
 
 /// Runs `read` on a connection of its own, off the threads that serve.
-async fn reading(
+pub(super) async fn reading(
     shared: Shared,
     read: impl FnOnce(&Reader, TimeNs) -> Result<Value, ApiProblem> + Send + 'static,
 ) -> Answer {
@@ -41,7 +41,7 @@ async fn reading(
     task.await.map_err(broken)?.map(Json)
 }
 
-fn trouble(error: &HistoryError) -> ApiProblem {
+pub(super) fn trouble(error: &HistoryError) -> ApiProblem {
     match error {
         HistoryError::Question(text) => ApiProblem::request(text.clone(), "see /api/v1/channels and /openapi.json"),
         error => ApiProblem::unavailable(error.to_string(), "the machine is still polled; see /api/v1/status"),

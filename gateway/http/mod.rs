@@ -10,6 +10,7 @@ mod page;
 mod problem;
 mod query;
 mod server;
+mod twin;
 mod vocabulary;
 
 pub use metrics::render as render_metrics;
@@ -70,7 +71,7 @@ impl Shared {
 type Route = (&'static str, fn() -> MethodRouter<Shared>);
 
 /// Everything that is served.
-pub const ROUTES: [Route; 14] = [
+pub const ROUTES: [Route; 15] = [
     ("/", || get(page::page)),
     ("/web/{file}", || get(page::web)),
     ("/healthz", || get(healthz)),
@@ -85,6 +86,7 @@ pub const ROUTES: [Route; 14] = [
     ("/api/v1/decisions", || get(history::decisions)),
     ("/api/v1/events", || get(history::events)),
     ("/api/v1/parts", || get(history::parts)),
+    ("/api/v1/twin", || get(twin::twin)),
 ];
 
 /// All routes with what they see.

@@ -16,7 +16,7 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 5] = [
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 9] = [
+const NO_ESTIMATES: [(&str, &str, &str); 11] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -26,6 +26,8 @@ const NO_ESTIMATES: [(&str, &str, &str); 9] = [
     ("extrapolated", "too far from learned speeds", "超出已学习转速范围"),
     ("imbalance", "coefficients contradict the power", "系数与功率矛盾"),
     ("below_no_load", "below no-load power", "低于空载功率"),
+    ("output_missing", "the measured value is missing", "缺少测量值"),
+    ("warming_up", "the model has not seen enough yet", "模型数据尚不足"),
 ];
 
 fn absence(reason: Absence) -> (&'static str, &'static str) {

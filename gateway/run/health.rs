@@ -33,6 +33,8 @@ pub struct Health {
     looked: Option<Instant>,
     saved: Instant,
     day: Option<i64>,
+    /// Values that are stored beside those of the pipeline.
+    beside: Option<[ExtraValue<'static>; 2]>,
 }
 
 impl Health {
@@ -55,6 +57,7 @@ impl Health {
             looked: None,
             saved: Instant::now(),
             day: None,
+            beside: None,
         }
     }
 
@@ -65,6 +68,16 @@ impl Health {
         let detail =
             if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
         self.kept.record(Event { at_ns, kind, source: source.to_owned(), text, detail }.into());
+    }
+
+    /// Remembers a record that is no event.
+    pub fn keep(&mut self, record: Record) {
+        self.kept.record(record);
+    }
+
+    /// From now on these values are stored with every sample, after those of the pipeline.
+    pub fn beside(&mut self, values: [ExtraValue<'static>; 2]) {
+        self.beside = Some(values);
     }
 
     /// Looks after everything, about once per second.
@@ -191,7 +204,10 @@ fn span(ns: i64) -> String {
 
 impl Store for Health {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
-        self.kept.sample(sample, extras);
+        match self.beside {
+            Some(beside) => self.kept.sample(sample, &[extras, &beside].concat()),
+            None => self.kept.sample(sample, extras),
+        }
     }
 
     fn record(&mut self, record: Record) {

@@ -2,7 +2,7 @@
 
 use crate::config;
 use crate::history::{
-    self, AlarmClear, DiskRoom, HistoryError, Options, Reader, Record, Retention, Span, Writer, disk_room,
+    self, AlarmClear, DiskRoom, ExtraSeries, HistoryError, Options, Reader, Record, Retention, Span, Writer, disk_room,
 };
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Store, stored_series};
@@ -41,14 +41,15 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Opens the history of the configuration, or goes on without it where the disk does not let it.
+    /// Opens the history of the configuration, or goes on without it where the disk does not let it. `beside` is stored
+    /// beside what the pipeline gives.
     ///
     /// # Errors
     /// A history that belongs to somebody else: another gateway, a newer version, another program.
-    pub fn open(config: &config::History) -> Result<Self, HistoryError> {
+    pub fn open(config: &config::History, beside: Vec<ExtraSeries>) -> Result<Self, HistoryError> {
         let mut kept = Self {
             path: config.path.clone(),
-            options: options(config),
+            options: options(config, beside),
             writer: None,
             closed: None,
             rows_before: 0,
@@ -202,7 +203,7 @@ fn foreign(error: &HistoryError) -> bool {
     matches!(error, HistoryError::InUse { .. } | HistoryError::NewerSchema { .. } | HistoryError::NotAHistory { .. })
 }
 
-fn options(config: &config::History) -> Options {
+fn options(config: &config::History, beside: Vec<ExtraSeries>) -> Options {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -210,7 +211,7 @@ fn options(config: &config::History) -> Options {
     )]
     let max_bytes = (config.max_gb * 1e9) as u64;
     let retention = Retention { raw_days: config.retention_days, max_bytes, ..Retention::default() };
-    Options { group_commit: config.commit, retention, extras: stored_series(), ..Options::default() }
+    Options { group_commit: config.commit, retention, extras: [stored_series(), beside].concat(), ..Options::default() }
 }
 
 /// Bytes that may still be used.

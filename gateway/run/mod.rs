@@ -9,6 +9,7 @@ pub mod pace;
 pub mod report;
 pub mod rules;
 pub mod tick;
+pub mod twin;
 
 use crate::cli::CannotRun;
 use crate::config::Config;
@@ -31,6 +32,7 @@ use std::time::Duration;
 use tick::{Identity, Ticker, Wishes};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
+use twin::Twin;
 
 /// What the box shall do.
 #[derive(Debug)]
@@ -94,7 +96,9 @@ async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
 fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String>>) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
-    let kept = Kept::open(&config.history).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let twin = Twin::of(config);
+    let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
+    let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &kept, clock.now_ns());
@@ -115,10 +119,13 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
     let own = (plan.speed == MachineSpeed::Real).then_some(own);
     let mut health = Health::new(kept, own, port, memory);
+    if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
+        health.beside(twin.values());
+    }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let wishes = wishes.clone();
-    Ok((Ticker { identity, pace, feed, pipeline, scripts: watched, health, wishes, publish, stop_after_ns }, live))
+    Ok((Ticker { identity, pace, feed, pipeline, twin, scripts: watched, health, wishes, publish, stop_after_ns }, live))
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

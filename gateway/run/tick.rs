@@ -5,9 +5,10 @@ use super::health::Health;
 use super::pace::Pace;
 use super::report;
 use super::rules::Watched;
+use super::twin::Twin;
 use crate::http::Published;
 use crate::pipeline::Pipeline;
-use crate::status::{Problem, Status, TickStatus};
+use crate::status::{AlarmStatus, Problem, Status, TickStatus};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use std::sync::Arc;
@@ -50,6 +51,8 @@ pub struct Ticker {
     pub feed: Feed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
+    /// The model beside the machine, where one is configured.
+    pub twin: Option<Twin>,
     /// Keeps the scripts as they are on disk.
     pub scripts: Watched,
     /// Store, sources, clock: what may fail while the box goes on.
@@ -75,6 +78,9 @@ impl Ticker {
             self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.pipeline.step(&sample, &mut self.health);
+            if let Some(twin) = &mut self.twin {
+                twin.step(&sample, &self.pipeline, &mut self.health);
+            }
             let over = !alive || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
             if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {
                 published = Some(Instant::now());
@@ -85,6 +91,9 @@ impl Ticker {
             }
         }
         self.feed.stop();
+        if let Some(twin) = &mut self.twin {
+            twin.save();
+        }
         self.health.close(&self.pipeline, sample.at_ns);
         self.wishes.stop.store(true, Ordering::SeqCst);
     }
@@ -110,7 +119,8 @@ impl Ticker {
             state: report::state(&self.pipeline),
             channels: report::channels(sample),
             estimates: report::estimates(self.pipeline.estimates()),
-            alarms: report::alarms(&self.pipeline),
+            alarms: self.alarms(),
+            twin: self.twin.as_ref().map(Twin::status),
             parts: self.pipeline.parts().finished(),
             gate: report::gate(&self.pipeline),
             sources: self.feed.status(now_ns),
@@ -118,6 +128,11 @@ impl Ticker {
             history: self.health.history_status(),
             problems: self.problems(),
         }
+    }
+
+    fn alarms(&self) -> Vec<AlarmStatus> {
+        let of_twin = self.twin.iter().flat_map(Twin::alarms);
+        report::alarms(&self.pipeline).into_iter().chain(of_twin).collect()
     }
 
     fn problems(&self) -> Vec<Problem> {

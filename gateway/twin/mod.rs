@@ -9,6 +9,10 @@ mod outputs;
 mod parquet;
 mod recordings;
 pub mod simulation;
+pub mod status;
+pub mod stretch;
+pub mod words;
+pub mod worker;
 
 pub use join::join;
 pub use models::{read_hypotheses, read_model};

@@ -120,6 +120,7 @@ function showCards() {
     return line;
   }), text("none"));
   showHistory();
+  showTwin();
   filled("channels", status.channels.concat(status.estimates).map((c) => {
     const unit = !c.unit || c.unit === "1" ? "" : ` ${c.unit}`;
     const shown = c.missing ? reason(c.missing) : typeof c.value === "number" ? `${number(c.value)}${unit}` : c.value;
@@ -128,6 +129,24 @@ function showCards() {
     line.title = c.name;
     return line;
   }), text("none"));
+}
+
+/** The simulation beside the machine, where a model is configured. */
+function showTwin() {
+  const twin = status.twin;
+  at("twin-card").hidden = !twin;
+  if (!twin) return;
+  const value = (x) => (x === null ? text("nothing") : `${number(x)} ${twin.unit}`);
+  const rows = [row(text("expected"), value(twin.twin_expected), `${twin.model} · ${name(twin.output)}`),
+    row(text("residual"), twin.missing ? reason(twin.missing) : value(twin.twin_residual), twin.missing ? twin.why : "")];
+  for (const regime of twin.regimes) {
+    const share = regime.learned ? `${regime.learned[0]} / ${regime.learned[1]}` : regime.usual === undefined ? value(regime.difference) : `± ${value(regime.usual)}`;
+    rows.push(row(`${text(`regime_${regime.regime}`)}: ${text(regime.stage)}`, share, regime.text, { dot: { watching: "good", differing: "warn" }[regime.stage] ?? "" }));
+  }
+  if (twin.diagnosing_since_ms) rows.push(row(text("diagnosing"), `${text("since")} ${clock(twin.diagnosing_since_ms)}`));
+  if (twin.diagnosis) rows.push(row(text("diagnosis"), clock(twin.diagnosis.at_ms), twin.diagnosis.summary));
+  if (twin.problem) rows.push(row(text("refused"), "", twin.problem, { dot: "bad", bad: true }));
+  filled("twin", rows, "");
 }
 
 /** The latest changes on small lines. */

@@ -58,10 +58,10 @@ pub struct Onset {
     pub low_s: f64,
     /// End of the interval, s.
     pub high_s: f64,
-    /// Mean deviation since then.
+    /// Mean difference since then, in the unit of the output.
     pub mean: f64,
-    /// Standard error of the mean.
-    pub error: f64,
+    /// Mean simulated output since then.
+    pub expected: f64,
 }
 
 /// One block of the series.
@@ -71,8 +71,12 @@ pub struct Point {
     pub from_s: f64,
     /// When it ended, s.
     pub to_s: f64,
-    /// Deviation from what was learned.
+    /// Deviation from what is usual, on the scale that all work of the regime shares.
     pub deviation: f64,
+    /// The same in the unit of the output.
+    pub difference: f64,
+    /// Simulated output.
+    pub expected: f64,
 }
 
 /// A possible onset, and the evidence for it.
@@ -92,8 +96,9 @@ struct Candidate {
     length: f64,
     /// See `length`.
     weight: f64,
-    /// Sum of deviations, and how many.
-    total: f64,
+    /// Sums of differences and of simulated outputs, and how many.
+    difference: f64,
+    expected: f64,
     count: f64,
 }
 
@@ -157,7 +162,7 @@ impl Chart {
         let innovation = (innovation / self.healthy.sd).clamp(-CLIP, CLIP);
         for candidate in &mut self.candidates {
             candidate.signature = 1.0 - noise.phi - noise.theta * candidate.signature;
-            candidate.add(innovation, point.deviation);
+            candidate.add(innovation, &point);
         }
         let mut fresh = Candidate {
             low_s: self.last_from_s.unwrap_or(point.from_s),
@@ -167,10 +172,11 @@ impl Chart {
             sum: 0.0,
             length: 0.0,
             weight: 0.0,
-            total: 0.0,
+            difference: 0.0,
+            expected: 0.0,
             count: 0.0,
         };
-        fresh.add(innovation, point.deviation);
+        fresh.add(innovation, &point);
         self.candidates.push_back(fresh);
         self.last_from_s = Some(point.from_s);
         self.recent.push_back(point.deviation);
@@ -206,8 +212,8 @@ impl Chart {
             at_s: found.from_s,
             low_s: within().map(|candidate| candidate.low_s).fold(f64::INFINITY, f64::min),
             high_s: within().map(|candidate| candidate.to_s).fold(f64::NEG_INFINITY, f64::max),
-            mean: found.total / found.count,
-            error: self.variance(found).sqrt(),
+            mean: found.difference / found.count,
+            expected: found.expected / found.count,
         })
     }
 
@@ -235,11 +241,12 @@ impl Candidate {
         self.sum * self.sum / (2.0 * self.weight)
     }
 
-    fn add(&mut self, innovation: f64, deviation: f64) {
+    fn add(&mut self, innovation: f64, point: &Point) {
         self.sum += innovation * self.signature;
         self.length += self.signature;
         self.weight += self.signature * self.signature;
-        self.total += deviation;
+        self.difference += point.difference;
+        self.expected += point.expected;
         self.count += 1.0;
     }
 }

@@ -15,6 +15,8 @@ pub const WORK_BLOCKS: usize = 4;
 const BAND_FACTOR: f64 = 1.3;
 /// and wider by this over the number of independent levels that were seen: few of them do not show the range.
 const BAND_FEW: f64 = 5.0;
+/// So many blocks of the spread that all work shares are mixed into that of one kind of work.
+const SHARED_BLOCKS: f64 = 8.0;
 /// Blocks over which deviations are averaged for the band.
 const BAND_BLOCKS: usize = 10;
 /// The band is at least this share of the mean output of the regime.
@@ -40,8 +42,10 @@ pub struct Block {
 pub struct Learned {
     /// The noise and what counts as a change.
     pub healthy: Healthy,
-    /// Usual residual of each kind of work.
-    pub usual: BTreeMap<usize, f64>,
+    /// What is usual for each kind of work.
+    pub usual: BTreeMap<usize, Usual>,
+    /// Standard deviation that the work of the regime shares.
+    pub shared: f64,
     /// Mean residual.
     pub bias: f64,
     /// Mean simulated output.
@@ -50,32 +54,53 @@ pub struct Learned {
     pub blocks: usize,
 }
 
+/// What is usual for a kind of work.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Usual {
+    /// Mean residual.
+    pub mean: f64,
+    /// Standard deviation of its blocks.
+    pub sd: f64,
+}
+
 /// Learns from blocks in the order of time. `None` when no kind of work has enough of them.
 #[must_use]
 pub fn learn(blocks: &[Block]) -> Option<Learned> {
-    let usual = usual(blocks);
-    let known: Vec<(&Block, f64)> =
-        blocks.iter().filter_map(|block| Some((block, block.residual - usual.get(&block.work)?))).collect();
+    let (usual, shared) = usual(blocks);
+    let known: Vec<&Block> = blocks.iter().filter(|block| usual.contains_key(&block.work)).collect();
     if known.len() < 2 * BAND_BLOCKS {
         return None;
     }
-    let deviations: Vec<f64> = known.iter().map(|(_, deviation)| *deviation).collect();
     let n = count(known.len());
-    let expected = known.iter().map(|(block, _)| block.expected).sum::<f64>() / n;
-    let bias = known.iter().map(|(block, _)| block.residual).sum::<f64>() / n;
-    let healthy = healthy(&deviations, expected, count(usual.len()));
-    Some(Learned { healthy, usual, bias, expected, blocks: known.len() })
+    let expected = known.iter().map(|block| block.expected).sum::<f64>() / n;
+    let bias = known.iter().map(|block| block.residual).sum::<f64>() / n;
+    let nothing = Healthy { phi: 0.0, theta: 0.0, sd: 0.0, mean_variance: 0.0, band: 0.0 };
+    let mut learned = Learned { healthy: nothing, usual, shared, bias, expected, blocks: known.len() };
+    let deviations: Vec<f64> =
+        known.iter().filter_map(|block| learned.point(block)).map(|point| point.deviation).collect();
+    learned.healthy = healthy(&deviations, expected, count(learned.usual.len()));
+    Some(learned)
 }
 
-/// Mean residual of each kind of work that was seen often enough.
-fn usual(blocks: &[Block]) -> BTreeMap<usize, f64> {
-    let mut sums: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
-    for block in blocks {
-        let sum = sums.entry(block.work).or_default();
-        *sum = (sum.0 + block.residual, sum.1 + 1);
-    }
-    let enough = sums.into_iter().filter(|(_, (_, blocks))| *blocks >= WORK_BLOCKS);
-    enough.map(|(work, (sum, blocks))| (work, sum / count(blocks))).collect()
+/// What is usual for each kind of work that was seen often enough, and the standard deviation within all of it.
+fn usual(blocks: &[Block]) -> (BTreeMap<usize, Usual>, f64) {
+    let mut works: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    blocks.iter().for_each(|block| works.entry(block.work).or_default().push(block.residual));
+    works.retain(|_, residuals| residuals.len() >= WORK_BLOCKS);
+    let mean = |residuals: &[f64]| residuals.iter().sum::<f64>() / count(residuals.len());
+    let squares = |residuals: &[f64]| {
+        let mean = mean(residuals);
+        residuals.iter().map(|residual| (residual - mean).powi(2)).sum::<f64>()
+    };
+    let all: usize = works.values().map(Vec::len).sum();
+    let within: f64 = works.values().map(|residuals| squares(residuals)).sum();
+    let shared = within / count(all.saturating_sub(works.len()).max(1));
+    // Few blocks say little of their spread: it is drawn towards what all work shares.
+    let sd = |residuals: &[f64]| {
+        ((squares(residuals) + SHARED_BLOCKS * shared) / (count(residuals.len()) + SHARED_BLOCKS)).sqrt()
+    };
+    let usual = works.iter().map(|(work, residuals)| (*work, Usual { mean: mean(residuals), sd: sd(residuals) }));
+    (usual.collect(), shared.sqrt())
 }
 
 fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
@@ -116,10 +141,13 @@ fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
 }
 
 impl Learned {
-    /// The deviation of a block from what is usual for its work; `None` for work that is new.
+    /// A block against what is usual for its work; `None` for work that is new.
     #[must_use]
-    pub fn deviation(&self, block: &Block) -> Option<Point> {
-        let deviation = block.residual - self.usual.get(&block.work)?;
-        Some(Point { from_s: block.from_s, to_s: block.to_s, deviation })
+    pub fn point(&self, block: &Block) -> Option<Point> {
+        let usual = self.usual.get(&block.work)?;
+        let difference = block.residual - usual.mean;
+        let scale = if usual.sd > 0.0 { self.shared / usual.sd } else { 1.0 };
+        let Block { from_s, to_s, expected, .. } = *block;
+        Some(Point { from_s, to_s, deviation: difference * scale, difference, expected })
     }
 }

@@ -2,15 +2,15 @@
 
 use super::block::{Gathering, Second};
 use super::chart::{Chart, Onset};
-use super::learn::{Block, Learned, WORK_BLOCKS, learn};
+use super::learn::{Block, Learned, Usual, WORK_BLOCKS, learn};
 use super::regime::{Regime, Settling};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Blocks from which a regime is learned, at least.
-const LEARN_BLOCKS: usize = 120;
-/// Settled seconds, over all regimes, before anything is learned: parts, lots and the warm-up must have been seen.
-const LEARN_SETTLED_S: f64 = 5.0 * 3600.0;
+const LEARN_BLOCKS: usize = 100;
+/// Compared seconds before anything is learned: parts, lots and the warm-up must have been seen.
+const LEARN_S: f64 = 6.0 * 3600.0;
 /// Blocks kept while learning; beyond, what there is must do.
 const BLOCKS_MAX: usize = 4000;
 /// Kinds of work told apart; the rest is one.
@@ -65,7 +65,7 @@ pub enum Stage {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Memory {
     works: Vec<String>,
-    settled_s: f64,
+    compared_s: f64,
     regimes: Vec<(Regime, RegimeMemory)>,
 }
 
@@ -92,7 +92,7 @@ pub struct Watch {
     settling: Settling<Second>,
     gathering: Gathering,
     works: Vec<String>,
-    settled_s: f64,
+    compared_s: f64,
     regimes: BTreeMap<Regime, Watched>,
 }
 
@@ -111,7 +111,7 @@ impl Watch {
             settling: Settling::new(),
             gathering: Gathering::default(),
             works: memory.works,
-            settled_s: memory.settled_s,
+            compared_s: memory.compared_s,
             regimes: regimes.collect(),
         }
     }
@@ -125,7 +125,7 @@ impl Watch {
         };
         Memory {
             works: self.works.clone(),
-            settled_s: self.settled_s,
+            compared_s: self.compared_s,
             regimes: self.regimes.iter().map(of).collect(),
         }
     }
@@ -142,11 +142,11 @@ impl Watch {
 
     /// Takes a second with what the machine does and its speed.
     pub fn step(&mut self, what: Option<(Regime, String)>, speed: f64, second: Second) -> Option<Notice> {
+        self.compared_s += 1.0;
         let (regime, work, second) = self.settling.add(what, speed, second)?;
-        self.settled_s += 1.0;
         let work = self.number_of(work);
         let block = self.gathering.add(regime, work, second)?;
-        let may_learn = self.settled_s >= LEARN_SETTLED_S;
+        let may_learn = self.compared_s >= LEARN_S;
         self.regimes.entry(regime).or_default().step(regime, block, may_learn)
     }
 
@@ -183,14 +183,14 @@ impl Watched {
             self.blocks.drain(..surplus);
             return if enough { self.learn(regime) } else { None };
         }
-        let point = match self.learned.as_ref().and_then(|learned| learned.deviation(&block)) {
+        let point = match self.learned.as_ref().and_then(|learned| learned.point(&block)) {
             Some(point) => point,
             None => return self.learn_work(block),
         };
         let chart = self.chart.as_mut()?;
         let found = chart.step(point);
         match (&self.differing, found) {
-            (None, Some(onset)) => self.begin(regime, onset),
+            (None, Some(onset)) => Some(self.begin(regime, onset)),
             (Some(Mismatch { onset: Some(_), .. }), _) if chart.is_back() => self.end(regime),
             _ => None,
         }
@@ -223,17 +223,16 @@ impl Watched {
         let mean = of_work().map(|block| block.residual).sum::<f64>() / crate::twin::noise::count(2 * WORK_BLOCKS);
         self.blocks.retain(|block| block.work != work);
         if let Some(learned) = &mut self.learned {
-            learned.usual.insert(work, mean - differs);
+            let sd = learned.shared;
+            learned.usual.insert(work, Usual { mean: mean - differs, sd });
         }
         None
     }
 
-    fn begin(&mut self, regime: Regime, onset: Onset) -> Option<Notice> {
-        let learned = self.learned.as_ref()?;
-        let mismatch = Mismatch { regime, onset: Some(onset), mean: onset.mean, expected: learned.expected };
+    fn begin(&mut self, regime: Regime, onset: Onset) -> Notice {
+        let mismatch = Mismatch { regime, onset: Some(onset), mean: onset.mean, expected: onset.expected };
         self.differing = Some(mismatch);
-        // What follows is held against the level from here on, so that its return is seen.
-        Some(Notice::Begins(mismatch))
+        Notice::Begins(mismatch)
     }
 
     fn end(&mut self, regime: Regime) -> Option<Notice> {

@@ -1,0 +1,38 @@
+//! `GET /api/v1/twin`: the simulation beside the machine, and the diagnoses of the history.
+
+use super::Shared;
+use super::history::{Answer, Given, reading, trouble};
+use super::query::QueryKeys;
+use crate::history::{Diagnosis, Span};
+use adapters::clock::TimeNs;
+use axum::extract::{Query as Pairs, State};
+use serde_json::{Value, json};
+
+/// Diagnoses told when nobody says otherwise.
+const DIAGNOSES_DEFAULT: u32 = 5;
+
+/// `GET /api/v1/twin`
+pub(super) async fn twin(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    let keys = QueryKeys::of(pairs, &["limit"])?;
+    let limit = keys.number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
+    let status = shared.status()?;
+    reading(shared, move |reader, _| {
+        let found = reader.diagnoses(Span::newest(limit)).map_err(|error| trouble(&error))?;
+        let diagnoses: Vec<Value> = found.iter().rev().map(diagnosis).collect();
+        Ok(json!({ "schema": "twin/1", "at_ms": status.at_ms, "twin": status.twin, "diagnoses": diagnoses }))
+    })
+    .await
+}
+
+/// Newest first; the whole diagnosis stands under `diagnosis` (`diagnosis/1`).
+fn diagnosis(found: &Diagnosis) -> Value {
+    let ms = |at_ns: TimeNs| at_ns.div_euclid(1_000_000);
+    json!({
+        "at_ms": ms(found.at_ns),
+        "from_ms": ms(found.from_ns),
+        "to_ms": ms(found.to_ns),
+        "verdict": found.verdict,
+        "summary": found.summary,
+        "diagnosis": serde_json::from_str::<Value>(&found.json).unwrap_or(Value::Null),
+    })
+}

@@ -1,0 +1,391 @@
+//! The model beside the running machine: compared every second, watched, and, when the two begin to differ, told and
+//! diagnosed in the background.
+
+use super::health::Health;
+use crate::config::{Config, Language};
+use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
+use crate::log::{Notice, Severity};
+use crate::pipeline::Pipeline;
+use crate::status::AlarmStatus;
+use crate::twin::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
+use crate::twin::words;
+use crate::twin::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{ChannelId, Sample};
+use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
+use rules::twin::verdicts::unit_of;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Who raises the alarms and writes the events.
+const SOURCE: &str = "twin";
+/// What was learned is saved about this often.
+const SAVE_EVERY: Duration = Duration::from_secs(600);
+/// A diagnosis needs this much of the machine as it is now,
+const AFTER_NS: i64 = 45 * 60 * SECOND_NS;
+/// and this much of it as it was.
+const BEFORE_NS: i64 = 4 * 3600 * SECOND_NS;
+/// Between the beginnings of two diagnoses.
+const APART_NS: i64 = 6 * 3600 * SECOND_NS;
+
+/// What is remembered across a restart.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Remembered {
+    /// The model under which it was learned.
+    toml: String,
+    memory: live::Memory,
+}
+
+/// The model in charge.
+struct InCharge {
+    live: Live,
+    loaded: Loaded,
+}
+
+/// See the [module](self).
+pub struct Twin {
+    places: Places,
+    memory: PathBuf,
+    language: Language,
+    in_charge: Option<InCharge>,
+    /// Unit and end of the name of the stored series; they stay while the box runs.
+    suffix: String,
+    stored: bool,
+    worker: Option<Worker>,
+    told: Vec<Notice>,
+    /// A model that has come into force and is not yet in the history.
+    new: Option<Loaded>,
+    problem: Option<String>,
+    /// When a diagnosis is due, and from where on.
+    due: Option<(TimeNs, TimeNs)>,
+    begun_ns: Option<TimeNs>,
+    diagnosing: bool,
+    finished: Option<Finished>,
+    saved: Instant,
+}
+
+impl Twin {
+    /// The twin of the configuration; `None` where no model is named. A model that cannot be used is told, and the
+    /// worker waits for a better one.
+    #[must_use]
+    pub fn of(config: &Config) -> Option<Self> {
+        let model = config.twin.model.clone()?;
+        let data_dir = &config.gateway.data_dir;
+        let places =
+            Places { model, history: config.history.path.clone(), improved: data_dir.join("model-improved.toml") };
+        let mut twin = Self {
+            places,
+            memory: data_dir.join("twin.json"),
+            language: config.gateway.language,
+            in_charge: None,
+            suffix: String::new(),
+            stored: false,
+            worker: None,
+            told: Vec::new(),
+            new: None,
+            problem: None,
+            due: None,
+            begun_ns: None,
+            diagnosing: false,
+            finished: None,
+            saved: Instant::now(),
+        };
+        twin.begin();
+        twin.stored = twin.in_charge.is_some();
+        Some(twin)
+    }
+
+    fn begin(&mut self) {
+        let loaded = worker::read(&self.places.model);
+        let known = loaded.as_ref().map(|loaded| loaded.toml.clone()).unwrap_or_default();
+        match loaded {
+            Ok(loaded) => self.put_in_charge(loaded, recall(&self.memory)),
+            Err(problem) => self.refuse(problem),
+        }
+        match Worker::start(self.places.clone(), known) {
+            Ok(worker) => self.worker = Some(worker),
+            Err(error) => {
+                let text = format!("no thread for the twin ({error}): nothing is diagnosed in the background");
+                self.told.push(Notice::new(Severity::Warning, "twin_alone", text));
+            }
+        }
+    }
+
+    fn put_in_charge(&mut self, loaded: Loaded, before: Remembered) {
+        let same = before.toml == loaded.toml;
+        let memory = if same { before.memory } else { before.memory.of_the_machine() };
+        if self.suffix.is_empty() {
+            self.suffix = loaded.model.output.rsplit('_').next().unwrap_or("").to_owned();
+        }
+        let text = format!(
+            "{} is compared with the machine: {} in {}",
+            loaded.model.name,
+            loaded.model.output,
+            self.places.model.display()
+        );
+        self.told.push(Notice::new(Severity::Info, "twin_model", text));
+        self.problem = None;
+        self.new = (!same).then(|| loaded.clone());
+        self.in_charge = Some(InCharge { live: Live::new(loaded.model.clone(), memory), loaded });
+    }
+
+    fn refuse(&mut self, problem: String) {
+        let consequence = if self.in_charge.is_some() { "the one before stays in charge" } else { "nothing is compared" };
+        let text = format!("the model cannot be used, {consequence}:\n  {}", problem.replace('\n', "\n  "));
+        self.told.push(Notice::new(Severity::Warning, "twin_refused", text));
+        self.problem = Some(problem);
+    }
+
+    /// What is stored beside the channels.
+    #[must_use]
+    pub fn series(&self) -> Vec<ExtraSeries> {
+        let Some(InCharge { loaded, .. }) = &self.in_charge else { return Vec::new() };
+        let unit = unit_of(&loaded.model.output);
+        let series = |name: &str, en, zh| ExtraSeries::number(&format!("{name}_{}", self.suffix), unit, en, zh);
+        vec![
+            series("twin_expected", "Expected by the simulation", "仿真值"),
+            series("twin_residual", "Recorded minus simulated", "实测与仿真之差"),
+        ]
+    }
+
+    /// The newest values of [`Twin::series`].
+    #[must_use]
+    pub fn values(&self) -> [ExtraValue<'static>; 2] {
+        let same_unit = |loaded: &Loaded| loaded.model.output.ends_with(&self.suffix);
+        let compared = match &self.in_charge {
+            Some(InCharge { live, loaded }) if same_unit(loaded) => live.compared(),
+            _ => Compared::none(live::NoTwin::NotYet),
+        };
+        [compared.expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
+    }
+
+    /// Takes one tick, after the pipeline has.
+    pub fn step(&mut self, sample: &Sample, pipeline: &Pipeline, health: &mut Health) {
+        let now_ns = sample.at_ns;
+        self.listen(health, now_ns);
+        self.told.drain(..).for_each(|notice| health.event(now_ns, SOURCE, &notice));
+        if let Some(Loaded { model, toml }) = self.new.take() {
+            let origin = self.places.model.display().to_string();
+            health.keep(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
+        }
+        let Some(InCharge { live, .. }) = &mut self.in_charge else { return };
+        let noticed = live.step(sample, pipeline.estimates().state);
+        match noticed {
+            None => {}
+            Some(live::Notice::Learned(regime)) => {
+                let text = format!("what is usual {} has been learned; it is watched from now on", regime.words().0);
+                health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_learned", text));
+                self.save();
+            }
+            Some(live::Notice::Begins(mismatch)) => self.differs(&mismatch, health, now_ns),
+            Some(live::Notice::Ends(regime)) => self.agrees(regime, health, now_ns),
+        }
+        self.ask_when_due(now_ns, health);
+        if self.saved.elapsed() >= SAVE_EVERY {
+            self.save();
+        }
+        if self.stored {
+            health.beside(self.values());
+        }
+    }
+
+    fn quantity(&self) -> (&'static str, &'static str) {
+        let output = self.in_charge.as_ref().map_or("", |in_charge| in_charge.loaded.model.output.as_str());
+        let channel = ChannelId::of(output).map(|id| id.channel());
+        channel.map_or(("the output", "输出"), |channel| (channel.en, channel.zh))
+    }
+
+    fn unit(&self) -> &'static str {
+        self.in_charge.as_ref().map_or("", |in_charge| unit_of(&in_charge.loaded.model.output))
+    }
+
+    fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
+        let (en, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+        health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en.clone()));
+        let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
+        health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
+        let onset = mismatch.onset.map(|onset| (words::nanoseconds(onset.at_s), words::nanoseconds(onset.low_s)));
+        let (at_ns, low_ns) = onset.unwrap_or((now_ns - AFTER_NS, now_ns - AFTER_NS));
+        let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
+        self.due.get_or_insert(((at_ns + AFTER_NS).max(now_ns).max(earliest_ns), low_ns - BEFORE_NS));
+        self.save();
+    }
+
+    fn agrees(&mut self, regime: Regime, health: &mut Health, now_ns: TimeNs) {
+        let (en, _) = words::agreement(regime, self.quantity());
+        health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_agrees", en));
+        health.keep(AlarmClear { at_ns: now_ns, code: code(regime), source: SOURCE.to_owned() }.into());
+        if self.mismatches().is_empty() {
+            self.due = None;
+        }
+        self.save();
+    }
+
+    fn mismatches(&self) -> Vec<Mismatch> {
+        let stages = self.in_charge.iter().flat_map(|in_charge| in_charge.live.stages());
+        let differing = |(_, stage)| if let Stage::Differing(mismatch) = stage { Some(mismatch) } else { None };
+        stages.filter_map(differing).collect()
+    }
+
+    fn ask_when_due(&mut self, now_ns: TimeNs, health: &mut Health) {
+        let Some((_, from_ns)) = self.due.filter(|(at_ns, _)| now_ns >= *at_ns && !self.diagnosing) else { return };
+        let (Some(worker), Some(InCharge { loaded, .. })) = (&self.worker, &self.in_charge) else { return };
+        if worker.ask(Request { model: loaded.model.clone(), from_ns, to_ns: now_ns }) {
+            (self.due, self.begun_ns, self.diagnosing) = (None, Some(now_ns), true);
+            let text = "a diagnosis of the difference between machine and simulation has begun in the background";
+            health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));
+        }
+    }
+
+    /// Takes what the worker has to tell.
+    fn listen(&mut self, health: &mut Health, now_ns: TimeNs) {
+        let Some(report) = self.worker.as_ref().and_then(Worker::take) else { return };
+        match report {
+            Report::Model(loaded) => self.replace(*loaded, health, now_ns),
+            Report::Refused(problem) => self.refuse(problem),
+            Report::NotDiagnosed(problem) => {
+                self.diagnosing = false;
+                let text = format!("the difference between machine and simulation could not be diagnosed: {problem}");
+                health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
+            }
+            Report::Diagnosed(mut finished) => {
+                self.diagnosing = false;
+                finished.record.at_ns = now_ns;
+                let text = format!("diagnosis: {}", finished.record.summary);
+                health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_finished", text));
+                health.keep(finished.record.clone().into());
+                self.finished = Some(*finished);
+            }
+        }
+    }
+
+    /// Another model: what the old one differed in is no alarm any more.
+    fn replace(&mut self, loaded: Loaded, health: &mut Health, now_ns: TimeNs) {
+        for mismatch in self.mismatches() {
+            let code = code(mismatch.regime);
+            health.keep(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
+        }
+        let memory = self.in_charge.take().map(|before| before.live.memory()).unwrap_or_default();
+        self.due = None;
+        self.put_in_charge(loaded, Remembered { toml: String::new(), memory });
+        self.save();
+    }
+
+    /// Saves what was learned: a new file in the place of the old one.
+    pub fn save(&mut self) {
+        self.saved = Instant::now();
+        let Some(InCharge { live, loaded }) = &self.in_charge else { return };
+        let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory() };
+        let saved = serde_json::to_string(&remembered)
+            .map_err(|error| error.to_string())
+            .and_then(|text| crate::twin::put(&self.memory, &text));
+        if let Err(problem) = saved {
+            tracing::warn!("what the twin has learned could not be saved: {problem}");
+        }
+    }
+
+    /// Differences that stand.
+    #[must_use]
+    pub fn alarms(&self) -> Vec<AlarmStatus> {
+        let alarm = |mismatch: &Mismatch| AlarmStatus {
+            code: code(mismatch.regime),
+            severity: "warning".to_owned(),
+            text: self.text(mismatch),
+            since_ms: mismatch.onset.map_or(0, |onset| milliseconds(onset.at_s)),
+        };
+        self.mismatches().iter().map(alarm).collect()
+    }
+
+    fn text(&self, mismatch: &Mismatch) -> String {
+        words::in_language(words::mismatch(mismatch, self.quantity(), self.unit()), self.language)
+    }
+
+    /// For the status document.
+    #[must_use]
+    pub fn status(&self) -> TwinStatus {
+        let in_charge = self.in_charge.as_ref();
+        let compared = in_charge.map_or(Compared::none(live::NoTwin::NotYet), |in_charge| in_charge.live.compared());
+        let why = in_charge.and_then(|in_charge| in_charge.live.why().map(str::to_owned));
+        let reason = compared.residual.err();
+        TwinStatus {
+            model: in_charge.map(|in_charge| in_charge.loaded.model.name.clone()).unwrap_or_default(),
+            file: self.places.model.display().to_string(),
+            output: in_charge.map(|in_charge| in_charge.loaded.model.output.clone()).unwrap_or_default(),
+            unit: self.unit(),
+            twin_expected: compared.expected.ok(),
+            twin_residual: compared.residual.ok(),
+            missing: reason.map(live::NoTwin::word),
+            why: reason.map(|reason| why.unwrap_or_else(|| reason.to_string())),
+            regimes: in_charge.map_or_else(Vec::new, |in_charge| self.regimes(&in_charge.live)),
+            diagnosing_since_ms: self.begun_ns.filter(|_| self.diagnosing).map(|ns| ns.div_euclid(1_000_000)),
+            diagnosis: self.finished.as_ref().map(|finished| self.diagnosis(finished)),
+            problem: self.problem.clone(),
+        }
+    }
+
+    fn regimes(&self, live: &Live) -> Vec<RegimeStatus> {
+        let status = |(regime, stage): (Regime, Stage)| {
+            let none = RegimeStatus {
+                regime: regime.word(),
+                stage: "learning",
+                learned: None,
+                usual: None,
+                difference: None,
+                difference_pct: None,
+                since_ms: None,
+                text: None,
+            };
+            match stage {
+                Stage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
+                Stage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
+                Stage::Differing(mismatch) => RegimeStatus {
+                    stage: "differing",
+                    difference: Some(mismatch.mean),
+                    difference_pct: mismatch.percent(),
+                    since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(milliseconds)),
+                    text: Some(self.text(&mismatch)),
+                    ..none
+                },
+            }
+        };
+        live.stages().map(status).collect()
+    }
+
+    fn diagnosis(&self, finished: &Finished) -> DiagnosisStatus {
+        let record = &finished.record;
+        let accept = finished.improved.as_ref().map_or(String::new(), |improved| {
+            format!("cp {} {}", improved.display(), self.places.model.display())
+        });
+        DiagnosisStatus {
+            at_ms: record.at_ns.div_euclid(1_000_000),
+            from_ms: record.from_ns.div_euclid(1_000_000),
+            to_ms: record.to_ns.div_euclid(1_000_000),
+            verdict: record.verdict.clone(),
+            summary: record.summary.clone(),
+            missing: finished.missing.clone(),
+            accept,
+        }
+    }
+}
+
+fn code(regime: Regime) -> String {
+    format!("twin_mismatch_{regime}")
+}
+
+fn milliseconds(at_s: f64) -> i64 {
+    words::nanoseconds(at_s).div_euclid(1_000_000)
+}
+
+/// What was learned before; nothing where that cannot be read.
+fn recall(path: &Path) -> Remembered {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    if text.is_empty() {
+        return Remembered::default();
+    }
+    serde_json::from_str(&text).unwrap_or_else(|error| {
+        let text = format!("{}: what the twin had learned cannot be read ({error}); it learns anew", path.display());
+        Notice::new(Severity::Warning, "twin_forgot", text).say();
+        Remembered::default()
+    })
+}

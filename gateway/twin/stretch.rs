@@ -1,0 +1,128 @@
+//! A stretch of the history as a diagnosis needs it: what was measured and commanded, one row per second, a run per part.
+
+use crate::history::{HistoryError, Query, Reader};
+use adapters::clock::TimeNs;
+use adapters::recording::{Cells, Numbers, Words};
+use adapters::{ChannelId, Recording};
+use std::ops::Range;
+use std::path::Path;
+
+/// Rows of a stretch; the beginning of a longer one is left out.
+const ROWS_MAX: usize = 43_200;
+/// Runs that make a part the unit of hold-out; with fewer the recording is cut into stretches.
+const RUNS_MIN: usize = 8;
+
+/// Reads the channels from `from_ns` to before `to_ns`. Estimates are left out: they follow from what they would explain.
+///
+/// # Errors
+/// What the history says.
+pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs) -> Result<Recording, HistoryError> {
+    let reader = Reader::open(history)?;
+    let names: Vec<String> = reader.series()?.iter().map(|series| series.name.to_string()).collect();
+    let channels = names.iter().map(String::as_str).filter(|name| ChannelId::of(name).is_some());
+    let recording = reader.recording(&Query::between(from_ns, to_ns).of(channels))?;
+    Ok(complete(per_second(&recording)))
+}
+
+/// The mean of every number and the last of every word in each second.
+#[must_use]
+pub fn per_second(recording: &Recording) -> Recording {
+    let mut seconds = seconds(recording);
+    let surplus = seconds.len().saturating_sub(ROWS_MAX);
+    seconds.drain(..surplus);
+    let time_s = seconds.iter().map(|rows| recording.time_s[rows.start].floor()).collect();
+    let mut thinned = Recording::new(recording.source.clone(), time_s, recording.start_ns);
+    for column in recording.columns().iter().filter(|column| !column.name.ends_with("_missing")) {
+        let cells = match &column.cells {
+            Cells::Numbers(numbers) => Cells::Numbers(seconds.iter().map(|rows| mean(numbers, rows)).collect()),
+            Cells::Words(words) => {
+                Cells::Words(seconds.iter().map(|rows| words.get(rows.end - 1).unwrap_or("")).collect::<Words>())
+            }
+        };
+        thinned.set_column(&column.name, cells);
+    }
+    thinned
+}
+
+/// Rows of each whole second.
+fn seconds(recording: &Recording) -> Vec<Range<usize>> {
+    let mut seconds: Vec<Range<usize>> = Vec::new();
+    for (row, time_s) in recording.time_s.iter().enumerate() {
+        match seconds.last_mut() {
+            Some(rows) if recording.time_s[rows.start].floor() == time_s.floor() => rows.end = row + 1,
+            _ => seconds.push(row..row + 1),
+        }
+    }
+    seconds
+}
+
+/// The mean of the rows that have a value, where at least half of them have.
+fn mean(numbers: &Numbers, rows: &Range<usize>) -> Option<f64> {
+    let present: Vec<f64> = rows.clone().filter_map(|row| numbers.get(row)).collect();
+    let enough = !present.is_empty() && 2 * present.len() >= rows.len();
+    #[expect(clippy::cast_precision_loss, reason = "rows of one second")]
+    enough.then(|| present.iter().sum::<f64>() / present.len() as f64)
+}
+
+/// Adds what the machine's own words say without saying it: in the cut where a depth is planned and the axis feeds, and
+/// a run per part.
+fn complete(mut recording: Recording) -> Recording {
+    if recording.numbers("engaged").is_none()
+        && let Some(engaged) = engaged(&recording)
+    {
+        recording.set_column("engaged", Cells::Numbers(engaged));
+    }
+    if recording.words("run").is_none()
+        && let Some(runs) = runs(&recording)
+    {
+        recording.set_column("run", Cells::Words(runs));
+    }
+    recording
+}
+
+/// In the cut as the program says it: a depth is planned, the axis feeds, and not in rapid traverse.
+#[must_use]
+pub fn engaged(recording: &Recording) -> Option<Numbers> {
+    let (depth, feed) = (recording.numbers("depth_of_cut_mm")?, recording.numbers("feed_mm_min")?);
+    let rapid = recording.numbers("rapid");
+    let in_cut = |row: usize| {
+        let rapid = rapid.and_then(|rapid| rapid.get(row)).unwrap_or(0.0) > 0.0;
+        Some(f64::from(u8::from(depth.get(row)? > 0.0 && feed.get(row)? > 0.0 && !rapid)))
+    };
+    Some((0..recording.rows()).map(in_cut).collect())
+}
+
+fn runs(recording: &Recording) -> Option<Words> {
+    let parts = recording.numbers("part_count")?;
+    let mut names = Vec::with_capacity(recording.rows());
+    let (mut run, mut last) = (1, None);
+    for row in 0..recording.rows() {
+        let count = parts.get(row).or(last);
+        run += usize::from(last.is_some() && count != last);
+        last = count;
+        names.push(run.to_string());
+    }
+    (run >= RUNS_MIN).then(|| names.iter().map(String::as_str).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_rows_become_one_and_the_program_tells_the_cut() {
+        let mut recording = Recording::new("test", (0..40).map(|row| f64::from(row) / 10.0).collect(), Some(0));
+        let numbers = |of: fn(i32) -> Option<f64>| Cells::Numbers((0..40).map(of).collect());
+        recording.set_column("spindle_power_w", numbers(|row| (row % 10 != 3).then(|| f64::from(row))));
+        recording.set_column("depth_of_cut_mm", numbers(|row| Some(f64::from(row / 20))));
+        recording.set_column("feed_mm_min", numbers(|_| Some(100.0)));
+        recording.set_column("spindle_power_w_missing", Cells::Words(std::iter::repeat_n("", 40).collect()));
+        let thinned = complete(per_second(&recording));
+        assert_eq!(thinned.time_s, [0.0, 1.0, 2.0, 3.0]);
+        let power = thinned.numbers("spindle_power_w").expect("kept").get(0).expect("nine of ten");
+        assert!((power - 42.0 / 9.0).abs() < 1e-12, "{power}");
+        let engaged: Vec<_> = thinned.numbers("engaged").expect("told by the program").iter().flatten().collect();
+        assert_eq!(engaged, [0.0, 0.0, 1.0, 1.0]);
+        assert!(thinned.words("spindle_power_w_missing").is_none() && thinned.words("run").is_none());
+    }
+}

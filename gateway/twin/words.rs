@@ -1,0 +1,93 @@
+//! What the twin notices, in plain words.
+
+use crate::config::Language;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::twin::live::{Mismatch, Onset, Regime};
+use rules::twin::text::short;
+
+/// A time in seconds since 1970 as nanoseconds.
+#[must_use]
+pub fn nanoseconds(at_s: f64) -> TimeNs {
+    #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+    let at_ns = (at_s * SECOND_NS as f64) as i64;
+    at_ns
+}
+
+fn clock(at_s: f64) -> String {
+    let stamp = jiff::Timestamp::from_nanosecond(i128::from(nanoseconds(at_s)));
+    stamp.map_or_else(|_| "?".to_owned(), |stamp| stamp.strftime("%Y-%m-%d %H:%M").to_string())
+}
+
+/// Hour and minute, the day only where it differs from that of `beside_s`.
+fn beside(at_s: f64, beside_s: f64) -> String {
+    let (at, other) = (clock(at_s), clock(beside_s));
+    match (at.split_once(' '), other.split_once(' ')) {
+        (Some((day, hour)), Some((same, _))) if day == same => hour.to_owned(),
+        _ => at,
+    }
+}
+
+/// A difference for the operator, English and Chinese. Times are UTC.
+#[must_use]
+pub fn mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
+    let size = format!("{} {unit}", short(found.mean.abs()));
+    let percent = found.percent().map_or(String::new(), |percent| format!(" ({} %)", short(percent.abs())));
+    let (en_where, zh_where) = found.regime.words();
+    let (en_way, zh_way) = if found.mean > 0.0 { ("more", "高") } else { ("less", "低") };
+    let (en_since, zh_since) = since(found.onset.as_ref());
+    let (en, zh) = quantity;
+    (
+        format!("{en_since}, {} {en_where} is {size}{percent} {en_way} than the simulation says", lower(en)),
+        format!("{zh_since}，{zh_where}{zh}比仿真值{zh_way}{size}{percent}"),
+    )
+}
+
+fn since(onset: Option<&Onset>) -> (String, String) {
+    let Some(Onset { at_s, low_s, high_s, .. }) = onset else {
+        return ("Ever since the comparison began".to_owned(), "自开始比较以来".to_owned());
+    };
+    let (at, low, high) = (clock(*at_s), beside(*low_s, *at_s), beside(*high_s, *at_s));
+    (format!("Since {at} UTC (between {low} and {high})"), format!("自{at}（UTC，{low}至{high}之间）起"))
+}
+
+/// The end of a difference, English and Chinese.
+#[must_use]
+pub fn agreement(regime: Regime, quantity: (&str, &str)) -> (String, String) {
+    let (en_where, zh_where) = regime.words();
+    let (en, zh) = quantity;
+    (format!("{} {en_where} agrees with the simulation again", short_name(en)), format!("{zh_where}{zh}与仿真重新一致"))
+}
+
+/// The text in this language.
+#[must_use]
+pub fn in_language((en, zh): (String, String), language: Language) -> String {
+    if language == Language::Zh { zh } else { en }
+}
+
+/// `Power into the spindle drive, negative when ...` up to the comma.
+fn short_name(name: &str) -> &str {
+    name.split(',').next().unwrap_or(name)
+}
+
+/// A name within a sentence.
+fn lower(name: &str) -> String {
+    let mut letters = short_name(name).chars();
+    let first = letters.next().map(|letter| letter.to_lowercase().to_string()).unwrap_or_default();
+    first + letters.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_reads_as_a_sentence() {
+        let onset = Onset { at_s: 1.8e9, low_s: 1.8e9 - 600.0, high_s: 1.8e9 + 86_400.0, mean: 61.0, expected: 1000.0 };
+        let found = Mismatch { regime: Regime::Cutting, onset: Some(onset), mean: 61.0, expected: 1000.0 };
+        let (en, zh) = mismatch(&found, ("Power into the spindle drive, negative when it brakes", "主轴驱动功率"), "W");
+        let expected = "Since 2027-01-15 08:00 UTC (between 07:50 and 2027-01-16 08:00), power into the spindle drive while \
+                        cutting is 61 W (6.1 %) more than the simulation says";
+        assert_eq!(en, expected);
+        assert!(zh.contains("切削时主轴驱动功率比仿真值高61 W"), "{zh}");
+    }
+}
