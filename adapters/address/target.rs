@@ -59,6 +59,12 @@ pub struct SimulatedTarget {
     pub annotations: bool,
     /// Flank wear of every edge at the start, mm.
     pub wear_mm: f64,
+    /// The machine changes after so many hours; infinite when it never does.
+    pub change_h: f64,
+    /// Strength of every cut after the change, percent of that before.
+    pub change_cut_pct: f64,
+    /// Friction of the spindle after the change, percent of that before.
+    pub change_friction_pct: f64,
 }
 
 /// A recording.
@@ -225,6 +231,9 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         speed_changes: keys.choice("speed_changes", &[("no", false), ("yes", true)]),
         annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),
         wear_mm: keys.number("wear_mm", 0.005, 0.0, 0.29),
+        change_h: keys.number("change_h", f64::INFINITY, 0.0, 1e5),
+        change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
+        change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
     };
     match body.strip_prefix("//").unwrap_or(body) {
         "lathe" => Ok(Target::Simulated(target)),

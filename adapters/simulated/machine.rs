@@ -5,7 +5,7 @@ use super::frame::Frame;
 use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
 use super::plant::{Plant, Spin};
 use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
-use super::settings::SimulatedSettings;
+use super::settings::{CutLevel, SimulatedSettings};
 use crate::address::SimulatedMachine;
 use crate::clock::{SECOND_NS, TimeNs};
 use crate::words::{execution, mode};
@@ -147,8 +147,11 @@ impl Machine {
         if let Some(percent) = self.control.override_request.take() {
             self.override_pct = percent;
         }
+        if since_s >= self.settings.change.after_s {
+            self.plant.friction = self.settings.change.friction;
+        }
         self.plant.spin(&self.control.demand, STEP_S);
-        self.engage();
+        self.engage(since_s);
         self.power(since_s);
         if self.steps % DRIFT_STEPS == 0 {
             let dt_s = STEP_S * 20.0;
@@ -159,7 +162,7 @@ impl Machine {
     }
 
     /// The tool enters and leaves the work within about a turn of the spindle.
-    fn engage(&mut self) {
+    fn engage(&mut self, since_s: f64) {
         let contact = self.control.contact();
         if let Some((cut, share)) = contact {
             self.cut = cut;
@@ -173,10 +176,18 @@ impl Machine {
         }
         let now = self.circumstances();
         let stage = self.frame.stage(self.control.demand.gear_stage);
-        self.load = cutting::load(self.frame, stage, &self.cut, &now, self.settings.cut);
+        self.load = cutting::load(self.frame, stage, &self.cut, &now, self.cut_level(since_s));
         let lathe = self.settings.machine == SimulatedMachine::Lathe;
         let tool = self.control.tool_index();
         self.control.wear_mm[tool] += STEP_S * cutting::wear_rate_mm_s(lathe, &now);
+    }
+
+    fn cut_level(&self, since_s: f64) -> CutLevel {
+        let factor = if since_s >= self.settings.change.after_s { self.settings.change.cut } else { 1.0 };
+        match self.settings.cut {
+            CutLevel::Planned(planned) => CutLevel::Planned(planned * factor),
+            CutLevel::OfNoLoad(share) => CutLevel::OfNoLoad(share * factor),
+        }
     }
 
     fn circumstances(&self) -> Circumstances {

@@ -31,7 +31,7 @@ pub use controller::SimulatedController;
 pub use meter::{MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
-pub use settings::{CutLevel, DaySettings, DeviceSettings, MeterSettings, SimulatedSettings};
+pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSettings, SimulatedSettings};
 
 use crate::clock::TimeNs;
 use machine::Machine;

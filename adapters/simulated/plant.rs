@@ -43,6 +43,8 @@ pub(super) struct Plant {
     excess_w: f64,
     acceleration_w: f64,
     pub(super) no_load_w: f64,
+    /// Dry and viscous friction against that of the frame.
+    pub(super) friction: f64,
     pub(super) bearing_c: f64,
     housing_c: f64,
     pub(super) motor_c: f64,
@@ -69,6 +71,7 @@ impl Plant {
             excess_w: 0.0,
             acceleration_w: 0.0,
             no_load_w: 0.0,
+            friction: 1.0,
             bearing_c: 20.0,
             housing_c: 20.0,
             motor_c: 20.0,
@@ -148,7 +151,8 @@ impl Plant {
         let stage = self.frame.stage(gear_stage);
         let viscosity = (-0.012 * (self.bearing_c - 40.0)).exp();
         let field_w = stage.field_w * (self.supply_v / 400.0).powi(2);
-        field_w + stage.dry_nm * w + stage.viscous * w.powf(1.6) * viscosity + stage.windage * w.powf(2.8)
+        let friction_w = stage.dry_nm * w + stage.viscous * w.powf(1.6) * viscosity;
+        field_w + self.friction * friction_w + stage.windage * w.powf(2.8)
     }
 
     /// Power that accelerates, and the excess of a start.

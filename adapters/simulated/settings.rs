@@ -66,6 +66,17 @@ pub struct MeterSettings {
     pub dropout_s: f64,
 }
 
+/// A change of the machine: harder material, a bearing that gets tight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaterChange {
+    /// When, s after the start; infinite when never.
+    pub after_s: f64,
+    /// Cutting forces after it over those before.
+    pub cut: f64,
+    /// Dry and viscous friction of the spindle after it over that before.
+    pub friction: f64,
+}
+
 /// The working day.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DaySettings {
@@ -102,6 +113,8 @@ pub struct SimulatedSettings {
     pub annotations: bool,
     /// Flank wear of every edge at the start, mm.
     pub wear_mm: f64,
+    /// What becomes of the machine later.
+    pub change: LaterChange,
     /// The controller's clock and line.
     pub controller: DeviceSettings,
     /// The meter.
@@ -121,6 +134,7 @@ impl Default for SimulatedSettings {
             speed_changes: false,
             annotations: true,
             wear_mm: FRESH_EDGE_MM,
+            change: LaterChange { after_s: f64::INFINITY, cut: 1.0, friction: 1.0 },
             controller: DeviceSettings {
                 period: Duration::from_millis(100),
                 refresh: Duration::from_millis(8),
@@ -191,6 +205,11 @@ impl SimulatedSettings {
             speed_changes: target.speed_changes,
             annotations: target.annotations,
             wear_mm: target.wear_mm,
+            change: LaterChange {
+                after_s: 3600.0 * target.change_h,
+                cut: target.change_cut_pct / 100.0,
+                friction: target.change_friction_pct / 100.0,
+            },
             meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
             ..base
         }

@@ -125,7 +125,10 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let wishes = wishes.clone();
-    Ok((Ticker { identity, pace, feed, pipeline, twin, scripts: watched, health, wishes, publish, stop_after_ns }, live))
+    Ok((
+        Ticker { identity, pace, feed, pipeline, twin, scripts: watched, health, wishes, publish, stop_after_ns },
+        live,
+    ))
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

@@ -35,6 +35,18 @@ struct Remembered {
     /// The model under which it was learned.
     toml: String,
     memory: live::Memory,
+    /// A diagnosis that is due or was interrupted.
+    #[serde(default)]
+    due: Option<Due>,
+}
+
+/// A diagnosis to come.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Due {
+    /// When it may begin.
+    at_ns: TimeNs,
+    /// Beginning of the stretch.
+    from_ns: TimeNs,
 }
 
 /// The model in charge.
@@ -57,12 +69,14 @@ pub struct Twin {
     /// A model that has come into force and is not yet in the history.
     new: Option<Loaded>,
     problem: Option<String>,
-    /// When a diagnosis is due, and from where on.
-    due: Option<(TimeNs, TimeNs)>,
+    /// Stays until the diagnosis is finished.
+    due: Option<Due>,
     begun_ns: Option<TimeNs>,
     diagnosing: bool,
     finished: Option<Finished>,
     saved: Instant,
+    /// Differences from before the restart have been raised again.
+    raised: bool,
 }
 
 impl Twin {
@@ -90,6 +104,7 @@ impl Twin {
             diagnosing: false,
             finished: None,
             saved: Instant::now(),
+            raised: false,
         };
         twin.begin();
         twin.stored = twin.in_charge.is_some();
@@ -115,6 +130,7 @@ impl Twin {
     fn put_in_charge(&mut self, loaded: Loaded, before: Remembered) {
         let same = before.toml == loaded.toml;
         let memory = if same { before.memory } else { before.memory.of_the_machine() };
+        self.due = before.due.filter(|_| same);
         if self.suffix.is_empty() {
             self.suffix = loaded.model.output.rsplit('_').next().unwrap_or("").to_owned();
         }
@@ -131,7 +147,8 @@ impl Twin {
     }
 
     fn refuse(&mut self, problem: String) {
-        let consequence = if self.in_charge.is_some() { "the one before stays in charge" } else { "nothing is compared" };
+        let consequence =
+            if self.in_charge.is_some() { "the one before stays in charge" } else { "nothing is compared" };
         let text = format!("the model cannot be used, {consequence}:\n  {}", problem.replace('\n', "\n  "));
         self.told.push(Notice::new(Severity::Warning, "twin_refused", text));
         self.problem = Some(problem);
@@ -169,6 +186,10 @@ impl Twin {
             let origin = self.places.model.display().to_string();
             health.keep(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
         }
+        // What differed before the restart still does; the history has ended its alarms.
+        if !std::mem::replace(&mut self.raised, true) {
+            self.mismatches().iter().for_each(|mismatch| self.raise(mismatch, health, now_ns));
+        }
         let Some(InCharge { live, .. }) = &mut self.in_charge else { return };
         let noticed = live.step(sample, pipeline.estimates().state);
         match noticed {
@@ -201,22 +222,28 @@ impl Twin {
     }
 
     fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
-        let (en, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
-        health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en.clone()));
-        let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
-        health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
+        let (en, _) = words::mismatch(mismatch, self.quantity(), self.unit());
+        health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "twin_mismatch", en));
+        self.raise(mismatch, health, now_ns);
         let onset = mismatch.onset.map(|onset| (words::nanoseconds(onset.at_s), words::nanoseconds(onset.low_s)));
         let (at_ns, low_ns) = onset.unwrap_or((now_ns - AFTER_NS, now_ns - AFTER_NS));
         let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
-        self.due.get_or_insert(((at_ns + AFTER_NS).max(now_ns).max(earliest_ns), low_ns - BEFORE_NS));
+        let at_ns = (at_ns + AFTER_NS).max(now_ns).max(earliest_ns);
+        self.due.get_or_insert(Due { at_ns, from_ns: low_ns - BEFORE_NS });
         self.save();
+    }
+
+    fn raise(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
+        let (en, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+        let (code, source, severity) = (code(mismatch.regime), SOURCE.to_owned(), "warning".to_owned());
+        health.keep(Alarm { at_ns: now_ns, code, source, severity, en, zh }.into());
     }
 
     fn agrees(&mut self, regime: Regime, health: &mut Health, now_ns: TimeNs) {
         let (en, _) = words::agreement(regime, self.quantity());
         health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_agrees", en));
         health.keep(AlarmClear { at_ns: now_ns, code: code(regime), source: SOURCE.to_owned() }.into());
-        if self.mismatches().is_empty() {
+        if self.mismatches().is_empty() && !self.diagnosing {
             self.due = None;
         }
         self.save();
@@ -229,10 +256,10 @@ impl Twin {
     }
 
     fn ask_when_due(&mut self, now_ns: TimeNs, health: &mut Health) {
-        let Some((_, from_ns)) = self.due.filter(|(at_ns, _)| now_ns >= *at_ns && !self.diagnosing) else { return };
+        let Some(Due { from_ns, .. }) = self.due.filter(|due| now_ns >= due.at_ns && !self.diagnosing) else { return };
         let (Some(worker), Some(InCharge { loaded, .. })) = (&self.worker, &self.in_charge) else { return };
         if worker.ask(Request { model: loaded.model.clone(), from_ns, to_ns: now_ns }) {
-            (self.due, self.begun_ns, self.diagnosing) = (None, Some(now_ns), true);
+            (self.begun_ns, self.diagnosing) = (Some(now_ns), true);
             let text = "a diagnosis of the difference between machine and simulation has begun in the background";
             health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));
         }
@@ -245,12 +272,12 @@ impl Twin {
             Report::Model(loaded) => self.replace(*loaded, health, now_ns),
             Report::Refused(problem) => self.refuse(problem),
             Report::NotDiagnosed(problem) => {
-                self.diagnosing = false;
+                (self.diagnosing, self.due) = (false, None);
                 let text = format!("the difference between machine and simulation could not be diagnosed: {problem}");
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
             }
             Report::Diagnosed(mut finished) => {
-                self.diagnosing = false;
+                (self.diagnosing, self.due) = (false, None);
                 finished.record.at_ns = now_ns;
                 let text = format!("diagnosis: {}", finished.record.summary);
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_finished", text));
@@ -267,8 +294,7 @@ impl Twin {
             health.keep(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
         }
         let memory = self.in_charge.take().map(|before| before.live.memory()).unwrap_or_default();
-        self.due = None;
-        self.put_in_charge(loaded, Remembered { toml: String::new(), memory });
+        self.put_in_charge(loaded, Remembered { toml: String::new(), memory, due: None });
         self.save();
     }
 
@@ -276,7 +302,7 @@ impl Twin {
     pub fn save(&mut self) {
         self.saved = Instant::now();
         let Some(InCharge { live, loaded }) = &self.in_charge else { return };
-        let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory() };
+        let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
         let saved = serde_json::to_string(&remembered)
             .map_err(|error| error.to_string())
             .and_then(|text| crate::twin::put(&self.memory, &text));
@@ -354,9 +380,10 @@ impl Twin {
 
     fn diagnosis(&self, finished: &Finished) -> DiagnosisStatus {
         let record = &finished.record;
-        let accept = finished.improved.as_ref().map_or(String::new(), |improved| {
-            format!("cp {} {}", improved.display(), self.places.model.display())
-        });
+        let accept = finished
+            .improved
+            .as_ref()
+            .map_or(String::new(), |improved| format!("cp {} {}", improved.display(), self.places.model.display()));
         DiagnosisStatus {
             at_ms: record.at_ns.div_euclid(1_000_000),
             from_ms: record.from_ns.div_euclid(1_000_000),

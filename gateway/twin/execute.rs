@@ -8,6 +8,7 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{Cells, Numbers, Words};
 use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings};
 use adapters::{Recording, Sample, Value};
+use rules::twin::plan::TRANSITION;
 use std::fmt::Write as _;
 
 /// When the machine is switched on: 2026-01-01, so that the same plan gives the same recording.
@@ -17,11 +18,18 @@ const SECONDS_MAX: f64 = 48.0 * 3600.0;
 /// Steps of a plan, at most.
 const STEPS_MAX: usize = 2000;
 
+/// The spindle has its commanded speed within this share,
+const AT_SPEED: f64 = 0.02;
+/// and has had it for so long, ns: the drive and the meter have settled.
+const SETTLED_NS: i64 = 4 * SECOND_NS;
+
 /// The steps of a plan, and the run that each belongs to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
     steps: Vec<ExperimentStep>,
     runs: Vec<String>,
+    /// Is only what comes after the way to the commanded speed part of the step? Plans that name their operations say.
+    settled: Vec<bool>,
 }
 
 impl Steps {
@@ -35,7 +43,7 @@ impl Steps {
                 "the plan has no column spindle_programmed_rpm; `diagnose --experiment` writes plans".to_owned()
             );
         }
-        let mut found = Self { steps: Vec::new(), runs: Vec::new() };
+        let mut found = Self { steps: Vec::new(), runs: Vec::new(), settled: Vec::new() };
         let mut last_tool: Option<String> = None;
         for run in plan.runs() {
             for row in run.rows {
@@ -43,7 +51,8 @@ impl Steps {
                 let tool = plan.words("tool").and_then(|words| words.get(row)).map(str::to_owned);
                 step.new_edge = tool.is_some() && last_tool.is_some() && tool != last_tool;
                 last_tool = tool.or(last_tool);
-                found.add(step, &run.name);
+                let operation = plan.words("operation").and_then(|words| words.get(row));
+                found.add(step, &run.name, operation.is_some_and(|operation| operation != TRANSITION));
             }
         }
         let seconds: f64 = found.steps.iter().map(|step| step.seconds).sum();
@@ -58,10 +67,11 @@ impl Steps {
         Ok(found)
     }
 
-    fn add(&mut self, step: ExperimentStep, run: &str) {
+    fn add(&mut self, step: ExperimentStep, run: &str, settled: bool) {
         match self.steps.last_mut() {
             Some(last)
                 if self.runs.last().is_some_and(|name| name == run)
+                    && self.settled.last() == Some(&settled)
                     && (ExperimentStep { seconds: last.seconds, ..step })
                         == (ExperimentStep { new_edge: false, ..*last }) =>
             {
@@ -70,6 +80,7 @@ impl Steps {
             _ => {
                 self.steps.push(step);
                 self.runs.push(run.to_owned());
+                self.settled.push(settled);
             }
         }
     }
@@ -114,7 +125,7 @@ pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> R
     };
     let machine = Simulated::experiment(name, settings, ORIGIN_NS, &steps.steps);
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
-    let mut table = Table::new(name, &steps.runs);
+    let mut table = Table::new(name, &steps);
     table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz);
     Ok(table.finish())
 }
@@ -122,14 +133,15 @@ pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> R
 /// The recording under construction.
 struct Table<'a> {
     name: &'static str,
-    names: &'a [String],
+    steps: &'a Steps,
+    on_the_way_ns: Option<TimeNs>,
     samples: Vec<(f64, usize, Sample)>,
     first_ns: Option<TimeNs>,
 }
 
 impl<'a> Table<'a> {
-    fn new(name: &'static str, names: &'a [String]) -> Self {
-        Self { name, names, samples: Vec::new(), first_ns: None }
+    fn new(name: &'static str, steps: &'a Steps) -> Self {
+        Self { name, steps, on_the_way_ns: None, samples: Vec::new(), first_ns: None }
     }
 
     /// Samples from the first step to the end of the last one.
@@ -155,15 +167,31 @@ impl<'a> Table<'a> {
     }
 
     fn add(&mut self, sample: &Sample, step: usize) {
+        if self.is_on_the_way(sample, step) {
+            return;
+        }
         let first_ns = *self.first_ns.get_or_insert(sample.at_ns);
         let time_s = (sample.at_ns - first_ns) as f64 / SECOND_NS as f64;
         self.samples.push((time_s, step, sample.clone()));
     }
 
+    /// Has the step not begun yet, because the spindle is still on its way to the commanded speed?
+    fn is_on_the_way(&mut self, sample: &Sample, step: usize) -> bool {
+        let (Some(wanted), Some(settled)) = (self.steps.steps.get(step - 1), self.steps.settled.get(step - 1)) else {
+            return false;
+        };
+        let off = number(sample, "spindle_speed_rpm")
+            .is_some_and(|rpm| (rpm - wanted.spindle_rpm).abs() > AT_SPEED * wanted.spindle_rpm.abs() + 1.0);
+        if off {
+            self.on_the_way_ns = Some(sample.at_ns);
+        }
+        *settled && self.on_the_way_ns.is_some_and(|then_ns| sample.at_ns - then_ns < SETTLED_NS)
+    }
+
     fn finish(self) -> Recording {
         let time_s = self.samples.iter().map(|(time_s, ..)| *time_s).collect();
         let mut recording = Recording::new(self.name, time_s, None);
-        let run = |step: usize| self.names.get(step - 1).map_or("", String::as_str);
+        let run = |step: usize| self.steps.runs.get(step - 1).map_or("", String::as_str);
         recording.set_column("run", Cells::Words(self.samples.iter().map(|(_, step, _)| run(*step)).collect()));
         for id in ChannelId::all() {
             if let Some(cells) = self.cells(id) {

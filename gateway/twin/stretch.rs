@@ -1,4 +1,5 @@
-//! A stretch of the history as a diagnosis needs it: what was measured and commanded, one row per second, a run per part.
+//! A stretch of the history as a diagnosis needs it: what was measured and commanded, one row per second, a run per
+//! part, and the output only where the work had settled, as the watch looks at it.
 
 use crate::history::{HistoryError, Query, Reader};
 use adapters::clock::TimeNs;
@@ -8,7 +9,11 @@ use std::ops::Range;
 use std::path::Path;
 
 /// Rows of a stretch; the beginning of a longer one is left out.
-const ROWS_MAX: usize = 43_200;
+const ROWS_MAX: usize = 28_800;
+/// Seconds of the same work before and after a row that counts.
+const SETTLED: (usize, usize) = (4, 2);
+/// Relative change of the speed within these seconds that is no steady speed.
+const STEADY_SHARE: f64 = 0.02;
 /// Runs that make a part the unit of hold-out; with fewer the recording is cut into stretches.
 const RUNS_MIN: usize = 8;
 
@@ -16,12 +21,35 @@ const RUNS_MIN: usize = 8;
 ///
 /// # Errors
 /// What the history says.
-pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs) -> Result<Recording, HistoryError> {
+pub fn read(history: &Path, from_ns: TimeNs, to_ns: TimeNs, output: &str) -> Result<Recording, HistoryError> {
     let reader = Reader::open(history)?;
     let names: Vec<String> = reader.series()?.iter().map(|series| series.name.to_string()).collect();
     let channels = names.iter().map(String::as_str).filter(|name| ChannelId::of(name).is_some());
     let recording = reader.recording(&Query::between(from_ns, to_ns).of(channels))?;
-    Ok(complete(per_second(&recording)))
+    Ok(settled(complete(per_second(&recording)), output))
+}
+
+/// The output stands only in rows of settled work.
+fn settled(mut recording: Recording, output: &str) -> Recording {
+    let Some(measured) = recording.numbers(output) else { return recording };
+    let kept = |row: usize| measured.get(row).filter(|_| is_settled(&recording, row));
+    let kept: Numbers = (0..recording.rows()).map(kept).collect();
+    recording.set_column(output, Cells::Numbers(kept));
+    recording
+}
+
+fn is_settled(recording: &Recording, row: usize) -> bool {
+    let (before, after) = SETTLED;
+    let near = row.saturating_sub(before)..(row + after + 1).min(recording.rows());
+    let number = |name: &str, row: usize| recording.numbers(name).and_then(|numbers| numbers.get(row));
+    let word = |name: &str, row: usize| recording.words(name).and_then(|words| words.code(row));
+    let speed = number("spindle_speed_rpm", row).unwrap_or(0.0);
+    let steady = |other: f64| (other - speed).abs() <= STEADY_SHARE * speed.abs().max(1.0);
+    near.into_iter().all(|other| {
+        steady(number("spindle_speed_rpm", other).unwrap_or(0.0))
+            && ["engaged", "rapid"].iter().all(|name| number(name, other) == number(name, row))
+            && ["tool", "operation"].iter().all(|name| word(name, other) == word(name, row))
+    })
 }
 
 /// The mean of every number and the last of every word in each second.
@@ -34,6 +62,9 @@ pub fn per_second(recording: &Recording) -> Recording {
     let mut thinned = Recording::new(recording.source.clone(), time_s, recording.start_ns);
     for column in recording.columns().iter().filter(|column| !column.name.ends_with("_missing")) {
         let cells = match &column.cells {
+            // A channel that nobody delivered is no column: it may follow from others.
+            Cells::Numbers(numbers) if numbers.count_present() == 0 => continue,
+            Cells::Words(words) if words.words().is_empty() => continue,
             Cells::Numbers(numbers) => Cells::Numbers(seconds.iter().map(|rows| mean(numbers, rows)).collect()),
             Cells::Words(words) => {
                 Cells::Words(seconds.iter().map(|rows| words.get(rows.end - 1).unwrap_or("")).collect::<Words>())
@@ -116,6 +147,7 @@ mod tests {
         recording.set_column("spindle_power_w", numbers(|row| (row % 10 != 3).then(|| f64::from(row))));
         recording.set_column("depth_of_cut_mm", numbers(|row| Some(f64::from(row / 20))));
         recording.set_column("feed_mm_min", numbers(|_| Some(100.0)));
+        recording.set_column("engaged", numbers(|_| None));
         recording.set_column("spindle_power_w_missing", Cells::Words(std::iter::repeat_n("", 40).collect()));
         let thinned = complete(per_second(&recording));
         assert_eq!(thinned.time_s, [0.0, 1.0, 2.0, 3.0]);
@@ -123,6 +155,11 @@ mod tests {
         assert!((power - 42.0 / 9.0).abs() < 1e-12, "{power}");
         let engaged: Vec<_> = thinned.numbers("engaged").expect("told by the program").iter().flatten().collect();
         assert_eq!(engaged, [0.0, 0.0, 1.0, 1.0]);
+        let settled: Vec<bool> = {
+            let settled = settled(thinned.clone(), "spindle_power_w");
+            settled.numbers("spindle_power_w").expect("kept").iter().map(|power| power.is_some()).collect()
+        };
+        assert_eq!(settled, [false; 4], "the cut begins in the middle of four seconds");
         assert!(thinned.words("spindle_power_w_missing").is_none() && thinned.words("run").is_none());
     }
 }

@@ -46,7 +46,9 @@ fn since(onset: Option<&Onset>) -> (String, String) {
     let Some(Onset { at_s, low_s, high_s, .. }) = onset else {
         return ("Ever since the comparison began".to_owned(), "自开始比较以来".to_owned());
     };
-    let (at, low, high) = (clock(*at_s), beside(*low_s, *at_s), beside(*high_s, *at_s));
+    // Whole minutes that contain the interval.
+    let (low, high) = ((low_s / 60.0).floor() * 60.0, (high_s / 60.0).ceil() * 60.0);
+    let (at, low, high) = (clock(*at_s), beside(low, *at_s), beside(high, *at_s));
     (format!("Since {at} UTC (between {low} and {high})"), format!("自{at}（UTC，{low}至{high}之间）起"))
 }
 

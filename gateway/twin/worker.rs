@@ -13,8 +13,8 @@ use std::time::{Duration, Instant, SystemTime};
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// So long the newest samples may take to become durable before a diagnosis goes on without them.
 const WAIT_MAX: Duration = Duration::from_secs(10);
-/// The least claim to the processor that there is.
-const NICE: i32 = 19;
+/// A tenth of the claim to the processor that everything else has; with less, a busy box would never finish.
+const NICE: i32 = 10;
 /// Seed of the resampling: the same stretch and model give the same diagnosis.
 const SEED: u64 = 1;
 
@@ -158,7 +158,7 @@ impl FileWatch {
 
 fn diagnose(request: &Request, places: &Places) -> Report {
     wait_for_samples(&places.history, request.to_ns);
-    let recording = match stretch::read(&places.history, request.from_ns, request.to_ns) {
+    let recording = match stretch::read(&places.history, request.from_ns, request.to_ns, &request.model.output) {
         Ok(recording) => recording,
         Err(error) => return Report::NotDiagnosed(error.to_string()),
     };

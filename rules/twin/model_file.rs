@@ -346,8 +346,12 @@ impl<'t> Reader<'t> {
 
 /// Names of forms are static; a file names one of those that effects offer.
 fn form_name(name: &str) -> Option<&'static str> {
-    FORM_NAMES.iter().copied().find(|known| *known == name)
+    FORM_NAMES.iter().chain(&MORE_FORM_NAMES).copied().find(|known| *known == name)
 }
+
+/// Form names beside [`FORM_NAMES`]: of states, delays and places.
+const MORE_FORM_NAMES: [&str; 10] =
+    ["lag", "delay", "direct", "flag", "lots", "one", "speed", "clipped", "mean", "slope"];
 
 /// Every form name that an effect of the catalogue uses.
 pub(super) const FORM_NAMES: [&str; 27] = [

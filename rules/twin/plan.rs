@@ -17,6 +17,9 @@ const BOTH_MINUTES_MAX: f64 = 60.0;
 /// Rows of a plan, at most; a longer one gets fewer rows per minute.
 const ROWS_MAX: f64 = 7200.0;
 
+/// The operation of moves in which the way to the commanded speed counts; of all others only what comes after it does.
+pub const TRANSITION: &str = "transition";
+
 /// The range in which the recording shows the machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Envelope {
@@ -43,7 +46,7 @@ pub struct Move {
     pub seconds: f64,
     /// Repetition, from 1: the run.
     pub run: u32,
-    /// `standstill`, `idle`, `cut`, `axis`.
+    /// `standstill`, `idle`, `cut`, `axis`, or [`TRANSITION`].
     pub operation: &'static str,
     /// Commanded quantities by channel.
     pub commands: BTreeMap<String, f64>,

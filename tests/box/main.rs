@@ -8,3 +8,4 @@ mod lives;
 mod page;
 mod process;
 mod replay;
+mod twin;

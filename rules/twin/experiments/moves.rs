@@ -1,6 +1,6 @@
 //! Experiments as moves, by the kind of the effect whose separating experiment they are.
 
-use super::super::plan::{Envelope, Move};
+use super::super::plan::{Envelope, Move, TRANSITION};
 use std::collections::BTreeMap;
 
 /// The experiment of this kind; the ordinary work, twice, where only a measurement or a look is asked for.
@@ -83,6 +83,11 @@ fn usual_cut(e: &Envelope, seconds: f64) -> Move {
     cut(e, e.cutting_speed_rpm, e.feed_mm.1, e.depth_mm.1, seconds)
 }
 
+/// The way to the commanded speed is what is looked at.
+fn on_the_way(a: Move) -> Move {
+    Move { operation: TRANSITION, ..a }
+}
+
 fn with(mut a: Move, channel: &str, value: f64) -> Move {
     a.commands.insert(channel.to_owned(), value);
     a
@@ -124,7 +129,7 @@ fn idle_ladder(e: &Envelope, seconds: f64) -> Vec<Move> {
 }
 
 fn coast_down(e: &Envelope) -> Vec<Move> {
-    vec![idle(e.speed_rpm.1, 30.0), told(standstill(60.0), DRIVE_OFF)]
+    vec![idle(e.speed_rpm.1, 30.0), on_the_way(told(standstill(60.0), DRIVE_OFF))]
 }
 
 /// From cold: hold the highest speed, look at the zero and at a lower speed, and again warm.
@@ -236,8 +241,8 @@ fn switches() -> Vec<Move> {
 
 /// Five starts and stops, then five entries into the cut.
 fn starts(e: &Envelope) -> Vec<Move> {
-    let start = |run: u32| [standstill(8.0), idle(e.speed_rpm.1, 12.0)].map(|a| Move { run, ..a });
-    let entry = |run: u32| [idle(e.cutting_speed_rpm, 5.0), usual_cut(e, 8.0)].map(|a| Move { run, ..a });
+    let start = |run: u32| [standstill(8.0), idle(e.speed_rpm.1, 12.0)].map(|a| Move { run, ..on_the_way(a) });
+    let entry = |run: u32| [idle(e.cutting_speed_rpm, 5.0), usual_cut(e, 8.0)].map(|a| Move { run, ..on_the_way(a) });
     (1..=5).flat_map(start).chain((6..=10).flat_map(entry)).collect()
 }
 

@@ -25,6 +25,8 @@ const INTERVAL: f64 = 1.92;
 const BLOCKS_MIN: usize = 3;
 /// The level of the moment is the mean of so many blocks.
 const LEVEL_BLOCKS: usize = 10;
+/// A level within this share of the band is where it was before.
+const BACK: f64 = 0.5;
 /// A block that stands this far from both its neighbours is a disturbance, not a level.
 const ALONE: f64 = 4.0;
 
@@ -231,7 +233,7 @@ impl Chart {
     #[must_use]
     pub fn is_back(&self) -> bool {
         let level = self.level(2 * LEVEL_BLOCKS).unwrap_or(f64::INFINITY);
-        self.recent.len() >= 2 * LEVEL_BLOCKS && level.abs() < 0.8 * self.healthy.band
+        self.recent.len() >= 2 * LEVEL_BLOCKS && level.abs() < BACK * self.healthy.band
     }
 }
 

@@ -134,9 +134,13 @@ fn a_healthy_machine_is_called_different_about_once_in_thirty_days_at_most() {
 
 #[test]
 fn a_change_is_noticed_within_the_hour_and_its_onset_lies_in_the_interval() {
-    for (kind, deviations) in
-        [(Kind::White, 0.6), (Kind::Slow, 3.0), (Kind::SlowAndWhite, 3.0), (Kind::HeavyAndPulses, 1.0), (Kind::Lots, 7.0)]
-    {
+    for (kind, deviations) in [
+        (Kind::White, 0.6),
+        (Kind::Slow, 3.0),
+        (Kind::SlowAndWhite, 3.0),
+        (Kind::HeavyAndPulses, 1.0),
+        (Kind::Lots, 7.0),
+    ] {
         let (mut seen, mut covered, mut delay_s) = (0, 0, 0.0);
         for seed in 1..=10 {
             let mut machine = Machine::new(kind, 100 + seed);
@@ -151,7 +155,10 @@ fn a_change_is_noticed_within_the_hour_and_its_onset_lies_in_the_interval() {
             assert_eq!(mismatch.regime, Regime::Cutting);
             assert!(mismatch.mean > 0.0);
         }
-        println!("{kind:?} + {deviations}: {seen} of 10, onset in its interval {covered}, after {:.0} s", delay_s / f64::from(seen));
+        println!(
+            "{kind:?} + {deviations}: {seen} of 10, onset in its interval {covered}, after {:.0} s",
+            delay_s / f64::from(seen)
+        );
         assert!(seen >= 9, "{kind:?}: {seen}");
         assert!(covered >= 8, "{kind:?}: {covered} of {seen}");
     }

@@ -37,7 +37,11 @@ impl Memory {
     #[must_use]
     pub fn of(kind: &str) -> Self {
         match kind {
-            "bearing_warm_up" | "preload_growth" | "spindle_growth" | "screw_growth" | "coolant_temperature"
+            "bearing_warm_up"
+            | "preload_growth"
+            | "spindle_growth"
+            | "screw_growth"
+            | "coolant_temperature"
             | "ambient_drift" => Self::Shift,
             "depth_taper" | "entry_exit" | "engagement_timing" | "meter_window" | "clock_lag" | "override_delay"
             | "built_up_edge" | "regeneration" => Self::Pass,
