@@ -12,8 +12,8 @@ use adapters::Recording;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// A plan for two explanations holds the experiments of both when they take no longer than this together, minutes.
-const BOTH_MINUTES_MAX: f64 = 60.0;
+/// A plan holds the experiments of several explanations when they take no longer than this together, minutes.
+const TOGETHER_MINUTES_MAX: f64 = 40.0;
 /// Rows of a plan, at most; a longer one gets fewer rows per minute.
 const ROWS_MAX: f64 = 7200.0;
 
@@ -96,17 +96,29 @@ pub fn of_kinds(kinds: &[&str], envelope: &Envelope) -> Plan {
     Plan { kinds: kinds.iter().map(|kind| (*kind).to_owned()).collect(), moves: all }
 }
 
-/// The kinds whose experiments separate what is left: that of the next experiment first, then its closest rival's.
+/// The kinds whose experiments separate what is left: that of the next experiment first, then those of every explanation
+/// that is still open, then those that the best explanation is usually confused with: a recording in which little was
+/// varied cannot even tell that they compete.
 fn kinds(diagnosis: &Diagnosis) -> Vec<&str> {
+    let asked = diagnosis.next_experiment.iter().map(|experiment| experiment.effect.as_str());
+    if diagnosis.alternatives.is_empty() && diagnosis.missing.is_empty() && diagnosis.next_experiment.is_none() {
+        return Vec::new();
+    }
+    let open = diagnosis.alternatives.iter().flat_map(|other| [other.effect.as_str(), &other.instead_of]);
+    let found = diagnosis.missing.iter().map(|missing| missing.effect.as_str());
+    let first = diagnosis.alternatives.first().map(|other| other.instead_of.as_str());
+    let rivals = first.and_then(effect).map_or(&[][..], |effect| effect.doc().rivals);
+    let usual = if diagnosis.alternatives.is_empty() { found.take(1).collect() } else { rivals.to_vec() };
+    chosen(asked.chain(open).chain(usual))
+}
+
+/// As many as can be carried out in the time, each experiment once.
+fn chosen<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut kinds: Vec<&str> = Vec::new();
     let mut minutes = 0.0;
-    let asked = diagnosis.next_experiment.iter().map(|experiment| experiment.effect.as_str());
-    let rivals = diagnosis.alternatives.iter().take(1).flat_map(|other| [other.effect.as_str(), &other.instead_of]);
-    let found = diagnosis.missing.iter().take(1).map(|missing| missing.effect.as_str());
-    let all = asked.chain(rivals).chain(found.filter(|_| diagnosis.alternatives.is_empty()));
-    for doc in all.filter_map(|kind| effect(kind).map(crate::physics::Effect::doc)) {
-        let fits = kinds.is_empty() || minutes + doc.experiment_minutes <= BOTH_MINUTES_MAX;
-        if fits && !kinds.contains(&doc.kind) {
+    for doc in wanted.filter_map(|kind| effect(kind).map(crate::physics::Effect::doc)) {
+        let fits = kinds.is_empty() || minutes + doc.experiment_minutes <= TOGETHER_MINUTES_MAX;
+        if fits && !kinds.iter().any(|kind| moves::same(kind, doc.kind)) {
             kinds.push(doc.kind);
             minutes += doc.experiment_minutes;
         }

@@ -52,8 +52,8 @@ fn start(directory: &Path, more: &[&str]) -> Gateway {
 /// So many hours of machine time, as fast as possible.
 fn hours(directory: &Path, hours: u32) {
     let mut gateway = start(directory, &["--speed", "max", "--for", &(hours * HOUR_S).to_string()]);
-    let ended = wait_for("the end of the run", Duration::from_secs(180), || gateway.has_ended().then_some(()));
-    assert_eq!(ended, (), "{}", gateway.said());
+    wait_for("the end of the run", Duration::from_secs(400), || gateway.has_ended().then_some(()));
+    assert!(gateway.said().contains("history closed"), "{}", gateway.said());
 }
 
 fn records(directory: &Path, kind: &str) -> Vec<Value> {
@@ -97,7 +97,7 @@ fn greater_cutting_forces_are_noticed_dated_diagnosed_and_shown() {
     // The diagnosis goes on after a restart, at a pace that leaves it a processor.
     let mut gateway = start(place, &["--speed", "2"]);
     let address = gateway.address();
-    let twin = wait_for("a diagnosis", Duration::from_secs(240), || {
+    let twin = wait_for("a diagnosis", Duration::from_secs(600), || {
         let twin = get(&address, "/api/v1/twin").json();
         (!twin["diagnoses"].as_array().expect("a list").is_empty()).then_some(twin)
     });

@@ -39,6 +39,22 @@ pub fn of_kind(kind: &str, e: &Envelope) -> Vec<Move> {
     }
 }
 
+/// Are these two told apart from others by the same experiment?
+#[must_use]
+pub fn same(a: &str, b: &str) -> bool {
+    const GROUPS: [&[&str]; 8] = [
+        &["no_load_power", "windage"],
+        &["iron_loss", "field_weakening"],
+        &["bearing_warm_up", "preload_growth"],
+        &["dry_friction", "viscous_friction"],
+        &["edge_force", "cutting_power"],
+        &["speed_softening", "built_up_edge", "runout"],
+        &["load_loss", "copper_loss", "inverter_loss"],
+        &["spindle_inertia", "regeneration", "meter_window", "clock_lag"],
+    ];
+    a == b || GROUPS.iter().any(|group| group.contains(&a) && group.contains(&b))
+}
+
 type Told = (&'static str, &'static str);
 
 const OVERNIGHT: Told = ("measure displacement and shop temperature overnight", "整夜测量位移和环境温度");

@@ -105,7 +105,7 @@ fn usual(blocks: &[Block]) -> (BTreeMap<usize, Usual>, f64) {
 
 fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
     let n = count(deviations.len());
-    let all = [0..deviations.len()];
+    let all = std::iter::once(0..deviations.len()).collect::<Vec<_>>();
     let noise = cautious(noise::fit(deviations, &all), n);
     let innovations = noise::whiten(deviations, &all, noise);
     let rms = (innovations.iter().map(|e| e * e).sum::<f64>() / (n - works).max(1.0)).sqrt();

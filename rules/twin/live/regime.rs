@@ -97,8 +97,11 @@ fn work(regime: Regime, row: &Row) -> String {
 /// Lets a second through when the same has been going on before and goes on after it.
 #[derive(Debug, Clone, Default)]
 pub struct Settling<T> {
-    held: VecDeque<(Option<(Regime, String)>, f64, T)>,
+    held: VecDeque<Held<T>>,
 }
+
+/// A second that waits: what is done, the speed, and what goes with it.
+type Held<T> = (Option<(Regime, String)>, f64, T);
 
 impl<T: Copy> Settling<T> {
     /// Nothing seen yet.

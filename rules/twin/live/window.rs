@@ -140,9 +140,10 @@ impl Window {
                 recording.set_column(id.name(), Cells::Numbers(numbers));
             }
         }
-        let derived = |of: &dyn Fn(&(Row, Option<f64>)) -> Option<f64>| rows.iter().map(|row| of(row)).collect();
-        recording.set_column("engaged", Cells::Numbers(derived(&|(row, _)| row.engaged())));
-        recording.set_column("cutting_time_min", Cells::Numbers(derived(&|(_, minutes)| *minutes)));
+        let engaged = rows.iter().map(|(row, _)| row.engaged()).collect();
+        recording.set_column("engaged", Cells::Numbers(engaged));
+        let minutes = rows.iter().map(|(_, minutes)| *minutes).collect();
+        recording.set_column("cutting_time_min", Cells::Numbers(minutes));
         recording
     }
 }
