@@ -37,6 +37,8 @@ pub struct Envelope {
     pub axis_speed: f64,
     /// Column of the axis velocity.
     pub axis_column: String,
+    /// Is it the spindle that is compared? Then friction is that of its bearings and belt.
+    pub spindle: bool,
 }
 
 /// What is commanded over a stretch of time.
@@ -151,6 +153,7 @@ impl Envelope {
             diameter_mm: middle(in_cut(column("diameter_mm")), 60.0),
             axis_speed: if axis_speed > 0.0 { axis_speed } else { 3000.0 },
             axis_column: axis_column.unwrap_or_else(|| "axis_velocity_mm_min".to_owned()),
+            spindle: diagnosis.output.contains("spindle"),
         }
     }
 }
@@ -232,6 +235,7 @@ mod tests {
             diameter_mm: 60.0,
             axis_speed: 3000.0,
             axis_column: "axis_velocity_mm_min".to_owned(),
+            spindle: false,
         }
     }
 

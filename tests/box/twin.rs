@@ -99,7 +99,7 @@ fn greater_cutting_forces_are_noticed_dated_diagnosed_and_shown() {
     let address = gateway.address();
     let twin = wait_for("a diagnosis", Duration::from_secs(600), || {
         let twin = get(&address, "/api/v1/twin").json();
-        (!twin["diagnoses"].as_array().expect("a list").is_empty()).then_some(twin)
+        twin["diagnoses"].as_array().is_some_and(|diagnoses| !diagnoses.is_empty()).then_some(twin)
     });
     let regimes = twin["twin"]["regimes"].as_array().expect("a list");
     let cutting = regimes.iter().find(|regime| regime["regime"] == "cutting").expect("it cuts");

@@ -11,6 +11,7 @@ pub fn of_kind(kind: &str, e: &Envelope) -> Vec<Move> {
         "iron_loss" | "field_weakening" => [twice(&idle_ladder(e, 45.0)), coast_down(e)].concat(),
         "bearing_warm_up" | "preload_growth" => cold_and_warm(e),
         "stribeck" => twice(&axis_ladder(e, &[0.005, 0.01, 0.02, 0.035, 0.05], 8.0)),
+        "dry_friction" | "viscous_friction" if e.spindle => twice(&idle_ladder(e, 60.0)),
         "dry_friction" | "viscous_friction" => twice(&axis_ladder(e, &[0.1, 0.3, 0.6, 1.0], 8.0)),
         "axis_friction" | "gravity_axis" => twice(&axis_ladder(e, &[0.2, 0.5, 1.0], 10.0)),
         "direction_asymmetry" => twice(&axis_ladder(e, &[0.5, 0.5, 0.5], 8.0)),

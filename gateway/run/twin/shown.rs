@@ -1,0 +1,98 @@
+//! The twin in the status document: differences that stand, what is compared, what was found.
+
+use super::{Twin, code};
+use crate::status::AlarmStatus;
+use crate::twin::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
+use crate::twin::words;
+use crate::twin::worker::Finished;
+use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
+
+impl Twin {
+    /// Differences that stand.
+    #[must_use]
+    pub fn alarms(&self) -> Vec<AlarmStatus> {
+        let alarm = |mismatch: &Mismatch| AlarmStatus {
+            code: code(mismatch.regime),
+            severity: "warning".to_owned(),
+            text: self.text(mismatch),
+            since_ms: mismatch.onset.map_or(0, |onset| milliseconds(onset.at_s)),
+        };
+        self.mismatches().iter().map(alarm).collect()
+    }
+
+    fn text(&self, mismatch: &Mismatch) -> String {
+        words::in_language(words::mismatch(mismatch, self.quantity(), self.unit()), self.language)
+    }
+
+    /// For the status document.
+    #[must_use]
+    pub fn status(&self) -> TwinStatus {
+        let in_charge = self.in_charge.as_ref();
+        let compared = in_charge.map_or(Compared::none(live::NoTwin::NotYet), |in_charge| in_charge.live.compared());
+        let why = in_charge.and_then(|in_charge| in_charge.live.why().map(str::to_owned));
+        let reason = compared.residual.err();
+        TwinStatus {
+            model: in_charge.map(|in_charge| in_charge.loaded.model.name.clone()).unwrap_or_default(),
+            file: self.places.model.display().to_string(),
+            output: in_charge.map(|in_charge| in_charge.loaded.model.output.clone()).unwrap_or_default(),
+            unit: self.unit(),
+            twin_expected: compared.expected.ok(),
+            twin_residual: compared.residual.ok(),
+            missing: reason.map(live::NoTwin::word),
+            why: reason.map(|reason| why.unwrap_or_else(|| reason.to_string())),
+            regimes: in_charge.map_or_else(Vec::new, |in_charge| self.regimes(&in_charge.live)),
+            diagnosing_since_ms: self.begun_ns.filter(|_| self.diagnosing).map(|ns| ns.div_euclid(1_000_000)),
+            diagnosis: self.finished.as_ref().map(|finished| self.diagnosis(finished)),
+            problem: self.problem.clone(),
+        }
+    }
+
+    fn regimes(&self, live: &Live) -> Vec<RegimeStatus> {
+        let status = |(regime, stage): (Regime, Stage)| {
+            let none = RegimeStatus {
+                regime: regime.word(),
+                stage: "learning",
+                learned: None,
+                usual: None,
+                difference: None,
+                difference_pct: None,
+                since_ms: None,
+                text: None,
+            };
+            match stage {
+                Stage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
+                Stage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
+                Stage::Differing(mismatch) => RegimeStatus {
+                    stage: "differing",
+                    difference: Some(mismatch.mean),
+                    difference_pct: mismatch.percent(),
+                    since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(milliseconds)),
+                    text: Some(self.text(&mismatch)),
+                    ..none
+                },
+            }
+        };
+        live.stages().map(status).collect()
+    }
+
+    fn diagnosis(&self, finished: &Finished) -> DiagnosisStatus {
+        let record = &finished.record;
+        let accept = finished
+            .improved
+            .as_ref()
+            .map_or(String::new(), |improved| format!("cp {} {}", improved.display(), self.places.model.display()));
+        DiagnosisStatus {
+            at_ms: record.at_ns.div_euclid(1_000_000),
+            from_ms: record.from_ns.div_euclid(1_000_000),
+            to_ms: record.to_ns.div_euclid(1_000_000),
+            verdict: record.verdict.clone(),
+            summary: record.summary.clone(),
+            missing: finished.missing.clone(),
+            accept,
+        }
+    }
+}
+
+fn milliseconds(at_s: f64) -> i64 {
+    words::nanoseconds(at_s).div_euclid(1_000_000)
+}
