@@ -4,7 +4,7 @@
 mod shown;
 
 use super::health::Health;
-use crate::config::{Config, Language};
+use crate::config::Config;
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
@@ -12,6 +12,7 @@ use crate::twin::words;
 use crate::twin::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
+use rules::physics::explain::Language;
 use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
 use rules::twin::verdicts::unit_of;
 use serde::{Deserialize, Serialize};
@@ -91,7 +92,7 @@ impl Twin {
         let mut twin = Self {
             places,
             memory: data_dir.join("twin.json"),
-            language: config.gateway.language,
+            language: config.gateway.language.unwrap_or_default(),
             in_charge: None,
             suffix: String::new(),
             stored: false,

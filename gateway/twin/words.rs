@@ -1,7 +1,7 @@
 //! What the twin notices, in plain words.
 
-use crate::config::Language;
 use adapters::clock::{SECOND_NS, TimeNs};
+use rules::physics::explain::Language;
 use rules::twin::live::{Mismatch, Onset, Regime};
 use rules::twin::text::short;
 
