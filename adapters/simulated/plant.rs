@@ -202,9 +202,9 @@ impl Plant {
         }
     }
 
-    /// Load display of the drive in percent of its rated power.
+    /// Load display of the drive in percent of its rated power; like a real one it stops at a full scale.
     pub(super) fn load_display_pct(&self) -> f64 {
-        100.0 * self.load_display_w / self.frame.rated_w
+        (100.0 * self.load_display_w / self.frame.rated_w).clamp(-LOAD_DISPLAY_MAX_PCT, LOAD_DISPLAY_MAX_PCT)
     }
 
     /// Magnetising current and the current that makes torque, at right angles.
@@ -221,6 +221,9 @@ impl Plant {
         0.85 * (self.bearing_c - 20.0) + 1.9 * (self.housing_c - 20.0) - 0.6 * (self.ambient_c - 20.0)
     }
 }
+
+/// Full scale of the load display.
+const LOAD_DISPLAY_MAX_PCT: f64 = 300.0;
 
 fn approach(state: &mut f64, towards: f64, dt_s: f64, tau_s: f64) {
     *state += (towards - *state) * (1.0 - (-dt_s / tau_s).exp());

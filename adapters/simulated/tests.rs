@@ -299,15 +299,29 @@ proptest::proptest! {
     ) {
         let base = if is_mill { mill() } else { lathe() };
         let settings = SimulatedSettings { seed, tau_s, cut: CutLevel::Planned(cut), speed_changes, ..base };
-        let machine = machine(settings);
-        machine.locked().write_override(40 * SECOND_NS, percent);
-        let (mut controller, mut meter, mut out) = (machine.controller(), machine.meter(), Vec::new());
-        for _ in 0..4000 {
-            let _ = controller.pull(&mut out);
-            let _ = meter.pull(&mut out);
-            for reading in out.drain(..) {
-                proptest::prop_assert!(reading.value != Err(Absence::OutOfRange), "{reading:?}");
-            }
+        let refused = out_of_range(settings, percent);
+        proptest::prop_assert!(refused.is_none(), "{refused:?}");
+    }
+}
+
+/// The first reading outside its channel's range.
+fn out_of_range(settings: SimulatedSettings, percent: u8) -> Option<Reading> {
+    let machine = machine(settings);
+    machine.locked().write_override(40 * SECOND_NS, percent);
+    let (mut controller, mut meter, mut out) = (machine.controller(), machine.meter(), Vec::new());
+    for _ in 0..4000 {
+        let _ = controller.pull(&mut out);
+        let _ = meter.pull(&mut out);
+        if let Some(refused) = out.drain(..).find(|reading| reading.value == Err(Absence::OutOfRange)) {
+            return Some(refused);
         }
     }
+    None
+}
+
+#[test]
+fn three_times_the_planned_cut_at_more_than_twice_the_feed_stays_on_the_display() {
+    let settings =
+        SimulatedSettings { seed: 10_129_099_058_646_574_734, tau_s: 1.098, cut: CutLevel::Planned(2.94), ..lathe() };
+    assert_eq!(out_of_range(settings, 246), None);
 }

@@ -81,17 +81,38 @@ impl Fit {
         frame.whiten(&self.residual, self.noise)
     }
 
-    /// Covariance of the free parameters, from the whitened tangent.
+    /// Variances of the free parameters: from the whitened tangent, or from how far the units of hold-out disagree
+    /// (Liang and Zeger, Biometrika 73, 1986) where that is more - the innovations are never quite white, and no law is
+    /// quite true.
     #[must_use]
-    pub fn covariance(&self, frame: &Frame) -> Vec<Vec<f64>> {
+    pub fn variances(&self, frame: &Frame) -> Vec<f64> {
         let columns: Vec<Vec<f64>> = self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
         let innovations = self.innovations(frame);
-        let solution = least_squares(&columns, &innovations);
+        let inverse = least_squares(&columns, &innovations).inverse;
         let freedom = count(frame.len().saturating_sub(self.free.len()).max(1));
         let variance = dot(&innovations, &innovations) / freedom;
-        let scale = |row: Vec<f64>| row.into_iter().map(|x| x * variance).collect();
-        solution.inverse.into_iter().map(scale).collect()
+        let among_units = disagreement(&columns, &innovations, &inverse, &frame.unit);
+        (0..columns.len()).map(|index| (inverse[index][index] * variance).max(among_units[index])).collect()
     }
+}
+
+/// Units below which their disagreement says nothing.
+const UNITS_MIN: usize = 5;
+
+/// Variances of the parameters from the sums of each unit; zero for too few units.
+fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>], unit: &[usize]) -> Vec<f64> {
+    let units = unit.last().map_or(0, |last| last + 1);
+    let mut scores = vec![vec![0.0; columns.len()]; units];
+    for (row, unit) in unit.iter().enumerate() {
+        columns.iter().zip(&mut scores[*unit]).for_each(|(column, score)| *score += column[row] * innovations[row]);
+    }
+    scores.retain(|score| score.iter().any(|x| *x != 0.0));
+    if scores.len() < UNITS_MIN {
+        return vec![0.0; columns.len()];
+    }
+    let few = count(scores.len()) / (count(scores.len()) - 1.0);
+    let of = |line: &Vec<f64>| few * scores.iter().map(|score| dot(line, score).powi(2)).sum::<f64>();
+    inverse.iter().map(of).collect()
 }
 
 /// The free parameters of parts: everything not fixed.
