@@ -1,8 +1,9 @@
 //! The hypotheses of a search: every form of every effect the scene can excite, as columns.
 
 use super::frame::Frame;
-use super::model::{Body, Model, Part};
-use crate::physics::{CATALOGUE, Effect, Form, Scene};
+use super::model::{Body, Model, Parameter, Part};
+use super::term::Term;
+use crate::physics::{CATALOGUE, Effect, Form, Role, Scene};
 
 /// Kinds that build a model and are never a finding by themselves.
 const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
@@ -81,7 +82,26 @@ pub fn wanted(effect: &dyn Effect, model: &Model) -> bool {
     let excluded = model.exclude.iter().any(|excluded| excluded == kind) || BUILDING.contains(&kind);
     // A part whose every number is fixed may itself be wrong, so its kind stays a candidate.
     let modelled = model.parts.iter().any(|part| part.kind == kind && !part.parameters.iter().all(|p| p.fixed));
-    listed && !excluded && !modelled
+    let weighed = INERTIA.contains(&kind) && weighs_acceleration(model);
+    listed && !(excluded || modelled || weighed)
+}
+
+/// Kinds that a coefficient of the acceleration already is.
+const INERTIA: [&str; 2] = ["axis_inertia", "spindle_inertia"];
+
+/// Has the model a free coefficient of the acceleration it declares? Another inertia would only mend that column.
+fn weighs_acceleration(model: &Model) -> bool {
+    let Some(acceleration) = model.roles.get(&Role::Acceleration) else { return false };
+    let weighs = |part: &Part| match &part.body {
+        Body::Linear(terms) => {
+            let of = |(term, parameter): (&Term, &Parameter)| {
+                term.input() == Some(acceleration.as_str()) && !parameter.fixed
+            };
+            terms.iter().zip(&part.parameters).any(of)
+        }
+        _ => false,
+    };
+    model.parts.iter().any(weighs)
 }
 
 /// The columns of one form.
