@@ -2,22 +2,16 @@
 
 #[path = "support/axis.rs"]
 mod axis;
+#[path = "support/command.rs"]
+mod command;
 
 use adapters::{ChannelId, Sample, Slot, Value};
 use axis::{MODEL, Noise, recording};
+use command::gateway;
 use gateway::history::{Options, Query, Reader, WhenFull, Writer};
 use serde_json::Value as Json;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
-
-fn gateway(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
-        .current_dir(directory)
-        .args(arguments)
-        .output()
-        .expect("the binary starts")
-}
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).expect("the program prints UTF-8")

@@ -4,23 +4,18 @@
 //! The machine is the simulated lathe, whose laws are not those of the catalogue; on top of it stands a law that only
 //! this file knows.
 
+#[path = "support/command.rs"]
+mod command;
+
+use command::gateway;
 use serde_json::Value as Json;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// What the lathe takes, as a broad recording of it was fitted; nothing of it is refitted.
 const MODEL: &str = include_str!("data/second_round/lathe.toml");
-
-fn gateway(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
-        .current_dir(directory)
-        .args(arguments)
-        .output()
-        .expect("the binary starts")
-}
 
 /// One row of a recording: a quantity by its column, 0 where the cell is empty.
 struct Row<'a> {

@@ -196,6 +196,14 @@ impl Frame {
         };
         self.groups.iter().map(mean).collect()
     }
+
+    /// The other way: each group's value in all of its rows, zero in rows that take no part.
+    #[must_use]
+    pub fn spread(&self, values: &[f64], rows: usize) -> Vec<f64> {
+        let mut column = vec![0.0; rows];
+        self.groups.iter().zip(values).for_each(|(group, value)| column[group.clone()].fill(*value));
+        column
+    }
 }
 
 /// Stretches of usable rows without a gap longer than three periods.

@@ -4,9 +4,13 @@
 use super::designs::Design;
 use super::diagnose::Case;
 use super::fit::Fit;
+use super::latent::{self, Switching};
 use super::noise::count;
 use super::quality::median;
+use super::ripple::{self, Ripple};
+use super::wave::{self, Wave};
 use crate::physics::{Form, OutputKind, Role};
+use std::ops::Range;
 
 /// Rows of a spell in the cut from which a frequency can be read.
 const SPELL_ROWS_MIN: usize = 8;
@@ -19,10 +23,10 @@ impl Case<'_> {
         if self.scene.output_kind() == OutputKind::Displacement || !super::designs::wanted(effect, self.model) {
             return None;
         }
-        let found = super::latent::find(&base.residual, &self.frame.stretches)?;
+        let found = latent::find(&base.residual, &self.frame.stretches)?;
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
-        let form = Form { name: "latent", ln_choices: 0.5 * super::latent::price(&found), ..Form::default() };
+        let form = Form { name: "latent", ln_choices: 0.5 * latent::price(&found), ..Form::default() };
         super::designs::design(effect, &form, &self.scene, &self.frame)
     }
 
@@ -36,7 +40,7 @@ impl Case<'_> {
         if !electric || !sampled || !super::designs::wanted(effect, self.model) {
             return None;
         }
-        let found = super::ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
+        let found = ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
         if !self.keeps_its_frequency(&base.residual, &found.wave) {
             return None;
         }
@@ -46,7 +50,7 @@ impl Case<'_> {
         let left: Vec<f64> = base.residual.iter().zip(&found.values).map(|(x, wave)| x - wave).collect();
         let (likelihood, _) = super::noise::fit_near(&left, &self.frame, found.wave.noise);
         let seeming = 2.0 * (likelihood - base.log_likelihood);
-        let ln_choices = 0.5 * (seeming - found.gain + super::ripple::price(self.frame.len()));
+        let ln_choices = 0.5 * (seeming - found.gain + ripple::price(self.frame.len()));
         let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
         let form = Form { name: "latent", ln_choices: ln_choices.max(0.0), shape, ..Form::default() };
         let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
@@ -60,29 +64,29 @@ impl Case<'_> {
 
     /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a
     /// screw, an insert or the work is not.
-    fn keeps_its_frequency(&self, residual: &[f64], wave: &super::wave::Wave) -> bool {
+    fn keeps_its_frequency(&self, residual: &[f64], wave: &Wave) -> bool {
         let paces = [self.scene.column("feed_mm_min"), self.scene.role(Role::Speed)];
         paces.into_iter().flatten().all(|pace| {
             let spells = self.spells_in_the_cut(pace);
             let paces: Vec<f64> = spells.iter().map(|(_, pace)| *pace).collect();
             let Some(middle) = median(paces) else { return true };
-            let part = |fast: bool| -> Vec<std::ops::Range<usize>> {
-                let wanted = |(_, pace): &&(std::ops::Range<usize>, f64)| {
+            let part = |fast: bool| -> Vec<Range<usize>> {
+                let wanted = |(_, pace): &&(Range<usize>, f64)| {
                     if fast { *pace > 1.1 * middle } else { *pace <= 0.9 * middle }
                 };
                 spells.iter().filter(wanted).map(|(groups, _)| groups.clone()).collect()
             };
             let (slow, fast) = (part(false), part(true));
-            super::ripple::same_frequency(residual, &slow, &fast, wave)
+            ripple::same_frequency(residual, &slow, &fast, wave)
         })
     }
 
     /// Stretches of the cut at one pace, with that pace.
-    fn spells_in_the_cut(&self, pace: &[f64]) -> Vec<(std::ops::Range<usize>, f64)> {
+    fn spells_in_the_cut(&self, pace: &[f64]) -> Vec<(Range<usize>, f64)> {
         let engaged = self.scene.role(Role::Engaged);
         let cutting = |group: usize| self.frame.rows(group).all(|row| engaged.is_none_or(|e| e[row] > 0.5));
         let of = |group: usize| pace[self.frame.rows(group).start];
-        let mut spells: Vec<(std::ops::Range<usize>, f64)> = Vec::new();
+        let mut spells: Vec<(Range<usize>, f64)> = Vec::new();
         for stretch in &self.frame.stretches {
             for group in stretch.clone().filter(|group| cutting(*group)) {
                 match spells.last_mut() {
@@ -102,17 +106,14 @@ impl Case<'_> {
     }
 
     /// The wave in every row: as smoothed where the rows were fitted, expected from earlier rows in held-out runs.
-    fn wave_per_row(&self, found: &super::ripple::Ripple) -> Vec<f64> {
-        let mut wave = vec![0.0; self.scene.rows()];
-        for group in 0..self.frame.len() {
-            self.frame.rows(group).for_each(|row| wave[row] = found.values[group]);
-        }
+    fn wave_per_row(&self, found: &Ripple) -> Vec<f64> {
+        let mut wave = self.frame.spread(&found.values, self.scene.rows());
         let simulated = self.scene.simulated().unwrap_or_default();
         let recorded = self.scene.recorded();
         for groups in &self.held_frame.stretches {
             let rows: Vec<usize> = groups.clone().flat_map(|group| self.held_frame.rows(group)).collect();
             let residual: Vec<f64> = rows.iter().map(|row| recorded[*row] - simulated[*row]).collect();
-            let expected = super::wave::follow(&residual, &found.wave);
+            let expected = wave::follow(&residual, &found.wave);
             rows.iter().zip(expected).for_each(|(row, expected)| wave[*row] = expected);
         }
         wave
@@ -120,17 +121,14 @@ impl Case<'_> {
 
     /// The state of a hidden switch in every row: as found where the rows were fitted, followed causally in held-out
     /// runs.
-    fn switch_per_row(&self, found: &super::latent::Switching) -> Vec<f64> {
-        let mut state = vec![0.0; self.scene.rows()];
-        for group in 0..self.frame.len() {
-            self.frame.rows(group).for_each(|row| state[row] = found.state[group]);
-        }
+    fn switch_per_row(&self, found: &Switching) -> Vec<f64> {
+        let mut state = self.frame.spread(&found.state, self.scene.rows());
         let simulated = self.scene.simulated().unwrap_or_default();
         let on = found.state.iter().sum::<f64>() / count(found.state.len());
         for rows in self.held.iter().map(|unit| self.units[*unit].rows.clone()) {
             let residual: Vec<f64> = rows.clone().map(|row| self.scene.recorded()[row] - simulated[row]).collect();
             let deviation = 0.5 * found.level.abs();
-            let followed = super::latent::follow(&residual, found, deviation, on);
+            let followed = latent::follow(&residual, found, deviation, on);
             rows.zip(followed).for_each(|(row, on)| state[row] = on);
         }
         state

@@ -16,6 +16,7 @@ mod place;
 mod plot;
 mod response;
 mod strip;
+mod table;
 #[cfg(test)]
 mod tests;
 mod text;

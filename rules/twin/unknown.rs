@@ -9,7 +9,7 @@ use super::empirical::empirical_designs;
 use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::model::{Body, simulate};
-use super::scan::Bank;
+use super::scan::{Bank, price};
 use super::search::{Found, Hypothesis, P_MAX};
 use crate::physics::Role;
 
@@ -54,37 +54,31 @@ impl Case<'_> {
         let frame = self.frame.clone();
         let bank = Bank::new(&designs, &frame);
         let on_top = self.best_empirical(&found.best.fit, &bank)?;
-        let alone = if found.best.members.is_empty() { on_top.clone() } else { self.best_empirical(base, &bank)? };
-        let named = found.best.information;
-        let least = if found.best.members.is_empty() { NOTHING_NAMED_INFORMATION } else { UNKNOWN_INFORMATION };
-        let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
         let anything = !found.best.members.is_empty();
+        let alone = if anything { self.best_empirical(base, &bank)? } else { on_top.clone() };
+        let named = found.best.information;
+        let least = if anything { UNKNOWN_INFORMATION } else { NOTHING_NAMED_INFORMATION };
+        let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
         let better = anything
             && alone.information > named + (BETTER_SHARE * named).max(BETTER_INFORMATION)
             && !self.is_friction(&alone, &bank, &found.best.fit);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
-        let stands = |given: f64| anything && named + on_top.information - given > STANDS_SHARE * named;
-        let doubted = remains && !self.with_empirical(base, &on_top, &bank).is_some_and(stands);
+        let stands = |given: Hypothesis| named + on_top.information - given.information > STANDS_SHARE * named;
+        let doubted = remains && !(anything && self.with_form(base, &bank, on_top.members[0]).is_some_and(stands));
         if !(doubted || better) {
             return None;
         }
-        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, found.best.members.is_empty());
         let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
         let small = self.negligible(&from.residual, &to.fit.residual, noise, to.information);
-        if small || !better && p > P_MAX {
+        if small {
+            return None;
+        }
+        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
+        if !better && p > P_MAX {
             return None;
         }
         Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
-    }
-
-    /// Information of one empirical form over the baseline.
-    fn with_empirical(&mut self, base: &Fit, empirical: &Hypothesis, bank: &Bank<'_>) -> Option<f64> {
-        let design = &bank.designs[*empirical.members.first()?];
-        let mut parts = base.parts.clone();
-        parts.push(design.part.clone());
-        let fitted = self.with_data(|data| fit(data, &parts, base.noise))?;
-        Some(2.0 * (fitted.log_likelihood - base.log_likelihood) - super::scan::price(design, self.ln_rows(base)))
     }
 
     /// Is a bent line over the velocity of the axis no more than the shape of a friction that has been named? No law of
@@ -100,18 +94,20 @@ impl Case<'_> {
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
     fn best_empirical(&mut self, from: &Fit, bank: &Bank<'_>) -> Option<Hypothesis> {
-        let ln_rows = self.ln_rows(from);
-        let designs = bank.designs;
-        let scores = bank.scan(from, ln_rows);
-        let best = scores
-            .iter()
-            .filter(|score| score.information.is_finite())
-            .max_by(|a, b| a.information.total_cmp(&b.information))?;
+        let scores = bank.scan(from, self.ln_rows(from));
+        let known = scores.iter().filter(|score| score.information.is_finite());
+        let best = known.max_by(|a, b| a.information.total_cmp(&b.information))?;
+        self.with_form(from, bank, best.design)
+    }
+
+    /// One empirical form on top of `from`, fitted in full; information relative to `from`.
+    fn with_form(&mut self, from: &Fit, bank: &Bank<'_>, index: usize) -> Option<Hypothesis> {
+        let design = &bank.designs[index];
         let mut parts = from.parts.clone();
-        parts.push(designs[best.design].part.clone());
+        parts.push(design.part.clone());
         let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
-        let information =
-            2.0 * (fit.log_likelihood - from.log_likelihood) - super::scan::price(&designs[best.design], ln_rows);
-        Some(Hypothesis { members: vec![best.design], fit, information })
+        let gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
+        let information = gain - price(design, self.ln_rows(from));
+        Some(Hypothesis { members: vec![index], fit, information })
     }
 }

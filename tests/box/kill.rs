@@ -1,7 +1,7 @@
 //! Kill -9 at random moments, of a replay and of a live box: nothing that was acknowledged is lost, nothing is stored
 //! twice, the file is in order, and the next start goes on.
 
-use super::process::{Gateway, get, program, run, stderr, stdout};
+use super::process::{Gateway, get, program, run, stderr, stdout, text};
 use rand::{Rng, SeedableRng};
 use serde_json::Value;
 use std::fs;
@@ -10,10 +10,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 const KILLS: usize = 20;
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path")
-}
 
 fn answer(arguments: &[&str]) -> String {
     let output = run(arguments);

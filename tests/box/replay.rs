@@ -1,6 +1,6 @@
 //! `replay`: real and made-up recordings through the same pipeline, and what a broken one is told.
 
-use super::process::{run, shared, stderr, stdout};
+use super::process::{run, shared, stderr, stdout, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -9,10 +9,6 @@ fn replayed(arguments: &[&str]) -> Value {
     let output = run(&[&["replay", "--json"], arguments].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     serde_json::from_str(&stdout(&output)).expect("JSON")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a path")
 }
 
 fn exported(database: &Path) -> String {

@@ -2,6 +2,7 @@
 
 use super::data::Data;
 use super::place::capital;
+use super::table::{Head, table};
 use super::text::{escape, exponent, fixed, law, number, unit_text, with_unit};
 use crate::physics::explain::Language;
 use crate::twin::diagnosis::{Estimate, Missing};
@@ -58,13 +59,13 @@ fn parameters(data: &Data<'_>, missing: &Missing) -> String {
         return format!("<p class=\"note\">{none}</p>");
     }
     let rows: String = missing.parameters.iter().map(|e| parameter(data, &missing.effect, e)).collect();
-    format!(
-        "<div class=\"scroll\"><table><thead><tr><th>{}</th><th class=\"n\">{}</th><th class=\"n\">{}</th><th>{}</th></tr></thead><tbody>{rows}</tbody></table></div>",
-        data.say("parameter", "参数"),
-        data.say("value", "值"),
-        data.say("95\u{202f}% interval", "95\u{202f}%区间"),
-        data.say("unit", "单位"),
-    )
+    let heads = [
+        Head::Words(data.say("parameter", "参数")),
+        Head::Number(data.say("value", "值")),
+        Head::Number(data.say("95\u{202f}% interval", "95\u{202f}%区间")),
+        Head::Words(data.say("unit", "单位")),
+    ];
+    table(&heads, &rows)
 }
 
 fn parameter(data: &Data<'_>, effect: &str, e: &Estimate) -> String {

@@ -1,6 +1,7 @@
 //! What else it could be, what to record next, bent parameters, data quality, and how to read the page.
 
 use super::data::Data;
+use super::table::{Head, listed};
 use super::text::{escape, fixed, number, signed, unit_text, with_unit};
 use crate::physics::explain::Language;
 use crate::twin::diagnosis::{Alternative, Shift};
@@ -18,14 +19,13 @@ pub(super) fn alternatives(data: &Data<'_>) -> String {
         "This recording supports these nearly as well. The smaller the lead, the harder they are to tell apart; under 6 units it is no proof.",
         "此记录对下列解释的支持几乎相同。领先越小越难区分；不足6个单位不能作为证据。",
     );
-    format!(
-        "<section><h2>{}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th>{}</th><th class=\"n\">{}</th><th>{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
-        data.say("What else it could be", "还可能是什么"),
-        data.say("could also be", "也可能是"),
-        data.say("instead of", "而不是"),
-        data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）"),
-        data.say("what tells them apart", "区分方法"),
-    )
+    let heads = [
+        Head::Words(data.say("could also be", "也可能是")),
+        Head::Words(data.say("instead of", "而不是")),
+        Head::Number(data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）")),
+        Head::Words(data.say("what tells them apart", "区分方法")),
+    ];
+    listed(data.say("What else it could be", "还可能是什么"), note, &heads, &rows)
 }
 
 fn alternative(data: &Data<'_>, other: &Alternative) -> String {
@@ -72,15 +72,14 @@ pub(super) fn shifts(data: &Data<'_>) -> String {
         "While the effect was missing, fitting had bent these parameters of the simulation to imitate it.",
         "在缺少该效应时，拟合曾扭曲仿真的这些参数来模仿它。",
     );
-    format!(
-        "<section><h2>{}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th class=\"n\">{}</th><th class=\"n\">{}</th><th class=\"n\">{}</th><th>{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
-        data.say("Parameters that had been bent", "曾被扭曲的参数"),
-        data.say("parameter", "参数"),
-        data.say("before", "之前"),
-        data.say("after", "之后"),
-        data.say("change", "变化"),
-        data.say("unit", "单位"),
-    )
+    let heads = [
+        Head::Words(data.say("parameter", "参数")),
+        Head::Number(data.say("before", "之前")),
+        Head::Number(data.say("after", "之后")),
+        Head::Number(data.say("change", "变化")),
+        Head::Words(data.say("unit", "单位")),
+    ];
+    listed(data.say("Parameters that had been bent", "曾被扭曲的参数"), note, &heads, &rows)
 }
 
 fn shifted(data: &Data<'_>, shift: &Shift) -> String {
@@ -128,12 +127,12 @@ pub(super) fn quality(data: &Data<'_>) -> String {
         "These do not bias the comparison. Rows without a trustworthy value took no part in it.",
         "这些不会使比较产生偏差。没有可信数值的行未参与比较。",
     );
-    format!(
-        "<section><h2>{title}</h2><p class=\"note\">{note}</p><div class=\"scroll\"><table><thead><tr><th>{}</th><th>{}</th><th class=\"n\">{}</th></tr></thead><tbody>{rows}</tbody></table></div></section>\n",
-        data.say("what", "问题"),
-        data.say("column", "列"),
-        data.say("rows", "行数"),
-    )
+    let heads = [
+        Head::Words(data.say("what", "问题")),
+        Head::Words(data.say("column", "列")),
+        Head::Number(data.say("rows", "行数")),
+    ];
+    listed(title, note, &heads, &rows)
 }
 
 fn faulty(data: &Data<'_>, fault: &Fault) -> String {
