@@ -7,15 +7,17 @@ mod check;
 mod diagnose;
 mod effects;
 mod history;
+mod identify;
 mod replay;
+mod rules;
 mod run;
 mod simulate;
 
 use crate::config::Log;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
+use ::rules::script::{Host, Problem, shipped};
 use clap::{Args, Parser, Subcommand};
-use rules::script::{Host, shipped};
 use std::fmt;
 use std::io::Write;
 use std::path::Path;
@@ -104,6 +106,10 @@ enum Command {
     Diagnose(diagnose::DiagnoseArguments),
     /// The catalogue of physical effects.
     Effects(effects::EffectsArguments),
+    /// Learn a machine's numbers from recordings of it.
+    Identify(identify::IdentifyArguments),
+    /// What scripts can see, call and set.
+    Rules(rules::RulesArguments),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -134,6 +140,8 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Simulate(simulate) => simulate::simulate(simulate),
         Command::Diagnose(diagnose) => diagnose::diagnose(diagnose),
         Command::Effects(effects) => effects::effects(effects),
+        Command::Identify(identify) => identify::identify(&identify),
+        Command::Rules(rules) => rules::run(&rules),
     }
 }
 
@@ -149,7 +157,7 @@ fn print_json(document: &serde_json::Value) {
 
 /// The scripts of a directory, or those that come with the gateway.
 fn scripts_from(directory: Option<&Path>) -> Result<Host, CannotRun> {
-    let told = |problems: Vec<rules::script::Problem>| {
+    let told = |problems: Vec<Problem>| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")
     };

@@ -15,6 +15,8 @@
 //! | `no_load`, `interpolation`, `learning` | no-load power over speed, per gear stage, learned from idle |
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
+//! | `power_separation` | no-load power and load loss from recordings |
+//! | `regression` | least squares with intervals, distributions, refusals |
 
 mod bound;
 mod cutting;
@@ -28,6 +30,8 @@ mod learning;
 mod no_load;
 mod noise;
 mod pipeline;
+pub mod power_separation;
+pub mod regression;
 mod settings;
 mod signals;
 mod situation;

@@ -41,6 +41,7 @@ pub(super) struct Collected {
     pub(super) request: Option<(f64, ImmutableString)>,
     pub(super) alarms: Vec<(ImmutableString, ImmutableString)>,
     pub(super) notes: Vec<ImmutableString>,
+    refusals: Vec<(&'static str, String)>,
 }
 
 impl Collected {
@@ -50,6 +51,24 @@ impl Collected {
         self.request = None;
         self.alarms.clear();
         self.notes.clear();
+        self.refusals.clear();
+    }
+
+    /// A method had no answer in this run; the last reason of each counts.
+    pub(super) fn refused(&mut self, method: &'static str, reason: &str) {
+        self.refusals.retain(|(known, _)| *known != method);
+        self.refusals.push((method, reason.to_owned()));
+    }
+
+    /// Why the method of this name last had no answer in this run; `()` where it had one.
+    pub(super) fn why(&self, method: &str) -> Dynamic {
+        let found = self.refusals.iter().find(|(known, _)| *known == method);
+        found.map_or(Dynamic::UNIT, |(_, reason)| reason.into())
+    }
+
+    /// What methods refused in this run, for the operator.
+    pub(super) fn refusals(&self) -> impl Iterator<Item = String> {
+        self.refusals.iter().map(|(method, reason)| format!("{method} has no value ({reason})"))
     }
 
     pub(super) fn alarm(&mut self, name: ImmutableString, text: ImmutableString) -> Outcome<()> {

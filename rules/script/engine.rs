@@ -1,6 +1,7 @@
 //! The interpreter: what a script may use, and the limits on everything it does.
 
 use super::collect::{Collected, Outcome};
+use super::functions;
 use super::problem::spoken;
 use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage, BasicMathPackage,
@@ -49,7 +50,7 @@ pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
         engine.disable_symbol(word);
     }
     engine.set_optimization_level(if optimize { OptimizationLevel::Simple } else { OptimizationLevel::None });
-    functions(&mut engine, shared);
+    host_functions(&mut engine, shared);
     // Registered functions go before those of the language.
     let asleep = || -> Outcome<()> { Err("a script may not sleep".into()) };
     engine.register_fn("sleep", move |_: i64| asleep());
@@ -81,7 +82,7 @@ fn limits(engine: &mut Engine) {
     engine.set_max_functions(FUNCTIONS_MAX);
 }
 
-fn functions(engine: &mut Engine, shared: &Shared) {
+fn host_functions(engine: &mut Engine, shared: &Shared) {
     engine.register_fn("has", |value: Dynamic| !value.is_unit());
     engine.register_fn("clamp", |value: Dynamic, least: Dynamic, greatest: Dynamic| -> Outcome<f64> {
         let (least, greatest) = (number("clamp", &least)?, number("clamp", &greatest)?);
@@ -100,6 +101,7 @@ fn functions(engine: &mut Engine, shared: &Shared) {
         Ok(())
     });
     alarms(engine, shared);
+    functions::register(engine, shared);
 }
 
 fn alarms(engine: &mut Engine, shared: &Shared) {

@@ -123,5 +123,7 @@ fn suggestion(near: Option<&str>) -> String {
 
 fn usage(name: &str) -> String {
     let own = super::vocabulary::FUNCTIONS.iter().find(|it| it.signature.split('(').next() == Some(name));
-    own.map(|it| format!("write {}", it.signature)).unwrap_or_default()
+    let method = || super::functions::methods().find(|it| it.name == name).map(|it| it.signature());
+    let signature = own.map(|it| it.signature.to_owned()).or_else(method);
+    signature.map(|signature| format!("write {signature}")).unwrap_or_default()
 }

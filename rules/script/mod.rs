@@ -16,16 +16,20 @@
 //! |---|---|
 //! | `vocabulary` | what a script sees and can call |
 //! | `engine` | the interpreter and its limits |
+//! | `functions` | the methods that scripts call by name, one table per subject |
+//! | `api` | everything of it as a document |
 //! | `compile`, `examine`, `settings` | from text to a script, and everything that is wrong with it |
 //! | `host`, `slot`, `running`, `collect`, `notes` | running |
 //! | `decision`, `status`, `problem` | what comes out |
 //! | `shipped` | the scripts that come with the gateway |
 
+mod api;
 mod collect;
 mod compile;
 mod decision;
 mod engine;
 mod examine;
+pub mod functions;
 mod host;
 mod notes;
 mod problem;
@@ -36,6 +40,7 @@ mod slot;
 mod status;
 mod vocabulary;
 
+pub use api::{api, api_json};
 pub use compile::{ScriptFile, ScriptSet, compile};
 pub use decision::{Alarm, AlarmChange, Decision, Note, OverrideRequest, SCRIPT_STOPPED};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};

@@ -117,7 +117,9 @@ impl Slot {
         self.runs += 1;
         match outcome {
             Ok(()) => self.succeed(&mut collected, outputs),
-            Err(error) if problem::is_absence(&error) && self.any_absent() => self.wait(&error, &view),
+            Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
+                self.wait(&error, &view, &collected);
+            }
             Err(error) => return self.fail(&error, outputs),
         }
         false
@@ -161,9 +163,10 @@ impl Slot {
         self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
     }
 
-    fn any_absent(&self) -> bool {
+    fn any_absent(&self, collected: &Collected) -> bool {
         let absent = |name| self.scope.get(name).is_some_and(Dynamic::is_unit);
-        self.script.reads.iter().any(|word| !word.writable() && absent(word.name))
+        collected.refusals().next().is_some()
+            || self.script.reads.iter().any(|word| !word.writable() && absent(word.name))
     }
 
     fn succeed(&mut self, collected: &mut Collected, outputs: &mut Outputs<'_>) {
@@ -226,14 +229,15 @@ impl Slot {
     }
 
     /// The script worked on a value that is not there: it asks for nothing and tries again; alarms stay as they are.
-    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>) {
+    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected) {
         self.request = None;
         if self.condition != Condition::Running {
             return;
         }
         let mut problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
         let absent = self.script.reads.iter().filter_map(|word| Some((word.name, word.why_absent(view)?)));
-        let absent: Vec<String> = absent.map(|(name, why)| format!("{name} has no value ({why})")).collect();
+        let absent = absent.map(|(name, why)| format!("{name} has no value ({why})"));
+        let absent: Vec<String> = absent.chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
     }

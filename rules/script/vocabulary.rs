@@ -292,6 +292,11 @@ pub const FUNCTIONS: &[Function] = &[
         "x 的值是否改变",
     ),
     function("clamp(x, least, greatest)", "x, but not outside the two limits", "限幅"),
+    function(
+        "why(method)",
+        "Why the method of this name had no answer in this run, as text; no value when it had one",
+        "该方法无值的原因",
+    ),
 ];
 
 /// The whole vocabulary as Markdown, in English or Chinese: what `check --vocabulary` prints.
@@ -306,6 +311,7 @@ pub fn vocabulary(chinese: bool) -> String {
     for function in FUNCTIONS {
         text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
     }
+    text += "\n`cnc-gateway rules api` lists the methods besides: power separation, curves, compensation, wear.\n";
     text +=
         "\n## Settings\n\nReturned by `fn settings() { #{ name: value } }`, read once when the script is loaded.\n\n";
     text += "| name | unit | default | range | what |\n|---|---|---|---|---|\n";

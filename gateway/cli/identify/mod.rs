@@ -1,0 +1,96 @@
+//! `cnc-gateway identify`: a machine's own numbers from recordings of it.
+//!
+//! Every subcommand reads recordings, learns, prints what it learned as text or JSON, and writes with `--out` the form
+//! that the gateway reads. What the recordings cannot tell is refused with the reason: exit code 1.
+
+mod no_load;
+
+use super::diagnose::cannot_use;
+use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::twin::{put, read_recordings};
+use adapters::Recording;
+use clap::{Args, Subcommand};
+use rules::estimators::regression::Refusal;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Arguments of `identify`.
+#[derive(Debug, Args)]
+pub(super) struct IdentifyArguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// No-load power per gear stage and speed, from the idle stretches of recordings.
+    NoLoad(no_load::NoLoadArguments),
+}
+
+/// What every subcommand reads and writes.
+#[derive(Debug, Args)]
+struct Reading {
+    /// Recordings (recording/1): .csv, .csv.gz, .parquet, or history:DB?from=..&to=..; several are put together.
+    #[arg(long, value_name = "R.csv", num_args = 1.., required = true)]
+    recording: Vec<String>,
+    /// Print JSON (identify/1).
+    #[arg(long)]
+    json: bool,
+    /// Write what was learned in the form that the gateway reads; - is standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// What a subcommand learned.
+struct Learned {
+    /// For the reader.
+    text: String,
+    /// For programs.
+    json: Value,
+    /// The form that the gateway reads.
+    file: Option<String>,
+}
+
+impl Reading {
+    /// The recordings, put together; rows that were refused are told on standard error.
+    fn read(&self) -> Result<Recording, CannotRun> {
+        let given = read_recordings(&self.recording).map_err(|problems| cannot_use(&problems))?;
+        given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+        Ok(given.recording)
+    }
+
+    /// Prints the result or the refusal, and writes the file.
+    fn finish(&self, what: &str, learned: Result<Learned, Refusal>) -> CommandResult {
+        match learned {
+            Ok(learned) => {
+                if let (Some(path), Some(file)) = (&self.out, &learned.file) {
+                    put(path, file).map_err(|problem| CannotRun::new(problem, ""))?;
+                }
+                let document =
+                    json!({ "schema": "identify/1", "what": what, "refused": null, "learned": learned.json });
+                if self.json {
+                    print_json(&document)
+                } else {
+                    print(&learned.text)
+                }
+                Ok(Outcome::Fine)
+            }
+            Err(refusal) => {
+                let document = json!({ "schema": "identify/1", "what": what, "refused": refusal, "learned": null });
+                if self.json {
+                    print_json(&document)
+                } else {
+                    print(&format!("cannot tell: {refusal}\n"))
+                }
+                Ok(Outcome::No)
+            }
+        }
+    }
+}
+
+/// Learns, prints, writes.
+pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
+    match &arguments.what {
+        What::NoLoad(arguments) => no_load::run(arguments),
+    }
+}

@@ -1,0 +1,23 @@
+//! `identify no-load`: the power of the idling spindle, per gear stage and speed.
+
+use super::{Learned, Reading};
+use crate::cli::CommandResult;
+use clap::Args;
+use rules::estimators::power_separation::identify_no_load;
+use serde_json::json;
+
+#[derive(Debug, Args)]
+pub(super) struct NoLoadArguments {
+    #[command(flatten)]
+    reading: Reading,
+}
+
+pub(super) fn run(arguments: &NoLoadArguments) -> CommandResult {
+    let recording = arguments.reading.read()?;
+    let learned = identify_no_load(&recording).map(|learned| Learned {
+        text: learned.to_string(),
+        json: json!(learned),
+        file: Some(learned.script()),
+    });
+    arguments.reading.finish("no-load", learned)
+}

@@ -1,0 +1,19 @@
+//! Power separation: what a recording tells about a machine's no-load power and load loss.
+//!
+//! Law: `Pi = Pu(n) + (1 + a0) Pc + a1 Pc^2` per gear stage; the split of one sample is [`super::balance`], no-load power
+//! between known speeds is [`super::lagrange`]. Here the numbers of that law are found in recordings.
+//!
+//! | file | what |
+//! |---|---|
+//! | `rows` | a recording through the estimators: what the machine was doing in each row |
+//! | `stretches` | idle stretches of one speed, their settled part, its level |
+//! | `no_load` | no-load power per gear stage and speed, several visits put together |
+//! | `words` | the result as text, as JSON and as a script's settings |
+
+mod no_load;
+mod rows;
+mod stretches;
+mod words;
+
+pub use no_load::{NoLoadLearned, SpeedLearned, identify_no_load};
+pub use stretches::Stretch;

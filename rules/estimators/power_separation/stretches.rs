@@ -1,0 +1,120 @@
+//! Idle stretches of one speed, their settled part, and its level.
+
+use super::rows::Row;
+use crate::estimators::State;
+use crate::estimators::regression::{Level, level};
+use serde::Serialize;
+
+/// Speeds closer than this share are one speed.
+pub(super) const SAME_SPEED: f64 = 0.02;
+/// Left out before and after an axis moves or a state changes, s.
+const GUARD_S: f64 = 1.0;
+/// A shorter settled part says nothing, s.
+const LEAST_S: f64 = 5.0;
+/// Samples of a settled part, at least.
+const LEAST_SAMPLES: usize = 8;
+/// A leading block is still settling when its mean lies this many standard errors off the rest.
+const SETTLED_SD: f64 = 3.0;
+
+/// A settled stretch of idling at one speed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stretch {
+    /// Gear stage.
+    pub stage: usize,
+    /// Mean speed.
+    pub speed_rpm: f64,
+    /// From where on it counts as settled, s.
+    pub from_s: f64,
+    /// To, s.
+    pub to_s: f64,
+    /// Time that was left out because the power still settled, s.
+    pub settling_s: f64,
+    /// Level and trend of the power, W.
+    pub level: Level,
+}
+
+impl Stretch {
+    /// Change of power over the stretch, W.
+    #[must_use]
+    pub fn drift_w(&self) -> f64 {
+        self.level.slope_per_s * (self.to_s - self.from_s)
+    }
+
+    /// Does the power drift by more than noise explains?
+    #[must_use]
+    pub fn drifts(&self) -> bool {
+        self.level.slope_per_s.abs() > 3.0 * self.level.slope_standard_error
+            && self.drift_w().abs() > 0.005 * self.level.mean.abs()
+    }
+}
+
+/// The settled idle stretches of a recording, in the order of time.
+pub(super) fn stretches(rows: &[Row]) -> Vec<Stretch> {
+    let mut found = Vec::new();
+    let mut open: Vec<(f64, f64, f64)> = Vec::new();
+    let mut stage = 0;
+    for row in rows {
+        let idle = idle(row);
+        let goes_on = idle.is_some_and(|(speed_rpm, _)| {
+            open.last().is_none_or(|last| row.time_s - last.0 < 30.0 && stage == row.stage)
+                && open.first().is_none_or(|first| (speed_rpm / first.1 - 1.0).abs() <= 0.5 * SAME_SPEED)
+        });
+        if !goes_on {
+            found.extend(close(&open, stage));
+            open.clear();
+        }
+        if let Some((speed_rpm, power_w)) = idle {
+            open.push((row.time_s, speed_rpm, power_w));
+            stage = row.stage;
+        }
+    }
+    found.extend(close(&open, stage));
+    found
+}
+
+/// Speed and power of a row in which the spindle idles without any axis moving.
+fn idle(row: &Row) -> Option<(f64, f64)> {
+    let idling = row.state == State::Idle && !row.feeding;
+    Some((row.speed_rpm.filter(|_| idling)?, row.power_w?))
+}
+
+fn close(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
+    let (begin_s, end_s) = (open.first()?.0 + GUARD_S, open.last()?.0 - GUARD_S);
+    let inner: Vec<&(f64, f64, f64)> = open.iter().filter(|it| it.0 >= begin_s && it.0 <= end_s).collect();
+    let time_s: Vec<f64> = inner.iter().map(|it| it.0).collect();
+    let power_w: Vec<f64> = inner.iter().map(|it| it.2).collect();
+    let settled = settled_from(&time_s, &power_w);
+    let (time_s, power_w) = (&time_s[settled..], &power_w[settled..]);
+    let (from_s, to_s) = (*time_s.first()?, *time_s.last()?);
+    if time_s.len() < LEAST_SAMPLES || to_s - from_s < LEAST_S {
+        return None;
+    }
+    let speeds = inner[settled..].iter().map(|it| it.1);
+    let speed_rpm = speeds.sum::<f64>() / crate::estimators::filter::count(time_s.len());
+    Some(Stretch { stage, speed_rpm, from_s, to_s, settling_s: from_s - begin_s, level: level(time_s, power_w)? })
+}
+
+/// Where the level is settled: leading twelfths are left out while they lie apart from what follows, at most half of all.
+fn settled_from(time_s: &[f64], power_w: &[f64]) -> usize {
+    let block = time_s.len() / 12;
+    let mut from = 0;
+    while block >= 2 && from + block <= time_s.len() / 2 {
+        let (Some(head), Some(rest)) =
+            (mean(&power_w[from..from + block]), level(&time_s[from + block..], &power_w[from + block..]))
+        else {
+            break;
+        };
+        let samples = crate::estimators::filter::count(block).min(rest.independent);
+        // The rest may drift; the head is compared with where the drift began.
+        let begun = rest.mean - 0.5 * rest.slope_per_s * (time_s[time_s.len() - 1] - time_s[from]);
+        if (head - begun).abs() <= SETTLED_SD * rest.sd / samples.sqrt() {
+            break;
+        }
+        from += block;
+    }
+    from
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / crate::estimators::filter::count(values.len()))
+}

@@ -1,0 +1,94 @@
+//! Everything that a script can see, call and set, as Markdown and as JSON: what `cnc-gateway rules api` prints.
+
+use super::functions::{Method, SUBJECTS, Subject};
+use super::vocabulary::vocabulary;
+use super::{FUNCTIONS, words};
+use crate::estimators::SETTINGS;
+use serde_json::{Value, json};
+
+/// The methods by subject, then variables, functions and settings, as Markdown.
+#[must_use]
+pub fn api(chinese: bool) -> String {
+    let pick = |en: &'static str, zh: &'static str| if chinese { zh } else { en };
+    let mut text = String::from("## Methods\n\n");
+    text += pick(
+        "Pure functions; without an answer they return `()` and `why(\"name\")` tells the reason.\n",
+        "纯函数；无结果时返回 `()`，原因由 `why(\"name\")` 给出。\n",
+    );
+    for subject in SUBJECTS {
+        text += &format!(
+            "\n### {}\n\n| method | takes | returns | what |\n|---|---|---|---|\n",
+            pick(subject.en, subject.zh)
+        );
+        for method in subject.methods {
+            let what = pick(method.en, method.zh);
+            text += &format!("| `{}` | {} | {} | {what} |\n", method.signature(), takes(method), method.returns);
+        }
+    }
+    text.push('\n');
+    text.push_str(&vocabulary(chinese));
+    text
+}
+
+fn takes(method: &Method) -> String {
+    let units: Vec<&str> = method.parameters.iter().map(|parameter| parameter.unit).collect();
+    units.join("; ")
+}
+
+/// The same as JSON, with the texts in both languages.
+#[must_use]
+pub fn api_json() -> Value {
+    let words =
+        words().iter().map(|word| json!({ "name": word.name, "unit": word.unit, "en": word.en, "zh": word.zh }));
+    let functions = FUNCTIONS.iter().map(|it| json!({ "signature": it.signature, "en": it.en, "zh": it.zh }));
+    let settings = SETTINGS.iter().map(|row| {
+        json!({ "name": row.name, "unit": row.unit, "default": row.default, "range": [row.range.0, row.range.1],
+            "whole": row.whole, "en": row.en })
+    });
+    json!({
+        "schema": "rules-api/1",
+        "methods": SUBJECTS.iter().flat_map(|subject| subject_json(subject)).collect::<Vec<Value>>(),
+        "functions": functions.collect::<Vec<Value>>(),
+        "variables": words.collect::<Vec<Value>>(),
+        "settings": settings.collect::<Vec<Value>>(),
+    })
+}
+
+fn subject_json(subject: &Subject) -> Vec<Value> {
+    let one = |method: &Method| {
+        let parameters = method.parameters.iter().map(|it| json!({ "name": it.name, "unit": it.unit }));
+        json!({ "name": method.name, "signature": method.signature(), "subject": subject.en,
+            "parameters": parameters.collect::<Vec<Value>>(), "returns": method.returns,
+            "en": method.en, "zh": method.zh })
+    };
+    subject.methods.iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::script::functions::methods;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_method_is_told_in_both_languages_and_no_name_means_two_things() {
+        let (english, chinese) = (api(false), api(true));
+        for method in methods() {
+            assert!(english.contains(&format!("`{}`", method.signature())) && chinese.contains(method.zh));
+            assert!(!method.en.is_empty() && !method.zh.is_empty() && !method.returns.is_empty());
+            assert!(method.parameters.iter().all(|parameter| !parameter.unit.is_empty()));
+        }
+        let names: Vec<&str> = methods().map(|it| it.name).chain(words().iter().map(|it| it.name)).collect();
+        let host = FUNCTIONS.iter().filter_map(|it| it.signature.split_once('(')).map(|(name, _)| name);
+        let names: Vec<&str> = names.into_iter().chain(host).collect();
+        assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+    }
+
+    #[test]
+    fn the_document_holds_every_table() {
+        let json = api_json();
+        assert_eq!(json["methods"].as_array().map(Vec::len), Some(methods().count()));
+        assert_eq!(json["settings"].as_array().map(Vec::len), Some(SETTINGS.len()));
+        assert_eq!(json["methods"][0]["parameters"][0]["unit"], "W");
+    }
+}

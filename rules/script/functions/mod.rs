@@ -1,0 +1,95 @@
+//! The methods that a script can call by name: one table per subject, registered into the interpreter from that table.
+//!
+//! They are pure: the same arguments give the same answer, whatever ran before. A method that has no number it can stand
+//! behind returns `()`, as a word without a value does; `why("name")` then tells the reason, and a script that computes
+//! with the missing number waits as it does for a channel.
+
+mod arguments;
+mod power_separation;
+
+pub use arguments::{Answer, Arguments};
+
+use super::collect::Outcome;
+use super::engine::Shared;
+use crate::estimators::regression::Refusal;
+use rhai::{Dynamic, Engine, ImmutableString, NativeCallContext};
+use std::any::TypeId;
+
+/// What a method takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parameter {
+    /// Name; ends in the unit where the unit has a short form.
+    pub name: &'static str,
+    /// Unit symbol; `1` for pure numbers; `[W]` for an array, `[[rpm, W]]` for an array of pairs.
+    pub unit: &'static str,
+}
+
+const fn takes(name: &'static str, unit: &'static str) -> Parameter {
+    Parameter { name, unit }
+}
+
+/// A method that a script can call.
+pub struct Method {
+    /// Name in scripts; ends in the unit of the answer where it is a number with one.
+    pub name: &'static str,
+    /// What it takes, in order.
+    pub parameters: &'static [Parameter],
+    /// Unit of the answer; for a map its keys with their units.
+    pub returns: &'static str,
+    /// What it does, in English.
+    pub en: &'static str,
+    /// What it does, in Chinese.
+    pub zh: &'static str,
+    run: fn(&Arguments<'_>) -> Result<Answer, Refusal>,
+}
+
+impl Method {
+    /// How it is written: name and parameters.
+    #[must_use]
+    pub fn signature(&self) -> String {
+        let names: Vec<&str> = self.parameters.iter().map(|parameter| parameter.name).collect();
+        format!("{}({})", self.name, names.join(", "))
+    }
+}
+
+/// Methods that belong together.
+pub struct Subject {
+    /// Heading, in English.
+    pub en: &'static str,
+    /// Heading, in Chinese.
+    pub zh: &'static str,
+    /// The methods.
+    pub methods: &'static [Method],
+}
+
+/// Every subject, in the order in which they are printed.
+pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT];
+
+/// Every method of every subject.
+pub fn methods() -> impl Iterator<Item = &'static Method> {
+    SUBJECTS.iter().flat_map(|subject| subject.methods)
+}
+
+/// Makes every method callable; what one refuses goes to `shared`.
+pub(super) fn register(engine: &mut Engine, shared: &Shared) {
+    for method in methods() {
+        let types = vec![TypeId::of::<Dynamic>(); method.parameters.len()];
+        let to = shared.clone();
+        let run = move |_: NativeCallContext<'_>, values: &mut [&mut Dynamic]| call(method, values, &to);
+        engine.register_raw_fn(method.name, types, run);
+    }
+    let to = shared.clone();
+    engine.register_fn("why", move |name: ImmutableString| to.lock().why(&name));
+}
+
+fn call(method: &Method, values: &mut [&mut Dynamic], to: &Shared) -> Outcome<Dynamic> {
+    let arguments = Arguments::read(method, values)?;
+    let answer = arguments.missing().map_or_else(|| (method.run)(&arguments), Err);
+    match answer.and_then(Answer::checked) {
+        Ok(answer) => Ok(answer.into_dynamic()),
+        Err(refusal) => {
+            to.lock().refused(method.name, &refusal.to_string());
+            Ok(Dynamic::UNIT)
+        }
+    }
+}
