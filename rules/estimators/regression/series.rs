@@ -3,8 +3,12 @@
 //! The number of independent samples follows from the integrated autocorrelation time, summed while the sums of pairs are
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
+use super::least_squares::number;
 use super::orthogonal::product;
 use serde::Serialize;
+
+/// What a trend leaves of slow noise is corrected by no more than the inverse of this.
+const LEFT_MIN: f64 = 0.3;
 
 /// What a steady stretch says about its level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -32,7 +36,7 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
     if n < 4 || time_s.len() != n || !increasing || values.iter().chain(time_s).any(|value| !value.is_finite()) {
         return None;
     }
-    let count = super::least_squares::number(n);
+    let count = number(n);
     let mean = values.iter().sum::<f64>() / count;
     let middle_s = time_s.iter().sum::<f64>() / count;
     let about: Vec<f64> = time_s.iter().map(|time_s| time_s - middle_s).collect();
@@ -53,7 +57,9 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
     })
 }
 
-/// By how much the memory of the noise multiplies the variance of a mean; 1 for independent samples, never less.
+/// By how much the memory of the noise multiplies the variance of a mean; 1 for independent samples, never less. The
+/// residuals are about a trend, which takes a part of slow noise with it: of the sum over `2 M + 1` lags about
+/// `2 (2 M + 1) / n`, as the variance of `n` values about their mean lacks `1 / n`.
 #[must_use]
 pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
     let power = product(residuals, residuals);
@@ -63,6 +69,7 @@ pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
     let at = |lag: usize| product(&residuals[..residuals.len() - lag], &residuals[lag..]) / power;
     let mut sum = -1.0;
     let mut last = f64::INFINITY;
+    let mut lags = 0;
     for lag in (0..residuals.len().saturating_sub(1)).step_by(2).take(2000) {
         let pair = (at(lag) + at(lag + 1)).min(last);
         if pair <= 0.0 {
@@ -70,8 +77,10 @@ pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
         }
         sum += 2.0 * pair;
         last = pair;
+        lags = lag + 1;
     }
-    sum.max(1.0)
+    let taken = 2.0 * number(2 * lags + 1) / number(residuals.len());
+    (sum / (1.0 - taken).max(LEFT_MIN)).max(1.0)
 }
 
 #[cfg(test)]
