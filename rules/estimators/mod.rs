@@ -16,6 +16,7 @@
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 //! | `power_separation` | no-load power and load loss from recordings |
+//! | `thermal` | thermal error from temperatures: sensors, laws, compensation, pulse insertion |
 //! | `regression` | least squares with intervals, distributions, refusals |
 
 mod bound;
@@ -36,6 +37,7 @@ mod settings;
 mod signals;
 mod situation;
 mod state;
+pub mod thermal;
 mod visibility;
 mod window;
 

@@ -1,0 +1,258 @@
+//! The same law late: the structure warms later than its sensors, so the error draws a loop over temperature.
+//!
+//! `E = b0 + sum b_j w_j` with `dw_j/dt = (T_j - w_j) / tau`, in one of two forms: every sensor late, or the first sensor
+//! both as it is and late (which also follows an error that is ahead of its sensor). For every tau the law is linear, so
+//! tau is searched for alone (variable projection) under the noise that suits it; its interval comes from the derivative
+//! of the law by its logarithm, fitted along with the coefficients. States run on true time stamps, through pauses in a
+//! straight line from the last temperature to the first one after; how they stood at the first row is fitted and not kept.
+//! Sources: Golub and Pereyra (1973), SIAM J. Numer. Anal. 10:413; static regression "not satisfied", a model with memory
+//! 94 %: 10.1177/0954405414556499.
+
+use super::course::Course;
+use super::cross_validation::{HeldOut, outside, squares, trained};
+use super::law::{Path, first_order};
+use super::noise::{Noise, grid, weigh};
+use super::regression::{Design, ROWS_MAX, Tau, ThermalFit, column, finish, rms};
+use crate::estimators::regression::{Column, Refusal, RefusalKind};
+use std::ops::Range;
+
+/// Which terms are late.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// Every sensor.
+    All,
+    /// The first one as it is and late, the others as they are.
+    FirstTwice,
+}
+
+pub(super) const FORMS: [Form; 2] = [Form::All, Form::FirstTwice];
+
+/// Time constants that are tried: from a few rows to half of the longest run, in these many steps.
+const TAUS: usize = 18;
+/// Steps of narrowing down after that.
+const NARROW: usize = 24;
+/// The derivative by the logarithm of tau is a difference over this much.
+const STEP: f64 = 0.01;
+/// Times the error is linearised anew.
+const ROUNDS: usize = 4;
+
+/// Fits the law with lags on these sensors.
+///
+/// # Errors
+/// A [`Refusal`]: pauses that are not known, runs too short for any time constant, and all that stops a regression.
+pub(super) fn fit_lagged(course: &Course, sensors: &[usize], form: Form) -> Result<ThermalFit, Refusal> {
+    course.check(sensors)?;
+    known_pauses(course)?;
+    let law = Late { course, sensors, form };
+    let mut tau_s = law.search()?;
+    let mut fit = law.fit(tau_s)?;
+    for _ in 0..ROUNDS {
+        let Some(better_s) = fit.law.tau_s else { break };
+        let moved = (better_s / tau_s).ln();
+        tau_s = better_s.clamp(law.bounds().0, law.bounds().1);
+        fit = law.fit(tau_s)?;
+        if moved.abs() < 1e-3 {
+            break;
+        }
+    }
+    Ok(fit)
+}
+
+fn known_pauses(course: &Course) -> Result<(), Refusal> {
+    if course.pauses_known() {
+        return Ok(());
+    }
+    let what = "the pauses between runs are not known, so how far the structure cooled meanwhile is not either";
+    let next = "record with time_utc, or with a time_s that goes on from run to run";
+    Err(Refusal::new(RefusalKind::Missing, what, next).at("time_s"))
+}
+
+/// The first-order state of a temperature along the clock of the course; it begins at the first temperature.
+pub(super) fn late(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut states = Vec::with_capacity(values.len());
+    let mut state = values.first().copied().unwrap_or(0.0);
+    for (row, value) in values.iter().enumerate() {
+        state = match course.since_s(row) {
+            Some(dt_s) => first_order(state, values[row - 1], *value, dt_s, tau_s),
+            None => *value,
+        };
+        states.push(state);
+    }
+    states
+}
+
+struct Late<'a> {
+    course: &'a Course,
+    sensors: &'a [usize],
+    form: Form,
+}
+
+impl Late<'_> {
+    fn bounds(&self) -> (f64, f64) {
+        (2.0 * self.course.period_s(), 0.5 * self.course.longest_s())
+    }
+
+    fn taus(&self) -> Result<Vec<f64>, Refusal> {
+        let (least, greatest) = self.bounds();
+        if greatest <= 4.0 * least {
+            let what = format!("the longest run lasts {:.0} s at one row in {:.0} s", 2.0 * greatest, 0.5 * least);
+            let next = "record runs of an hour or more, at least one row a minute";
+            return Err(Refusal::new(RefusalKind::TooFew, what, next).at("time_s"));
+        }
+        let ratio = (greatest / least).powf(1.0 / (TAUS - 1) as f64);
+        Ok((0..TAUS).map(|step| least * ratio.powi(i32::try_from(step).unwrap_or(0))).collect())
+    }
+
+    /// Columns of the terms, in the order of [`Late::terms`].
+    fn columns(&self, tau_s: f64) -> Vec<Column> {
+        let sensor = |at: &usize| &self.course.sensors()[*at];
+        let direct = |at: &usize| column(sensor(at));
+        let state = |at: &usize| {
+            let name = format!("late({})", sensor(at).name);
+            Column::new(name, late(self.course, &sensor(at).values, tau_s))
+        };
+        match self.form {
+            Form::All => self.sensors.iter().map(state).collect(),
+            Form::FirstTwice => self.sensors.iter().map(direct).chain(self.sensors.first().map(state)).collect(),
+        }
+    }
+
+    /// Sensor and path of every term.
+    fn terms(&self) -> (Vec<usize>, Vec<Path>) {
+        let mut sensors = self.sensors.to_vec();
+        let path = if self.form == Form::All { Path::Lagged } else { Path::Direct };
+        let mut paths = vec![path; sensors.len()];
+        if let (Form::FirstTwice, Some(first)) = (self.form, self.sensors.first()) {
+            sensors.push(*first);
+            paths.push(Path::Lagged);
+        }
+        (sensors, paths)
+    }
+
+    /// What is left of a state that did not begin at the first temperature.
+    fn beginning(&self, tau_s: f64) -> Column {
+        let clock_s = self.course.clock_s();
+        let left = |at: &f64| (-(at - clock_s[0]) / tau_s).exp();
+        Column::new("beginning", clock_s.iter().map(left).collect())
+    }
+
+    fn search(&self) -> Result<f64, Refusal> {
+        let taus = self.taus()?;
+        let mut noises: Vec<Noise> = grid(self.course).into_iter().skip(1).step_by(7).collect();
+        noises.push(Noise::WHITE);
+        let best = |tau_s: f64, noises: &[Noise]| -> Result<(f64, Noise), Refusal> {
+            let (short, columns) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
+            let mut best = (f64::MIN, Noise::WHITE);
+            for noise in noises {
+                let likelihood = weigh(&short, &columns, short.error_um(), *noise)?.likelihood;
+                best = if likelihood > best.0 { (likelihood, *noise) } else { best };
+            }
+            Ok(best)
+        };
+        let tried = taus.iter().map(|tau_s| Ok((*tau_s, best(*tau_s, &noises)?)));
+        let tried = tried.collect::<Result<Vec<(f64, (f64, Noise))>, Refusal>>()?;
+        let likeliest = tried.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let (tau_s, (_, noise)) = likeliest.copied().unwrap_or((taus[0], (0.0, Noise::WHITE)));
+        let ratio = taus[1] / taus[0];
+        narrow(tau_s / ratio, tau_s * ratio, |tau_s| Ok(best(tau_s, &[noise])?.0))
+    }
+
+    /// Constant, terms and beginning.
+    fn whole(&self, tau_s: f64) -> Vec<Column> {
+        let ones = Column::new("intercept", vec![1.0; self.course.rows()]);
+        std::iter::once(ones).chain(self.columns(tau_s)).chain([self.beginning(tau_s)]).collect()
+    }
+
+    /// The fit linearised at `tau_s`; the law in it has the tau that this suggests.
+    fn fit(&self, tau_s: f64) -> Result<ThermalFit, Refusal> {
+        let columns = self.columns(tau_s);
+        let (short, whole) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
+        let white = weigh(&short, &whole, short.error_um(), Noise::WHITE)?.regression.values();
+        let (more, less) = (self.columns(tau_s * STEP.exp()), self.columns(tau_s * (-STEP).exp()));
+        let slope = |row: usize| {
+            let terms = white[1..].iter().zip(more.iter().zip(&less));
+            terms.map(|(b, (more, less))| b * (more.values[row] - less.values[row]) / (2.0 * STEP)).sum::<f64>()
+        };
+        let by_log_tau = Column::new("tau_s", (0..self.course.rows()).map(slope).collect());
+        let (sensors, paths) = self.terms();
+        let tau = Tau { tau_s, spread_k: self.spread_k(tau_s), by_log_tau };
+        let nuisance = vec![self.beginning(tau_s)];
+        finish(&Design { course: self.course, sensors: &sensors, paths: &paths, columns, nuisance, tau: Some(tau) })
+    }
+
+    /// Root mean square of what temperatures and states differ by.
+    fn spread_k(&self, tau_s: f64) -> f64 {
+        let differences = self.sensors.iter().flat_map(|at| {
+            let values = &self.course.sensors()[*at].values;
+            let states = late(self.course, values, tau_s);
+            values.iter().zip(states).map(|(value, state)| value - state).collect::<Vec<f64>>()
+        });
+        rms(&differences.collect::<Vec<f64>>())
+    }
+}
+
+/// The greatest value of a function of a positive number, by golden section over its logarithm.
+fn narrow(least: f64, greatest: f64, of: impl Fn(f64) -> Result<f64, Refusal>) -> Result<f64, Refusal> {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let (mut low, mut high) = (least.ln(), greatest.ln());
+    for _ in 0..NARROW {
+        let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        if of(left.exp())? > of(right.exp())? { high = right } else { low = left }
+    }
+    Ok((0.5 * (low + high)).exp())
+}
+
+/// Errors of blocks left out; each block searches its own time constant in the others.
+///
+/// # Errors
+/// As the fit.
+pub(super) fn held_out_lagged(
+    course: &Course,
+    sensors: &[usize],
+    form: Form,
+    rows_max: usize,
+) -> Result<HeldOut, Refusal> {
+    let law = Late { course, sensors, form };
+    let taus = law.taus()?;
+    let mut error_um = Vec::new();
+    let mut blocks = Vec::new();
+    let mut designs = Vec::new();
+    for tau_s in taus {
+        let columns: Vec<Column> = law.columns(tau_s).into_iter().chain([law.beginning(tau_s)]).collect();
+        let (short, columns) = course.condensed(&columns, rows_max);
+        (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
+        designs.push(columns);
+    }
+    let squares =
+        blocks.iter().map(|block| one_block(&designs, &error_um, block)).collect::<Result<Vec<_>, Refusal>>()?;
+    Ok(HeldOut::of(&squares))
+}
+
+/// Squared errors of one block with the time constant that suits the other rows best.
+fn one_block(designs: &[Vec<Column>], error_um: &[f64], block: &Range<usize>) -> Result<Vec<f64>, Refusal> {
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut refused = None;
+    for columns in designs {
+        // The beginning of the states is forgotten in most blocks, and then cannot be fitted.
+        let terms = columns.len() - 1;
+        let left = outside(&columns[terms].values, block).iter().fold(0.0_f64, |most, x| most.max(*x));
+        let count = if left > 0.05 { terms + 1 } else { terms };
+        match trained(&columns[..count], error_um, block) {
+            Ok(coefficients) => {
+                let rest: f64 = [0..block.start, block.end..error_um.len()]
+                    .iter()
+                    .flat_map(|rows| squares(&coefficients, columns, error_um, rows))
+                    .sum();
+                if best.as_ref().is_none_or(|(least, _)| rest < *least) {
+                    best = Some((rest, squares(&coefficients, columns, error_um, block)));
+                }
+            }
+            Err(refusal) => refused = Some(refusal),
+        }
+    }
+    let none = || Refusal::new(RefusalKind::TooFew, "no time constant can be tried", "record longer runs");
+    best.map(|(_, squares)| squares).ok_or_else(|| refused.unwrap_or_else(none))
+}
+
+#[cfg(test)]
+mod tests;

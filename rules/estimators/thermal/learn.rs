@@ -1,0 +1,169 @@
+//! From warm-ups to a law: sensors, static and late forms, and which of them predicts what it has not seen.
+
+use super::course::Course;
+use super::cross_validation::{HeldOut, held_out};
+use super::lagged::{FORMS, Form, fit_lagged, held_out_lagged, late};
+use super::regression::{ThermalFit, column, fit_static};
+use super::selection::{Selection, SelectionSettings, select};
+use crate::estimators::regression::{Column, Refusal, RefusalKind};
+use serde::Serialize;
+
+/// Rows that cross-validation works on; more are averaged first.
+const ROWS_MAX: usize = 400;
+/// A late law must lower the error of blocks left out by this share.
+const GAIN_MIN: f64 = 0.05;
+/// ... and raise the log likelihood by this: half of the 99.9 % point of chi-squared with three degrees of freedom, for
+/// a time constant, a coefficient and the beginning.
+const LIKELIHOOD_MIN: f64 = 8.13;
+
+/// A fitted law and how it predicts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Coefficients, memory, residuals.
+    pub fit: ThermalFit,
+    /// Error of blocks left out.
+    pub held_out: HeldOut,
+    /// Mean residual while the first sensor warms less that while it cools, um: the loop that the law leaves. None where
+    /// it does not do both.
+    pub hysteresis_um: Option<f64>,
+}
+
+/// What was learned.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThermalLearned {
+    /// The sensors and why.
+    pub selection: Selection,
+    /// The law without lag.
+    pub without_lag: Candidate,
+    /// The best law with lag, or why there is none.
+    pub with_lag: Result<Candidate, Refusal>,
+    /// Is the law with lag the one to use?
+    pub lag_chosen: bool,
+    /// Why.
+    pub reason: String,
+    /// Are the blocks that were left out whole runs?
+    pub blocks_are_runs: bool,
+    /// How many blocks.
+    pub blocks: usize,
+}
+
+impl ThermalLearned {
+    /// The law to use.
+    #[must_use]
+    pub fn best(&self) -> &Candidate {
+        match &self.with_lag {
+            Ok(late) if self.lag_chosen => late,
+            _ => &self.without_lag,
+        }
+    }
+}
+
+/// Learns a law; `sensors` names those to use, none lets the data choose.
+///
+/// # Errors
+/// A [`Refusal`] that says what cannot be learned, where, and what to record instead.
+pub fn learn(
+    course: &Course,
+    settings: SelectionSettings,
+    sensors: Option<&[String]>,
+) -> Result<ThermalLearned, Refusal> {
+    course.usable()?;
+    let chosen = sensors.map(|names| positions(course, names)).transpose()?;
+    let selection = match &chosen {
+        Some(chosen) => given(course, settings, chosen)?,
+        None => select(course, settings)?,
+    };
+    let without_lag = candidate(course, &selection.chosen, fit_static(course, &selection.chosen)?)?;
+    says_something(&without_lag)?;
+    let with_lag = best_late(course, &selection.chosen);
+    let (lag_chosen, reason) = decide(&without_lag, &with_lag);
+    let (blocks_are_runs, blocks) = (course.blocks_are_runs(), course.blocks().len());
+    Ok(ThermalLearned { selection, without_lag, with_lag, lag_chosen, reason, blocks_are_runs, blocks })
+}
+
+fn positions(course: &Course, names: &[String]) -> Result<Vec<usize>, Refusal> {
+    let position = |name: &String| {
+        let known: Vec<&str> = course.sensors().iter().map(|sensor| sensor.name.as_str()).collect();
+        let next = format!("choose among {}", known.join(", "));
+        let missing = || Refusal::new(RefusalKind::Missing, "is not among the usable temperatures", next).at(name);
+        known.iter().position(|sensor| sensor == name).ok_or_else(missing)
+    };
+    names.iter().map(position).collect()
+}
+
+fn given(course: &Course, settings: SelectionSettings, chosen: &[usize]) -> Result<Selection, Refusal> {
+    let everything = SelectionSettings { inflation_max: f64::INFINITY, ..settings };
+    super::selection::describe(course, everything, chosen.to_vec())
+}
+
+fn candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<Candidate, Refusal> {
+    let columns: Vec<Column> = sensors.iter().map(|at| column(&course.sensors()[*at])).collect();
+    let (short, columns) = course.condensed(&columns, ROWS_MAX);
+    let held_out = held_out(&columns, short.error_um(), &short.blocks())?;
+    let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
+    Ok(Candidate { fit, held_out, hysteresis_um })
+}
+
+/// A law whose every interval holds zero explains nothing.
+fn says_something(candidate: &Candidate) -> Result<(), Refusal> {
+    let away = |it: &super::law::Term| it.interval.0 * it.interval.1 > 0.0;
+    if candidate.fit.law.terms.iter().any(away) {
+        return Ok(());
+    }
+    let rows = candidate.fit.memory.effective_rows;
+    let what = format!("no coefficient differs from zero: the rows tell as much as {rows:.1} independent ones");
+    let next = "record several warm-ups and cool-downs at different speeds, each longer than an hour";
+    Err(Refusal::new(RefusalKind::NotIdentifiable, what, next).at(super::quantities::THERMAL_ERROR))
+}
+
+/// The late law that predicts best.
+fn best_late(course: &Course, sensors: &[usize]) -> Result<Candidate, Refusal> {
+    let mut best: Option<(Form, HeldOut)> = None;
+    for form in FORMS {
+        let error = held_out_lagged(course, sensors, form, ROWS_MAX)?;
+        // The second form has more coefficients: it must be clearly better.
+        if best.as_ref().is_none_or(|(_, least)| error.beats(least, GAIN_MIN)) {
+            best = Some((form, error));
+        }
+    }
+    let none = || Refusal::new(RefusalKind::TooFew, "no late law can be tried", "record longer runs");
+    let (form, held_out) = best.ok_or_else(none)?;
+    let fit = fit_lagged(course, sensors, form)?;
+    let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
+    Ok(Candidate { fit, held_out, hysteresis_um })
+}
+
+fn decide(plain: &Candidate, late: &Result<Candidate, Refusal>) -> (bool, String) {
+    let late = match late {
+        Ok(late) => late,
+        Err(refusal) => return (false, format!("without lag, because a lag cannot be learned: {refusal}")),
+    };
+    let (before, after) = (plain.held_out.rms_um, late.held_out.rms_um);
+    let gained = late.fit.likelihood - plain.fit.likelihood;
+    let numbers =
+        format!("blocks left out {before:.2} um without, {after:.2} um with lag; log likelihood {gained:+.1}");
+    if !late.held_out.beats(&plain.held_out, GAIN_MIN) {
+        return (false, format!("without lag: a lag does not predict better ({numbers})"));
+    }
+    if gained < LIKELIHOOD_MIN {
+        return (false, format!("without lag: remembering errors explain the rows as well ({numbers})"));
+    }
+    (true, format!("with lag: {numbers}"))
+}
+
+/// Mean residual while the first sensor warms less that while it cools.
+fn hysteresis_um(course: &Course, sensors: &[usize], residuals_um: &[f64]) -> Option<f64> {
+    let values = &course.sensors()[*sensors.first()?].values;
+    let behind = late(course, values, (20.0 * course.period_s()).min(0.1 * course.longest_s()));
+    let ahead: Vec<f64> = values.iter().zip(&behind).map(|(value, state)| value - state).collect();
+    let threshold = 0.3 * super::regression::rms(&ahead);
+    let mean = |sign: f64| {
+        let rows = residuals_um.iter().zip(&ahead).filter(|(_, ahead)| sign * **ahead > threshold);
+        let chosen: Vec<f64> = rows.map(|(residual, _)| *residual).collect();
+        (chosen.len() * 20 >= residuals_um.len()).then(|| chosen.iter().sum::<f64>() / chosen.len() as f64)
+    };
+    Some(mean(1.0)? - mean(-1.0)?)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,53 @@
+//! Thermal error of the tool against the work, from temperatures: which sensors, which law, and what to do about it.
+//!
+//! Source: thermal-error compensation on a milling spindle with 13 temperature points (grey relational grades, multiple
+//! linear regression, pulse insertion). Where that method is known to fail the better one stands beside it.
+//!
+//! | file | what |
+//! |---|---|
+//! | `quantities` | units that were mistaken, series that teach nothing |
+//! | `course` | rows of warm-ups, run by run, blocks to leave out |
+//! | `grey` | grey relational grades, two normalisations |
+//! | `selection` | which sensors, and why |
+//! | `cross_validation` | errors of blocks that were left out |
+//! | `noise` | residuals that remember |
+//! | `regression` | multiple linear regression with intervals that hold |
+//! | `lagged` | the same law late: time constant, hysteresis removed |
+//! | `learn` | all of it, and which law to use |
+//! | `law` | which temperatures, with what weight, late by how much |
+//! | `predictor` | the law at work: error, uncertainty, residual, outside the range |
+//! | `compensation` | clamp, dead band, slew, increments that add up |
+//! | `quadrature` | encoder lines A and B, and a decoder |
+//! | `pulse_insertion` | extra pulses between encoder and controller |
+
+#[cfg(test)]
+mod bed;
+mod compensation;
+mod course;
+mod cross_validation;
+mod grey;
+mod lagged;
+mod law;
+mod learn;
+mod noise;
+mod predictor;
+mod pulse_insertion;
+mod quadrature;
+mod quantities;
+mod regression;
+mod selection;
+
+pub use compensation::{
+    AxisSituation, CompensationSettingError, CompensationSettings, CompensationStep, Compensator, Standing,
+};
+pub use course::{Course, Sensor};
+pub use cross_validation::HeldOut;
+pub use grey::{Grade, Grades, Normalisation, RHO_USUAL, grades};
+pub use law::{POINTS_MAX, Path, TERMS_MAX, Term, ThermalLaw, first_order};
+pub use learn::{Candidate, ThermalLearned, learn};
+pub use predictor::{Comparison, NoPrediction, Outside, Prediction, Predictor};
+pub use pulse_insertion::{Edge, InsertionFault, PulseInserter};
+pub use quadrature::{Decoder, EDGES_PER_PULSE, IllegalTransition, Lines};
+pub use quantities::Series;
+pub use regression::{Memory, ThermalCoefficient, ThermalFit, fit_static};
+pub use selection::{GradeChoice, Selection, SelectionSettings, SensorVerdict, select};
