@@ -17,6 +17,7 @@
 //! | `cutting` | power balance: cutting power and load loss |
 //! | `power_separation` | no-load power and load loss from recordings |
 //! | `thermal` | thermal error from temperatures: sensors, laws, compensation, pulse insertion |
+//! | `spindle_current` | filter, feature and feed curve of the spindle current |
 //! | `regression` | least squares with intervals, distributions, refusals |
 
 mod bound;
@@ -36,6 +37,7 @@ pub mod regression;
 mod settings;
 mod signals;
 mod situation;
+pub mod spindle_current;
 mod state;
 pub mod thermal;
 mod visibility;

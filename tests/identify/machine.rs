@@ -5,7 +5,7 @@ use adapters::channel::Kind;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{Cells, Numbers, Words};
-use adapters::simulated::{ExperimentStep, Simulated, SimulatedSettings, Truth};
+use adapters::simulated::{ExperimentCut, ExperimentStep, Simulated, SimulatedSettings, Truth};
 use adapters::{ChannelId, Pull, Recording, Sample, Value};
 
 const ORIGIN_NS: TimeNs = 1_767_225_600 * SECOND_NS;
@@ -30,6 +30,11 @@ pub(crate) fn idle(seconds: f64, spindle_rpm: f64, gear_stage: u8) -> Experiment
         override_pct: 100,
         new_edge: false,
     }
+}
+
+/// Turning down.
+pub(crate) fn cut(seconds: f64, spindle_rpm: f64, gear_stage: u8, cut: ExperimentCut) -> ExperimentStep {
+    ExperimentStep { cut: Some(cut), ..idle(seconds, spindle_rpm, gear_stage) }
 }
 
 /// A recording, and what was true in each of its rows.

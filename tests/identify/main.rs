@@ -5,6 +5,7 @@
 
 #[path = "../support/command.rs"]
 mod command;
+mod current;
 mod machine;
 mod power;
 

@@ -3,6 +3,7 @@
 //! Every subcommand reads recordings, learns, prints what it learned as text or JSON, and writes with `--out` the form
 //! that the gateway reads. What the recordings cannot tell is refused with the reason: exit code 1.
 
+mod feed_curve;
 mod no_load;
 
 use super::diagnose::cannot_use;
@@ -25,6 +26,8 @@ pub(super) struct IdentifyArguments {
 enum What {
     /// No-load power per gear stage and speed, from the idle stretches of recordings.
     NoLoad(no_load::NoLoadArguments),
+    /// Spindle current over feed, by speed and depth of cut, from cuts at several feeds.
+    FeedCurve(feed_curve::FeedCurveArguments),
 }
 
 /// What every subcommand reads and writes.
@@ -63,8 +66,13 @@ impl Reading {
     fn finish(&self, what: &str, learned: Result<Learned, Refusal>) -> CommandResult {
         match learned {
             Ok(learned) => {
-                if let (Some(path), Some(file)) = (&self.out, &learned.file) {
-                    put(path, file).map_err(|problem| CannotRun::new(problem, ""))?;
+                match (&self.out, &learned.file) {
+                    (Some(path), Some(file)) => put(path, file).map_err(|problem| CannotRun::new(problem, ""))?,
+                    (Some(path), None) => eprintln!(
+                        "note: nothing was written to {}: nothing in it is of use to the gateway",
+                        path.display()
+                    ),
+                    (None, _) => {}
                 }
                 let document =
                     json!({ "schema": "identify/1", "what": what, "refused": null, "learned": learned.json });
@@ -92,5 +100,6 @@ impl Reading {
 pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
         What::NoLoad(arguments) => no_load::run(arguments),
+        What::FeedCurve(arguments) => feed_curve::run(arguments),
     }
 }

@@ -17,3 +17,4 @@ mod words;
 
 pub use no_load::{NoLoadLearned, SpeedLearned, identify_no_load};
 pub use stretches::Stretch;
+pub(super) use stretches::settled_from;

@@ -95,7 +95,7 @@ fn close(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
 }
 
 /// Where the level is settled: leading twelfths are left out while they lie apart from what follows, at most half of all.
-fn settled_from(time_s: &[f64], power_w: &[f64]) -> usize {
+pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> usize {
     let block = time_s.len() / 12;
     let mut from = 0;
     while block >= 2 && from + block <= time_s.len() / 2 {

@@ -45,6 +45,20 @@ impl Plausible {
         range: (5.0, 2e5),
         mistakes: &[factor("1/s", 60.0), factor("rad/s", 60.0 / std::f64::consts::TAU)],
     };
+    /// Feed: 0.5 mm/min to 60 m/min.
+    pub const FEED_MM_MIN: Self = Self {
+        quantity: "feed",
+        unit: "mm/min",
+        range: (0.5, 6e4),
+        mistakes: &[factor("m/min", 1000.0), factor("um/min", 1e-3)],
+    };
+    /// Current of a spindle motor: 50 mA to 2 kA.
+    pub const SPINDLE_CURRENT_A: Self = Self {
+        quantity: "spindle current",
+        unit: "A",
+        range: (0.05, 2000.0),
+        mistakes: &[factor("kA", 1000.0), factor("mA", 1e-3)],
+    };
     /// Torque at the spindle: 0.02 N·m to 20 kN·m.
     pub const TORQUE_NM: Self = Self {
         quantity: "spindle torque",

@@ -15,7 +15,7 @@ enum Argument {
     Number(f64),
     Text(String),
     Numbers(Vec<f64>),
-    Pairs(Vec<(f64, f64)>),
+    Rows(Vec<Vec<f64>>),
 }
 
 /// The arguments of one call, in the order of the parameters.
@@ -25,7 +25,7 @@ pub struct Arguments<'a> {
 }
 
 impl<'a> Arguments<'a> {
-    /// Reads what the script handed over. Something that is neither number, text, array of numbers nor array of pairs is a
+    /// Reads what the script handed over. Something that is neither number, text, array of numbers nor array of rows is a
     /// mistake in the script.
     pub(super) fn read(method: &'a Method, values: &[&mut Dynamic]) -> Outcome<Self> {
         let read = values.iter().zip(method.parameters).map(|(value, parameter)| {
@@ -72,13 +72,25 @@ impl<'a> Arguments<'a> {
         }
     }
 
-    /// The array of pairs at this place.
+    /// The array of rows of numbers at this place.
     #[must_use]
-    pub fn pairs(&self, at: usize) -> &[(f64, f64)] {
+    pub fn rows(&self, at: usize) -> &[Vec<f64>] {
         match self.values.get(at) {
-            Some(Argument::Pairs(pairs)) => pairs,
+            Some(Argument::Rows(rows)) => rows,
             _ => &[],
         }
+    }
+
+    /// The same, every row of the same length.
+    ///
+    /// # Errors
+    /// A row of another length.
+    pub fn rows_of<const N: usize>(&self, at: usize) -> Result<Vec<[f64; N]>, Refusal> {
+        let name = self.method.parameters.get(at).map_or("", |parameter| parameter.name);
+        let wrong = |length: usize| {
+            Refusal::new(RefusalKind::Mismatch, format!("a row of {name} has {length} numbers"), format!("give {N}"))
+        };
+        self.rows(at).iter().map(|row| row.as_slice().try_into().map_err(|_| wrong(row.len()))).collect()
     }
 }
 
@@ -89,7 +101,7 @@ impl Argument {
             Self::Number(_) => !unit.starts_with('[') && unit != "text",
             Self::Text(_) => unit == "text",
             Self::Numbers(_) => unit.starts_with('[') && !unit.starts_with("[["),
-            Self::Pairs(_) => unit.starts_with("[["),
+            Self::Rows(_) => unit.starts_with("[["),
         }
     }
 }
@@ -109,7 +121,7 @@ fn argument(value: &Dynamic) -> Option<Argument> {
         return None;
     }
     match array.first() {
-        Some(first) if first.is_array() => array.iter().map(pair).collect::<Option<_>>().map(Argument::Pairs),
+        Some(first) if first.is_array() => array.iter().map(row).collect::<Option<_>>().map(Argument::Rows),
         _ => array.iter().map(number).collect::<Option<_>>().map(Argument::Numbers),
     }
 }
@@ -118,11 +130,8 @@ fn number(value: &Dynamic) -> Option<f64> {
     value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
 }
 
-fn pair(value: &Dynamic) -> Option<(f64, f64)> {
-    match value.read_lock::<Array>()?.as_slice() {
-        [first, second] => Some((number(first)?, number(second)?)),
-        _ => None,
-    }
+fn row(value: &Dynamic) -> Option<Vec<f64>> {
+    value.read_lock::<Array>()?.iter().map(number).collect()
 }
 
 /// What a method answers.

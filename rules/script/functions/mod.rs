@@ -6,6 +6,7 @@
 
 mod arguments;
 mod power_separation;
+mod spindle_current;
 
 pub use arguments::{Answer, Arguments};
 
@@ -20,7 +21,7 @@ use std::any::TypeId;
 pub struct Parameter {
     /// Name; ends in the unit where the unit has a short form.
     pub name: &'static str,
-    /// Unit symbol; `1` for pure numbers; `[W]` for an array, `[[rpm, W]]` for an array of pairs.
+    /// Unit symbol; `1` for pure numbers; `[W]` for an array, `[[rpm, W]]` for an array of rows.
     pub unit: &'static str,
 }
 
@@ -63,7 +64,7 @@ pub struct Subject {
 }
 
 /// Every subject, in the order in which they are printed.
-pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT];
+pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT, &spindle_current::SUBJECT];
 
 /// Every method of every subject.
 pub fn methods() -> impl Iterator<Item = &'static Method> {
