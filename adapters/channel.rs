@@ -206,6 +206,22 @@ pub static CHANNELS: &[Channel] = &[
     text("execution", "Execution state of the controller", "执行状态"),
     text("alarm", "Alarm shown by the controller, empty when there is none", "报警"),
     text("motion", "Motion word of the controller", "运动状态"),
+    number("temperature_1_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 1", "测温点1"),
+    number("temperature_2_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 2", "测温点2"),
+    number("temperature_3_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 3", "测温点3"),
+    number("temperature_4_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 4", "测温点4"),
+    number("temperature_5_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 5", "测温点5"),
+    number("temperature_6_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 6", "测温点6"),
+    number("temperature_7_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 7", "测温点7"),
+    number("temperature_8_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 8", "测温点8"),
+    number("temperature_9_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 9", "测温点9"),
+    number("temperature_10_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 10", "测温点10"),
+    number("temperature_11_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 11", "测温点11"),
+    number("temperature_12_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 12", "测温点12"),
+    number("temperature_13_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 13", "测温点13"),
+    number("temperature_14_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 14", "测温点14"),
+    number("temperature_15_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 15", "测温点15"),
+    number("temperature_16_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 16", "测温点16"),
 ];
 
 /// Index into [`CHANNELS`].

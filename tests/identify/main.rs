@@ -8,6 +8,9 @@ mod command;
 mod current;
 mod machine;
 mod power;
+mod thermal;
+#[path = "../support/thermal_machine.rs"]
+mod thermal_machine;
 
 /// Repetitions of the long form.
 pub(crate) const LONG: u64 = 200;
@@ -25,6 +28,11 @@ impl Coverage {
     /// Nothing counted yet.
     pub(crate) fn new(quantity: impl Into<String>) -> Self {
         Self { quantity: quantity.into(), inside: 0, repetitions: 0 }
+    }
+
+    /// The same count under another name.
+    pub(crate) fn named(self, quantity: impl Into<String>) -> Self {
+        Self { quantity: quantity.into(), ..self }
     }
 
     /// One repetition.

@@ -4,6 +4,7 @@
 
 mod current;
 mod power;
+mod thermal;
 
 /// One line of the table.
 pub(crate) struct Row {
@@ -63,7 +64,7 @@ fn line(row: &Row) -> String {
 
 #[test]
 fn published_numbers_are_reproduced() {
-    let rows: Vec<Row> = [power::rows(), current::rows()].into_iter().flatten().collect();
+    let rows: Vec<Row> = [power::rows(), current::rows(), thermal::rows()].into_iter().flatten().collect();
     println!(
         "{:<58} {:>14} {:>14} {:>11} {:>9}  {:<28} verdict",
         "quantity", "published", "ours", "difference", "tolerance", "source"

@@ -5,6 +5,7 @@
 
 mod feed_curve;
 mod no_load;
+mod thermal;
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
@@ -28,6 +29,8 @@ enum What {
     NoLoad(no_load::NoLoadArguments),
     /// Spindle current over feed, by speed and depth of cut, from cuts at several feeds.
     FeedCurve(feed_curve::FeedCurveArguments),
+    /// Thermal error from temperatures: which sensors, static or late, with intervals.
+    Thermal(thermal::ThermalArguments),
 }
 
 /// What every subcommand reads and writes.
@@ -101,5 +104,6 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
         What::NoLoad(arguments) => no_load::run(arguments),
         What::FeedCurve(arguments) => feed_curve::run(arguments),
+        What::Thermal(arguments) => thermal::run(arguments),
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! `E = b0 + sum b_j w_j` with `dw_j/dt = (T_j - w_j) / tau`, in one of two forms: every sensor late, or the first sensor
 //! both as it is and late (which also follows an error that is ahead of its sensor). For every tau the law is linear, so
-//! tau is searched for alone (variable projection) under the noise that suits it; its interval comes from the derivative
-//! of the law by its logarithm, fitted along with the coefficients. States run on true time stamps, through pauses in a
+//! tau is searched for alone (variable projection); its interval comes from the derivative of the law by its
+//! logarithm, fitted along with the coefficients. States run on true time stamps, through pauses in a
 //! straight line from the last temperature to the first one after; how they stood at the first row is fitted and not kept.
 //! Sources: Golub and Pereyra (1973), SIAM J. Numer. Anal. 10:413; static regression "not satisfied", a model with memory
 //! 94 %: 10.1177/0954405414556499.
@@ -11,9 +11,9 @@
 use super::course::Course;
 use super::cross_validation::{HeldOut, outside, squares, trained};
 use super::law::{Path, first_order};
-use super::noise::{Noise, grid, weigh};
+use super::quantities::THERMAL_ERROR;
 use super::regression::{Design, ROWS_MAX, Tau, ThermalFit, column, finish, rms};
-use crate::estimators::regression::{Column, Refusal, RefusalKind};
+use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
 use std::ops::Range;
 
 /// Which terms are late.
@@ -24,8 +24,6 @@ pub(super) enum Form {
     /// The first one as it is and late, the others as they are.
     FirstTwice,
 }
-
-pub(super) const FORMS: [Form; 2] = [Form::All, Form::FirstTwice];
 
 /// Time constants that are tried: from a few rows to half of the longest run, in these many steps.
 const TAUS: usize = 18;
@@ -136,25 +134,18 @@ impl Late<'_> {
         Column::new("beginning", clock_s.iter().map(left).collect())
     }
 
+    /// The time constant with the least sum of squares.
     fn search(&self) -> Result<f64, Refusal> {
         let taus = self.taus()?;
-        let mut noises: Vec<Noise> = grid(self.course).into_iter().skip(1).step_by(7).collect();
-        noises.push(Noise::WHITE);
-        let best = |tau_s: f64, noises: &[Noise]| -> Result<(f64, Noise), Refusal> {
+        let squares = |tau_s: f64| {
             let (short, columns) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
-            let mut best = (f64::MIN, Noise::WHITE);
-            for noise in noises {
-                let likelihood = weigh(&short, &columns, short.error_um(), *noise)?.likelihood;
-                best = if likelihood > best.0 { (likelihood, *noise) } else { best };
-            }
-            Ok(best)
+            let target = Column::new(THERMAL_ERROR, short.error_um().to_vec());
+            Ok(fit(&target, &columns, Intercept::None)?.rss)
         };
-        let tried = taus.iter().map(|tau_s| Ok((*tau_s, best(*tau_s, &noises)?)));
-        let tried = tried.collect::<Result<Vec<(f64, (f64, Noise))>, Refusal>>()?;
-        let likeliest = tried.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        let (tau_s, (_, noise)) = likeliest.copied().unwrap_or((taus[0], (0.0, Noise::WHITE)));
+        let tried = taus.iter().map(|tau_s| Ok((*tau_s, squares(*tau_s)?))).collect::<Result<Vec<_>, Refusal>>()?;
+        let least = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(taus[0], |(tau_s, _)| *tau_s);
         let ratio = taus[1] / taus[0];
-        narrow(tau_s / ratio, tau_s * ratio, |tau_s| Ok(best(tau_s, &[noise])?.0))
+        narrow(least / ratio, least * ratio, squares)
     }
 
     /// Constant, terms and beginning.
@@ -167,7 +158,8 @@ impl Late<'_> {
     fn fit(&self, tau_s: f64) -> Result<ThermalFit, Refusal> {
         let columns = self.columns(tau_s);
         let (short, whole) = self.course.condensed(&self.whole(tau_s), ROWS_MAX / 3);
-        let white = weigh(&short, &whole, short.error_um(), Noise::WHITE)?.regression.values();
+        let target = Column::new(THERMAL_ERROR, short.error_um().to_vec());
+        let white = fit(&target, &whole, Intercept::None)?.values();
         let (more, less) = (self.columns(tau_s * STEP.exp()), self.columns(tau_s * (-STEP).exp()));
         let slope = |row: usize| {
             let terms = white[1..].iter().zip(more.iter().zip(&less));
@@ -191,13 +183,13 @@ impl Late<'_> {
     }
 }
 
-/// The greatest value of a function of a positive number, by golden section over its logarithm.
+/// Where a function of a positive number is least, by golden section over its logarithm.
 fn narrow(least: f64, greatest: f64, of: impl Fn(f64) -> Result<f64, Refusal>) -> Result<f64, Refusal> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let (mut low, mut high) = (least.ln(), greatest.ln());
     for _ in 0..NARROW {
         let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-        if of(left.exp())? > of(right.exp())? { high = right } else { low = left }
+        if of(left.exp())? < of(right.exp())? { high = right } else { low = left }
     }
     Ok((0.5 * (low + high)).exp())
 }

@@ -48,7 +48,7 @@ pub struct ThermalLaw {
     /// Ends of its 95 % interval.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tau_interval_s: Option<(f64, f64)>,
-    /// Standard deviation of what the law leaves, um.
+    /// Standard deviation of what the law leaves, also of rows that it was not fitted to, um.
     pub residual_sd_um: f64,
     /// Greatest standard deviation of the law itself in the rows of identification, um: more is extrapolation.
     pub law_sd_max_um: f64,

@@ -2,11 +2,12 @@
 
 use super::course::Course;
 use super::cross_validation::{HeldOut, held_out};
-use super::lagged::{FORMS, Form, fit_lagged, held_out_lagged, late};
+use super::lagged::{Form, fit_lagged, held_out_lagged, late};
 use super::regression::{ThermalFit, column, fit_static};
 use super::selection::{Selection, SelectionSettings, select};
 use crate::estimators::regression::{Column, Refusal, RefusalKind};
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 
 /// Rows that cross-validation works on; more are averaged first.
 const ROWS_MAX: usize = 400;
@@ -36,6 +37,7 @@ pub struct ThermalLearned {
     /// The law without lag.
     pub without_lag: Candidate,
     /// The best law with lag, or why there is none.
+    #[serde(serialize_with = "or_refused")]
     pub with_lag: Result<Candidate, Refusal>,
     /// Is the law with lag the one to use?
     pub lag_chosen: bool,
@@ -45,6 +47,18 @@ pub struct ThermalLearned {
     pub blocks_are_runs: bool,
     /// How many blocks.
     pub blocks: usize,
+}
+
+/// The candidate, or `{"refused": ...}`.
+fn or_refused<S: Serializer>(late: &Result<Candidate, Refusal>, to: S) -> Result<S::Ok, S::Error> {
+    match late {
+        Ok(candidate) => candidate.serialize(to),
+        Err(refusal) => {
+            let mut map = to.serialize_map(Some(1))?;
+            map.serialize_entry("refused", refusal)?;
+            map.end()
+        }
+    }
 }
 
 impl ThermalLearned {
@@ -101,7 +115,13 @@ fn candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<Cand
     let (short, columns) = course.condensed(&columns, ROWS_MAX);
     let held_out = held_out(&columns, short.error_um(), &short.blocks())?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(Candidate { fit, held_out, hysteresis_um })
+    Ok(Candidate { fit: expecting(fit, &held_out), held_out, hysteresis_um })
+}
+
+/// What a law leaves of rows that it was not fitted to is what is to be expected of it later.
+fn expecting(mut fit: ThermalFit, held_out: &HeldOut) -> ThermalFit {
+    fit.law.residual_sd_um = fit.law.residual_sd_um.max(held_out.rms_um);
+    fit
 }
 
 /// A law whose every interval holds zero explains nothing.
@@ -116,21 +136,20 @@ fn says_something(candidate: &Candidate) -> Result<(), Refusal> {
     Err(Refusal::new(RefusalKind::NotIdentifiable, what, next).at(super::quantities::THERMAL_ERROR))
 }
 
-/// The late law that predicts best.
+/// The late law that predicts best. The second form is not the first with a term more, and must be clearly better both in
+/// blocks left out and in likelihood.
 fn best_late(course: &Course, sensors: &[usize]) -> Result<Candidate, Refusal> {
-    let mut best: Option<(Form, HeldOut)> = None;
-    for form in FORMS {
-        let error = held_out_lagged(course, sensors, form, ROWS_MAX)?;
-        // The second form has more coefficients: it must be clearly better.
-        if best.as_ref().is_none_or(|(_, least)| error.beats(least, GAIN_MIN)) {
-            best = Some((form, error));
-        }
-    }
-    let none = || Refusal::new(RefusalKind::TooFew, "no late law can be tried", "record longer runs");
-    let (form, held_out) = best.ok_or_else(none)?;
+    let all = late_candidate(course, sensors, Form::All)?;
+    let Ok(twice) = late_candidate(course, sensors, Form::FirstTwice) else { return Ok(all) };
+    let likelier = twice.fit.likelihood > all.fit.likelihood + LIKELIHOOD_MIN;
+    Ok(if likelier && twice.held_out.beats(&all.held_out, GAIN_MIN) { twice } else { all })
+}
+
+fn late_candidate(course: &Course, sensors: &[usize], form: Form) -> Result<Candidate, Refusal> {
+    let held_out = held_out_lagged(course, sensors, form, ROWS_MAX)?;
     let fit = fit_lagged(course, sensors, form)?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(Candidate { fit, held_out, hysteresis_um })
+    Ok(Candidate { fit: expecting(fit, &held_out), held_out, hysteresis_um })
 }
 
 fn decide(plain: &Candidate, late: &Result<Candidate, Refusal>) -> (bool, String) {

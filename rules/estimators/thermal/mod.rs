@@ -7,12 +7,14 @@
 //! |---|---|
 //! | `quantities` | units that were mistaken, series that teach nothing |
 //! | `course` | rows of warm-ups, run by run, blocks to leave out |
+//! | `recording` | the same from a recording |
 //! | `grey` | grey relational grades, two normalisations |
 //! | `selection` | which sensors, and why |
 //! | `cross_validation` | errors of blocks that were left out |
 //! | `noise` | residuals that remember |
 //! | `regression` | multiple linear regression with intervals that hold |
 //! | `lagged` | the same law late: time constant, hysteresis removed |
+//! | `told`, `written` | what was learned in words, and as a script |
 //! | `learn` | all of it, and which law to use |
 //! | `law` | which temperatures, with what weight, late by how much |
 //! | `predictor` | the law at work: error, uncertainty, residual, outside the range |
@@ -34,8 +36,11 @@ mod predictor;
 mod pulse_insertion;
 mod quadrature;
 mod quantities;
+mod recording;
 mod regression;
 mod selection;
+mod told;
+mod written;
 
 pub use compensation::{
     AxisSituation, CompensationSettingError, CompensationSettings, CompensationStep, Compensator, Standing,
@@ -49,5 +54,6 @@ pub use predictor::{Comparison, NoPrediction, Outside, Prediction, Predictor};
 pub use pulse_insertion::{Edge, InsertionFault, PulseInserter};
 pub use quadrature::{Decoder, EDGES_PER_PULSE, IllegalTransition, Lines};
 pub use quantities::Series;
+pub use recording::{Collected, LeftOut, collect};
 pub use regression::{Memory, ThermalCoefficient, ThermalFit, fit_static};
 pub use selection::{GradeChoice, Selection, SelectionSettings, SensorVerdict, select};

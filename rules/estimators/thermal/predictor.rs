@@ -80,7 +80,7 @@ pub enum Outside {
 pub struct Prediction {
     /// The error, um, with the standard deviation of a single measurement around it.
     pub error_um: Estimate,
-    /// The part of that deviation which is the law's own, um.
+    /// Standard deviation of the law itself at this point, from the intervals of its coefficients, um.
     pub law_sd_um: f64,
     /// Set where this is an extrapolation.
     pub outside: Option<Outside>,
@@ -196,8 +196,10 @@ impl Predictor {
         let lagged = self.law.terms.iter().filter(|term| term.path == Path::Lagged);
         let slope: f64 = lagged.map(|term| term.um_per_k.abs()).sum();
         let start_sd_um = self.unsettled * slope * self.law.lag_spread_k;
-        let sd = self.law.residual_sd_um.hypot(law_sd_um).hypot(start_sd_um);
-        let together = law_sd_um > LAW_SD_FACTOR * self.law.law_sd_max_um;
+        // What blocks left out showed holds the law's own deviation already, at points that the law knows as well.
+        let beyond = (law_sd_um / self.law.law_sd_max_um.max(f64::MIN_POSITIVE)).max(1.0);
+        let sd = (beyond * self.law.residual_sd_um).hypot(start_sd_um);
+        let together = beyond > LAW_SD_FACTOR;
         Prediction {
             error_um: Estimate { value: self.law.error_um(point), sd },
             law_sd_um,
@@ -209,12 +211,17 @@ impl Predictor {
         let terms = self.law.terms.iter().zip(temperatures_c).zip(&self.sensor_of);
         terms.into_iter().find_map(|((term, temperature_c), sensor)| {
             let (least, greatest) = term.range_c;
-            let margin = (MARGIN_SHARE * (greatest - least)).max(MARGIN_K);
+            let margin = margin_k(least, greatest);
             let inside = (least - margin..=greatest + margin).contains(temperature_c);
             let (sensor, temperature_c, range_c) = (*sensor, *temperature_c, term.range_c);
             (!inside).then_some(Outside::Sensor { sensor, temperature_c, range_c })
         })
     }
+}
+
+/// By how much a temperature may leave the range of identification.
+pub(super) fn margin_k(least_c: f64, greatest_c: f64) -> f64 {
+    (MARGIN_SHARE * (greatest_c - least_c)).max(MARGIN_K)
 }
 
 fn usable(sensor: usize, temperature_c: Result<f64, Absence>) -> Result<f64, NoPrediction> {

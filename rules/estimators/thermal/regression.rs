@@ -221,7 +221,7 @@ fn law(design: &Design<'_>, averaged: &Averaged, all: &[ThermalCoefficient], res
         intercept_interval: all[0].own.interval,
         tau_s: tau.map(|tau| tau.better_s(averaged, size)),
         tau_interval_s: tau.and_then(|_| all.last()).map(|tau| tau.own.interval),
-        residual_sd_um: rms(residuals).max(averaged.variance.max(0.0).sqrt()),
+        residual_sd_um: rms(residuals),
         law_sd_max_um: 0.0,
         lag_spread_k: tau.map_or(0.0, |tau| tau.spread_k),
         terms: (0..design.terms()).map(term).collect(),

@@ -7,6 +7,7 @@
 mod arguments;
 mod power_separation;
 mod spindle_current;
+mod thermal;
 
 pub use arguments::{Answer, Arguments};
 
@@ -64,7 +65,7 @@ pub struct Subject {
 }
 
 /// Every subject, in the order in which they are printed.
-pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT, &spindle_current::SUBJECT];
+pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT, &spindle_current::SUBJECT, &thermal::SUBJECT];
 
 /// Every method of every subject.
 pub fn methods() -> impl Iterator<Item = &'static Method> {

@@ -1,0 +1,82 @@
+//! `identify thermal`: thermal error from temperatures, which sensors and which law.
+
+use super::{Learned, Reading};
+use crate::cli::CommandResult;
+use adapters::Recording;
+use clap::Args;
+use rules::estimators::regression::{Refusal, RefusalKind};
+use rules::estimators::thermal::{LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalLearned, collect, learn};
+use serde_json::{Value, json};
+
+#[derive(Debug, Args)]
+pub(super) struct ThermalArguments {
+    #[command(flatten)]
+    reading: Reading,
+    /// Use these sensors instead of choosing, e.g. bearing_temperature_c,temperature_3_c.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    sensors: Option<Vec<String>>,
+    /// Choose at most so many sensors.
+    #[arg(long, value_name = "N", default_value_t = SelectionSettings::default().sensors_max)]
+    sensors_max: usize,
+    /// Greatest variance inflation among chosen sensors.
+    #[arg(long, value_name = "FACTOR", default_value_t = SelectionSettings::default().inflation_max)]
+    inflation_max: f64,
+    /// Resolution coefficient of the grey relational grades, above 0 and at most 1.
+    #[arg(long, value_name = "RHO", default_value_t = RHO_USUAL)]
+    rho: f64,
+}
+
+pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
+    let recording = arguments.reading.read()?;
+    let learned = identify(&recording, arguments);
+    arguments.reading.finish("thermal", learned)
+}
+
+fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<Learned, Refusal> {
+    let settings = settings(arguments)?;
+    let collected = collect(recording)?;
+    let learned = learn(&collected.course, settings, arguments.sensors.as_deref())?;
+    let text = format!("{}{learned}", left_out(&collected.left_out));
+    Ok(Learned { text, json: document(&learned, &collected.left_out), file: Some(learned.script()) })
+}
+
+fn settings(arguments: &ThermalArguments) -> Result<SelectionSettings, Refusal> {
+    let given = SelectionSettings {
+        sensors_max: arguments.sensors_max,
+        inflation_max: arguments.inflation_max,
+        rho: arguments.rho,
+        ..SelectionSettings::default()
+    };
+    let refuse =
+        |option: &str, what: String, next: &str| Err(Refusal::new(RefusalKind::OutOfRange, what, next).at(option));
+    if given.sensors_max == 0 || given.sensors_max > POINTS_MAX {
+        let next = format!("choose 1 to {POINTS_MAX}");
+        return refuse("--sensors-max", format!("{} sensors", given.sensors_max), &next);
+    }
+    if !(given.rho > 0.0 && given.rho <= 1.0) {
+        return refuse("--rho", format!("{}", given.rho), "give a number above 0 and at most 1");
+    }
+    if given.inflation_max.is_nan() || given.inflation_max < 1.0 {
+        return refuse("--inflation-max", format!("{}", given.inflation_max), "give 1 or more; 10 is usual");
+    }
+    Ok(given)
+}
+
+fn left_out(left_out: &LeftOut) -> String {
+    let mut text = String::new();
+    if left_out.rows > 0 {
+        text.push_str(&format!("{} rows without an error or without every temperature are left out\n", left_out.rows));
+    }
+    if !left_out.sensors.is_empty() {
+        text.push_str(&format!("{} mostly have no value and are left out\n", left_out.sensors.join(", ")));
+    }
+    text
+}
+
+fn document(learned: &ThermalLearned, left_out: &LeftOut) -> Value {
+    let mut document = json!(learned);
+    document["left_out"] = json!(left_out);
+    document["law"] = json!(learned.best().fit.law);
+    document["coefficients"] = json!(learned.best().fit.coefficients);
+    document
+}

@@ -1,0 +1,92 @@
+//! A law as a script that the gateway runs.
+
+use super::law::{Path, ThermalLaw};
+use super::learn::ThermalLearned;
+use std::fmt::Write;
+
+impl ThermalLearned {
+    /// A script with the chosen law: predicted error, residual where the error is measured, and alarms where the
+    /// temperatures leave the range of identification or the law is contradicted.
+    #[must_use]
+    pub fn script(&self) -> String {
+        let law = &self.best().fit.law;
+        let mut text = heading(self, law);
+        text.push_str(&states(law));
+        text.push_str(&prediction(law));
+        text
+    }
+}
+
+/// Names of the channels, each once.
+fn sensors(law: &ThermalLaw) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for term in &law.terms {
+        if !names.contains(&term.sensor.as_str()) {
+            names.push(&term.sensor);
+        }
+    }
+    names
+}
+
+fn heading(learned: &ThermalLearned, law: &ThermalLaw) -> String {
+    let best = learned.best();
+    let mut text =
+        String::from("// Thermal error from temperatures, identified from recordings. 热误差预测（由记录辨识）\n");
+    let _ = writeln!(
+        text,
+        "// Residual {:.2} um; in {} blocks left out one at a time {:.2} um.",
+        best.fit.residual_rms_um, learned.blocks, best.held_out.rms_um
+    );
+    for term in &law.terms {
+        let late = if term.path == Path::Lagged { "late, " } else { "" };
+        let (least, greatest) = term.interval;
+        let _ = writeln!(text, "// {}: {late}{least:.3} to {greatest:.3} um/K", term.sensor);
+    }
+    let present: Vec<String> = sensors(law).iter().map(|name| format!("has({name})")).collect();
+    let _ = writeln!(text, "\nif {} {{", present.join(" && "));
+    text
+}
+
+/// The state of every lagged sensor, kept from run to run; it begins at the temperature.
+fn states(law: &ThermalLaw) -> String {
+    let mut text = String::new();
+    let Some(tau_s) = law.tau_s else { return text };
+    for term in law.terms.iter().filter(|term| term.path == Path::Lagged) {
+        let name = &term.sensor;
+        let _ = write!(
+            text,
+            "    if !(\"late_{name}\" in memory) {{\n        memory.late_{name} = {name};\n        memory.before_{name} = {name};\n    }}\n    memory.late_{name} = first_order_c(memory.late_{name}, memory.before_{name}, {name}, dt_s, {tau_s:.1});\n    memory.before_{name} = {name};\n"
+        );
+    }
+    text
+}
+
+fn prediction(law: &ThermalLaw) -> String {
+    let value = |at: usize| match law.terms[at].path {
+        Path::Direct => law.terms[at].sensor.clone(),
+        Path::Lagged => format!("memory.late_{}", law.terms[at].sensor),
+    };
+    let list = |of: &dyn Fn(usize) -> String| (0..law.terms.len()).map(of).collect::<Vec<String>>().join(", ");
+    let values = list(&value);
+    let coefficients = list(&|at| format!("{:.6}", law.terms[at].um_per_k));
+    let temperatures = list(&|at| law.terms[at].sensor.clone());
+    let ranges = list(&|at| format!("[{:.2}, {:.2}]", law.terms[at].range_c.0, law.terms[at].range_c.1));
+    format!(
+        "    let predicted_um = predicted_thermal_error_um([{values}], [{coefficients}], {:.4});\n    \
+         let outside_k = temperature_outside_k([{temperatures}], [{ranges}]);\n    \
+         if has(outside_k) {{\n        \
+         alarm_when(\"thermal_outside\", outside_k > {:.2}, 60.0, \"temperatures outside the range of identification: identify thermal again\");\n    }}\n    \
+         if has(thermal_error_um) && has(predicted_um) {{\n        \
+         let residual_um = thermal_error_um - predicted_um;\n        \
+         alarm_when(\"thermal_contradicted\", residual_um > {limit:.2} || residual_um < -{limit:.2}, 600.0, \"measured and predicted thermal error disagree: identify thermal again\");\n    }}\n}}\n",
+        law.intercept_um,
+        margin_k(law),
+        limit = 3.0 * law.residual_sd_um,
+    )
+}
+
+/// The least margin beyond the range of identification among the sensors.
+fn margin_k(law: &ThermalLaw) -> f64 {
+    let margin = |(least, greatest): (f64, f64)| super::predictor::margin_k(least, greatest);
+    law.terms.iter().map(|term| margin(term.range_c)).fold(f64::MAX, f64::min)
+}

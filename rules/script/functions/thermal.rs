@@ -1,0 +1,163 @@
+//! Thermal error: prediction from temperatures, the lag of a structure, and increments of a compensation.
+
+use super::{Answer, Arguments, Method, Parameter, Subject, takes};
+use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::estimators::thermal::first_order;
+
+pub(super) static SUBJECT: Subject = Subject { en: "Thermal error", zh: "热误差", methods: METHODS };
+
+/// A temperature above this was meant in kelvin.
+const KELVIN_FROM_C: f64 = 200.0;
+
+const PREDICTION: &[Parameter] =
+    &[takes("temperatures_c", "[°C]"), takes("coefficients_um_per_k", "[um/K]"), takes("intercept_um", "um")];
+
+const DEVIATION: &[Parameter] =
+    &[takes("temperatures_c", "[°C]"), takes("covariance_by_rows", "[um2]"), takes("residual_sd_um", "um")];
+
+const LAG: &[Parameter] = &[
+    takes("state_c", "°C"),
+    takes("temperature_before_c", "°C"),
+    takes("temperature_c", "°C"),
+    takes("dt_s", "s"),
+    takes("tau_s", "s"),
+];
+
+const WANTED: &[Parameter] = &[
+    takes("value_um", "um"),
+    takes("error_um", "um"),
+    takes("limit_um", "um"),
+    takes("dead_band_um", "um"),
+    takes("slew_um_per_s", "um/s"),
+    takes("dt_s", "s"),
+];
+
+const PULSES: &[Parameter] = &[takes("value_um", "um"), takes("sent_um", "um"), takes("pulse_um", "um")];
+
+static METHODS: &[Method] = &[
+    Method {
+        name: "predicted_thermal_error_um",
+        parameters: PREDICTION,
+        returns: "um",
+        en: "Thermal error E = intercept + sum of coefficient times temperature; a lagged sensor takes its state from first_order_c",
+        zh: "由各测温点温度线性预测热误差",
+        run: |given| predicted(given).map(Answer::Number),
+    },
+    Method {
+        name: "predicted_thermal_error_sd_um",
+        parameters: DEVIATION,
+        returns: "um",
+        en: "Standard deviation of that prediction, from the covariance of intercept and coefficients, row by row, and the residual",
+        zh: "热误差预测的标准不确定度",
+        run: |given| deviation(given).map(Answer::Number),
+    },
+    Method {
+        name: "temperature_outside_k",
+        parameters: &[takes("temperatures_c", "[°C]"), takes("ranges_c", "[[°C, °C]]")],
+        returns: "K",
+        en: "By how much the worst temperature lies outside its range of identification; 0 inside",
+        zh: "温度超出辨识范围的最大值",
+        run: |given| outside(given).map(Answer::Number),
+    },
+    Method {
+        name: "first_order_c",
+        parameters: LAG,
+        returns: "°C",
+        en: "State of a structure that follows its temperature late, dw/dt = (T - w) / tau, dt_s later; keep it in memory",
+        zh: "一阶滞后温度状态",
+        run: |given| late(given).map(Answer::Number),
+    },
+    Method {
+        name: "thermal_compensation_um",
+        parameters: WANTED,
+        returns: "um",
+        en: "Next compensation value: against the error, within the limit, followed outside the dead band, at most slew times dt",
+        zh: "热误差补偿量（限幅、死区、限速）",
+        run: |given| compensation(given).map(Answer::Number),
+    },
+    Method {
+        name: "thermal_compensation_pulses",
+        parameters: PULSES,
+        returns: "1",
+        en: "Whole pulses that bring what was sent to the value; what is less than a pulse is carried",
+        zh: "补偿脉冲增量（小数部分保留）",
+        run: |given| pulses(given).map(Answer::Number),
+    },
+];
+
+fn refuse<T>(kind: RefusalKind, what: String, next: &str) -> Result<T, Refusal> {
+    Err(Refusal::new(kind, what, next))
+}
+
+/// The temperatures of a call, none of them in kelvin.
+fn temperatures<'a>(given: &'a Arguments<'_>) -> Result<&'a [f64], Refusal> {
+    let all = given.numbers(0);
+    match all.iter().find(|temperature| **temperature > KELVIN_FROM_C) {
+        Some(hot) => refuse(RefusalKind::Unit, format!("{hot:.1} °C looks like K"), "subtract 273.15"),
+        None => Ok(all),
+    }
+}
+
+fn predicted(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let (temperatures, coefficients) = (temperatures(given)?, given.numbers(1));
+    if temperatures.is_empty() || temperatures.len() != coefficients.len() {
+        let what = format!("{} temperatures for {} coefficients", temperatures.len(), coefficients.len());
+        return refuse(RefusalKind::Mismatch, what, "give one coefficient for each temperature");
+    }
+    Ok(given.number(2) + temperatures.iter().zip(coefficients).map(|(t, b)| t * b).sum::<f64>())
+}
+
+fn deviation(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let point: Vec<f64> = std::iter::once(1.0).chain(temperatures(given)?.iter().copied()).collect();
+    let covariance = given.numbers(1);
+    if covariance.len() != point.len() * point.len() {
+        let what = format!("{} entries for {} coefficients with intercept", covariance.len(), point.len());
+        return refuse(RefusalKind::Mismatch, what, "give the whole covariance, row by row");
+    }
+    let rows = covariance.chunks(point.len()).zip(&point);
+    let variance: f64 = rows.map(|(row, x)| x * row.iter().zip(&point).map(|(c, y)| c * y).sum::<f64>()).sum();
+    if variance < 0.0 {
+        return refuse(RefusalKind::Contradiction, "the covariance is none".to_owned(), "copy it whole");
+    }
+    Ok(variance.sqrt().hypot(given.number(2)))
+}
+
+fn outside(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let (temperatures, ranges) = (temperatures(given)?, given.pairs(1));
+    if temperatures.is_empty() || temperatures.len() != ranges.len() {
+        let what = format!("{} temperatures for {} ranges", temperatures.len(), ranges.len());
+        return refuse(RefusalKind::Mismatch, what, "give one range for each temperature");
+    }
+    let beyond =
+        |(temperature, (least, greatest)): (&f64, &(f64, f64))| (least - temperature).max(temperature - greatest);
+    Ok(temperatures.iter().zip(ranges).map(beyond).fold(0.0, f64::max))
+}
+
+fn late(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let (dt_s, tau_s) = (given.number(3), given.number(4));
+    if tau_s <= 0.0 || dt_s < 0.0 {
+        let what = format!("dt_s = {dt_s}, tau_s = {tau_s}");
+        return refuse(RefusalKind::OutOfRange, what, "time does not go back, and a time constant is positive");
+    }
+    Ok(first_order(given.number(0), given.number(1), given.number(2), dt_s, tau_s))
+}
+
+fn compensation(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let [value, error, limit, dead_band, slew, dt_s] = std::array::from_fn(|at| given.number(at));
+    if limit <= 0.0 || dead_band < 0.0 || slew <= 0.0 || dt_s < 0.0 {
+        let what = format!("limit {limit} um, dead band {dead_band} um, slew {slew} um/s, dt {dt_s} s");
+        return refuse(RefusalKind::OutOfRange, what, "limit and slew are positive, dead band and dt not negative");
+    }
+    let wanted = (-error).clamp(-limit, limit);
+    let step = if (wanted - value).abs() <= dead_band { 0.0 } else { wanted - value };
+    Ok((value + step.clamp(-slew * dt_s, slew * dt_s)).clamp(-limit, limit))
+}
+
+fn pulses(given: &Arguments<'_>) -> Result<f64, Refusal> {
+    let [value, sent, pulse] = std::array::from_fn(|at| given.number(at));
+    if pulse <= 0.0 {
+        return refuse(RefusalKind::OutOfRange, format!("pulse_um = {pulse}"), "a pulse has a length");
+    }
+    // A whole pulse is not missed by rounding of the division.
+    Ok(((value - sent) / pulse * (1.0 + 1e-12)).trunc())
+}
