@@ -70,10 +70,11 @@ fn prediction(law: &ThermalLaw) -> String {
     let values = list(&value);
     let coefficients = list(&|at| format!("{:.6}", law.terms[at].um_per_k));
     let temperatures = list(&|at| law.terms[at].sensor.clone());
-    let ranges = list(&|at| format!("[{:.2}, {:.2}]", law.terms[at].range_c.0, law.terms[at].range_c.1));
+    let least = list(&|at| format!("{:.2}", law.terms[at].range_c.0));
+    let greatest = list(&|at| format!("{:.2}", law.terms[at].range_c.1));
     format!(
         "    let predicted_um = predicted_thermal_error_um([{values}], [{coefficients}], {:.4});\n    \
-         let outside_k = temperature_outside_k([{temperatures}], [{ranges}]);\n    \
+         let outside_k = temperature_outside_k([{temperatures}], [{least}], [{greatest}]);\n    \
          if has(outside_k) {{\n        \
          alarm_when(\"thermal_outside\", outside_k > {:.2}, 60.0, \"temperatures outside the range of identification: identify thermal again\");\n    }}\n    \
          if has(thermal_error_um) && has(predicted_um) {{\n        \

@@ -53,7 +53,7 @@ static METHODS: &[Method] = &[
     },
     Method {
         name: "temperature_outside_k",
-        parameters: &[takes("temperatures_c", "[°C]"), takes("ranges_c", "[[°C, °C]]")],
+        parameters: &[takes("temperatures_c", "[°C]"), takes("least_c", "[°C]"), takes("greatest_c", "[°C]")],
         returns: "K",
         en: "By how much the worst temperature lies outside its range of identification; 0 inside",
         zh: "温度超出辨识范围的最大值",
@@ -123,14 +123,14 @@ fn deviation(given: &Arguments<'_>) -> Result<f64, Refusal> {
 }
 
 fn outside(given: &Arguments<'_>) -> Result<f64, Refusal> {
-    let (temperatures, ranges) = (temperatures(given)?, given.pairs(1));
-    if temperatures.is_empty() || temperatures.len() != ranges.len() {
-        let what = format!("{} temperatures for {} ranges", temperatures.len(), ranges.len());
+    let (temperatures, least, greatest) = (temperatures(given)?, given.numbers(1), given.numbers(2));
+    let count = temperatures.len();
+    if count == 0 || least.len() != count || greatest.len() != count {
+        let what = format!("{count} temperatures for {} and {} limits", least.len(), greatest.len());
         return refuse(RefusalKind::Mismatch, what, "give one range for each temperature");
     }
-    let beyond =
-        |(temperature, (least, greatest)): (&f64, &(f64, f64))| (least - temperature).max(temperature - greatest);
-    Ok(temperatures.iter().zip(ranges).map(beyond).fold(0.0, f64::max))
+    let beyond = |at: usize| (least[at] - temperatures[at]).max(temperatures[at] - greatest[at]);
+    Ok((0..count).map(beyond).fold(0.0, f64::max))
 }
 
 fn late(given: &Arguments<'_>) -> Result<f64, Refusal> {
