@@ -10,6 +10,7 @@ pub use csv::{ReadRecording, RecordingError, RowProblem, read_csv, read_path};
 pub use derive::{derived, with_derived};
 
 use crate::clock::TimeNs;
+use std::collections::HashMap;
 
 /// Columns that hold text even when their cells look like numbers.
 pub const TEXT_COLUMNS: [&str; 12] =
@@ -85,6 +86,7 @@ impl FromIterator<Option<f64>> for Numbers {
 pub struct Words {
     codes: Vec<Option<u32>>,
     words: Vec<String>,
+    numbers: HashMap<String, u32>,
 }
 
 impl Words {
@@ -95,13 +97,19 @@ impl Words {
     }
 
     fn code_of(&mut self, text: &str) -> u32 {
-        // The last words seen are the likeliest to come again.
-        let found = self.words.iter().rposition(|word| word == text);
-        let index = found.unwrap_or_else(|| {
-            self.words.push(text.to_owned());
-            self.words.len() - 1
-        });
-        u32::try_from(index).unwrap_or(u32::MAX)
+        // The word of the row before is the likeliest to come again.
+        if let Some(Some(last)) = self.codes.last()
+            && self.words[*last as usize] == text
+        {
+            return *last;
+        }
+        if let Some(known) = self.numbers.get(text) {
+            return *known;
+        }
+        let code = u32::try_from(self.words.len()).unwrap_or(u32::MAX);
+        self.words.push(text.to_owned());
+        self.numbers.insert(text.to_owned(), code);
+        code
     }
 
     /// The word in `row`, if there is one.
@@ -114,6 +122,16 @@ impl Words {
     #[must_use]
     pub fn code(&self, row: usize) -> Option<u32> {
         *self.codes.get(row)?
+    }
+
+    /// The words of these rows, with the same numbers.
+    #[must_use]
+    pub fn at_rows(&self, rows: impl Iterator<Item = usize>) -> Self {
+        Self { codes: rows.map(|row| self.code(row)).collect(), ..self.clone_words() }
+    }
+
+    fn clone_words(&self) -> Self {
+        Self { codes: Vec::new(), words: self.words.clone(), numbers: self.numbers.clone() }
     }
 
     /// The distinct words, in the order of first appearance.

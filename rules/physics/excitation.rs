@@ -77,6 +77,9 @@ pub(crate) fn delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
     delays
 }
 
+/// Runs at whose start a step is tried, at most, evenly spread: in a month of runs a change is dated to some of them.
+const STEPS_MAX: usize = 96;
+
 /// Forms that step at the start of a run and stay, with at least two runs on either side.
 pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
     let mut seen = BTreeSet::new();
@@ -87,7 +90,7 @@ pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
     let ln_choices = ln_count(starts.len());
     let form =
         |run: &&String| Form { name, place: Some(("run".to_owned(), (*run).clone())), ln_choices, ..Form::default() };
-    starts.iter().map(form).collect()
+    starts.iter().step_by(starts.len().div_ceil(STEPS_MAX).max(1)).map(form).collect()
 }
 
 /// One from the first row of the run on, zero before; `None` when there is no such run.

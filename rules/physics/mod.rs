@@ -15,7 +15,7 @@ mod tool_load;
 mod unit;
 
 pub use catalogue::{CATALOGUE, effect};
-pub use scene::{LinearLaw, OutputKind, Role, Scene, SceneError};
+pub use scene::{Block, LinearLaw, OutputKind, Role, Scene, SceneError, blocks_of};
 pub use unit::{unit_in, unit_of_quantity};
 
 /// How a parameter enters the law.

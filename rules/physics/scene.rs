@@ -1,5 +1,9 @@
 //! What an effect sees: the inputs of a recording by the part they play.
 
+mod excerpt;
+
+pub use excerpt::{Block, blocks_of};
+
 use adapters::recording::{Recording, Words, with_derived};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -9,6 +13,8 @@ use thiserror::Error;
 
 /// Relative change of the spindle speed from one row to the next that starts a new pass.
 const PASS_JUMP: f64 = 0.05;
+/// Periods for which an input is held across a pause.
+const DRIVEN_PERIODS: f64 = 10.0;
 
 /// The parts that columns play for the effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -143,6 +149,7 @@ pub struct Scene {
     runs: Vec<Range<usize>>,
     run_names: Vec<String>,
     clock_s: Vec<f64>,
+    driven_s: Option<Vec<f64>>,
     latent: BTreeMap<&'static str, Vec<f64>>,
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
@@ -182,6 +189,7 @@ impl Scene {
             rows: recording.rows(),
             time_s: recording.time_s.clone(),
             clock_s: running_clock_s(&recording, &runs),
+            driven_s: None,
             latent: BTreeMap::new(),
             period_s: median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
@@ -300,6 +308,13 @@ impl Scene {
     #[must_use]
     pub fn clock_s(&self) -> &[f64] {
         &self.clock_s
+    }
+
+    /// How long the row before this one drove a state, s: until this row, but for ten periods at most; `row` from 1 on.
+    #[must_use]
+    pub fn driven_s(&self, row: usize) -> f64 {
+        let since_s = || (self.clock_s[row] - self.clock_s[row - 1]).clamp(0.0, DRIVEN_PERIODS * self.period_s);
+        self.driven_s.as_ref().map_or_else(since_s, |driven_s| driven_s[row])
     }
 
     /// Median time between two rows of a run.

@@ -15,7 +15,7 @@ pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
 
 fn advance(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
     let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
-    let driven_s = dt_s.min(10.0 * scene.period_s());
+    let driven_s = scene.driven_s(row).min(dt_s);
     let x = input + (x - input) * (-driven_s / tau_s).exp();
     x * (-(dt_s - driven_s) / tau_s).exp()
 }

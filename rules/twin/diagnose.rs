@@ -4,7 +4,7 @@ use super::bind::bind;
 use super::designs::{Design, designs};
 use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
 use super::fit::{Data, Fit, fit};
-use super::frame::{Frame, Unit, held_out, units};
+use super::frame::{Frame, Unit, group_size, held_out, units};
 use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::{Arma, count};
@@ -13,7 +13,7 @@ use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
 use super::unknown::Unknown;
 use super::verdicts;
-use crate::physics::Scene;
+use crate::physics::{Block, Scene, blocks_of};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
@@ -27,20 +27,23 @@ const CREEPING: [&str; 3] = ["zero_drift", "bearing_warm_up", "preload_growth"];
 /// # Errors
 /// Everything that makes the input unusable, with what to record instead.
 pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
-    let mut case = Case::new(recording, model)?;
-    if let Some(needed) = case.too_little() {
-        return Ok(verdicts::cannot_tell(&case, needed));
+    let mut whole = Case::new(recording, model)?;
+    let Some(ways) = super::excerpt::ways(&whole.scene, &whole.units) else { return Ok(whole.diagnosed(seed)) };
+    let mut answer: Option<Diagnosis> = None;
+    for blocks in ways {
+        let mut short = whole.shortened(&blocks);
+        let found = short.diagnosed(seed);
+        let Some(back) = short.whole.take() else { return Ok(found) };
+        whole = *back;
+        let nothing = found.verdict == Verdict::NoMismatch;
+        if answer.is_none() || matches!(found.verdict, Verdict::Explained | Verdict::Ambiguous) {
+            answer = Some(found);
+        }
+        if !nothing {
+            break;
+        }
     }
-    let Some(base) = case.fit_baseline() else {
-        return Ok(verdicts::cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
-    };
-    let base = if case.give_levels(&base) { case.fit_baseline().unwrap_or(base) } else { base };
-    let (mut found, designs) = case.search(&base, seed);
-    let base = case.settle(base, &mut found);
-    let unknown = case.unknown(&base, &found, seed);
-    let found = if unknown.is_none() { case.worth_claiming(found, &base) } else { found };
-    let outcome = Outcome::new(&mut case, base, found, designs, unknown);
-    Ok(verdicts::judge(&mut case, outcome))
+    Ok(answer.unwrap_or_else(|| whole.diagnosed(seed)))
 }
 
 /// A recording prepared for comparison with a model.
@@ -65,6 +68,10 @@ pub struct Case<'a> {
     pub faults: Vec<Fault>,
     /// A wave that was followed, where there is one.
     pub ripple: Option<super::ripple::Ripple>,
+    /// A hidden switch that was followed, where there is one.
+    pub switching: Option<super::latent::Switching>,
+    /// The whole recording where this is an excerpt of it.
+    pub whole: Option<Box<Case<'a>>>,
 }
 
 impl<'a> Case<'a> {
@@ -78,10 +85,59 @@ impl<'a> Case<'a> {
         let faults = clean(&mut scene, &nominal.total);
         let units = units(&scene);
         let held = held_out(&units);
-        let frame = Frame::new(&scene, &units, |unit| !held.contains(&unit));
-        let held_frame = Frame::new(&scene, &units, |unit| held.contains(&unit));
+        let size = group_size(&scene);
+        Ok(Self::of(model, scene, parts, units, held, size, faults))
+    }
+
+    fn of(
+        model: &'a Model,
+        scene: Scene,
+        parts: Vec<Part>,
+        units: Vec<Unit>,
+        held: BTreeSet<usize>,
+        size: usize,
+        faults: Vec<Fault>,
+    ) -> Self {
+        let frame = Frame::new(&scene, &units, size, |unit| !held.contains(&unit));
+        let held_frame = Frame::new(&scene, &units, size, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        Ok(Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple: None })
+        let (ripple, switching, whole) = (None, None, None);
+        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, whole }
+    }
+
+    /// An excerpt of this case, from which its answer is found.
+    fn shortened(self, blocks: &[Block]) -> Self {
+        let unit = |unit: &Unit| Unit { name: unit.name.clone(), rows: blocks_of(blocks, &unit.rows) };
+        let units = self.units.iter().map(unit).collect();
+        let (scene, parts, held) = (self.scene.excerpt(blocks), self.parts.clone(), self.held.clone());
+        let mut short = Self::of(self.model, scene, parts, units, held, 1, self.faults.clone());
+        // Every row counts where the answer is told.
+        let Self { model, scene, parts, units, held, faults, .. } = self;
+        short.whole = Some(Box::new(Self::of(model, scene, parts, units, held, 1, faults)));
+        short
+    }
+
+    /// From the baseline to the verdict.
+    fn diagnosed(&mut self, seed: u64) -> Diagnosis {
+        if let Some(needed) = self.too_little() {
+            return verdicts::cannot_tell(self, needed);
+        }
+        let Some(base) = self.fit_baseline() else {
+            return verdicts::cannot_tell(self, "a model that can be fitted to this recording".to_owned());
+        };
+        let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
+        let (mut found, designs) = self.search(&base, seed);
+        let base = self.settle(base, &mut found);
+        let unknown = self.unknown(&base, &found, seed);
+        let found = if unknown.is_none() { self.worth_claiming(found, &base) } else { found };
+        self.show_hidden(&base);
+        let outcome = Outcome::new(self, base, found, designs, unknown);
+        verdicts::judge(self, outcome)
+    }
+
+    /// The case in which the answer is told: the whole recording.
+    pub fn told(&self) -> &Self {
+        self.whole.as_deref().unwrap_or(self)
     }
 
     fn too_little(&self) -> Option<String> {
@@ -178,6 +234,9 @@ impl<'a> Case<'a> {
 
     /// Simulates every row with hidden states followed through the held-out units.
     pub fn predict(&mut self, fit: &Fit) -> Option<Prediction> {
+        if let Some(whole) = &mut self.whole {
+            return whole.predict(fit);
+        }
         let noise = Noise { arma: fit.noise, deviation: ordinary_noise(fit) };
         predict(&mut self.scene, &fit.parts, self.parts.len(), &self.units, &self.held, noise)
     }
@@ -185,9 +244,10 @@ impl<'a> Case<'a> {
     /// How well a prediction fits.
     #[must_use]
     pub fn quality(&self, prediction: &Prediction) -> Quality {
+        let told = self.told();
         Quality {
-            rmse: rmse(&self.scene, &self.frame, &prediction.total).unwrap_or(0.0),
-            held_out_rmse: rmse(&self.scene, &self.held_frame, &prediction.total),
+            rmse: rmse(&told.scene, &told.frame, &prediction.total).unwrap_or(0.0),
+            held_out_rmse: rmse(&told.scene, &told.held_frame, &prediction.total),
         }
     }
 }
@@ -225,7 +285,7 @@ pub struct Outcome {
 impl Outcome {
     fn new(case: &mut Case<'_>, base: Fit, found: Found, designs: Vec<Design>, unknown: Option<Unknown>) -> Self {
         let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
-        let empty = || Prediction { total: vec![0.0; case.scene.rows()], contributions: Vec::new() };
+        let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
         let none = empty();
         let before = case.predict(&base).unwrap_or_else(|| none.clone());
         let after = case.predict(&last).unwrap_or(none);
@@ -233,19 +293,19 @@ impl Outcome {
         let labels = last.parts[first..].iter().map(|part| part.label().to_owned());
         let added: Vec<(String, Vec<f64>)> = labels.zip(after.contributions.iter().skip(first).cloned()).collect();
         let fits = Fits {
-            rows: case.frame.len() + case.held_frame.len(),
+            rows: case.told().frame.len() + case.told().held_frame.len(),
             runs: case.units.len(),
             held_out_runs: case.held.iter().map(|unit| case.units[*unit].name.clone()).collect(),
             noise_floor: ordinary_noise(&last),
             before: case.quality(&before),
             after: case.quality(&after),
         };
-        let known = super::inputs::rows_with_inputs(&case.scene, &case.parts);
+        let known = super::inputs::rows_with_inputs(&case.told().scene, &case.parts);
         let visible = |total: Vec<f64>| total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
         let rows = Rows {
             simulated_before: visible(before.total),
             simulated_after: visible(after.total),
-            compared: case.scene.usable().to_vec(),
+            compared: case.told().scene.usable().to_vec(),
             effects: added.clone(),
         };
         Self { base, found, designs, unknown, fits, rows, added }

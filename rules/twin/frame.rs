@@ -11,7 +11,13 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Groups beyond which neighbouring rows are averaged.
-const GROUPS_MAX: usize = 8_000;
+const GROUPS_MAX: usize = 12_000;
+
+/// Rows to a group where all of them are fitted.
+#[must_use]
+pub fn group_size(scene: &Scene) -> usize {
+    scene.rows().div_ceil(GROUPS_MAX).max(1)
+}
 
 /// A stretch of rows that is held out, or not, as a whole.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -134,10 +140,9 @@ impl Frame {
             innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
     }
 
-    /// The usable rows of the units that `takes` accepts.
+    /// The usable rows of the units that `takes` accepts, in groups of `size`.
     #[must_use]
-    pub fn new(scene: &Scene, units: &[Unit], takes: impl Fn(usize) -> bool) -> Self {
-        let size = scene.rows().div_ceil(GROUPS_MAX).max(1);
+    pub fn new(scene: &Scene, units: &[Unit], size: usize, takes: impl Fn(usize) -> bool) -> Self {
         let mut frame = Self {
             groups: Vec::new(),
             stretches: Vec::new(),

@@ -5,9 +5,10 @@ use super::designs::Design;
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::latent::{self, Switching};
+use super::model::simulate;
 use super::noise::count;
 use super::quality::median;
-use super::ripple::{self, Ripple};
+use super::ripple;
 use super::wave::{self, Wave};
 use crate::physics::{Form, OutputKind, Role};
 use std::ops::Range;
@@ -26,6 +27,7 @@ impl Case<'_> {
         let found = latent::find(&base.residual, &self.frame.stretches)?;
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
+        self.switching = Some(found.clone());
         let form = Form { name: "latent", ln_choices: 0.5 * latent::price(&found), ..Form::default() };
         super::designs::design(effect, &form, &self.scene, &self.frame)
     }
@@ -44,7 +46,7 @@ impl Case<'_> {
         if !self.keeps_its_frequency(&base.residual, &found.wave) {
             return None;
         }
-        let wave = self.wave_per_row(&found);
+        let wave = self.wave_per_row(&found.values, &found.wave);
         self.scene.set_latent("ripple_alias", wave);
         // The wave is read from the residual it explains: what it seems to gain beyond its likelihood is no gain.
         let left: Vec<f64> = base.residual.iter().zip(&found.values).map(|(x, wave)| x - wave).collect();
@@ -60,6 +62,26 @@ impl Case<'_> {
         }
         self.ripple = Some(found);
         Some(design)
+    }
+
+    /// Follows what an excerpt has shown of hidden states through the whole recording.
+    pub(super) fn show_hidden(&mut self, base: &Fit) {
+        let Some(whole) = &mut self.whole else { return };
+        if self.ripple.is_none() && self.switching.is_none() || simulate(&base.parts, &mut whole.scene).is_none() {
+            return;
+        }
+        let simulated = whole.frame.reduce(whole.scene.simulated().unwrap_or_default());
+        let residual: Vec<f64> = whole.recorded.iter().zip(&simulated).map(|(x, simulated)| x - simulated).collect();
+        if let Some(found) = &self.switching {
+            let found = latent::again(&residual, &whole.frame.stretches, found);
+            let state = whole.switch_per_row(&found);
+            whole.scene.set_latent("auxiliary_switch", state);
+        }
+        if let Some(found) = &self.ripple {
+            let values = wave::smoothed(&residual, &whole.frame.stretches, &found.wave);
+            let state = whole.wave_per_row(&values, &found.wave);
+            whole.scene.set_latent("ripple_alias", state);
+        }
     }
 
     /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a
@@ -106,14 +128,14 @@ impl Case<'_> {
     }
 
     /// The wave in every row: as smoothed where the rows were fitted, expected from earlier rows in held-out runs.
-    fn wave_per_row(&self, found: &Ripple) -> Vec<f64> {
-        let mut wave = self.frame.spread(&found.values, self.scene.rows());
+    fn wave_per_row(&self, values: &[f64], followed: &Wave) -> Vec<f64> {
+        let mut wave = self.frame.spread(values, self.scene.rows());
         let simulated = self.scene.simulated().unwrap_or_default();
         let recorded = self.scene.recorded();
         for groups in &self.held_frame.stretches {
             let rows: Vec<usize> = groups.clone().flat_map(|group| self.held_frame.rows(group)).collect();
             let residual: Vec<f64> = rows.iter().map(|row| recorded[*row] - simulated[*row]).collect();
-            let expected = wave::follow(&residual, &found.wave);
+            let expected = wave::follow(&residual, followed);
             rows.iter().zip(expected).for_each(|(row, expected)| wave[*row] = expected);
         }
         wave

@@ -50,6 +50,13 @@ pub fn find(residual: &[f64], stretches: &[Range<usize>]) -> Option<Switching> {
     (switchings >= SWITCHINGS_MIN && separated(residual, stretches, &found)).then_some(found)
 }
 
+/// The same switch in another residual.
+#[must_use]
+pub fn again(residual: &[f64], stretches: &[Range<usize>], found: &Switching) -> Switching {
+    let scatter = local_scatter(residual, stretches).unwrap_or(found.level.abs());
+    Switching { state: sequence(residual, stretches, (found.off, found.off + found.level), scatter), ..found.clone() }
+}
+
 /// The price, in units of information, of having chosen when to switch.
 #[must_use]
 pub fn price(switching: &Switching) -> f64 {

@@ -170,7 +170,7 @@ mod tests {
         }
         let read = read_csv(csv.as_bytes(), "t.csv").expect("readable").recording;
         let scene = Scene::new(&read, "spindle_power_w", &BTreeMap::new()).expect("a scene");
-        let frame = Frame::new(&scene, &units(&scene), |_| true);
+        let frame = Frame::new(&scene, &units(&scene), 1, |_| true);
         (scene, frame)
     }
 

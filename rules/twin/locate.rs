@@ -2,7 +2,7 @@
 
 use super::frame::Unit;
 use super::noise::count;
-use crate::physics::Scene;
+use crate::physics::{Role, Scene};
 
 /// Share of the greatest contribution above which a row counts as affected.
 const ACTIVE_SHARE: f64 = 0.1;
@@ -30,6 +30,23 @@ pub enum Condition {
         /// The words.
         words: Vec<String>,
     },
+}
+
+impl Condition {
+    /// The column it is on.
+    #[must_use]
+    pub fn column(&self) -> &str {
+        match self {
+            Self::Range { column, .. } | Self::Equals { column, .. } => column,
+        }
+    }
+}
+
+/// Is the column an output measured beside this one, and no input of anything? Its height says nothing of how the
+/// machine was run.
+fn is_measured(scene: &Scene, column: &str) -> bool {
+    let measured = ["power", "current", "load", "torque", "force"].iter().any(|word| column.contains(word));
+    measured && !Role::ALL.iter().any(|role| scene.role_name(*role) == Some(column))
 }
 
 /// A stretch of affected rows.
@@ -128,7 +145,8 @@ pub fn conditions(scene: &Scene, active: &[bool]) -> Vec<Condition> {
     let mut accepted = vec![true; active.len()];
     let mut agreement = overlap(&accepted, active);
     while chosen.len() < CONDITIONS_MAX {
-        let candidates = candidates(scene, active, &accepted);
+        let mut candidates = candidates(scene, active, &accepted);
+        candidates.retain(|candidate| chosen.iter().all(|known| known.column() != candidate.column()));
         let judged = candidates.into_iter().map(|condition| {
             let rows = holds(scene, &condition);
             let both: Vec<bool> = rows.iter().zip(&accepted).map(|(a, b)| *a && *b).collect();
@@ -158,7 +176,11 @@ fn overlap(a: &[bool], b: &[bool]) -> f64 {
 
 fn candidates(scene: &Scene, active: &[bool], accepted: &[bool]) -> Vec<Condition> {
     let mut all = Vec::new();
-    let names: Vec<String> = scene.column_names().filter(|name| *name != scene.output()).map(str::to_owned).collect();
+    let names: Vec<String> = scene
+        .column_names()
+        .filter(|name| *name != scene.output() && !is_measured(scene, name))
+        .map(str::to_owned)
+        .collect();
     for name in names {
         if let Some(values) = scene.column(&name) {
             all.extend(ranges(&name, values, active, accepted));

@@ -18,6 +18,7 @@ pub mod diagnose;
 pub mod diagnosis;
 pub mod empirical;
 pub mod examine;
+mod excerpt;
 pub mod experiments;
 pub mod expression;
 pub mod fit;

@@ -4,7 +4,7 @@ use super::diagnose::{Case, Outcome, ordinary_noise};
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
 use super::fit::Fit;
 use super::locate::{Region, region};
-use super::model::{Body, Model, Part};
+use super::model::{Body, Model, Part, simulate};
 use super::noise::count;
 use super::ripple::Ripple;
 use crate::physics::{effect, unit_in};
@@ -94,6 +94,8 @@ pub fn unit_of(output: &str) -> &'static str {
 }
 
 fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
+    // Parts that act on load or output find both as the reported fit simulates them.
+    let _ = simulate(&outcome.last().parts, &mut case.scene);
     if let Some(unknown) = &outcome.unknown {
         let part = &unknown.fit.parts[case.parts.len()];
         let mut found = vec![described(case, outcome, &unknown.fit, part, case.parts.len())];
@@ -134,7 +136,7 @@ fn described(case: &Case<'_>, outcome: &Outcome, fit: &Fit, part: &Part, index: 
         p_value: 1.0,
         held_out_rmse_before: None,
         held_out_rmse_after: None,
-        absorbed_share: absorbed(case, outcome, index - case.parts.len()),
+        absorbed_share: absorbed(case, outcome, part),
     }
 }
 
@@ -196,9 +198,9 @@ fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
 }
 
 /// Share of a contribution's variance that the baseline can imitate.
-fn absorbed(case: &Case<'_>, outcome: &Outcome, position: usize) -> f64 {
-    let Some((_, contribution)) = outcome.added.get(position) else { return 0.0 };
-    let reduced = case.frame.reduce(contribution);
+fn absorbed(case: &Case<'_>, outcome: &Outcome, part: &Part) -> f64 {
+    let Some(contribution) = part.contribution(&case.scene) else { return 0.0 };
+    let reduced = case.frame.reduce(&contribution);
     let whole = super::linear::dot(&reduced, &reduced);
     let left = super::linear::least_squares(&outcome.base.tangent, &reduced).rss;
     if whole > 0.0 { (1.0 - left / whole).clamp(0.0, 1.0) } else { 0.0 }
@@ -256,7 +258,7 @@ fn experiment(outcome: &Outcome, alternatives: &[Alternative]) -> Option<Experim
 fn regions(case: &Case<'_>, outcome: &Outcome) -> Vec<Region> {
     let squares: f64 = outcome.added.iter().flat_map(|(_, values)| values).map(|x| x * x).sum();
     let mut regions: Vec<Region> =
-        outcome.added.iter().map(|(effect, values)| region(&case.scene, effect, values, squares)).collect();
+        outcome.added.iter().map(|(effect, values)| region(&case.told().scene, effect, values, squares)).collect();
     regions.retain(|region| !region.spans.is_empty());
     regions.sort_by(|a, b| b.share.total_cmp(&a.share));
     regions

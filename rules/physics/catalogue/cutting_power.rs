@@ -88,7 +88,8 @@ fn section(scene: &Scene, process: &str, mc: f64) -> Option<Vec<f64>> {
 fn turning(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let depth = scene.column("depth_of_cut_mm")?;
     let feed = scene.column("feed_per_rev_mm")?;
-    let area: Vec<f64> = depth.iter().zip(feed).map(|(depth, feed)| depth * feed.max(0.0).powf(1.0 - mc)).collect();
+    let mut thinned = held(|feed: f64| feed.max(0.0).powf(1.0 - mc));
+    let area: Vec<f64> = depth.iter().zip(feed).map(|(depth, feed)| depth * thinned(*feed)).collect();
     in_output(scene, &area)
 }
 
@@ -101,7 +102,8 @@ fn milling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
         (Some(width), Some(diameter)) if diameter[row] > 0.0 => (width[row] / diameter[row]).clamp(0.0, 1.0).sqrt(),
         _ => 1.0,
     };
-    Some((0..scene.rows()).map(|row| thinned(tooth[row] * share(row), mc) * rate[row] / 60.0).collect())
+    let mut thinned = held(|thickness_mm| thinned(thickness_mm, mc));
+    Some((0..scene.rows()).map(|row| thinned(tooth[row] * share(row)) * rate[row] / 60.0).collect())
 }
 
 fn drilling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
@@ -111,7 +113,21 @@ fn drilling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     let tooth = scene.column("feed_per_tooth_mm");
     let thickness = |row: usize| tooth.map_or(per_rev[row] / 2.0, |tooth| tooth[row]);
     let rate = |row: usize| PI * diameter[row].powi(2) * feed[row] / 4000.0;
-    Some((0..scene.rows()).map(|row| thinned(thickness(row), mc) * rate(row) / 60.0).collect())
+    let mut thinned = held(|thickness_mm| thinned(thickness_mm, mc));
+    Some((0..scene.rows()).map(|row| thinned(thickness(row)) * rate(row) / 60.0).collect())
+}
+
+/// A law that is worked out anew only where its argument changes: feeds are held over many rows, and powers are dear.
+fn held(law: impl Fn(f64) -> f64) -> impl FnMut(f64) -> f64 {
+    let mut last: Option<(f64, f64)> = None;
+    move |x| match last {
+        Some((known, value)) if known == x => value,
+        _ => {
+            let value = law(x);
+            last = Some((x, value));
+            value
+        }
+    }
 }
 
 /// `h^(-mc)`; zero without a chip.

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
 use crate::physics::excitation::varies;
-use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
 /// Losses in the iron of the motor.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +57,10 @@ impl Effect for IronLoss {
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
-        turns.then(|| self.default_form(scene)).into_iter().collect()
+        // On a drive whose only motion is its own speed, a loss torque that hardly grows is a shape of its friction.
+        let drive =
+            scene.output_kind() == OutputKind::Force && scene.role_name(Role::Velocity) == scene.role_name(Role::Speed);
+        (turns && !drive).then(|| self.default_form(scene)).into_iter().collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
