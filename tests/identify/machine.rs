@@ -14,6 +14,7 @@ const ORIGIN_NS: TimeNs = 1_767_225_600 * SECOND_NS;
 pub(crate) fn lathe(seed: u64) -> SimulatedSettings {
     let mut settings = SimulatedSettings { machine: SimulatedMachine::Lathe, seed, ..SimulatedSettings::default() };
     settings.meter.dropouts_per_h = 0.0;
+    settings.meter.zero_drift_w = 0.0;
     settings
 }
 

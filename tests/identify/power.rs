@@ -1,12 +1,19 @@
 //! Power separation.
 
 use crate::command::gateway;
-use crate::machine::{idle, lathe, record};
+use crate::machine::{Recorded, cut, idle, lathe, record};
 use crate::{Coverage, LONG, SHORT};
+use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
+use adapters::simulated::{ExperimentCut, ExperimentStep, Truth};
 use gateway::twin::execute;
-use rules::estimators::power_separation::identify_no_load;
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use rules::estimators::power_separation::{ReferenceChoice, identify_load_loss, identify_no_load};
+use rules::estimators::regression::RefusalKind;
 use rules::script::{ScriptFile, compile};
+use std::f64::consts::TAU;
 
 #[test]
 fn no_load_powers_are_found_and_written_as_a_script_can_say_them() {
@@ -38,9 +45,7 @@ fn a_recording_without_idling_is_refused() {
 fn levels(repetitions: u64) {
     let mut coverage = Coverage::new("level of one idle visit, W");
     for seed in 1..=repetitions {
-        let mut settings = lathe(seed);
-        settings.meter.zero_drift_w = 0.0;
-        let recorded = record(settings, &[idle(40.0, 600.0, 1)], 5.0);
+        let recorded = record(lathe(seed), &[idle(40.0, 600.0, 1)], 5.0);
         let learned = identify_no_load(&recorded.recording).expect("idle");
         let visit = &learned.stretches[0];
         let truth = recorded.mean(visit.from_s, visit.to_s, |truth| truth.no_load_power_w);
@@ -58,4 +63,183 @@ fn the_level_of_a_visit_is_inside_its_interval() {
 #[ignore = "200 repetitions"]
 fn the_level_of_a_visit_is_inside_its_interval_200_times() {
     levels(LONG);
+}
+
+/// Speeds in an order that chance gives, three rounds of them, the spindle warm.
+fn rounds(seed: u64) -> (Vec<ExperimentStep>, [f64; 4]) {
+    let mut dice = Pcg64Mcg::seed_from_u64(seed);
+    let speeds = [300.0, 500.0, 700.0, 900.0];
+    let mut steps = vec![idle(900.0, 700.0, 1)];
+    for _ in 0..3 {
+        let mut order = speeds;
+        (1..order.len()).rev().for_each(|at| order.swap(at, dice.random_range(0..=at)));
+        steps.extend(order.map(|rpm| idle(30.0, rpm, 1)));
+    }
+    (steps, speeds)
+}
+
+/// What a visit of a speed takes on the mean of many machines that ran such rounds: the truth that an interval over visits
+/// is about.
+fn true_means(seeds: std::ops::Range<u64>) -> [f64; 4] {
+    let mut sums = [(0.0, 0.0); 4];
+    for seed in seeds {
+        let (steps, speeds) = rounds(seed);
+        let recorded = record(lathe(seed), &steps, 1.0);
+        for (time_s, truth) in recorded.recording.time_s.iter().zip(&recorded.truth) {
+            let settled = truth.transient_power_w.abs() < 1.0 && *time_s > 900.0;
+            for (sum, speed) in sums.iter_mut().zip(speeds).filter(|_| settled) {
+                if (truth.spindle_speed_rpm / speed - 1.0).abs() < 0.005 {
+                    *sum = (sum.0 + truth.no_load_power_w, sum.1 + 1.0);
+                }
+            }
+        }
+    }
+    sums.map(|(sum, count)| sum / count)
+}
+
+fn no_load(repetitions: u64) {
+    let means = true_means(10_000..10_040);
+    let mut coverages = [300, 500, 700, 900].map(|rpm| Coverage::new(format!("Pu({rpm}), W, over visits")));
+    let mut widths = 0.0;
+    for seed in 1..=repetitions {
+        let (steps, speeds) = rounds(seed);
+        let recorded = record(lathe(seed), &steps, 5.0);
+        let learned = identify_no_load(&recorded.recording).expect("idle");
+        for ((speed, truth), coverage) in speeds.into_iter().zip(means).zip(&mut coverages) {
+            let found = learned.speeds.iter().find(|it| (it.speed_rpm / speed - 1.0).abs() < 0.01).expect("visited");
+            coverage.add(found.interval_w, truth);
+            widths += (found.interval_w.1 - found.interval_w.0) / found.power_w / 4.0;
+        }
+    }
+    println!("mean width of the intervals {:.2} %", 100.0 * widths / repetitions as f64);
+    coverages.iter().for_each(Coverage::assert);
+}
+
+#[test]
+fn no_load_powers_are_inside_their_intervals() {
+    no_load(SHORT);
+}
+
+#[test]
+#[ignore = "200 repetitions"]
+fn no_load_powers_are_inside_their_intervals_200_times() {
+    no_load(LONG);
+}
+
+/// Cuts at five depths, twice each, in an order that chance gives, with idling between; what a torque sensor would show.
+fn cuts(seed: u64, stage: u8, rpm: f64, depths_mm: [f64; 5]) -> Recorded {
+    let mut dice = Pcg64Mcg::seed_from_u64(seed);
+    let mut depths: Vec<f64> = depths_mm.iter().chain(&depths_mm).copied().collect();
+    (1..depths.len()).rev().for_each(|at| depths.swap(at, dice.random_range(0..=at)));
+    let feed_mm_min = 0.2 * rpm;
+    let pass = |depth_mm: f64| {
+        let cut = cut(10.0, rpm, stage, ExperimentCut { feed_mm_min, depth_mm, diameter_mm: 60.0 });
+        [idle(12.0, rpm, stage), cut]
+    };
+    let steps: Vec<ExperimentStep> = depths.into_iter().flat_map(pass).collect();
+    let mut recorded = record(lathe(seed), &steps, 5.0);
+    let torque = |truth: &Truth| {
+        let rad_s = truth.spindle_speed_rpm.abs() * TAU / 60.0;
+        let noise: f64 = dice.sample(StandardNormal);
+        (rad_s > 1.0).then(|| truth.cutting_power_w / rad_s * (1.0 + 0.01 * noise) + 0.4 + 0.05 * noise)
+    };
+    let torque = recorded.truth.iter().map(torque).collect::<Numbers>();
+    recorded.recording.set_column("torque_nm", Cells::Numbers(torque));
+    recorded
+}
+
+const DEPTHS: [f64; 5] = [0.5, 1.0, 1.6, 2.3, 3.0];
+
+/// a0 and a1 that the simulated machine truly has at a speed: by its own loss in two cuts.
+fn true_loss(recorded: &Recorded) -> (f64, f64) {
+    let cuts = recorded.truth.iter().filter(|truth| truth.engaged > 0.99 && truth.cutting_power_w > 50.0);
+    let shares: Vec<(f64, f64)> =
+        cuts.map(|truth| (truth.cutting_power_w, truth.load_loss_w / truth.cutting_power_w)).collect();
+    let light = shares.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0)).expect("cuts");
+    let heavy = shares.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).expect("cuts");
+    let a1 = (heavy.1 - light.1) / (heavy.0 - light.0);
+    (light.1 - a1 * light.0, a1)
+}
+
+fn load_loss(repetitions: u64) {
+    let stages = [(1, 800.0), (2, 1500.0)];
+    let mut coverages: Vec<Coverage> = Vec::new();
+    for (stage, rpm) in stages {
+        let mut of_stage = ["a0", "a1"].map(|name| Coverage::new(format!("{name}, stage {stage}, {rpm} rpm")));
+        for seed in 1..=repetitions {
+            let recorded = cuts(seed, stage, rpm, DEPTHS);
+            let learned = identify_load_loss(&recorded.recording, &ReferenceChoice::default()).expect("coefficients");
+            let found = &learned.stages[0];
+            let (a0, a1) = true_loss(&recorded);
+            assert_eq!((found.stage, found.cuts), (usize::from(stage), 10), "seed {seed}");
+            of_stage[0].add(found.linear.interval, a0);
+            of_stage[1].add(found.quadratic_per_w.interval, a1);
+        }
+        coverages.extend(of_stage);
+    }
+    coverages.iter().for_each(Coverage::assert);
+}
+
+#[test]
+fn load_loss_is_inside_its_intervals() {
+    load_loss(SHORT);
+}
+
+#[test]
+#[ignore = "200 repetitions"]
+fn load_loss_is_inside_its_intervals_200_times() {
+    load_loss(LONG);
+}
+
+#[test]
+fn load_loss_is_written_as_a_script_can_say_it_and_separates_what_it_was_learned_from() {
+    let recorded = cuts(1, 1, 800.0, DEPTHS);
+    let directory = tempfile::tempdir().expect("a directory");
+    std::fs::write(directory.path().join("cuts.csv"), execute::csv(&recorded.recording)).expect("written");
+    let arguments = ["identify", "load-loss", "--recording", "cuts.csv", "--out", "load_loss.rhai"];
+    let told = gateway(directory.path(), &arguments);
+    assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+    assert!(String::from_utf8_lossy(&told.stdout).contains("a0 = "));
+    let text = std::fs::read_to_string(directory.path().join("load_loss.rhai")).expect("written");
+    let set = compile(&[ScriptFile { name: "load_loss.rhai".to_owned(), text }]).expect("a script of settings");
+    let (a0, a1) = set.settings().load_loss(1);
+    let learned = identify_load_loss(&recorded.recording, &ReferenceChoice::default()).expect("coefficients");
+    assert!((a0 - learned.stages[0].linear.value).abs() < 1e-5);
+    assert!((a1 - learned.stages[0].quadratic_per_w.value).abs() < 1e-9);
+}
+
+#[test]
+fn load_loss_that_cannot_be_told_is_refused_and_the_reason_given() {
+    let told = |recording: &Recording, choice: &ReferenceChoice| {
+        identify_load_loss(recording, choice).expect_err("cannot be told")
+    };
+    let plain = ReferenceChoice::default();
+    let narrow = told(&cuts(1, 1, 800.0, [1.9, 1.95, 2.0, 2.05, 2.1]).recording, &plain);
+    assert!(narrow.kind == RefusalKind::Collinear && narrow.what.contains("a0 + a1 Pc"), "{narrow}");
+    let whole = cuts(1, 1, 800.0, DEPTHS).recording;
+    let elsewhere = ReferenceChoice { torque_column: "no_such_column".to_owned(), ..plain.clone() };
+    let alone = told(&whole, &elsewhere);
+    assert!(alone.kind == RefusalKind::NotIdentifiable && alone.what.contains("from power alone"), "{alone}");
+    let with = |name: &str, factor: f64| {
+        let mut changed = whole.clone();
+        let scaled = whole.numbers(name).expect("there").iter().map(|value| value.map(|value| value * factor));
+        changed.set_column(name, Cells::Numbers(scaled.collect::<Numbers>()));
+        changed
+    };
+    assert_eq!(told(&with("spindle_power_w", 1e-3), &plain).kind, RefusalKind::Unit, "kW");
+    assert_eq!(told(&with("torque_nm", 1e3), &plain).kind, RefusalKind::Unit, "N mm");
+    assert!(told(&with("torque_nm", 3.0), &plain).what.contains("of the power above no-load power"));
+    let nothing = told(&with("feed_mm_min", 0.0), &plain);
+    assert_eq!(nothing.kind, RefusalKind::TooFew, "{nothing}");
+}
+
+#[test]
+fn a_known_cutting_energy_serves_as_far_as_it_is_known() {
+    let recording = cuts(1, 1, 800.0, DEPTHS).recording;
+    let told = |sd: f64| {
+        let choice = ReferenceChoice { torque_column: String::new(), specific_energy_j_mm3: Some((1.75, sd)) };
+        identify_load_loss(&recording, &choice).map(|learned| learned.stages[0].linear.interval)
+    };
+    let (exact, rough) = (told(0.0).expect("coefficients"), told(0.2).expect("coefficients"));
+    assert!(rough.1 - rough.0 > exact.1 - exact.0 + 0.3, "{exact:?} {rough:?}");
 }

@@ -4,6 +4,7 @@
 //! that the gateway reads. What the recordings cannot tell is refused with the reason: exit code 1.
 
 mod feed_curve;
+mod load_loss;
 mod no_load;
 mod thermal;
 
@@ -27,6 +28,8 @@ pub(super) struct IdentifyArguments {
 enum What {
     /// No-load power per gear stage and speed, from the idle stretches of recordings.
     NoLoad(no_load::NoLoadArguments),
+    /// Load loss per gear stage, from cuts whose power at the edge is known besides.
+    LoadLoss(load_loss::LoadLossArguments),
     /// Spindle current over feed, by speed and depth of cut, from cuts at several feeds.
     FeedCurve(feed_curve::FeedCurveArguments),
     /// Thermal error from temperatures: which sensors, static or late, with intervals.
@@ -103,6 +106,7 @@ impl Reading {
 pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
         What::NoLoad(arguments) => no_load::run(arguments),
+        What::LoadLoss(arguments) => load_loss::run(arguments),
         What::FeedCurve(arguments) => feed_curve::run(arguments),
         What::Thermal(arguments) => thermal::run(arguments),
     }

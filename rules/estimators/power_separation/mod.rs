@@ -8,13 +8,22 @@
 //! | `rows` | a recording through the estimators: what the machine was doing in each row |
 //! | `stretches` | idle stretches of one speed, their settled part, its level |
 //! | `no_load` | no-load power per gear stage and speed, several visits put together |
+//! | `reference` | what tells the power at the edge: torque, force, known removal |
+//! | `cuts` | steady cuts and idle stretches with power and reference |
+//! | `load_loss` | a0 and a1 per gear stage |
 //! | `words` | the result as text, as JSON and as a script's settings |
 
+mod cuts;
+mod load_loss;
 mod no_load;
+mod reference;
 mod rows;
 mod stretches;
 mod words;
 
+pub use cuts::Point;
+pub use load_loss::{LoadLossLearned, StageLearned, Told, identify_load_loss};
 pub use no_load::{NoLoadLearned, SpeedLearned, identify_no_load};
+pub use reference::{Reference, ReferenceChoice};
 pub use stretches::Stretch;
 pub(super) use stretches::settled_from;

@@ -2,10 +2,19 @@
 
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, Stretch, stretches};
-use crate::estimators::SPEEDS_PER_STAGE;
-use crate::estimators::regression::{CONFIDENCE, Refusal, RefusalKind, t_quantile};
+use crate::estimators::filter::count;
+use crate::estimators::regression::{
+    CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit, t_quantile,
+};
+use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
 use adapters::Recording;
 use serde::Serialize;
+
+/// With so many visits of its own a speed needs no others to tell how much it differs from visit to visit.
+const OWN_VISITS: usize = 5;
+
+/// A visit in which the power drifts by more than this share is one of a spindle that warms up.
+const WARM_UP: f64 = 0.02;
 
 /// No-load power at one speed of one gear stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,7 +31,7 @@ pub struct SpeedLearned {
     pub interval_w: (f64, f64),
     /// Visits of this speed.
     pub visits: usize,
-    /// Standard deviation from visit to visit beyond the noise; `None` with one visit.
+    /// Standard deviation from visit to visit beyond the noise; `None` where no speed was visited again.
     pub between_visits_w: Option<f64>,
     /// Settled seconds in all visits together.
     pub settled_s: f64,
@@ -35,6 +44,8 @@ pub struct SpeedLearned {
 pub struct NoLoadLearned {
     /// By gear stage and speed.
     pub speeds: Vec<SpeedLearned>,
+    /// Standard deviation from visit to visit, relative; `None` where no speed was visited again.
+    pub drift: Option<f64>,
     /// The stretches that it rests on.
     pub stretches: Vec<Stretch>,
     /// What the reader should know.
@@ -55,11 +66,17 @@ pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal>
         ));
     }
     let mut speeds: Vec<SpeedLearned> = Vec::new();
-    for visits in grouped(&stretches) {
-        speeds.push(pooled(&visits)?);
+    let (groups, left_out) = without_warm_up(grouped(&stretches));
+    let between = Between::of(&groups);
+    for visits in &groups {
+        speeds.push(pooled(visits, between.as_ref())?);
     }
-    let notes = notes(&speeds);
-    Ok(NoLoadLearned { speeds, stretches, notes })
+    let mut notes = notes(&speeds, &groups);
+    if left_out > 0 {
+        notes.push(format!("{left_out} visits in which the power drifted by more than 2 % are left out: warming up"));
+    }
+    let drift = between.map(|between| between.relative.sqrt());
+    Ok(NoLoadLearned { speeds, drift, stretches, notes })
 }
 
 /// Visits of the same stage and speed.
@@ -80,49 +97,125 @@ fn grouped(stretches: &[Stretch]) -> Vec<Vec<&Stretch>> {
     groups
 }
 
-fn pooled(visits: &[&Stretch]) -> Result<SpeedLearned, Refusal> {
-    let count = crate::estimators::filter::count(visits.len());
-    let mean = |of: &dyn Fn(&Stretch) -> f64| visits.iter().map(|visit| of(visit)).sum::<f64>() / count;
-    let power_w = mean(&|visit| visit.level.mean);
-    let speed_rpm = mean(&|visit| visit.speed_rpm);
-    let within = mean(&|visit| visit.level.standard_error.powi(2));
-    let place = format!("gear stage {}, {speed_rpm:.0} rpm", visits[0].stage);
+/// Leaves out the visits in which the power drifts far, where a speed has others; how many those are.
+fn without_warm_up(mut groups: Vec<Vec<&Stretch>>) -> (Vec<Vec<&Stretch>>, usize) {
+    let far = |visit: &&Stretch| visit.drifts() && visit.drift_w().abs() > WARM_UP * visit.level.mean.abs();
+    let mut left_out = 0;
+    for visits in &mut groups {
+        let drifting = visits.iter().filter(|visit| far(visit)).count();
+        if drifting < visits.len() {
+            visits.retain(|visit| !far(visit));
+            left_out += drifting;
+        }
+    }
+    (groups, left_out)
+}
+
+/// How much no-load power differs from visit to visit, over all speeds that were visited again. Warmth acts in proportion
+/// to the power, the supply and the meter's zero do not; the greater of the two counts.
+struct Between {
+    relative: f64,
+    absolute_w2: f64,
+    freedom: f64,
+}
+
+impl Between {
+    fn of(groups: &[Vec<&Stretch>]) -> Option<Self> {
+        let freedom = groups.iter().map(|visits| count(visits.len()) - 1.0).sum::<f64>();
+        let absolute: f64 = groups.iter().map(|visits| scatter(visits)).sum();
+        let relative: f64 = groups.iter().map(|visits| scatter(visits) / mean(visits).powi(2)).sum();
+        let of = |sum: f64| sum / freedom;
+        (freedom >= 1.0).then(|| Self { relative: of(relative), absolute_w2: of(absolute), freedom })
+    }
+
+    /// Variance of one visit at this power, W2.
+    fn at(&self, power_w: f64) -> f64 {
+        self.absolute_w2.max(self.relative * power_w * power_w)
+    }
+}
+
+fn mean(visits: &[&Stretch]) -> f64 {
+    visits.iter().map(|visit| visit.level.mean).sum::<f64>() / count(visits.len())
+}
+
+/// Sum of squares of the levels about their mean.
+fn scatter(visits: &[&Stretch]) -> f64 {
+    let middle = mean(visits);
+    visits.iter().map(|visit| (visit.level.mean - middle).powi(2)).sum()
+}
+
+/// The mean of the visits. Its variance is that from visit to visit, over the number of visits: by this speed's own
+/// visits where there are enough, by those of all speeds together where there are not, and by the noise within the only
+/// visit where no speed was visited again.
+fn pooled(visits: &[&Stretch], between: Option<&Between>) -> Result<SpeedLearned, Refusal> {
+    let visited = count(visits.len());
+    let power_w = mean(visits);
+    let speed_rpm = visits.iter().map(|visit| visit.speed_rpm).sum::<f64>() / visited;
     if power_w <= 0.0 {
         let what = format!("the spindle idles at {power_w:.1} W");
         let next = "no-load power is positive: look at the sign and the wiring of the meter";
+        let place = format!("gear stage {}, {speed_rpm:.0} rpm", visits[0].stage);
         return Err(Refusal::new(RefusalKind::Contradiction, what, next).at(place));
     }
-    let spread = visits.iter().map(|visit| (visit.level.mean - power_w).powi(2)).sum::<f64>() / (count - 1.0);
-    let (variance, freedom) = if visits.len() > 1 {
-        ((spread / count).max(within / count), count - 1.0)
-    } else {
-        (within, visits[0].level.independent - 1.0)
+    let within = visits.iter().map(|visit| visit.level.standard_error.powi(2)).sum::<f64>() / visited;
+    let (one, freedom) = match between {
+        _ if visits.len() >= OWN_VISITS => (scatter(visits) / (visited - 1.0), visited - 1.0),
+        Some(between) => (between.at(power_w), between.freedom),
+        None => (within, (visits[0].level.independent - 1.0).max(1.0)),
     };
-    let half = t_quantile(0.5 + 0.5 * CONFIDENCE, freedom.max(1.0)) * variance.sqrt();
+    let standard_error_w = (one.max(within) / visited).sqrt();
+    let half = t_quantile(0.5 + 0.5 * CONFIDENCE, freedom) * standard_error_w;
     let drifts = visits.iter().filter(|visit| visit.drifts()).map(|visit| visit.drift_w());
     Ok(SpeedLearned {
         stage: visits[0].stage,
         speed_rpm,
         power_w,
-        standard_error_w: variance.sqrt(),
+        standard_error_w,
         interval_w: (power_w - half, power_w + half),
         visits: visits.len(),
-        between_visits_w: (visits.len() > 1).then(|| (spread - within).max(0.0).sqrt()),
+        between_visits_w: between.map(|_| (one - within).max(0.0).sqrt()),
         settled_s: visits.iter().map(|visit| visit.to_s - visit.from_s).sum(),
         drift_w: drifts.max_by(|a, b| a.abs().total_cmp(&b.abs())),
     })
 }
 
-fn notes(speeds: &[SpeedLearned]) -> Vec<String> {
+/// Slope of the relative deviation from each speed's mean over the hours of the recording, where it stands out.
+fn warm_up(groups: &[Vec<&Stretch>]) -> Option<Coefficient> {
+    let again = groups.iter().filter(|visits| visits.len() > 1);
+    let deviations = again.flat_map(|visits| {
+        let middle = mean(visits);
+        visits.iter().map(move |visit| (0.5 * (visit.from_s + visit.to_s) / 3600.0, visit.level.mean / middle - 1.0))
+    });
+    let (hours, deviations): (Vec<f64>, Vec<f64>) = deviations.unzip();
+    let time = Column::new("hours", hours);
+    let fitted = fit(&Column::new("deviation", deviations), &[time], Intercept::Fitted).ok()?;
+    fitted.coefficient("hours").filter(|slope| slope.p < 0.01).cloned()
+}
+
+fn notes(speeds: &[SpeedLearned], groups: &[Vec<&Stretch>]) -> Vec<String> {
     let mut notes = Vec::new();
-    for stage in 0..crate::estimators::STAGES {
-        let count = speeds.iter().filter(|speed| speed.stage == stage).count();
-        if count > SPEEDS_PER_STAGE {
-            notes.push(format!("gear stage {stage}: {count} speeds; the gateway keeps {SPEEDS_PER_STAGE}"));
+    for stage in 0..STAGES {
+        let known = speeds.iter().filter(|speed| speed.stage == stage).count();
+        if known > SPEEDS_PER_STAGE {
+            notes.push(format!(
+                "gear stage {stage}: {known} speeds; the gateway keeps {SPEEDS_PER_STAGE}, spread over the range"
+            ));
         }
-        if count == 1 || count == 2 {
-            notes.push(format!("gear stage {stage}: {count} speeds; three or more make a curve"));
+        if known == 1 || known == 2 {
+            notes.push(format!("gear stage {stage}: {known} speeds; three or more make a curve"));
         }
+    }
+    if groups.iter().all(|visits| visits.len() == 1) {
+        notes.push(
+            "every speed was visited once: the intervals hold for the warmth of that visit; visit the speeds again in another order"
+                .to_owned(),
+        );
+    }
+    if let Some(slope) = warm_up(groups) {
+        notes.push(format!(
+            "no-load power changes by {:+.1} % per hour over the recording: the spindle was warming up or cooling down",
+            100.0 * slope.value
+        ));
     }
     notes
 }

@@ -2,7 +2,8 @@
 
 use super::rows::Row;
 use crate::estimators::State;
-use crate::estimators::regression::{Level, level};
+use crate::estimators::filter::count;
+use crate::estimators::regression::{Level, level, without_pulses};
 use serde::Serialize;
 
 /// Speeds closer than this share are one speed.
@@ -84,14 +85,14 @@ fn close(open: &[(f64, f64, f64)], stage: usize) -> Option<Stretch> {
     let time_s: Vec<f64> = inner.iter().map(|it| it.0).collect();
     let power_w: Vec<f64> = inner.iter().map(|it| it.2).collect();
     let settled = settled_from(&time_s, &power_w);
-    let (time_s, power_w) = (&time_s[settled..], &power_w[settled..]);
+    let speeds: Vec<f64> = inner[settled..].iter().map(|it| it.1).collect();
+    let speed_rpm = speeds.iter().sum::<f64>() / count(speeds.len().max(1));
+    let (time_s, power_w) = without_pulses(&time_s[settled..], &power_w[settled..]);
     let (from_s, to_s) = (*time_s.first()?, *time_s.last()?);
     if time_s.len() < LEAST_SAMPLES || to_s - from_s < LEAST_S {
         return None;
     }
-    let speeds = inner[settled..].iter().map(|it| it.1);
-    let speed_rpm = speeds.sum::<f64>() / crate::estimators::filter::count(time_s.len());
-    Some(Stretch { stage, speed_rpm, from_s, to_s, settling_s: from_s - begin_s, level: level(time_s, power_w)? })
+    Some(Stretch { stage, speed_rpm, from_s, to_s, settling_s: from_s - begin_s, level: level(&time_s, &power_w)? })
 }
 
 /// Where the level is settled: leading twelfths are left out while they lie apart from what follows, at most half of all.
@@ -104,7 +105,7 @@ pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> us
         else {
             break;
         };
-        let samples = crate::estimators::filter::count(block).min(rest.independent);
+        let samples = count(block).min(rest.independent);
         // The rest may drift; the head is compared with where the drift began.
         let begun = rest.mean - 0.5 * rest.slope_per_s * (time_s[time_s.len() - 1] - time_s[from]);
         if (head - begun).abs() <= SETTLED_SD * rest.sd / samples.sqrt() {
@@ -116,5 +117,5 @@ pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> us
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / crate::estimators::filter::count(values.len()))
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / count(values.len()))
 }

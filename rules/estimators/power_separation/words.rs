@@ -1,6 +1,7 @@
 //! Results as text and as a script's settings.
 
-use super::no_load::NoLoadLearned;
+use super::load_loss::{LoadLossLearned, StageLearned};
+use super::no_load::{NoLoadLearned, SpeedLearned};
 use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
 use std::fmt::{self, Write as _};
 
@@ -12,7 +13,7 @@ impl NoLoadLearned {
             "// No-load power by gear stage, identified from recordings: pairs of speed in rpm and power in W. 空载功率\n\nfn settings() {\n    #{\n",
         );
         for stage in 0..STAGES {
-            let own: Vec<_> = self.speeds.iter().filter(|speed| speed.stage == stage).take(SPEEDS_PER_STAGE).collect();
+            let own = spread(self.speeds.iter().filter(|speed| speed.stage == stage).collect());
             if own.is_empty() {
                 continue;
             }
@@ -20,8 +21,20 @@ impl NoLoadLearned {
                 own.iter().map(|speed| format!("[{:.1}, {:.1}]", speed.speed_rpm, speed.power_w)).collect();
             let _ = writeln!(text, "        no_load_stage_{stage}: [{}],", pairs.join(", "));
         }
+        if let Some(drift) = self.drift {
+            let _ = writeln!(text, "        no_load_drift: {:.5},", drift.clamp(0.0, 0.5));
+        }
         text + "    }\n}\n"
     }
+}
+
+/// As many speeds as the gateway keeps, from the slowest to the fastest.
+fn spread(speeds: Vec<&SpeedLearned>) -> Vec<&SpeedLearned> {
+    let (last, kept) = (speeds.len().saturating_sub(1), SPEEDS_PER_STAGE - 1);
+    if last <= kept {
+        return speeds;
+    }
+    (0..=kept).map(|at| speeds[at * last / kept]).collect()
 }
 
 impl fmt::Display for NoLoadLearned {
@@ -42,6 +55,45 @@ impl fmt::Display for NoLoadLearned {
                 number(speed.drift_w),
             )?;
         }
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
+    }
+}
+
+impl LoadLossLearned {
+    /// The coefficients as settings that a script returns; the file can stand beside the other scripts as it is.
+    #[must_use]
+    pub fn script(&self) -> String {
+        let mut text = String::from(
+            "// Load loss by gear stage, identified from recordings: Pad = a0 Pc + a1 Pc^2. 附加载荷损耗系数\n\nfn settings() {\n    #{\n",
+        );
+        for StageLearned { stage, linear, quadratic_per_w, .. } in &self.stages {
+            let _ = writeln!(text, "        load_loss_linear_stage_{stage}: {:.6},", linear.value);
+            let _ = writeln!(text, "        load_loss_quadratic_per_w_stage_{stage}: {:.10},", quadratic_per_w.value);
+        }
+        let sd = self.stages.iter().map(|stage| stage.share_at_mean.standard_error).fold(0.0, f64::max);
+        let _ = writeln!(text, "        load_loss_sd: {:.6},", sd.min(0.5));
+        text + "    }\n}\n"
+    }
+}
+
+impl fmt::Display for LoadLossLearned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for stage in &self.stages {
+            let (low, high, _) = stage.cutting_power_w;
+            writeln!(
+                f,
+                "gear stage {}: {} cuts of {low:.0} to {high:.0} W, {} idle stretches, residual {:.2} W",
+                stage.stage, stage.cuts, stage.idle, stage.residual_sd_w
+            )?;
+            for (name, told) in [
+                ("a0", stage.linear),
+                ("a1, 1/W", stage.quadratic_per_w),
+                ("load loss over cutting power at the mean cut", stage.share_at_mean),
+            ] {
+                writeln!(f, "  {name} = {:.6e}   95 % {:.6e} to {:.6e}", told.value, told.interval.0, told.interval.1)?;
+            }
+        }
+        self.refused.iter().try_for_each(|refusal| writeln!(f, "cannot tell: {refusal}"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
 }

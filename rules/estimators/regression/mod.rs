@@ -23,7 +23,7 @@ pub use least_squares::{Coefficient, Column, Intercept, Regression, fit, fit_wei
 pub use plausible::{Mistake, Plausible};
 pub use prediction::{FTest, Prediction};
 pub use refusal::{Refusal, RefusalKind};
-pub use series::{Level, integrated_autocorrelation, level};
+pub use series::{Level, integrated_autocorrelation, level, without_pulses};
 
 /// The probability that every stated interval covers.
 pub const CONFIDENCE: f64 = 0.95;

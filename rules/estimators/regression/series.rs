@@ -10,6 +10,9 @@ use serde::Serialize;
 /// What a trend leaves of slow noise is corrected by no more than the inverse of this.
 const LEFT_MIN: f64 = 0.3;
 
+/// A pulse lies so many standard deviations off, as the median deviation tells them.
+const PULSE_SD: f64 = 6.0;
+
 /// What a steady stretch says about its level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Level {
@@ -55,6 +58,21 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
         slope_per_s,
         slope_standard_error: sd * (memory / spread).sqrt(),
     })
+}
+
+/// The samples without those that lie far from the middle of all: pulses of a meter are no noise, and one of them moves a
+/// mean by more than all noise together. Far is six standard deviations, as the median deviation tells them.
+#[must_use]
+pub fn without_pulses(time_s: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let middle = median(values.to_vec());
+    let sd = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect());
+    let near = |(_, value): &(&f64, &f64)| sd <= 0.0 || (*value - middle).abs() <= PULSE_SD * sd;
+    time_s.iter().zip(values).filter(near).map(|(time_s, value)| (*time_s, *value)).unzip()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// By how much the memory of the noise multiplies the variance of a mean; 1 for independent samples, never less. The
@@ -114,6 +132,19 @@ mod tests {
             assert!(inside > 355 && trends > 350, "{keep}: {inside} {trends}");
             assert!((said * (1.0 + keep) / (1.0 - keep) / 400.0 - 1.0).abs() < 0.35, "{keep}: {said}");
         }
+    }
+
+    #[test]
+    fn pulses_are_left_out_and_noise_is_kept() {
+        let mut dice = Pcg64Mcg::seed_from_u64(5);
+        let time_s: Vec<f64> = (0..300_i32).map(f64::from).collect();
+        let mut values = remembering(&mut dice, 0.5, 300);
+        values[17] = 40.0;
+        values[200] = -25.0;
+        let (kept_s, kept) = without_pulses(&time_s, &values);
+        assert_eq!((kept_s.len(), kept.len()), (298, 298));
+        assert!(!kept_s.contains(&17.0) && !kept_s.contains(&200.0));
+        assert_eq!(without_pulses(&[0.0, 1.0], &[3.0, 3.0]).1, vec![3.0, 3.0]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::estimators::filter::count;
 use crate::estimators::power_separation::settled_from;
-use crate::estimators::regression::{Level, Plausible, Refusal, RefusalKind, level};
+use crate::estimators::regression::{Level, Plausible, Refusal, RefusalKind, level, without_pulses};
 use adapters::Recording;
 use serde::Serialize;
 
@@ -119,6 +119,7 @@ fn close(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
     }
     let mean =
         |of: fn(&Cutting) -> f64| inner[settled..].iter().map(|it| of(it)).sum::<f64>() / count(inner.len() - settled);
+    let (kept_s, kept) = without_pulses(&time_s[settled..], &feature[settled..]);
     Some(Plateau {
         speed_rpm: mean(|it| it.speed_rpm),
         depth_mm: mean(|it| it.depth_mm),
@@ -126,6 +127,6 @@ fn close(open: &[Cutting], tool: Option<String>) -> Option<Plateau> {
         from_s,
         to_s,
         tool,
-        level: level(&time_s[settled..], &feature[settled..])?,
+        level: level(&kept_s, &kept)?,
     })
 }

@@ -1,0 +1,134 @@
+//! Steady cuts of a recording, and idle stretches, each with power and reference.
+
+use super::reference::Referenced;
+use super::rows::Row;
+use super::stretches::{SAME_SPEED, Stretch, settled_from};
+use crate::estimators::State;
+use crate::estimators::filter::count;
+use crate::estimators::regression::{Level, level, without_pulses};
+use adapters::Recording;
+use serde::Serialize;
+
+/// Left out after a cut begins and before it ends, s.
+const GUARD_S: f64 = 1.0;
+/// A shorter steady part says nothing, s.
+const LEAST_S: f64 = 3.0;
+
+/// A steady cut, or an idle stretch (reference 0).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// Gear stage.
+    pub stage: usize,
+    /// Spindle speed.
+    pub speed_rpm: f64,
+    /// Middle, s.
+    pub at_s: f64,
+    /// Spindle power.
+    pub power: Level,
+    /// Cutting power by the reference, less what the reference shows while idling, W.
+    pub cutting_power_w: f64,
+    /// Is it a cut?
+    pub cut: bool,
+}
+
+/// What must stay the same within a cut.
+#[derive(Clone, Copy, PartialEq)]
+struct Conditions {
+    stage: usize,
+    speed_rpm: f64,
+    feed: f64,
+    depth: f64,
+}
+
+/// The idle stretches and the steady cuts, in the order of time.
+pub(super) fn points(recording: &Recording, rows: &[Row], idle: &[Stretch], reference: &Referenced) -> Vec<Point> {
+    let mut found: Vec<Point> = idle.iter().map(|stretch| of_idle(stretch)).collect();
+    let mut open: Vec<usize> = Vec::new();
+    for (at, row) in rows.iter().enumerate() {
+        let usable = row.state == State::Cutting && row.power_w.is_some() && reference.power_w[at].is_some();
+        let goes_on = usable && open.first().is_none_or(|first| same(recording, &rows[*first], row));
+        if !goes_on {
+            found.extend(close(rows, &open, reference));
+            open.clear();
+        }
+        if usable {
+            open.push(at);
+        }
+    }
+    found.extend(close(rows, &open, reference));
+    subtract_idle(&mut found, rows, idle, reference);
+    found.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    found
+}
+
+fn of_idle(stretch: &Stretch) -> Point {
+    let at_s = 0.5 * (stretch.from_s + stretch.to_s);
+    let (stage, speed_rpm, power) = (stretch.stage, stretch.speed_rpm, stretch.level);
+    Point { stage, speed_rpm, at_s, power, cutting_power_w: 0.0, cut: false }
+}
+
+fn conditions(recording: &Recording, row: &Row) -> Conditions {
+    let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row.row)).unwrap_or(0.0);
+    Conditions {
+        stage: row.stage,
+        speed_rpm: row.speed_rpm.unwrap_or(0.0),
+        feed: number("feed_mm_min"),
+        depth: number("depth_of_cut_mm"),
+    }
+}
+
+fn same(recording: &Recording, a: &Row, b: &Row) -> bool {
+    let (a, b) = (conditions(recording, a), conditions(recording, b));
+    let near = |a: f64, b: f64| (a - b).abs() <= SAME_SPEED * a.abs().max(b.abs());
+    a.stage == b.stage && near(a.speed_rpm, b.speed_rpm) && near(a.feed, b.feed) && near(a.depth, b.depth)
+}
+
+fn close(rows: &[Row], open: &[usize], reference: &Referenced) -> Option<Point> {
+    let (begin_s, end_s) = (rows[*open.first()?].time_s + GUARD_S, rows[*open.last()?].time_s - GUARD_S);
+    let inner: Vec<usize> =
+        open.iter().copied().filter(|at| rows[*at].time_s >= begin_s && rows[*at].time_s <= end_s).collect();
+    let time_s: Vec<f64> = inner.iter().map(|at| rows[*at].time_s).collect();
+    let power_w: Vec<f64> = inner.iter().filter_map(|at| rows[*at].power_w).collect();
+    let settled = settled_from(&time_s, &power_w);
+    let (from_s, to_s) = (*time_s.get(settled)?, *time_s.last()?);
+    if to_s - from_s < LEAST_S {
+        return None;
+    }
+    let (kept_s, kept_w) = without_pulses(&time_s[settled..], &power_w[settled..]);
+    let kept = &inner[settled..];
+    let mean =
+        |of: &dyn Fn(usize) -> Option<f64>| kept.iter().filter_map(|at| of(*at)).sum::<f64>() / count(kept.len());
+    Some(Point {
+        stage: rows[kept[0]].stage,
+        speed_rpm: mean(&|at| rows[at].speed_rpm),
+        at_s: 0.5 * (from_s + to_s),
+        power: level(&kept_s, &kept_w)?,
+        cutting_power_w: mean(&|at| reference.power_w[at]),
+        cut: true,
+    })
+}
+
+/// A torque sensor's zero and the friction behind it are no cutting power.
+fn subtract_idle(points: &mut [Point], rows: &[Row], idle: &[Stretch], reference: &Referenced) {
+    let shown = |stretch: &Stretch| {
+        let inside = |row: &Row| row.time_s >= stretch.from_s && row.time_s <= stretch.to_s;
+        let values: Vec<f64> = rows
+            .iter()
+            .zip(&reference.power_w)
+            .filter(|(row, _)| inside(row))
+            .filter_map(|(_, power)| *power)
+            .collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / count(values.len()))
+    };
+    let shown: Vec<(usize, f64, f64)> =
+        idle.iter().filter_map(|stretch| Some((stretch.stage, stretch.speed_rpm, shown(stretch)?))).collect();
+    for point in points.iter_mut().filter(|point| point.cut) {
+        let near = |(stage, speed, _): &&(usize, f64, f64)| {
+            *stage == point.stage && (speed / point.speed_rpm - 1.0).abs() <= SAME_SPEED
+        };
+        let own: Vec<f64> = shown.iter().filter(near).map(|(.., power)| *power).collect();
+        if !own.is_empty() {
+            point.cutting_power_w -= own.iter().sum::<f64>() / count(own.len());
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! Load loss per gear stage: `Pi = Pu(n) + (1 + a0) Pc + a1 Pc^2`, by least squares on steady cuts and idle stretches.
+//!
+//! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals.
+
+use super::cuts::{Point, points};
+use super::reference::{Reference, ReferenceChoice, referenced};
+use super::rows::rows;
+use super::stretches::{SAME_SPEED, stretches};
+use crate::estimators::STAGES;
+use crate::estimators::filter::count;
+use crate::estimators::regression::{
+    CONFIDENCE, Column, FTest, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile,
+};
+use adapters::Recording;
+use serde::Serialize;
+
+/// The heaviest cut must take this many times the power of the lightest, or a0 and a1 cannot be told apart.
+const SPAN_MIN: f64 = 2.0;
+/// Different cutting powers that are needed.
+const LEVELS_MIN: usize = 3;
+/// Cutting power over power above no-load power that is credible.
+const CREDIBLE: (f64, f64) = (0.4, 1.5);
+/// Values that the gateway takes.
+const LINEAR_RANGE: (f64, f64) = (-0.5, 2.0);
+const QUADRATIC_RANGE: (f64, f64) = (-0.001, 0.01);
+
+/// A number with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Told {
+    /// The value.
+    pub value: f64,
+    /// Standard error.
+    pub standard_error: f64,
+    /// Ends of the 95 % interval.
+    pub interval: (f64, f64),
+}
+
+/// Load loss of one gear stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StageLearned {
+    /// Gear stage; 0 where the recording has none.
+    pub stage: usize,
+    /// a0, load loss per watt of cutting power.
+    pub linear: Told,
+    /// a1, 1/W.
+    pub quadratic_per_w: Told,
+    /// Load loss over cutting power at the mean cut, and its standard error.
+    pub share_at_mean: Told,
+    /// Cutting powers from, to and mean, W.
+    pub cutting_power_w: (f64, f64, f64),
+    /// Speeds with cuts, rpm.
+    pub speeds_rpm: Vec<f64>,
+    /// Cuts and idle stretches that it rests on.
+    pub cuts: usize,
+    /// Idle stretches.
+    pub idle: usize,
+    /// Residual standard deviation, W.
+    pub residual_sd_w: f64,
+    /// Variance inflation of a0 by a1.
+    pub variance_inflation: f64,
+    /// Does each speed want coefficients of its own?
+    pub by_speed: Option<FTest>,
+}
+
+/// What a recording tells about load loss.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoadLossLearned {
+    /// What told the cutting power.
+    pub reference: Reference,
+    /// By gear stage.
+    pub stages: Vec<StageLearned>,
+    /// The cuts and idle stretches.
+    pub points: Vec<Point>,
+    /// Stages that cannot be told, and why.
+    pub refused: Vec<Refusal>,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+}
+
+/// Learns a0 and a1 of every gear stage from cuts whose power at the edge is known besides the spindle power.
+///
+/// # Errors
+/// A [`Refusal`] where nothing tells the cutting power, or no stage has cuts that differ enough.
+pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Result<LoadLossLearned, Refusal> {
+    let rows = rows(recording)?;
+    let reference = referenced(recording, &rows, choice)?;
+    let points = points(recording, &rows, &stretches(&rows), &reference);
+    let mut learned = LoadLossLearned {
+        reference: reference.reference,
+        stages: Vec::new(),
+        points: Vec::new(),
+        refused: Vec::new(),
+        notes: Vec::new(),
+    };
+    for stage in 0..STAGES {
+        let own: Vec<&Point> = points.iter().filter(|point| point.stage == stage).collect();
+        if own.iter().any(|point| point.cut) {
+            match of_stage(&own, reference.reference) {
+                Ok(found) => learned.stages.push(found),
+                Err(refusal) => learned.refused.push(refusal.at(format!("gear stage {stage}"))),
+            }
+        }
+    }
+    if learned.stages.is_empty() {
+        return Err(learned.refused.into_iter().next().unwrap_or_else(nothing));
+    }
+    learned.notes = learned.stages.iter().filter_map(note).collect();
+    learned.points = points;
+    Ok(learned)
+}
+
+fn nothing() -> Refusal {
+    let what = "no steady cut of 5 s or longer in which both power and reference are known";
+    Refusal::new(
+        RefusalKind::TooFew,
+        what,
+        "cut at one speed with at least three depths or feeds, 10 s each, idling between",
+    )
+}
+
+fn of_stage(points: &[&Point], reference: Reference) -> Result<StageLearned, Refusal> {
+    let cuts: Vec<f64> = points.iter().filter(|point| point.cut).map(|point| point.cutting_power_w).collect();
+    let speeds = speeds(points);
+    check_span(&cuts)?;
+    check_idle(points, &speeds)?;
+    let regression = regression(points, &speeds, false)?;
+    check_share(points, &regression, &speeds)?;
+    let mean = cuts.iter().sum::<f64>() / count(cuts.len());
+    let own = Widening::of(&regression, speeds.len(), reference);
+    let stage = StageLearned {
+        stage: points[0].stage,
+        linear: own.told(-1.0, 1.0, 0.0),
+        quadratic_per_w: own.told(0.0, 0.0, 1.0),
+        share_at_mean: own.told(-1.0, 1.0, mean),
+        cutting_power_w: (least(&cuts), greatest(&cuts), mean),
+        speeds_rpm: speeds.clone(),
+        cuts: cuts.len(),
+        idle: points.len() - cuts.len(),
+        residual_sd_w: regression.residual_sd,
+        variance_inflation: regression.coefficients[speeds.len()].variance_inflation.unwrap_or(1.0),
+        by_speed: by_speed(points, &speeds, &regression),
+    };
+    credible(&stage)?;
+    Ok(stage)
+}
+
+fn least(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn greatest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Speeds that have cuts.
+fn speeds(points: &[&Point]) -> Vec<f64> {
+    let mut speeds: Vec<f64> = Vec::new();
+    for point in points.iter().filter(|point| point.cut) {
+        if !speeds.iter().any(|known| near(*known, point.speed_rpm)) {
+            speeds.push(point.speed_rpm);
+        }
+    }
+    speeds
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= SAME_SPEED
+}
+
+fn check_span(cuts: &[f64]) -> Result<(), Refusal> {
+    let (low, high) = (least(cuts), greatest(cuts));
+    let mut sorted = cuts.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let levels = 1 + sorted.windows(2).filter(|pair| pair[1] > pair[0] + 0.05 * high.abs()).count();
+    if low <= 0.0 {
+        let what = format!("the reference shows {low:.1} W in a cut");
+        return Err(Refusal::new(RefusalKind::Contradiction, what, "look at the sign and the zero of the reference"));
+    }
+    if levels < LEVELS_MIN || high < SPAN_MIN * low {
+        let what = format!(
+            "the cuts take {low:.0} to {high:.0} W at the edge in {levels} steps: over so narrow a range a0 and a1 are \
+             collinear, and only their sum a0 + a1 Pc can be told"
+        );
+        let next = "record cuts of at least three powers, the heaviest at least twice the lightest, better four times";
+        return Err(Refusal::new(RefusalKind::Collinear, what, next));
+    }
+    Ok(())
+}
+
+fn check_idle(points: &[&Point], speeds: &[f64]) -> Result<(), Refusal> {
+    let idles = |speed: &&f64| points.iter().any(|point| !point.cut && near(**speed, point.speed_rpm));
+    match speeds.iter().find(|speed| !idles(speed)) {
+        None => Ok(()),
+        Some(speed) => {
+            let what = format!("the spindle never idles at {speed:.0} rpm, where it cuts");
+            let next = "let it turn without feed for 10 s at this speed, between the cuts";
+            Err(Refusal::new(RefusalKind::NotIdentifiable, what, next))
+        }
+    }
+}
+
+/// Columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each.
+fn regression(points: &[&Point], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
+    let used: Vec<&&Point> = points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
+    let column = |name: String, of: &dyn Fn(&Point) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
+    let at = |speed: f64, point: &Point| f64::from(u8::from(near(speed, point.speed_rpm)));
+    let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
+    let mut columns: Vec<Column> =
+        speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();
+    let groups: Vec<Option<f64>> = if each { speeds.iter().copied().map(Some).collect() } else { vec![None] };
+    for group in groups {
+        let inside = |point: &Point| group.map_or(1.0, |speed| at(speed, point));
+        let name = group.map_or_else(String::new, |speed| format!(" {speed:.0} rpm"));
+        columns.push(column(format!("Pc{name}"), &|point| inside(point) * point.cutting_power_w));
+        columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * point.cutting_power_w.powi(2)));
+    }
+    fit(&y, &columns, Intercept::None)
+}
+
+/// Cutting power and spindle power must be of one size.
+fn check_share(points: &[&Point], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
+    let no_load = |point: &Point| {
+        let at = speeds.iter().position(|speed| near(*speed, point.speed_rpm)).unwrap_or(0);
+        regression.coefficients[at].value
+    };
+    let cuts = || points.iter().filter(|point| point.cut);
+    let (cutting, above): (f64, f64) =
+        (cuts().map(|point| point.cutting_power_w).sum(), cuts().map(|point| point.power.mean - no_load(point)).sum());
+    let share = cutting / above;
+    if share > CREDIBLE.0 && share < CREDIBLE.1 {
+        return Ok(());
+    }
+    let what = format!("the reference says {share:.4} of the power above no-load power; 0.7 to 1 is usual");
+    let next = "look at units (torque in N·m, force in N, diameter in mm) and at what the meter measures";
+    Err(Refusal::new(RefusalKind::Unit, what, next))
+}
+
+/// a0 and a1 with their covariance, widened by what is not known of the reference's scale: with `Pc` known to a factor,
+/// `1 + a0` goes with its inverse and `a1` with the inverse of its square.
+struct Widening {
+    gain: f64,
+    quadratic: f64,
+    gain_variance: f64,
+    covariance: f64,
+    quadratic_variance: f64,
+    t: f64,
+}
+
+impl Widening {
+    fn of(regression: &Regression, at: usize, reference: Reference) -> Self {
+        let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
+        let scale = match reference {
+            Reference::Removal { relative_sd } => relative_sd * relative_sd,
+            Reference::Torque | Reference::Force => 0.0,
+        };
+        Self {
+            gain,
+            quadratic,
+            gain_variance: regression.covariance(at, at) + scale * gain * gain,
+            covariance: regression.covariance(at, at + 1) + 2.0 * scale * gain * quadratic,
+            quadratic_variance: regression.covariance(at + 1, at + 1) + 4.0 * scale * quadratic * quadratic,
+            t: t_quantile(0.5 + 0.5 * CONFIDENCE, regression.degrees_of_freedom),
+        }
+    }
+
+    /// `offset + a (1 + a0) + b a1`.
+    fn told(&self, offset: f64, a: f64, b: f64) -> Told {
+        let value = offset + a * self.gain + b * self.quadratic;
+        let variance = a * a * self.gain_variance + 2.0 * a * b * self.covariance + b * b * self.quadratic_variance;
+        let standard_error = variance.max(0.0).sqrt();
+        Told { value, standard_error, interval: (value - self.t * standard_error, value + self.t * standard_error) }
+    }
+}
+
+fn by_speed(points: &[&Point], speeds: &[f64], together: &Regression) -> Option<FTest> {
+    if speeds.len() < 2 {
+        return None;
+    }
+    regression(points, speeds, true).ok()?.against(together)
+}
+
+fn credible(stage: &StageLearned) -> Result<(), Refusal> {
+    let inside = |value: f64, range: (f64, f64)| (range.0..=range.1).contains(&value);
+    if inside(stage.linear.value, LINEAR_RANGE) && inside(stage.quadratic_per_w.value, QUADRATIC_RANGE) {
+        return Ok(());
+    }
+    let (a0, a1) = (stage.linear.value, stage.quadratic_per_w.value);
+    let what = format!("a0 = {a0:.3} and a1 = {a1:.2e} 1/W are those of no drive");
+    Err(Refusal::new(RefusalKind::Contradiction, what, "look at reference and meter, and record heavier cuts"))
+}
+
+fn note(stage: &StageLearned) -> Option<String> {
+    let test = stage.by_speed.filter(|test| test.p < 0.05)?;
+    Some(format!(
+        "gear stage {}: the speeds want coefficients of their own (F = {:.1}, p = {:.3}); the common ones are a mean over {} speeds",
+        stage.stage,
+        test.f,
+        test.p,
+        stage.speeds_rpm.len()
+    ))
+}

@@ -1,0 +1,91 @@
+//! What tells the power at the cutting edge besides the spindle power: torque, force, or a known removal.
+
+use super::rows::Row;
+use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
+use adapters::Recording;
+use serde::Serialize;
+use std::f64::consts::{PI, TAU};
+
+/// What to look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceChoice {
+    /// Column of the cutting torque at the spindle, N·m.
+    pub torque_column: String,
+    /// Cutting energy of the material, J/mm3, and its standard deviation, where known: cuts of known removal then serve.
+    pub specific_energy_j_mm3: Option<(f64, f64)>,
+}
+
+impl Default for ReferenceChoice {
+    fn default() -> Self {
+        Self { torque_column: "torque_nm".to_owned(), specific_energy_j_mm3: None }
+    }
+}
+
+/// What tells the power at the edge.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// Torque times angular speed.
+    Torque,
+    /// Main cutting force times cutting speed.
+    Force,
+    /// Removal rate times the material's cutting energy: as good as that energy is known.
+    Removal {
+        /// Relative standard deviation of the cutting energy.
+        relative_sd: f64,
+    },
+}
+
+/// The reference of every row, W.
+pub(super) struct Referenced {
+    pub(super) reference: Reference,
+    pub(super) power_w: Vec<Option<f64>>,
+}
+
+/// The best reference that the recording holds.
+///
+/// # Errors
+/// No reference, or a unit that was mistaken.
+pub(super) fn referenced(recording: &Recording, rows: &[Row], choice: &ReferenceChoice) -> Result<Referenced, Refusal> {
+    let column = |name: &str| recording.numbers(name);
+    let per_row = |of: &dyn Fn(&Row) -> Option<f64>| rows.iter().map(of).collect::<Vec<Option<f64>>>();
+    if let Some(torque) = column(&choice.torque_column) {
+        Plausible::TORQUE_NM
+            .check(cutting(rows, |row| torque.get(row.row)))
+            .map_err(|it| it.at(&choice.torque_column))?;
+        let power = |row: &Row| Some(torque.get(row.row)?.abs() * row.speed_rpm? * TAU / 60.0);
+        return Ok(Referenced { reference: Reference::Torque, power_w: per_row(&power) });
+    }
+    if let (Some(force), Some(diameter)) = (column("cutting_force_n"), column("diameter_mm")) {
+        Plausible::CUTTING_FORCE_N
+            .check(cutting(rows, |row| force.get(row.row)))
+            .map_err(|it| it.at("cutting_force_n"))?;
+        let power =
+            |row: &Row| Some(force.get(row.row)?.abs() * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
+        return Ok(Referenced { reference: Reference::Force, power_w: per_row(&power) });
+    }
+    let removal = adapters::recording::with_derived(recording.clone());
+    match (removal.numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
+        (Some(removal), Some((energy_j_mm3, sd))) if energy_j_mm3 > 0.0 && sd >= 0.0 => {
+            let power = |row: &Row| Some(removal.get(row.row)? * 1000.0 / 60.0 * energy_j_mm3);
+            let reference = Reference::Removal { relative_sd: sd / energy_j_mm3 };
+            Ok(Referenced { reference, power_w: per_row(&power) })
+        }
+        (Some(_), _) => Err(alone("the removal rate is known, the cutting energy of the material is not")),
+        (None, _) => Err(alone("there is no torque, no force and no removal rate")),
+    }
+}
+
+fn cutting<'a>(rows: &'a [Row], of: impl Fn(&Row) -> Option<f64> + 'a) -> impl Iterator<Item = f64> + 'a {
+    rows.iter().filter(|row| row.state == crate::estimators::State::Cutting).filter_map(of)
+}
+
+fn alone(why: &str) -> Refusal {
+    let what = format!(
+        "load loss cannot be told from power alone ({why}): with cutting power k Q the power above no-load is \
+         (1 + a0) k Q + a1 k^2 Q^2, and every k gives the same curve with other a0 and a1"
+    );
+    let next =
+        "record torque_nm, or cutting_force_n with diameter_mm, or give the cutting energy of the material in J/mm3";
+    Refusal::new(RefusalKind::NotIdentifiable, what, next)
+}
