@@ -42,7 +42,7 @@ struct Conditions {
 
 /// The idle stretches and the steady cuts, in the order of time.
 pub(super) fn points(recording: &Recording, rows: &[Row], idle: &[Stretch], reference: &Referenced) -> Vec<Point> {
-    let mut found: Vec<Point> = idle.iter().map(|stretch| of_idle(stretch)).collect();
+    let mut found: Vec<Point> = idle.iter().map(of_idle).collect();
     let mut open: Vec<usize> = Vec::new();
     for (at, row) in rows.iter().enumerate() {
         let usable = row.state == State::Cutting && row.power_w.is_some() && reference.power_w[at].is_some();
