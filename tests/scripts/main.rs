@@ -3,6 +3,7 @@
 mod deciding;
 mod failing;
 mod mad;
+mod methods;
 mod reload;
 mod shipped;
 

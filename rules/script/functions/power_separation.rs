@@ -1,8 +1,11 @@
 //! Power separation: no-load power at a speed, cutting power and load loss.
 
 use super::{Answer, Arguments, Method, Parameter, Subject, takes};
-use crate::estimators::balance;
 use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::estimators::{balance, lagrange, noise_gain, triple};
+
+/// Extrapolation that amplifies noise more than this is refused, as the estimators do.
+const GAIN_MAX: f64 = 3.0 + 1e-9;
 
 pub(super) static SUBJECT: Subject = Subject { en: "Power separation", zh: "功率分离", methods: METHODS };
 
@@ -13,7 +16,29 @@ const BALANCE: &[Parameter] = &[
     takes("load_loss_quadratic_per_w", "1/W"),
 ];
 
+/// `identify no-load --out` writes such pairs.
+const TABLE: Parameter = takes("no_load_table", "[[rpm, W]]");
+
 static METHODS: &[Method] = &[
+    Method {
+        name: "interpolated_no_load_power_w",
+        parameters: &[TABLE, takes("speed_rpm", "rpm")],
+        returns: "W",
+        en: "No-load power at a speed, by the parabola through the three nearest known speeds of one gear stage; no value where extrapolation amplifies noise more than three times",
+        zh: "由相邻三个已知转速二次插值空载功率",
+        run: |given| {
+            let (powers_w, weights) = interpolation(given)?;
+            Ok(Answer::Number(weights.iter().zip(powers_w).map(|(weight, power_w)| weight * power_w).sum()))
+        },
+    },
+    Method {
+        name: "no_load_noise_gain",
+        parameters: &[TABLE, takes("speed_rpm", "rpm")],
+        returns: "1",
+        en: "By how much that interpolation amplifies the noise of the known powers; 1 at a known speed",
+        zh: "插值的噪声放大倍数",
+        run: |given| interpolation(given).map(|(_, weights)| Answer::Number(noise_gain(&weights))),
+    },
     Method {
         name: "separated_cutting_power_w",
         parameters: BALANCE,
@@ -31,6 +56,28 @@ static METHODS: &[Method] = &[
         run: |given| split(given).map(|split| Answer::Number(split.load_loss_w)),
     },
 ];
+
+/// Powers of the three speeds that are used, and their weights.
+fn interpolation(given: &Arguments<'_>) -> Result<([f64; 3], [f64; 3]), Refusal> {
+    let mut table = given.rows_of::<2>(0)?;
+    let speed_rpm = given.number(1).abs();
+    table.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let usable = table.iter().flatten().all(|number| number.is_finite() && *number > 0.0) && speed_rpm.is_finite();
+    let distinct = table.windows(2).all(|pair| pair[1][0] > 1.001 * pair[0][0]);
+    if !usable || !distinct || table.len() < 3 {
+        let what = "the table has fewer than three speeds, one of them twice, or a number that is not positive";
+        return Err(Refusal::new(RefusalKind::TooFew, what, "let the spindle idle at three speeds of this gear stage"));
+    }
+    let speeds: Vec<f64> = table.iter().map(|row| row[0]).collect();
+    let first = triple(&speeds, speed_rpm);
+    let weights = lagrange([speeds[first], speeds[first + 1], speeds[first + 2]], speed_rpm);
+    let gain = noise_gain(&weights);
+    if gain > GAIN_MAX {
+        let what = format!("{speed_rpm:.0} rpm lies too far from the known speeds (noise gain {gain:.1})");
+        return Err(Refusal::new(RefusalKind::OutOfRange, what, "let the spindle idle at this speed"));
+    }
+    Ok(([table[first][1], table[first + 1][1], table[first + 2][1]], weights))
+}
 
 fn split(given: &Arguments<'_>) -> Result<crate::estimators::Balance, Refusal> {
     let excess_w = given.number(0) - given.number(1);
