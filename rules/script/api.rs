@@ -89,6 +89,6 @@ mod tests {
         let json = api_json();
         assert_eq!(json["methods"].as_array().map(Vec::len), Some(methods().count()));
         assert_eq!(json["settings"].as_array().map(Vec::len), Some(SETTINGS.len()));
-        assert_eq!(json["methods"][0]["parameters"][0]["unit"], "W");
+        assert_eq!(json["methods"][0]["parameters"][1]["unit"], "rpm");
     }
 }
