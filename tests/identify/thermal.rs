@@ -182,11 +182,43 @@ fn the_script_that_is_written_compiles_and_the_words_are_for_people() {
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(0), "{}", text(&told));
     println!("{}", text(&told));
-    assert!(text(&told).contains("Chosen: "), "{}", text(&told));
+    assert!(text(&told).contains("Chosen: with lag"), "the law is late: {}", text(&told));
     let script = std::fs::read_to_string(directory.path().join("thermal.rhai")).expect("written");
     println!("{script}");
+    assert!(script.contains("first_order_c(memory.late_temperature_12_c"), "{script}");
     let compiled = compile(&[ScriptFile { name: "thermal.rhai".to_owned(), text: script.clone() }]);
     compiled.unwrap_or_else(|problems| panic!("{problems:?}\n{script}"));
+}
+
+/// How many alarms a replay of these rows raises under the scripts of `rules`.
+fn alarms(directory: &std::path::Path, recorded: &Recorded) -> u64 {
+    std::fs::write(directory.join("later.csv"), recorded.every_second().csv()).expect("written");
+    let told = gateway(directory, &["replay", "later.csv", "--scripts", "rules", "--json"]);
+    assert_eq!(told.status.code(), Some(0), "{}", text(&told));
+    let summary: Value = serde_json::from_slice(&told.stdout).expect("JSON");
+    summary["alarms"].as_u64().expect("a count")
+}
+
+#[test]
+fn the_script_that_is_written_watches_a_machine() {
+    let mut machine = ThermalMachine::new(5);
+    let law = |recorded: Recorded| recorded.with_law(LATE.0, LATE.1, LATE.2, 6, 0.8);
+    let all = law(machine.tests(6, 200));
+    // The last test is among those learned from, so that its temperatures lie inside the range of identification.
+    let later = all.rows_of(1000..1200);
+    let directory = tempfile::tempdir().expect("a directory");
+    std::fs::create_dir(directory.path().join("rules")).expect("a directory");
+    std::fs::write(directory.path().join("warm.csv"), all.csv()).expect("written");
+    let arguments = ["identify", "thermal", "--recording", "warm.csv", "--out", "rules/thermal.rhai"];
+    let told = gateway(directory.path(), &arguments);
+    assert_eq!(told.status.code(), Some(0), "{}", text(&told));
+    assert_eq!(alarms(directory.path(), &later), 0, "the law holds");
+    let mut bent = later.rows_of(0..200);
+    bent.error_um.iter_mut().for_each(|um| *um += 25.0);
+    assert!(alarms(directory.path(), &bent) > 0, "measured and predicted disagree");
+    let mut hot = later.rows_of(0..200);
+    hot.temperature_c.iter_mut().flatten().for_each(|c| *c += 30.0);
+    assert!(alarms(directory.path(), &hot) > 0, "outside the range of identification");
 }
 
 #[test]

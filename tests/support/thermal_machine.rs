@@ -194,7 +194,37 @@ impl Recorded {
         self.time_s.len()
     }
 
-    /// The recording as CSV with these columns changed or added.
+    /// Some of the rows.
+    pub(crate) fn rows_of(&self, rows: std::ops::Range<usize>) -> Self {
+        let of = |values: &[f64]| values[rows.clone()].to_vec();
+        Self {
+            time_s: of(&self.time_s),
+            runs: self.runs[rows.clone()].to_vec(),
+            speed_rpm: of(&self.speed_rpm),
+            temperature_c: self.temperature_c.iter().map(|sensor| of(sensor)).collect(),
+            error_um: of(&self.error_um),
+        }
+    }
+
+    /// The same with a row every second, in a straight line between rows a minute apart.
+    pub(crate) fn every_second(&self) -> Self {
+        let between = |values: &[f64]| {
+            let pairs = values.windows(2);
+            pairs
+                .flat_map(|pair| (0..60).map(|s| pair[0] + (pair[1] - pair[0]) * f64::from(s) / 60.0))
+                .collect::<Vec<f64>>()
+        };
+        let time_s = between(&self.time_s);
+        Self {
+            runs: vec![self.runs[0].clone(); time_s.len()],
+            speed_rpm: between(&self.speed_rpm),
+            temperature_c: self.temperature_c.iter().map(|sensor| between(sensor)).collect(),
+            error_um: between(&self.error_um),
+            time_s,
+        }
+    }
+
+    /// The recording as CSV.
     pub(crate) fn csv(&self) -> String {
         let mut text = String::from("time_s,run,spindle_speed_rpm,thermal_error_um");
         (1..=self.temperature_c.len()).for_each(|n| text.push_str(&format!(",temperature_{n}_c")));

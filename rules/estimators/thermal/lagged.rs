@@ -79,6 +79,13 @@ pub(super) fn late(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
     states
 }
 
+/// A few time constants over the range that is tried.
+pub(super) fn some_taus(course: &Course) -> Result<Vec<f64>, Refusal> {
+    known_pauses(course)?;
+    let all = Late { course, sensors: &[], form: Form::All }.taus()?;
+    Ok(all.into_iter().skip(1).step_by(2).collect())
+}
+
 struct Late<'a> {
     course: &'a Course,
     sensors: &'a [usize],

@@ -2,9 +2,9 @@
 
 use super::course::Course;
 use super::cross_validation::{HeldOut, held_out};
-use super::lagged::{Form, fit_lagged, held_out_lagged, late};
+use super::lagged::{Form, fit_lagged, held_out_lagged, late, some_taus};
 use super::regression::{ThermalFit, column, fit_static};
-use super::selection::{Selection, SelectionSettings, select};
+use super::selection::{Selection, SelectionSettings, select, select_late};
 use crate::estimators::regression::{Column, Refusal, RefusalKind};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -32,7 +32,7 @@ pub struct Candidate {
 /// What was learned.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThermalLearned {
-    /// The sensors and why.
+    /// The sensors of the law to use, and why.
     pub selection: Selection,
     /// The law without lag.
     pub without_lag: Candidate,
@@ -83,16 +83,37 @@ pub fn learn(
 ) -> Result<ThermalLearned, Refusal> {
     course.usable()?;
     let chosen = sensors.map(|names| positions(course, names)).transpose()?;
-    let selection = match &chosen {
+    let mut selection = match &chosen {
         Some(chosen) => given(course, settings, chosen)?,
         None => select(course, settings)?,
     };
     let without_lag = candidate(course, &selection.chosen, fit_static(course, &selection.chosen)?)?;
     says_something(&without_lag)?;
-    let with_lag = best_late(course, &selection.chosen);
-    let (lag_chosen, reason) = decide(&without_lag, &with_lag);
+    let mut with_lag = best_late(course, &selection.chosen);
+    let (mut lag_chosen, mut reason) = decide(&without_lag, &with_lag);
+    // A late law may want other sensors than those that imitate a lag best.
+    let other = if sensors.is_none() { late_with_own_sensors(course, settings, &with_lag) } else { None };
+    if let Some((own, candidate)) = other {
+        let late = Ok(candidate);
+        let (chosen, why) = decide(&without_lag, &late);
+        if chosen {
+            (selection, with_lag, lag_chosen, reason) = (own, late, chosen, why);
+        }
+    }
     let (blocks_are_runs, blocks) = (course.blocks_are_runs(), course.blocks().len());
     Ok(ThermalLearned { selection, without_lag, with_lag, lag_chosen, reason, blocks_are_runs, blocks })
+}
+
+/// The late law of the sensors that suit it best, where it predicts clearly better than that of the others.
+fn late_with_own_sensors(
+    course: &Course,
+    settings: SelectionSettings,
+    other: &Result<Candidate, Refusal>,
+) -> Option<(Selection, Candidate)> {
+    let selection = select_late(course, settings, &some_taus(course).ok()?).ok()?;
+    let candidate = late_candidate(course, &selection.chosen, Form::All).ok()?;
+    let better = other.as_ref().map_or(true, |other| candidate.held_out.beats(&other.held_out, GAIN_MIN));
+    better.then_some((selection, candidate))
 }
 
 fn positions(course: &Course, names: &[String]) -> Result<Vec<usize>, Refusal> {

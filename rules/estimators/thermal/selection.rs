@@ -7,9 +7,10 @@
 //! Sources: Machines 2022 10(6):427 (collinearity makes the selected points vary from run to run); variance inflation up
 //! to 10: Montgomery, Introduction to Linear Regression Analysis, 9.4.2.
 
-use super::course::Course;
+use super::course::{Course, Sensor};
 use super::cross_validation::{HeldOut, held_out};
 use super::grey::{Grades, Normalisation, grades};
+use super::lagged::late;
 use super::quantities::{self, Series};
 use super::regression::column;
 use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
@@ -73,6 +74,8 @@ pub struct GradeChoice {
 
 /// Rows that the search works on; more are averaged first.
 const ROWS_MAX: usize = 400;
+/// Sensors of a late law: the lag stands for what further sensors would have to imitate.
+const LATE_MAX: usize = 2;
 /// Lists of three or more sensors that are extended further.
 const BEAM: usize = 8;
 
@@ -85,6 +88,28 @@ pub fn select(course: &Course, settings: SelectionSettings) -> Result<Selection,
     let search = Search::new(course, settings, candidates);
     let chosen = search.choose()?;
     search.selection(course, chosen)
+}
+
+/// Chooses up to two sensors for a law in which every sensor is late, over several time constants.
+///
+/// # Errors
+/// As [`select`].
+pub(super) fn select_late(course: &Course, settings: SelectionSettings, taus_s: &[f64]) -> Result<Selection, Refusal> {
+    let candidates = course.usable()?;
+    let settings = SelectionSettings { sensors_max: settings.sensors_max.min(LATE_MAX), ..settings };
+    let mut best: Option<(f64, Search, Vec<usize>)> = None;
+    for tau_s in taus_s {
+        let search = Search::late(course, settings, candidates.clone(), *tau_s);
+        let Ok(chosen) = search.choose() else { continue };
+        let error = search.score(&chosen).map_or(f64::MAX, |it| it.rms_um);
+        if best.as_ref().is_none_or(|(least, ..)| error < *least) {
+            best = Some((error, search, chosen));
+        }
+    }
+    match best {
+        Some((_, search, chosen)) => search.selection(course, chosen),
+        None => Err(nothing_found()),
+    }
 }
 
 /// What can be said of sensors that someone else chose.
@@ -109,6 +134,15 @@ impl Search {
     fn new(course: &Course, settings: SelectionSettings, candidates: Vec<usize>) -> Self {
         let (short, _) = course.condensed(&[], ROWS_MAX);
         let columns = short.sensors().iter().map(column).collect();
+        let (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
+        Self { settings, candidates, columns, error_um, blocks }
+    }
+
+    /// The same with the state of every sensor in its place.
+    fn late(course: &Course, settings: SelectionSettings, candidates: Vec<usize>, tau_s: f64) -> Self {
+        let state = |sensor: &Sensor| Column::new(sensor.name.as_str(), late(course, &sensor.values, tau_s));
+        let states: Vec<Column> = course.sensors().iter().map(state).collect();
+        let (short, columns) = course.condensed(&states, ROWS_MAX);
         let (error_um, blocks) = (short.error_um().to_vec(), short.blocks());
         Self { settings, candidates, columns, error_um, blocks }
     }
@@ -149,9 +183,7 @@ impl Search {
         if !chosen.is_empty() {
             return Ok(chosen);
         }
-        let what = "no temperature predicts blocks that were left out better than the mean of the others does";
-        let next = "record several warm-ups and cool-downs, with sensors near the spindle, the motor and the column";
-        Err(Refusal::new(RefusalKind::NotIdentifiable, what, next).at(quantities::THERMAL_ERROR))
+        Err(nothing_found())
     }
 
     /// Every list with one more sensor that is not collinear, best first by the error of blocks left out.
@@ -205,6 +237,12 @@ impl Search {
             sensors: names,
         }
     }
+}
+
+fn nothing_found() -> Refusal {
+    let what = "no temperature predicts blocks that were left out better than the mean of the others does";
+    let next = "record several warm-ups and cool-downs, with sensors near the spindle, the motor and the column";
+    Refusal::new(RefusalKind::NotIdentifiable, what, next).at(quantities::THERMAL_ERROR)
 }
 
 fn cross_mean(error_um: &[f64], blocks: &[Range<usize>]) -> Result<HeldOut, Refusal> {

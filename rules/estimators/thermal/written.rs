@@ -47,19 +47,27 @@ fn heading(learned: &ThermalLearned, law: &ThermalLaw) -> String {
     text
 }
 
-/// The state of every lagged sensor, kept from run to run; it begins at the temperature.
+/// The state of every lagged sensor, kept from run to run; at the beginning and after a pause it stands at the temperature,
+/// and nothing is judged until that is forgotten.
 fn states(law: &ThermalLaw) -> String {
-    let mut text = String::new();
-    let Some(tau_s) = law.tau_s else { return text };
-    for term in law.terms.iter().filter(|term| term.path == Path::Lagged) {
-        let name = &term.sensor;
+    let Some(tau_s) = law.tau_s else { return String::new() };
+    let lagged = || law.terms.iter().filter(|term| term.path == Path::Lagged).map(|term| &term.sensor);
+    let mut text = String::from("    if dt_s == 0.0 {\n        memory.seen_s = 0.0;\n");
+    for name in lagged() {
+        let _ = write!(text, "        memory.late_{name} = {name};\n        memory.before_{name} = {name};\n");
+    }
+    text.push_str("    }\n    memory.seen_s += dt_s;\n");
+    for name in lagged() {
         let _ = write!(
             text,
-            "    if !(\"late_{name}\" in memory) {{\n        memory.late_{name} = {name};\n        memory.before_{name} = {name};\n    }}\n    memory.late_{name} = first_order_c(memory.late_{name}, memory.before_{name}, {name}, dt_s, {tau_s:.1});\n    memory.before_{name} = {name};\n"
+            "    memory.late_{name} = first_order_c(memory.late_{name}, memory.before_{name}, {name}, dt_s, {tau_s:.1});\n    memory.before_{name} = {name};\n"
         );
     }
     text
 }
+
+/// How long a state remembers that its beginning was guessed, in time constants.
+const SETTLED_TAUS: f64 = 3.0;
 
 fn prediction(law: &ThermalLaw) -> String {
     let value = |at: usize| match law.terms[at].path {
@@ -77,12 +85,14 @@ fn prediction(law: &ThermalLaw) -> String {
          let outside_k = temperature_outside_k([{temperatures}], [{least}], [{greatest}]);\n    \
          if has(outside_k) {{\n        \
          alarm_when(\"thermal_outside\", outside_k > {:.2}, 60.0, \"temperatures outside the range of identification: identify thermal again\");\n    }}\n    \
-         if has(thermal_error_um) && has(predicted_um) {{\n        \
+         if has(thermal_error_um) && has(predicted_um){settled} {{\n        \
          let residual_um = thermal_error_um - predicted_um;\n        \
          alarm_when(\"thermal_contradicted\", residual_um > {limit:.2} || residual_um < -{limit:.2}, 600.0, \"measured and predicted thermal error disagree: identify thermal again\");\n    }}\n}}\n",
         law.intercept_um,
         margin_k(law),
         limit = 3.0 * law.residual_sd_um,
+        settled =
+            law.tau_s.map_or_else(String::new, |tau_s| format!(" && memory.seen_s > {:.0}", SETTLED_TAUS * tau_s)),
     )
 }
 

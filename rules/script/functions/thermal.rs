@@ -161,3 +161,67 @@ fn pulses(given: &Arguments<'_>) -> Result<f64, Refusal> {
     // A whole pulse is not missed by rounding of the division.
     Ok(((value - sent) / pulse * (1.0 + 1e-12)).trunc())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rhai::Dynamic;
+
+    fn call(name: &str, values: Vec<Dynamic>) -> Result<f64, Refusal> {
+        let method = METHODS.iter().find(|method| method.name == name).expect("a method");
+        let mut values = values;
+        let handed: Vec<&mut Dynamic> = values.iter_mut().collect();
+        let arguments = Arguments::read(method, &handed).expect("arguments of the right kind");
+        (method.run)(&arguments).map(|answer| match answer {
+            Answer::Number(number) => number,
+            other => panic!("a number, not {other:?}"),
+        })
+    }
+
+    fn list(values: &[f64]) -> Dynamic {
+        values.iter().map(|value| Dynamic::from_float(*value)).collect::<Vec<Dynamic>>().into()
+    }
+
+    fn numbers(values: &[f64]) -> Vec<Dynamic> {
+        values.iter().map(|value| Dynamic::from_float(*value)).collect()
+    }
+
+    #[test]
+    fn a_prediction_and_its_deviation() {
+        let temperatures = || list(&[30.0, 20.0]);
+        let error = call("predicted_thermal_error_um", vec![temperatures(), list(&[2.0, -1.0]), (-10.0).into()]);
+        assert_eq!(error, Ok(30.0));
+        // Independent coefficients: 1 + 900 * 0.01 + 400 * 0.0025 + 2^2.
+        let covariance = list(&[1.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0025]);
+        let sd = call("predicted_thermal_error_sd_um", vec![temperatures(), covariance, 2.0.into()]);
+        assert!((sd.expect("a deviation") - 15.0_f64.sqrt()).abs() < 1e-12);
+        let kelvin = call("predicted_thermal_error_um", vec![list(&[303.0]), list(&[2.0]), 0.0.into()]);
+        assert_eq!(kelvin.expect_err("kelvin").kind, RefusalKind::Unit);
+        let odd = call("predicted_thermal_error_um", vec![temperatures(), list(&[2.0]), 0.0.into()]);
+        assert_eq!(odd.expect_err("one coefficient short").kind, RefusalKind::Mismatch);
+        let outside = vec![temperatures(), list(&[15.0, 21.5]), list(&[28.0, 40.0])];
+        assert_eq!(call("temperature_outside_k", outside), Ok(2.0));
+    }
+
+    #[test]
+    fn a_state_follows_and_time_does_not_go_back() {
+        let settled = call("first_order_c", numbers(&[20.0, 30.0, 30.0, 1e6, 600.0]));
+        assert!((settled.expect("a state") - 30.0).abs() < 1e-9);
+        assert!(call("first_order_c", numbers(&[20.0, 30.0, 30.0, -1.0, 600.0])).is_err());
+    }
+
+    #[test]
+    fn increments_add_up_within_the_limits() {
+        let (mut value, mut sent) = (0.0, 0.0);
+        for _ in 0..1000 {
+            value = call("thermal_compensation_um", numbers(&[value, 37.3, 25.0, 0.5, 2.0, 0.1])).expect("a value");
+            let pulses = call("thermal_compensation_pulses", numbers(&[value, sent, 0.7])).expect("pulses");
+            assert_eq!(pulses, pulses.trunc());
+            sent += pulses * 0.7;
+            assert!((value - sent).abs() < 0.7 + 1e-9);
+        }
+        assert_eq!(value, -25.0, "against the error, at the limit");
+        assert!(call("thermal_compensation_um", numbers(&[0.0, 10.0, -1.0, 0.5, 2.0, 0.1])).is_err());
+        assert!(call("thermal_compensation_pulses", numbers(&[1.0, 0.0, 0.0])).is_err());
+    }
+}

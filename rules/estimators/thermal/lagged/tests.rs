@@ -79,6 +79,27 @@ fn no_lag_is_chosen_where_there_is_none() {
 }
 
 #[test]
+fn a_late_law_may_have_sensors_of_its_own() {
+    let (mut chosen, mut before, mut after) = (0, 0.0, 0.0);
+    for seed in 40..44 {
+        let mut random = bed::random(seed);
+        let course = bed::warm_ups(&mut random, 7, 180);
+        let course = bed::with_error(&mut random, &course, LAW, TAU_S, ROUGH);
+        let learned = learn(&course, SelectionSettings::default(), None).expect("a law");
+        let names: Vec<&str> = learned.best().fit.law.terms.iter().map(|term| term.sensor.as_str()).collect();
+        println!("seed {seed}: {names:?}, {}", learned.reason);
+        let best = learned.best().held_out.rms_um;
+        (chosen, before, after) =
+            (chosen + usize::from(learned.lag_chosen), before + learned.without_lag.held_out.rms_um, after + best);
+        let in_use = learned.selection.sensors.iter().filter(|it| it.chosen).count();
+        assert!(names.iter().all(|name| learned.selection.sensors.iter().any(|it| it.chosen && it.sensor == *name)));
+        assert_eq!(in_use, learned.selection.chosen.len());
+    }
+    println!("chosen {chosen} of 4, blocks left out {before:.2} -> {after:.2} um");
+    assert!(chosen >= 3 && after < 0.85 * before, "{chosen} of 4, {before} -> {after}");
+}
+
+#[test]
 fn unknown_pauses_are_a_reason_and_the_static_law_remains() {
     let known = course(1, TAU_S);
     let (runs, error) = (known.runs().to_vec(), known.error_um().to_vec());
