@@ -231,6 +231,8 @@ fn what_cannot_be_learned_is_refused_with_words() {
     };
     let few = recorded().csv().lines().take(6).collect::<Vec<&str>>().join("\n");
     assert!(refused(&few, &[]).contains("5 rows; record at least 8"), "{}", refused(&few, &[]));
+    let short = "time_s,thermal_error_um,temperature_1_c\n0,1,20\n60,5,20\n120,9,20\n";
+    assert!(refused(short, &[]).contains("3 rows; record at least 8"), "{}", refused(short, &[]));
     let still = column(&|it| it.temperature_c.iter_mut().for_each(|sensor| sensor.fill(21.0)));
     assert!(refused(&still, &[]).contains("changes by 0.000 K only"));
     let kelvin = column(&|it| it.temperature_c[2].iter_mut().for_each(|t| *t += 273.15));

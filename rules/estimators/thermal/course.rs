@@ -61,6 +61,7 @@ impl Course {
     /// # Errors
     /// A sensor that is wrong in another way, its unit among them; or the first obstacle where none can be used.
     pub fn usable(&self) -> Result<Vec<usize>, Refusal> {
+        quantities::enough_rows(self.rows())?;
         let mut usable = Vec::new();
         let mut refused = None;
         for (at, sensor) in self.sensors.iter().enumerate() {

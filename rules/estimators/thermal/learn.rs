@@ -47,6 +47,8 @@ pub struct ThermalLearned {
     pub blocks_are_runs: bool,
     /// How many blocks.
     pub blocks: usize,
+    /// Neighbouring rows that are averaged before errors of blocks left out are told.
+    pub rows_averaged: usize,
 }
 
 /// The candidate, or `{"refused": ...}`.
@@ -101,7 +103,8 @@ pub fn learn(
         }
     }
     let (blocks_are_runs, blocks) = (course.blocks_are_runs(), course.blocks().len());
-    Ok(ThermalLearned { selection, without_lag, with_lag, lag_chosen, reason, blocks_are_runs, blocks })
+    let rows_averaged = course.rows().div_ceil(ROWS_MAX);
+    Ok(ThermalLearned { selection, without_lag, with_lag, lag_chosen, reason, blocks_are_runs, blocks, rows_averaged })
 }
 
 /// The late law of the sensors that suit it best, where it predicts clearly better than that of the others.

@@ -44,12 +44,21 @@ pub(super) fn check(error_um: &[f64], sensors: &[Series<'_>]) -> Result<(), Refu
         let next = "record temperatures as temperature_1_c, temperature_2_c, ... or bearing_temperature_c";
         return Err(Refusal::new(RefusalKind::Missing, "there is no temperature", next));
     }
-    if rows < ROWS_MIN {
-        let next = format!("record at least {ROWS_MIN} rows, better an hour of warm-up at one a minute");
-        return Err(Refusal::new(RefusalKind::TooFew, format!("{rows} rows"), next).at(THERMAL_ERROR));
-    }
+    enough_rows(rows)?;
     error_is_usable(error_um)?;
     sensors.iter().try_for_each(|sensor| temperature_is_usable(*sensor, rows))
+}
+
+/// The part of [`check`] that concerns the number of rows.
+///
+/// # Errors
+/// See [`check`].
+pub(super) fn enough_rows(rows: usize) -> Result<(), Refusal> {
+    if rows >= ROWS_MIN {
+        return Ok(());
+    }
+    let next = format!("record at least {ROWS_MIN} rows, better an hour of warm-up at one a minute");
+    Err(Refusal::new(RefusalKind::TooFew, format!("{rows} rows"), next).at(THERMAL_ERROR))
 }
 
 /// The part of [`check`] that concerns the error.

@@ -9,7 +9,11 @@ impl fmt::Display for ThermalLearned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.selection)?;
         let kind = if self.blocks_are_runs { "whole runs" } else { "contiguous blocks" };
-        writeln!(f, "\nErrors in {} {kind} that were left out one at a time, um:", self.blocks)?;
+        let means = match self.rows_averaged {
+            0 | 1 => String::new(),
+            rows => format!(" (means over {rows} rows)"),
+        };
+        writeln!(f, "\nErrors in {} {kind} that were left out one at a time, um{means}:", self.blocks)?;
         line(f, "mean of the others", self.selection.held_out_mean.rms_um, None)?;
         line(f, "law without lag", self.without_lag.held_out.rms_um, self.without_lag.hysteresis_um)?;
         match &self.with_lag {
