@@ -171,7 +171,7 @@ fn load_loss(repetitions: u64) {
             let learned = identify_load_loss(&recorded.recording, &ReferenceChoice::default()).expect("coefficients");
             let found = &learned.stages[0];
             let (a0, a1) = true_loss(&recorded);
-            assert_eq!((found.stage, found.cuts), (usize::from(stage), 10), "seed {seed}");
+            assert!(found.stage == usize::from(stage) && (8..=12).contains(&found.cuts), "seed {seed}: {found:?}");
             of_stage[0].add(found.linear.interval, a0);
             of_stage[1].add(found.quadratic_per_w.interval, a1);
         }
