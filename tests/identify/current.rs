@@ -124,6 +124,40 @@ fn turning(seed: u64) -> crate::machine::Recorded {
     record(settings, &steps.into_iter().map(step).collect::<Vec<_>>(), 5.0)
 }
 
+/// Cuts at a feed that was left out of the identification, against the curve: two standard deviations of one cut.
+fn left_out(repetitions: u64) {
+    let mut coverage = Coverage::new("current of a cut at a feed left out, lathe");
+    for seed in 1..=repetitions {
+        let whole = turning(seed).recording;
+        let is_out = |feed: f64| (feed / 150.0 - 1.0).abs() < 0.05;
+        let feeds = whole.numbers("feed_mm_min").expect("recorded");
+        let depths = whole.numbers("depth_of_cut_mm").expect("recorded").iter().zip(feeds.iter());
+        let kept = depths.map(|(depth, feed)| depth.filter(|_| !feed.is_some_and(is_out))).collect::<Numbers>();
+        let mut rest = whole.clone();
+        rest.set_column("depth_of_cut_mm", Cells::Numbers(kept));
+        let identify = |recording| identify_feed_curve(recording, "feed_mm_min", "spindle_current_a").expect("curves");
+        let (learned, all) = (identify(&rest), identify(&whole));
+        assert!(learned.plateaus.iter().all(|cut| !is_out(cut.feed)), "left out");
+        for cut in all.plateaus.iter().filter(|cut| is_out(cut.feed)) {
+            let curve = learned.curves.iter().find(|it| (it.depth_mm / cut.depth_mm - 1.0).abs() < 0.05).expect("both");
+            let (value, half) = (curve.curve.at(cut.feed), 2.0 * curve.sd);
+            coverage.add((value - half, value + half), cut.level.mean);
+        }
+    }
+    coverage.assert();
+}
+
+#[test]
+fn a_cut_at_a_feed_left_out_lies_about_the_curve() {
+    left_out(SHORT / 4);
+}
+
+#[test]
+#[ignore = "200 repetitions"]
+fn a_cut_at_a_feed_left_out_lies_about_the_curve_200_times() {
+    left_out(LONG);
+}
+
 #[test]
 fn the_lathe_gives_a_family_and_a_script_that_runs() {
     let recorded = turning(1);
