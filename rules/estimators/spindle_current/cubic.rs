@@ -44,14 +44,11 @@ impl Cubic {
         4.0 * c2 * c2 - 12.0 * c1 * c3
     }
 
-    /// Feeds within the range where the slope is zero, in order.
-    pub(super) fn turning(&self) -> Vec<f64> {
+    /// Feeds within the range where the slope is zero.
+    pub(super) fn turning(&self) -> impl Iterator<Item = f64> {
         let [_, c1, c2, c3] = self.coefficients;
-        let inside = |feed: &f64| *feed > self.feed_min && *feed < self.feed_max;
-        let mut roots = roots(3.0 * c3, 2.0 * c2, c1);
-        roots.retain(inside);
-        roots.sort_by(f64::total_cmp);
-        roots
+        let (least, greatest) = (self.feed_min, self.feed_max);
+        roots(3.0 * c3, 2.0 * c2, c1).into_iter().flatten().filter(move |feed| *feed > least && *feed < greatest)
     }
 
     /// Does the feature rise with feed in the whole range?
@@ -59,7 +56,7 @@ impl Cubic {
     pub fn rises(&self) -> bool {
         let middle = self.slope(0.5 * (self.feed_min + self.feed_max));
         middle > 0.0
-            && self.turning().is_empty()
+            && self.turning().next().is_none()
             && self.slope(self.feed_min) >= 0.0
             && self.slope(self.feed_max) >= 0.0
     }
@@ -114,17 +111,17 @@ fn outside(feature: f64, (low, high): (f64, f64), (feed_min, feed_max): (f64, f6
 }
 
 /// Real roots of `a x^2 + b x + c`.
-fn roots(a: f64, b: f64, c: f64) -> Vec<f64> {
+fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     if a == 0.0 {
-        return if b == 0.0 { Vec::new() } else { vec![-c / b] };
+        return [(b != 0.0).then(|| -c / b), None];
     }
     let discriminant = b * b - 4.0 * a * c;
     if discriminant < 0.0 {
-        return Vec::new();
+        return [None, None];
     }
     // The form that does not cancel.
     let q = -0.5 * (b + if b < 0.0 { -discriminant.sqrt() } else { discriminant.sqrt() });
-    if q == 0.0 { vec![0.0] } else { vec![q / a, c / q] }
+    if q == 0.0 { [Some(0.0), None] } else { [Some(q / a), Some(c / q)] }
 }
 
 #[cfg(test)]

@@ -98,36 +98,35 @@ impl Family {
             let what = format!("a feed of {feed} lies outside {least} to {greatest}");
             return Err(Refusal::new(RefusalKind::OutOfRange, what, "identify the curves over this feed too"));
         }
-        let values: Vec<f64> = self.curves.iter().map(|it| it.curve.at(feed)).collect();
-        let last = values.len() - 1;
+        let value = |at: usize| self.curves[at].curve.at(feed);
+        let last = self.curves.len() - 1;
         // At the shallowest and the deepest curve half of all cuts lie outside by chance.
         let chance = |at: usize| EDGE_SD * self.curves[at].sd.hypot(feature_sd);
-        if !(values[0] - chance(0)..=values[last] + chance(last)).contains(&feature) {
-            return Err(self.beyond(feature, &values));
+        if !(value(0) - chance(0)..=value(last) + chance(last)).contains(&feature) {
+            return Err(self.beyond(feature, value(0), value(last)));
         }
-        let feature = feature.clamp(values[0], values[last]);
-        let at = values.windows(2).position(|pair| feature <= pair[1]).unwrap_or(last - 1);
+        let feature = feature.clamp(value(0), value(last));
+        let at = (0..last).find(|at| feature <= value(at + 1)).unwrap_or(last - 1);
         let (shallow, deep) = (&self.curves[at], &self.curves[at + 1]);
-        let rise = (values[at + 1] - values[at]) / (deep.depth_mm - shallow.depth_mm);
-        let share = (feature - values[at]) / (values[at + 1] - values[at]);
+        let rise = (value(at + 1) - value(at)) / (deep.depth_mm - shallow.depth_mm);
+        let share = (feature - value(at)) / (value(at + 1) - value(at));
         let curve_sd = ((1.0 - share) * shallow.sd).hypot(share * deep.sd);
-        let sd_mm = (feature_sd.abs().hypot(curve_sd) / rise).hypot(self.bend(at, &values, share));
+        let sd_mm = (feature_sd.abs().hypot(curve_sd) / rise).hypot(self.bend(at, value, share));
         Ok(Inferred { depth_mm: shallow.depth_mm + share * (deep.depth_mm - shallow.depth_mm), sd_mm })
     }
 
     /// How far a parabola through three depths lies from the straight line between two of them, mm.
-    fn bend(&self, at: usize, values: &[f64], share: f64) -> f64 {
-        let third = if at + 2 < values.len() { Some(at + 2) } else { at.checked_sub(1) };
+    fn bend(&self, at: usize, value: impl Fn(usize) -> f64, share: f64) -> f64 {
+        let third = if at + 2 < self.curves.len() { Some(at + 2) } else { at.checked_sub(1) };
         let Some(third) = third else { return 0.0 };
-        let (h0, h1, h2) = (self.curves[at].depth_mm, self.curves[at + 1].depth_mm, self.curves[third].depth_mm);
-        let (v0, v1, v2) = (values[at], values[at + 1], values[third]);
+        let [h0, h1, h2] = [at, at + 1, third].map(|at| self.curves[at].depth_mm);
+        let [v0, v1, v2] = [at, at + 1, third].map(value);
         let curvature = ((h2 - h1) / (v2 - v1) - (h1 - h0) / (v1 - v0)) / (v2 - v0);
         (curvature * share * (1.0 - share) * (v1 - v0) * (v1 - v0)).abs()
     }
 
-    fn beyond(&self, feature: f64, values: &[f64]) -> Refusal {
-        let (least, greatest) = (values[0], values[values.len() - 1]);
-        let (shallow, deep) = (self.curves[0].depth_mm, self.curves[values.len() - 1].depth_mm);
+    fn beyond(&self, feature: f64, least: f64, greatest: f64) -> Refusal {
+        let (shallow, deep) = (self.curves[0].depth_mm, self.curves[self.curves.len() - 1].depth_mm);
         if feature > greatest {
             let what = format!("{feature:.4} lies above {greatest:.4}, the deepest curve ({deep} mm) at this feed");
             return Refusal::new(
