@@ -222,6 +222,12 @@ pub static CHANNELS: &[Channel] = &[
     number("temperature_14_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 14", "测温点14"),
     number("temperature_15_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 15", "测温点15"),
     number("temperature_16_c", "°C", (-60.0, 300.0), Kind::Continuous, "Temperature point 16", "测温点16"),
+    text("work_material", "Material of the work", "工件材料"),
+    text(
+        "recipe",
+        "Operation of the recipe that filled in this sample, and the version of the recipe",
+        "所用工序配方及其版本",
+    ),
 ];
 
 /// Index into [`CHANNELS`].

@@ -1,7 +1,8 @@
-//! Reads everything that the user wrote - configuration, scripts, model, recordings - and tells everything that is
+//! Reads everything that the user wrote - configuration, scripts, operations recipe, model, recordings - and tells everything that is
 //! wrong, before a machine is involved.
 
 use crate::config::{self, Config, Problem};
+use crate::operations;
 use crate::reload::read_directory;
 use adapters::address::{FanucBackend, Target};
 use adapters::open::missing_driver;
@@ -61,6 +62,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
             report.read.push(summary(&name, &config));
             report.read.extend(open_to_all(&config));
             check_scripts(&config, &mut report);
+            check_operations(&config, &mut report);
             check_model(&config, &mut report);
             check_sources(&name, &config, &mut report);
         }
@@ -109,6 +111,17 @@ fn below(directory: &Path, problem: script::Problem) -> Problem {
         problem.file = directory.join(&problem.file).display().to_string();
     }
     problem
+}
+
+fn check_operations(config: &Config, report: &mut Report) {
+    let Some(path) = &config.operations.path else { return };
+    match operations::read(path) {
+        Ok(loaded) => {
+            let (count, version) = (loaded.recipe.operations().len(), loaded.recipe.version());
+            report.read.push(format!("{}: {count} operations, version {version}", path.display()));
+        }
+        Err(problems) => report.problems.extend(problems.into_iter().map(Problem::from)),
+    }
 }
 
 fn check_model(config: &Config, report: &mut Report) {

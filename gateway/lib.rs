@@ -9,6 +9,7 @@ pub mod history;
 pub mod http;
 pub mod log;
 pub mod moment;
+pub mod operations;
 pub mod pipeline;
 pub mod records;
 pub mod reload;

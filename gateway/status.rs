@@ -159,6 +159,26 @@ pub struct ScriptStatus {
     pub error: Option<String>,
 }
 
+/// The operations recipe.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OperationsStatus {
+    /// The file.
+    pub path: String,
+    /// Version in force; `null` when there is none.
+    pub version: Option<String>,
+    /// How many operations it holds.
+    pub operations: usize,
+    /// Operation of the block that runs now, with the version of the recipe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_force: Option<String>,
+    /// Why no operation is in force, where none is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<String>,
+    /// Why the newest text of the file is not in force, with line and column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
 /// The store.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HistoryStatus {
@@ -238,6 +258,9 @@ pub struct Status {
     pub sources: Vec<SourceStatus>,
     /// Scripts.
     pub scripts: Vec<ScriptStatus>,
+    /// The operations recipe, where one is configured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operations: Option<OperationsStatus>,
     /// The store.
     pub history: HistoryStatus,
     /// What does not work while the box goes on.

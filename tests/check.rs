@@ -25,12 +25,15 @@ fn text(output: &Output) -> String {
 /// A configuration with one mistake in everything it names.
 fn furnish(directory: &Path) {
     let config = "[[source]]\naddress = \"replay:run.csv\"\n[[source]]\naddress = \"fanuc://10.0.0.5?backend=vendor&library=missing.so\"\n\
-                  [gateway]\ndata_dir = \"data\"\n[twin]\nmodel = \"model.toml\"\n";
+                  [gateway]\ndata_dir = \"data\"\n[operations]\npath = \"operations.toml\"\n[twin]\nmodel = \"model.toml\"\n";
     fs::write(directory.join("cnc-gateway.toml"), config).expect("written");
     fs::write(directory.join("run.csv"), "time_s,spindle_speed_rpm\n0,100\n1,fast\n2,300\n").expect("written");
     let model =
         "schema = \"model/1\"\nname = \"m\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"no_load_powr\"\n";
     fs::write(directory.join("model.toml"), model).expect("written");
+    let recipe =
+        "schema = \"operations/1\"\n[[operation]]\nprogram = \"O1\"\nname = \"rough\"\ndepth_of_cut_um = 1500\n";
+    fs::write(directory.join("operations.toml"), recipe).expect("written");
     fs::create_dir_all(directory.join("data/scripts")).expect("created");
     fs::write(directory.join("data/scripts/mine.rhai"), "alarn(\"a\", \"b\");\n").expect("written");
 }
@@ -45,11 +48,13 @@ fn everything_that_is_wrong_is_told_at_once() {
     for part in [
         "data/scripts/mine.rhai:1:1: there is no function `alarn`",
         "did you mean `alarm`?",
+        "operations.toml:5:1: an operation has no `depth_of_cut_um`",
+        "write depth_of_cut_mm = 1.5",
         "model.toml:5: ",
         "run.csv:3: ",
         "missing.so: the vendor library is not there",
         "the FANUC driver (FOCAS2) is not built yet",
-        "5 problems",
+        "6 problems",
     ] {
         assert!(text.contains(part), "{part}\n---\n{text}");
     }
@@ -63,7 +68,7 @@ fn the_result_as_json_names_every_place() {
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((output.status.code(), &json["fine"]), (Some(1), &serde_json::json!(false)));
     let problems = json["problems"].as_array().expect("a list");
-    assert_eq!(problems.len(), 5);
+    assert_eq!(problems.len(), 6);
     assert_eq!(problems[0]["line"], 1);
 }
 

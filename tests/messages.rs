@@ -39,6 +39,13 @@ fn a_configuration_is_refused_with_everything_that_is_wrong() {
 }
 
 #[test]
+fn an_operations_recipe_is_refused_with_everything_that_is_wrong() {
+    let text = std::fs::read_to_string(data("operations.toml")).expect("the file is there");
+    let problems = rules::operations::parse("operations.toml", &text).expect_err("little in it is right");
+    golden("operations.txt", &problems.iter().map(|problem| format!("{problem}\n")).collect::<String>());
+}
+
+#[test]
 fn variables_are_checked_like_the_file() {
     let problems = parse(
         config::BUILT_IN_TEXT,

@@ -13,8 +13,22 @@ use crate::clock::TimeNs;
 use std::collections::HashMap;
 
 /// Columns that hold text even when their cells look like numbers.
-pub const TEXT_COLUMNS: [&str; 12] =
-    ["run", "pass", "part", "tool", "lot", "program", "block", "operation", "mode", "execution", "alarm", "motion"];
+pub const TEXT_COLUMNS: [&str; 14] = [
+    "run",
+    "pass",
+    "part",
+    "tool",
+    "lot",
+    "program",
+    "block",
+    "operation",
+    "mode",
+    "execution",
+    "alarm",
+    "motion",
+    "work_material",
+    "recipe",
+];
 
 /// Numbers with typed absence: `values[i]` is meaningful only where `present[i]`.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -155,14 +155,21 @@ fn print_json(document: &serde_json::Value) {
     print(&format!("{document:#}\n"));
 }
 
+/// The operations recipe in a file.
+fn recipe_from(path: &Path) -> Result<::rules::operations::Recipe, CannotRun> {
+    crate::operations::read(path).map(|loaded| loaded.recipe).map_err(refused)
+}
+
+/// Files of the user that cannot be used.
+fn refused(problems: Vec<Problem>) -> CannotRun {
+    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    CannotRun::new(lines.join("\n"), "")
+}
+
 /// The scripts of a directory, or those that come with the gateway.
 fn scripts_from(directory: Option<&Path>) -> Result<Host, CannotRun> {
-    let told = |problems: Vec<Problem>| {
-        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-        CannotRun::new(lines.join("\n"), "")
-    };
-    let files = directory.map_or_else(|| Ok(shipped()), read_directory).map_err(told)?;
+    let files = directory.map_or_else(|| Ok(shipped()), read_directory).map_err(refused)?;
     let mut host = Host::new();
-    host.load(&files).map_err(told)?;
+    host.load(&files).map_err(refused)?;
     Ok(host)
 }

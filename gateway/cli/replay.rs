@@ -1,6 +1,6 @@
 //! `cnc-gateway replay`: recordings through the same pipeline as fast as possible.
 
-use super::{CannotRun, CommandResult, Outcome, print_json, scripts_from};
+use super::{CannotRun, CommandResult, Outcome, print_json, recipe_from, scripts_from};
 use crate::config;
 use crate::replay::{Plan, replay};
 use clap::Args;
@@ -19,6 +19,9 @@ pub(super) struct ReplayArguments {
     /// Directory of scripts; without it those that come with the gateway decide.
     #[arg(long, value_name = "DIR")]
     scripts: Option<PathBuf>,
+    /// Operations recipe: fills in depth of cut, diameter, tool and material where the recordings lack them.
+    #[arg(long, value_name = "FILE")]
+    operations: Option<PathBuf>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -26,8 +29,9 @@ pub(super) struct ReplayArguments {
 
 /// Replays and prints the summary.
 pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
-    let ReplayArguments { files, history, scripts, json } = arguments;
-    let plan = Plan { files, history, progress: std::io::stderr().is_terminal(), talk: true };
+    let ReplayArguments { files, history, scripts, operations, json } = arguments;
+    let operations = operations.as_deref().map(recipe_from).transpose()?;
+    let plan = Plan { files, operations, history, progress: std::io::stderr().is_terminal(), talk: true };
     let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
     let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
     if json {

@@ -2,7 +2,7 @@
 
 use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
-use super::{Config, Gate, GateMode, Gateway, History, Http, Log, Scripts, Source, Twin};
+use super::{Config, Gate, GateMode, Gateway, History, Http, Log, Operations, Scripts, Source, Twin};
 use crate::log::LogFormat;
 use adapters::channel::nearest;
 use rules::physics::explain::Language;
@@ -17,6 +17,7 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     let gateway = gateway(reading, base)?;
     Some(Config {
         scripts: scripts(reading, &gateway.data_dir)?,
+        operations: Operations { path: text(reading, "operations", "path").map(|path| base.join(path)) },
         gate: gate(reading)?,
         history: history(reading, &gateway.data_dir)?,
         http: Http { listen: text(reading, "http", "listen")?, enabled: flag(reading, "http", "enabled")? },

@@ -67,6 +67,7 @@ pub const SECTIONS: &[Section] = &[
     section("gateway", "the box itself"),
     Section { name: "source", repeated: true, en: "one controller or meter; write the section once for each" },
     section("scripts", "the rules that the integrator edits"),
+    section("operations", "how each stretch of an NC program cuts, which no controller can be asked for"),
     section("gate", "what may be written to the machine"),
     section("history", "what is remembered"),
     section("http", "the page and the interface on the network"),
@@ -152,6 +153,13 @@ pub const KEYS: &[Key] = &[
         Default("true"),
         "Look for changed scripts every second",
         "脚本修改后自动重新加载",
+    ),
+    key(
+        ("operations", "path"),
+        Path,
+        Optional,
+        "Operations recipe (operations/1): program and blocks to depth of cut, diameter, tool, material; relative to this file",
+        "工序配方文件",
     ),
     key(
         ("gate", "mode"),

@@ -39,6 +39,8 @@ pub struct Config {
     pub sources: Vec<Source>,
     /// The scripts.
     pub scripts: Scripts,
+    /// How each stretch of an NC program cuts.
+    pub operations: Operations,
     /// What may be written to the machine.
     pub gate: Gate,
     /// What is remembered.
@@ -84,6 +86,13 @@ pub struct Scripts {
     pub directory: PathBuf,
     /// Look for changes every second.
     pub reload: bool,
+}
+
+/// `[operations]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Operations {
+    /// The recipe file.
+    pub path: Option<PathBuf>,
 }
 
 /// How far the gate goes.

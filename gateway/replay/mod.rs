@@ -23,6 +23,7 @@ use adapters::{Pull, Sample};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use resume::{Before, origin_of};
 use rules::estimators::{self, VisibilityTally};
+use rules::operations::{Completion, Recipe};
 use rules::script::Host;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -36,6 +37,8 @@ const PROGRESS_ROWS: u64 = 2048;
 pub struct Plan {
     /// Recordings, in order.
     pub files: Vec<PathBuf>,
+    /// What the recordings do not say of the cut; fills in channels that they lack.
+    pub operations: Option<Recipe>,
     /// The history they go into; without one nothing is stored.
     pub history: Option<PathBuf>,
     /// Show a progress bar on a terminal.
@@ -88,7 +91,13 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
     for file in &plan.files {
         let read = read_path(file).map_err(|error| CannotRun::new(error.to_string(), ""))?;
         files.push(FileSummary::of(file, &read));
-        let mut one = OneFile { plan, pipeline: &mut pipeline, visibility: &mut visibility, motion: &mut motion };
+        let mut one = OneFile {
+            plan,
+            pipeline: &mut pipeline,
+            visibility: &mut visibility,
+            motion: &mut motion,
+            completion: Completion::new(),
+        };
         let (of_file, last_ns) = one.run(file, &read, next_ns)?;
         counts.add(&of_file);
         next_ns = last_ns + (UNKNOWN_PAUSE_S * 1e9) as i64;
@@ -112,6 +121,7 @@ struct OneFile<'a> {
     pipeline: &'a mut Pipeline,
     visibility: &'a mut VisibilityTally,
     motion: &'a mut Motion,
+    completion: Completion,
 }
 
 impl OneFile<'_> {
@@ -145,6 +155,9 @@ impl OneFile<'_> {
         let mut sample = Sample::empty(0);
         while let Some(now_ns) = sources.next_ns() {
             sources.sample_into(&mut sample, now_ns);
+            if let Some(recipe) = &self.plan.operations {
+                let _marked_in_the_sample = self.completion.apply(recipe, &mut sample);
+            }
             self.pipeline.step(&sample, sink);
             if let Some(record) = sink.before.continued(sink.counts.rows, &sample, self.pipeline.estimates()) {
                 sink.record(record);

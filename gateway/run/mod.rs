@@ -16,6 +16,7 @@ use crate::config::Config;
 use crate::gate::Gate;
 use crate::http::{Published, Server, Shared, bind, port_trouble};
 use crate::log::{Notice, Severity};
+use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
 use ::rules::estimators;
@@ -125,8 +126,21 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let wishes = wishes.clone();
+    let operations = config.operations.path.as_deref().map(Operations::begin);
     Ok((
-        Ticker { identity, pace, feed, pipeline, twin, scripts: watched, health, wishes, publish, stop_after_ns },
+        Ticker {
+            identity,
+            pace,
+            feed,
+            pipeline,
+            operations,
+            twin,
+            scripts: watched,
+            health,
+            wishes,
+            publish,
+            stop_after_ns,
+        },
         live,
     ))
 }

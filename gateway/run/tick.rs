@@ -7,6 +7,7 @@ use super::report;
 use super::rules::Watched;
 use super::twin::Twin;
 use crate::http::Published;
+use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
 use crate::status::{AlarmStatus, Problem, Status, TickStatus};
 use adapters::Sample;
@@ -51,6 +52,8 @@ pub struct Ticker {
     pub feed: Feed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
+    /// How each stretch of a program cuts, where a recipe is configured.
+    pub operations: Option<Operations>,
     /// The model beside the machine, where one is configured.
     pub twin: Option<Twin>,
     /// Keeps the scripts as they are on disk.
@@ -75,6 +78,7 @@ impl Ticker {
         while let Some(now_ns) = self.pace.next_tick(&self.wishes.stop) {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
+            self.complete(&mut sample, now_ns);
             self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.pipeline.step(&sample, &mut self.health);
@@ -96,6 +100,13 @@ impl Ticker {
         }
         self.health.close(&self.pipeline, sample.at_ns);
         self.wishes.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// The recipe fills in what the sources do not deliver.
+    fn complete(&mut self, sample: &mut Sample, now_ns: TimeNs) {
+        let Some(operations) = &mut self.operations else { return };
+        let reload = self.wishes.reload.load(Ordering::SeqCst);
+        operations.step(sample, reload, |notice| self.health.event(now_ns, SOURCE, notice));
     }
 
     fn send(&self, sample: &Sample, now_ns: TimeNs, started: Instant) {
@@ -125,6 +136,7 @@ impl Ticker {
             gate: report::gate(&self.pipeline),
             sources: self.feed.status(now_ns),
             scripts: report::scripts(&self.pipeline),
+            operations: self.operations.as_ref().map(Operations::status),
             history: self.health.history_status(),
             problems: self.problems(),
         }
@@ -136,6 +148,7 @@ impl Ticker {
     }
 
     fn problems(&self) -> Vec<Problem> {
-        self.health.problems()
+        let recipe = self.operations.as_ref().and_then(Operations::problem);
+        self.health.problems().into_iter().chain(recipe).collect()
     }
 }

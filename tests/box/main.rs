@@ -5,6 +5,7 @@ mod cost;
 mod http;
 mod kill;
 mod lives;
+mod operations;
 mod page;
 mod process;
 mod replay;
