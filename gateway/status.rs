@@ -179,6 +179,30 @@ pub struct OperationsStatus {
     pub error: Option<String>,
 }
 
+/// Wear of the tool from the cutting power, where the library has a model for the cut. The numbers are those of the last
+/// moment of cutting.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WearStatus {
+    /// `surface` or `physical`.
+    pub form: &'static str,
+    /// Flank wear at which the edge is worn, mm.
+    pub criterion_mm: f64,
+    /// Limit [Pc] of the cut, W.
+    pub limit_w: Option<f64>,
+    /// Half the 95 % interval of a single cut at the limit, W.
+    pub limit_uncertainty_w: Option<f64>,
+    /// Flank wear that the power means, mm.
+    pub flank_wear_mm: Option<f64>,
+    /// Half its 95 % interval, mm.
+    pub flank_wear_uncertainty_mm: Option<f64>,
+    /// `observable` or `not_observable_here`.
+    pub observability: Option<&'static str>,
+    /// Factors in which the cut lies outside what the model was fitted on.
+    pub extrapolated: Vec<&'static str>,
+    /// Why a number is missing, where one is.
+    pub why: Option<String>,
+}
+
 /// The store.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HistoryStatus {
@@ -261,6 +285,9 @@ pub struct Status {
     /// The operations recipe, where one is configured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub operations: Option<OperationsStatus>,
+    /// Wear of the tool, where the library has a model for the cut.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wear: Option<WearStatus>,
     /// The store.
     pub history: HistoryStatus,
     /// What does not work while the box goes on.

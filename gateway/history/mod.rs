@@ -67,6 +67,7 @@ mod tail;
 mod thread;
 mod vtab;
 mod walk;
+mod wear_models;
 mod writer;
 
 pub use block::{Cells, NumberCells, Summary, WordCells};
@@ -85,4 +86,5 @@ pub use rusqlite::types::Value as SqlValue;
 pub use series::{Series, as_stored, decimals_of_unit};
 pub use space::{DiskRoom, disk_room};
 pub use status::Status;
+pub use wear_models::{StoredWearModel, store_wear_model};
 pub use writer::Writer;

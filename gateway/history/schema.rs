@@ -8,10 +8,12 @@ use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
 /// Newest schema this version knows; stored as `user_version`.
-pub(crate) const SCHEMA: i64 = 1;
+pub(crate) const SCHEMA: i64 = 2;
 /// `cncg`, stored as `application_id`.
 const APPLICATION: i64 = 0x636e_6367;
 const TABLES: &str = include_str!("schema.sql");
+/// What each schema adds to the one before, beginning with 2. A new file gets all of it.
+const ADDED: [&str; 1] = [include_str!("schema_2.sql")];
 
 /// Opens the file for writing and creates the tables in a new one.
 pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> {
@@ -25,16 +27,33 @@ pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> 
     }
     db.pragma_update(None, "journal_mode", "WAL").map_err(|error| explain(path, error))?;
     db.pragma_update(None, "synchronous", "FULL").doing("choosing durable commits")?;
-    if new {
-        create(&db).map_err(|error| explain(path, error))?;
-    }
+    let ready = if new { create(&db) } else { migrate(&db) };
+    ready.map_err(|error| explain(path, error))?;
     Ok(db)
 }
 
 fn create(db: &Connection) -> Result<(), rusqlite::Error> {
+    let added = ADDED.concat();
     db.execute_batch(&format!(
-        "BEGIN IMMEDIATE; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
+        "BEGIN IMMEDIATE; {TABLES} {added} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT;"
     ))
+}
+
+/// Brings a file of an older version to the newest schema, one version after the other, each in one transaction. A second
+/// writer waits and finds it done.
+fn migrate(db: &Connection) -> Result<(), rusqlite::Error> {
+    for (next, added) in (2_i64..).zip(ADDED) {
+        if version(db)? >= next {
+            continue;
+        }
+        db.execute_batch("BEGIN IMMEDIATE")?;
+        let step = if version(db)? < next { format!("{added} PRAGMA user_version = {next};") } else { String::new() };
+        db.execute_batch(&step).and_then(|()| db.execute_batch("COMMIT")).inspect_err(|_| {
+            // The transaction is gone either way; the first error is the one to tell.
+            let _rolled_back = db.execute_batch("ROLLBACK");
+        })?;
+    }
+    Ok(())
 }
 
 /// Opens the file for reading while a gateway may be writing it.
@@ -92,7 +111,8 @@ fn check(path: &Path, db: &Connection) -> Result<bool, HistoryError> {
         (APPLICATION, found, _) if found > SCHEMA => {
             Err(HistoryError::NewerSchema { path: path.to_owned(), found, known: SCHEMA })
         }
-        (APPLICATION, SCHEMA, _) => Ok(false),
+        // Older schemas lack tables that no reader needs to find.
+        (APPLICATION, 1.., _) => Ok(false),
         _ => Err(HistoryError::NotAHistory { path: path.to_owned(), what: "another SQLite database".to_owned() }),
     }
 }

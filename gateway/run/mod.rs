@@ -10,6 +10,7 @@ pub mod report;
 pub mod rules;
 pub mod tick;
 pub mod twin;
+pub mod wear;
 
 use crate::cli::CannotRun;
 use crate::config::Config;
@@ -34,6 +35,7 @@ use tick::{Identity, Ticker, Wishes};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use twin::Twin;
+use wear::Wear;
 
 /// What the box shall do.
 #[derive(Debug)]
@@ -127,6 +129,7 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let wishes = wishes.clone();
     let operations = config.operations.path.as_deref().map(Operations::begin);
+    let wear = Wear::of(config);
     Ok((
         Ticker {
             identity,
@@ -135,6 +138,7 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
             pipeline,
             operations,
             twin,
+            wear,
             scripts: watched,
             health,
             wishes,

@@ -6,6 +6,7 @@ use super::pace::Pace;
 use super::report;
 use super::rules::Watched;
 use super::twin::Twin;
+use super::wear::Wear;
 use crate::http::Published;
 use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
@@ -56,6 +57,8 @@ pub struct Ticker {
     pub operations: Option<Operations>,
     /// The model beside the machine, where one is configured.
     pub twin: Option<Twin>,
+    /// The wear model of the tool in use, where the library has one.
+    pub wear: Wear,
     /// Keeps the scripts as they are on disk.
     pub scripts: Watched,
     /// Store, sources, clock: what may fail while the box goes on.
@@ -82,6 +85,7 @@ impl Ticker {
             self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.pipeline.step(&sample, &mut self.health);
+            self.wear.step(&sample, self.pipeline.estimates(), &mut self.health);
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }
@@ -137,6 +141,7 @@ impl Ticker {
             sources: self.feed.status(now_ns),
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
+            wear: self.wear.status(),
             history: self.health.history_status(),
             problems: self.problems(),
         }
@@ -144,7 +149,7 @@ impl Ticker {
 
     fn alarms(&self) -> Vec<AlarmStatus> {
         let of_twin = self.twin.iter().flat_map(Twin::alarms);
-        report::alarms(&self.pipeline).into_iter().chain(of_twin).collect()
+        report::alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.wear.alarms()).collect()
     }
 
     fn problems(&self) -> Vec<Problem> {

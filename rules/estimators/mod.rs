@@ -41,6 +41,7 @@ pub mod spindle_current;
 mod state;
 pub mod thermal;
 mod visibility;
+pub mod wear;
 mod window;
 
 pub use evidence::Evidence;

@@ -6,3 +6,4 @@ mod killed;
 mod machine;
 mod questions;
 mod round_trip;
+mod wear_models;

@@ -11,6 +11,8 @@ mod power;
 mod thermal;
 #[path = "../support/thermal_machine.rs"]
 mod thermal_machine;
+mod turning_wear;
+mod wear;
 
 /// Repetitions of the long form.
 pub(crate) const LONG: u64 = 200;

@@ -5,6 +5,7 @@
 mod current;
 mod power;
 mod thermal;
+mod wear;
 
 /// One line of the table.
 pub(crate) struct Row {
@@ -64,7 +65,8 @@ fn line(row: &Row) -> String {
 
 #[test]
 fn published_numbers_are_reproduced() {
-    let rows: Vec<Row> = [power::rows(), current::rows(), thermal::rows()].into_iter().flatten().collect();
+    let rows: Vec<Row> =
+        [power::rows(), current::rows(), thermal::rows(), wear::rows()].into_iter().flatten().collect();
     println!(
         "{:<58} {:>14} {:>14} {:>11} {:>9}  {:<28} verdict",
         "quantity", "published", "ours", "difference", "tolerance", "source"

@@ -7,6 +7,7 @@ mod feed_curve;
 mod load_loss;
 mod no_load;
 mod thermal;
+mod tool_wear;
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
@@ -34,6 +35,8 @@ enum What {
     FeedCurve(feed_curve::FeedCurveArguments),
     /// Thermal error from temperatures: which sensors, static or late, with intervals.
     Thermal(thermal::ThermalArguments),
+    /// Cutting power over wear, speed, feed and depth; the cuts to make for it; the library of models.
+    ToolWear(Box<tool_wear::ToolWearArguments>),
 }
 
 /// What every subcommand reads and writes.
@@ -109,5 +112,6 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
         What::LoadLoss(arguments) => load_loss::run(arguments),
         What::FeedCurve(arguments) => feed_curve::run(arguments),
         What::Thermal(arguments) => thermal::run(arguments),
+        What::ToolWear(arguments) => tool_wear::run(arguments),
     }
 }

@@ -8,6 +8,7 @@ mod arguments;
 mod power_separation;
 mod spindle_current;
 mod thermal;
+mod wear;
 
 pub use arguments::{Answer, Arguments};
 
@@ -65,7 +66,8 @@ pub struct Subject {
 }
 
 /// Every subject, in the order in which they are printed.
-pub static SUBJECTS: &[&Subject] = &[&power_separation::SUBJECT, &spindle_current::SUBJECT, &thermal::SUBJECT];
+pub static SUBJECTS: &[&Subject] =
+    &[&power_separation::SUBJECT, &spindle_current::SUBJECT, &thermal::SUBJECT, &wear::SUBJECT];
 
 /// Every method of every subject.
 pub fn methods() -> impl Iterator<Item = &'static Method> {

@@ -1,0 +1,166 @@
+//! `identify tool-wear`: a model of the cutting power over wear, speed, feed and depth; the list of cuts to make for it; and
+//! the library of models.
+
+mod design;
+mod library;
+
+use super::{Learned, Reading};
+use crate::cli::{CommandResult, recipe_from};
+use adapters::Recording;
+use clap::{Args, ValueEnum};
+use rules::estimators::regression::{Refusal, RefusalKind};
+use rules::estimators::wear::{
+    Columns, FACTORS, Factor, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
+};
+use rules::operations::complete_recording;
+use serde_json::json;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(super) struct ToolWearArguments {
+    /// Recordings or tables (recording/1) with flank_wear_mm, speed, feed, depth and cutting power.
+    #[arg(long, value_name = "R.csv", num_args = 1.., required_unless_present_any = ["design", "list"])]
+    recording: Vec<String>,
+    /// Print JSON (identify/1).
+    #[arg(long)]
+    json: bool,
+    /// Write the model (wear/1, TOML) or the list of cuts (CSV); - is standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    table: TableArguments,
+    #[command(flatten)]
+    fit: FitArguments,
+    #[command(flatten)]
+    design: design::DesignArguments,
+    #[command(flatten)]
+    library: library::LibraryArguments,
+}
+
+/// Where the numbers stand.
+#[derive(Debug, Args)]
+struct TableArguments {
+    /// Column of a quantity under another name: VB, vc, f, ap or power, as in --column power=pc_w.
+    #[arg(long, value_name = "WHAT=COLUMN", value_parser = pair)]
+    column: Vec<(String, String)>,
+    /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power from spindle_power_w and no_load_power_w.
+    #[arg(long, num_args = 2, value_names = ["A0", "A1"], allow_hyphen_values = true)]
+    load_loss: Vec<f64>,
+    /// Operations recipe: gives depth of cut and diameter where the recording lacks them.
+    #[arg(long, value_name = "FILE")]
+    operations: Option<PathBuf>,
+    /// Every row is a cut of its own; otherwise consecutive rows of one cut are averaged.
+    #[arg(long)]
+    each_row: bool,
+}
+
+/// How the models are fitted.
+#[derive(Debug, Args)]
+struct FitArguments {
+    /// Flank wear at which an edge is worn.
+    #[arg(long, value_name = "MM", default_value_t = 0.3)]
+    criterion_mm: f64,
+    /// Factors that were held on purpose; the model is for their value alone.
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    held: Vec<String>,
+    /// Terms that the surface begins with.
+    #[arg(long, value_enum, default_value_t = OrderWord::Second)]
+    order: OrderWord,
+    /// Terms with a greater p are dropped; 1 keeps all.
+    #[arg(long, value_name = "P", default_value_t = 0.05)]
+    p_out: f64,
+    /// Drop a factor also where a product or square with it stays.
+    #[arg(long)]
+    no_hierarchy: bool,
+    /// Take this form; without it the one that predicts better.
+    #[arg(long, value_parser = ["surface", "physical"], value_name = "FORM")]
+    form: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum OrderWord {
+    Linear,
+    Interactions,
+    Second,
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (what, column) = text.split_once('=').ok_or("write WHAT=COLUMN, for example power=pc_w")?;
+    let known = what == "power" || Factor::of(what).is_some();
+    if known {
+        Ok((what.to_owned(), column.to_owned()))
+    } else {
+        Err("the quantities are VB, vc, f, ap, power".to_owned())
+    }
+}
+
+pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
+    if arguments.design.wanted() {
+        return design::run(arguments);
+    }
+    if arguments.library.list {
+        return library::list(&arguments.library, arguments.json);
+    }
+    let recording = arguments.reading().read()?;
+    let recording = match &arguments.table.operations {
+        Some(path) => complete_recording(recording, &recipe_from(path)?).0,
+        None => recording,
+    };
+    let learned = match learn(arguments, &recording) {
+        Ok((mut learned, record)) => {
+            learned.text += &library::store(&arguments.library, &record)?.unwrap_or_default();
+            Ok(learned)
+        }
+        Err(refusal) => Err(refusal),
+    };
+    arguments.reading().finish("tool-wear", learned)
+}
+
+fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(Learned, WearRecord), Refusal> {
+    let gathered = gather(recording, &arguments.table.columns())?;
+    let learned = identify_tool_wear(gathered.cuts, &arguments.fit.options())?;
+    let origin = (arguments.recording.join(", "), learned.cuts.len(), learned.r2);
+    let record = WearRecord::new(arguments.library.key(), learned.criterion_mm, origin, learned.model.clone());
+    let file = record.to_toml().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
+    let text = format!("{} rows used, {} left out; {learned}", gathered.rows, gathered.left_out);
+    let mut json = learned.json();
+    json["rows_used"] = json!(gathered.rows);
+    json["rows_left_out"] = json!(gathered.left_out);
+    Ok((Learned { text, json, file: Some(file) }, record))
+}
+
+impl ToolWearArguments {
+    fn reading(&self) -> Reading {
+        Reading { recording: self.recording.clone(), json: self.json, out: self.out.clone() }
+    }
+}
+
+impl TableArguments {
+    fn columns(&self) -> Columns {
+        let mut columns = Columns { each_row: self.each_row, ..Columns::default() };
+        for (what, column) in &self.column {
+            match FACTORS.iter().position(|factor| Some(factor) == Factor::of(what)) {
+                Some(at) => columns.conditions[at].clone_from(column),
+                None => columns.power.clone_from(column),
+            }
+        }
+        if let [linear, quadratic] = self.load_loss[..] {
+            columns.load_loss = Some((linear, quadratic));
+        }
+        columns
+    }
+}
+
+impl FitArguments {
+    fn options(&self) -> WearOptions {
+        let order = match self.order {
+            OrderWord::Linear => Order::Linear,
+            OrderWord::Interactions => Order::Interactions,
+            OrderWord::Second => Order::Second,
+        };
+        let held =
+            self.held.iter().map(|name| Factor::of(name).map_or(name.as_str(), |it| it.name).to_owned()).collect();
+        let surface = SurfaceOptions { order, p_out: self.p_out, hierarchical: !self.no_hierarchy, held };
+        WearOptions { surface, criterion_mm: self.criterion_mm, form: self.form.clone() }
+    }
+}

@@ -1,0 +1,103 @@
+//! The library: models stored in a history by machine, tool, work material and operation.
+
+use crate::cli::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
+use adapters::clock::{Clock, SystemClock};
+use clap::Args;
+use rules::estimators::wear::{Key, WearRecord};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Which model it is, and where it goes.
+#[derive(Debug, Args)]
+pub(super) struct LibraryArguments {
+    /// Store the model in this history; the newest model of machine, tool, material and operation is in force.
+    #[arg(long, value_name = "DB")]
+    store: Option<PathBuf>,
+    /// List the models of the history given with --history.
+    #[arg(long, conflicts_with_all = ["recording", "design", "store"])]
+    pub(super) list: bool,
+    /// History whose models are listed.
+    #[arg(long, value_name = "DB", default_value = "cnc-gateway-data/history.db", requires = "list")]
+    history: PathBuf,
+    /// Machine that the model is for, as [gateway] name says it; without it any.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    machine: String,
+    /// Tool that the model is for; without it any.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    tool: String,
+    /// Work material that the model is for; without it any.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    work_material: String,
+    /// Operation that the model is for; without it any.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    operation: String,
+}
+
+fn cannot(error: &HistoryError) -> CannotRun {
+    CannotRun::new(error.to_string(), "")
+}
+
+impl LibraryArguments {
+    /// What the model is for.
+    pub(super) fn key(&self) -> Key {
+        let Self { machine, tool, work_material, operation, .. } = self;
+        Key {
+            machine: machine.clone(),
+            tool: tool.clone(),
+            work_material: work_material.clone(),
+            operation: operation.clone(),
+        }
+    }
+}
+
+/// Stores the model where that was asked for; a line that says so.
+pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
+    let Some(path) = &arguments.store else { return Ok(None) };
+    let id = store_wear_model(path, SystemClock::new().now_ns(), record).map_err(|error| cannot(&error))?;
+    Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), named(&record.key))))
+}
+
+fn named(key: &Key) -> String {
+    let texts = [
+        ("machine", &key.machine),
+        ("tool", &key.tool),
+        ("material", &key.work_material),
+        ("operation", &key.operation),
+    ];
+    texts.map(|(what, text)| if text.is_empty() { format!("any {what}") } else { format!("{what} {text}") }).join(", ")
+}
+
+/// Prints every model of the library.
+pub(super) fn list(arguments: &LibraryArguments, as_json: bool) -> CommandResult {
+    let reader = Reader::open(&arguments.history).map_err(|error| cannot(&error))?;
+    let models = reader.wear_models().map_err(|error| cannot(&error))?;
+    if as_json {
+        let each: Vec<_> = models.iter().map(document).collect();
+        print_json(&json!({ "schema": "wear-models/1", "models": each }));
+    } else if models.is_empty() {
+        print(&format!("{}: no wear model yet; identify tool-wear --store writes one\n", arguments.history.display()));
+    } else {
+        models.iter().for_each(|model| print(&line(model)));
+    }
+    Ok(Outcome::Fine)
+}
+
+fn document(model: &StoredWearModel) -> serde_json::Value {
+    json!({ "id": model.id, "at_ns": model.at_ns, "in_force": model.in_force, "record": model.record })
+}
+
+fn line(model: &StoredWearModel) -> String {
+    let record = &model.record;
+    let force = if model.in_force { "in force" } else { "replaced" };
+    format!(
+        "{:>4} {force:<9} {:<9} criterion {} mm, {} cuts, R2 {:.2} %: {} (from {})\n",
+        model.id,
+        record.model.form(),
+        record.criterion_mm,
+        record.cuts,
+        100.0 * record.r2,
+        named(&record.key),
+        record.origin
+    )
+}

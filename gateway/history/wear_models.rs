@@ -1,0 +1,107 @@
+//! The library of wear models: stored beside the samples, found by machine, tool, work material and operation.
+
+use super::error::{Doing, HistoryError};
+use super::reader::Reader;
+use super::schema;
+use adapters::clock::TimeNs;
+use rules::estimators::wear::{Key, WearModel, WearRecord};
+use rusqlite::{Connection, OptionalExtension, params};
+use std::path::Path;
+
+/// A model of the library.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredWearModel {
+    /// Number in the library.
+    pub id: i64,
+    /// When it was stored.
+    pub at_ns: TimeNs,
+    /// Is it the newest of its key?
+    pub in_force: bool,
+    /// The model and what it is for.
+    pub record: WearRecord,
+}
+
+/// Stores a model; the ones before stay, the newest of a key is in force. A gateway may be writing the same history. Gives the
+/// number of the model.
+///
+/// # Errors
+/// The file cannot be opened or written, or the model has a number that cannot be stored.
+pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
+    let toml = record.to_toml().map_err(HistoryError::Question)?;
+    let db = schema::open_for_writing(path)?;
+    let Key { machine, tool, work_material, operation } = &record.key;
+    db.execute(
+        "INSERT INTO wear_models (at_ns, machine, tool, work_material, operation, form, criterion_mm, cuts, residual_sd_w, r2,
+         origin, toml) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+        params![
+            at_ns,
+            machine,
+            tool,
+            work_material,
+            operation,
+            record.model.form(),
+            record.criterion_mm,
+            i64::try_from(record.cuts).unwrap_or(i64::MAX),
+            residual_sd_w(&record.model),
+            record.r2,
+            record.origin,
+            toml
+        ],
+    )
+    .doing("storing a wear model")?;
+    Ok(db.last_insert_rowid())
+}
+
+fn residual_sd_w(model: &WearModel) -> f64 {
+    match model {
+        WearModel::Surface(surface) => surface.residual_sd_w,
+        WearModel::Physical(physical) => physical.residual_sd_w,
+    }
+}
+
+/// Does the file have the table? One of an older version that nobody has written since does not.
+fn has_library(db: &Connection) -> Result<bool, HistoryError> {
+    db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'wear_models'", [], |_| Ok(()))
+        .optional()
+        .map(|found| found.is_some())
+        .doing("looking for the wear models")
+}
+
+impl Reader {
+    /// Number of the newest model; 0 without any.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn newest_wear_model(&self) -> Result<i64, HistoryError> {
+        if !has_library(&self.db)? {
+            return Ok(0);
+        }
+        self.db
+            .query_row("SELECT coalesce(max(id), 0) FROM wear_models", [], |row| row.get(0))
+            .doing("looking for the newest wear model")
+    }
+
+    /// Every model, the oldest first.
+    ///
+    /// # Errors
+    /// What `SQLite` says, or a model that was spoilt.
+    pub fn wear_models(&self) -> Result<Vec<StoredWearModel>, HistoryError> {
+        if !has_library(&self.db)? {
+            return Ok(Vec::new());
+        }
+        let mut statement = self
+            .db
+            .prepare("SELECT id, at_ns, in_force, (SELECT toml FROM wear_models AS it WHERE it.id = list.id) FROM wear_model_list AS list ORDER BY id")
+            .doing("reading the wear models")?;
+        let rows = statement.query_map([], |row| {
+            Ok((row.get::<_, i64>(0)?, row.get::<_, i64>(1)?, row.get::<_, bool>(2)?, row.get::<_, String>(3)?))
+        });
+        let rows: Vec<_> = rows.and_then(Iterator::collect).doing("reading the wear models")?;
+        rows.into_iter()
+            .map(|(id, at_ns, in_force, toml)| {
+                let spoilt = |what| HistoryError::Question(format!("wear model {id} of the library: {what}"));
+                Ok(StoredWearModel { id, at_ns, in_force, record: WearRecord::parse(&toml).map_err(spoilt)? })
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,114 @@
+//! The models of the library, read on a thread of its own whenever a newer one was stored.
+
+use crate::history::Reader;
+use crate::log::{Notice, Severity};
+use rules::estimators::wear::{Key, WearRecord};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, channel, sync_channel};
+use std::time::Duration;
+
+/// Time between two looks at the library.
+const LOOK_EVERY: Duration = Duration::from_secs(5);
+
+type Found = Result<Vec<Arc<WearRecord>>, String>;
+
+/// The models in force.
+#[derive(Debug)]
+pub(super) struct Library {
+    newest: Option<Receiver<Found>>,
+    /// Dropped with the library: the thread ends.
+    _ends: Option<std::sync::mpsc::Sender<()>>,
+    models: Vec<Arc<WearRecord>>,
+    problem: Option<String>,
+}
+
+impl Library {
+    /// Begins to watch; a notice where that is not possible.
+    pub(super) fn watch(history: &Path) -> (Self, Option<Notice>) {
+        let (send, newest) = sync_channel(1);
+        let (ends, ended) = channel();
+        let history = history.to_owned();
+        let started =
+            std::thread::Builder::new().name("wear".to_owned()).spawn(move || look_again(&history, &send, &ended));
+        let mut library = Self { newest: Some(newest), _ends: Some(ends), models: Vec::new(), problem: None };
+        let told = started.err().map(|error| {
+            library.newest = None;
+            let text = format!("no thread for the wear models ({error}): no limit of the cutting power is shown");
+            Notice::new(Severity::Warning, "wear_alone", text)
+        });
+        (library, told)
+    }
+
+    /// Takes what was found since the last call. True when the models are others than before.
+    pub(super) fn take(&mut self) -> bool {
+        match self.newest.as_ref().and_then(|newest| newest.try_recv().ok()) {
+            None => false,
+            Some(Ok(models)) => {
+                self.models = models;
+                true
+            }
+            Some(Err(problem)) => {
+                self.problem = Some(problem);
+                false
+            }
+        }
+    }
+
+    /// What went wrong, once.
+    pub(super) fn problem(&mut self) -> Option<Notice> {
+        let problem = self.problem.take()?;
+        let text = format!("the wear models cannot be read, the ones before stay in force: {problem}");
+        Some(Notice::new(Severity::Warning, "wear_models_refused", text))
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.models.is_empty()
+    }
+
+    /// The model that names most of this cut; of equals the newest.
+    pub(super) fn best(&self, cut: &Key) -> Option<Arc<WearRecord>> {
+        let fitting = self.models.iter().filter_map(|model| Some((model.key.fits(cut)?, model)));
+        fitting.max_by_key(|(count, _)| *count).map(|(_, model)| model.clone())
+    }
+}
+
+fn look_again(history: &Path, send: &SyncSender<Found>, ended: &Receiver<()>) {
+    let mut known = 0;
+    let mut said = None;
+    loop {
+        let found = newer(history, &mut known);
+        let news = match &found {
+            Ok(None) => false,
+            Ok(Some(_)) => true,
+            // The same trouble is told once.
+            Err(problem) => said.replace(problem.clone()).as_ref() != Some(problem),
+        };
+        if news
+            && let Some(found) = found.transpose()
+            && let Err(TrySendError::Disconnected(_)) = send.try_send(found)
+        {
+            return;
+        }
+        match ended.recv_timeout(LOOK_EVERY) {
+            Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
+            _ => return,
+        }
+    }
+}
+
+/// The models in force, when a newer one was stored than is `known`. A history that is not there yet has none.
+fn newer(history: &Path, known: &mut i64) -> Result<Option<Vec<Arc<WearRecord>>>, String> {
+    if !history.exists() {
+        return Ok(None);
+    }
+    let told = |error: crate::history::HistoryError| error.to_string();
+    let reader = Reader::open(history).map_err(told)?;
+    let newest = reader.newest_wear_model().map_err(told)?;
+    if newest == *known {
+        return Ok(None);
+    }
+    let models = reader.wear_models().map_err(told)?;
+    *known = newest;
+    Ok(Some(models.into_iter().filter(|model| model.in_force).map(|model| Arc::new(model.record)).collect()))
+}

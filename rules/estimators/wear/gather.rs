@@ -1,0 +1,274 @@
+//! From a recording or a table to cuts: one row per cut, its conditions and its mean cutting power.
+
+use super::conditions::{CUTTING_POWER, Conditions, Cut, FACTORS};
+use crate::estimators::balance;
+use crate::estimators::regression::{Refusal, RefusalKind};
+use adapters::Recording;
+use adapters::recording::{Numbers, with_derived};
+
+/// Speed and feed within this share are those of one cut.
+const SAME_SHARE: f64 = 0.02;
+/// Wear and depth within this are those of one cut, mm.
+const SAME_MM: f64 = 1e-6;
+/// A stretch of rows this many times shorter than is usual is a transition and no cut.
+const TRANSITION: usize = 5;
+/// Columns whose change begins a new cut.
+const GROUPS: [&str; 5] = ["run", "pass", "part", "tool", "operation"];
+
+/// Where the numbers stand in the recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// Columns of VB, vc, f, ap, in the order of [`FACTORS`].
+    pub conditions: [String; 4],
+    /// Column of the cutting power.
+    pub power: String,
+    /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power where it has no column: from
+    /// `spindle_power_w` and `no_load_power_w`.
+    pub load_loss: Option<(f64, f64)>,
+    /// Every row is a cut of its own; otherwise consecutive rows of one cut are averaged.
+    pub each_row: bool,
+}
+
+impl Default for Columns {
+    fn default() -> Self {
+        Self {
+            conditions: FACTORS.map(|factor| factor.name.to_owned()),
+            power: CUTTING_POWER.to_owned(),
+            load_loss: None,
+            each_row: false,
+        }
+    }
+}
+
+/// The cuts of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gathered {
+    /// The cuts, in the order of the recording.
+    pub cuts: Vec<Cut>,
+    /// Rows behind them.
+    pub rows: usize,
+    /// Rows left out: not cutting, or without one of the values.
+    pub left_out: usize,
+}
+
+/// The cuts of a recording. Speed and feed per revolution are derived where they have no column of their own.
+///
+/// # Errors
+/// Which columns are missing and where they come from; no row with a value in all of them.
+pub fn gather(recording: &Recording, columns: &Columns) -> Result<Gathered, Refusal> {
+    let recording = with_derived(recording.clone());
+    let missing: Vec<String> =
+        columns.conditions.iter().filter(|name| recording.numbers(name).is_none()).map(|name| absent(name)).collect();
+    let power = cutting_power(&recording, columns);
+    if let Some(what) =
+        missing.into_iter().chain(power.as_ref().err().cloned()).reduce(|all, one| format!("{all}; {one}"))
+    {
+        let next = "a table needs the columns flank_wear_mm, cutting_speed_m_min, feed_per_rev_mm, depth_of_cut_mm, \
+                    cutting_power_w, one row per cut";
+        return Err(Refusal::new(RefusalKind::Missing, what, next));
+    }
+    let factors: Vec<&Numbers> = columns.conditions.iter().filter_map(|name| recording.numbers(name)).collect();
+    let rows = Rows { recording: &recording, factors, power: power.unwrap_or_default() };
+    rows.gather(columns.each_row)
+}
+
+/// Where a missing column comes from.
+fn absent(name: &str) -> String {
+    let source = match name {
+        "flank_wear_mm" => "read under the microscope, entered with each cut",
+        "cutting_speed_m_min" => "or spindle_speed_rpm and diameter_mm (--operations gives the diameter)",
+        "feed_per_rev_mm" => "or feed_mm_min and spindle_speed_rpm",
+        "depth_of_cut_mm" => "no controller knows it: --operations FILE gives it by program and block",
+        _ => "name another column with --column",
+    };
+    format!("there is no column {name} ({source})")
+}
+
+fn cutting_power(recording: &Recording, columns: &Columns) -> Result<Numbers, String> {
+    if let Some(power) = recording.numbers(&columns.power) {
+        return Ok(power.clone());
+    }
+    let kilowatts = columns.power.strip_suffix("_w").map(|stem| format!("{stem}_kw"));
+    if let Some(name) = kilowatts.filter(|name| recording.numbers(name).is_some()) {
+        return Err(format!("{name} is in kW; the column must be {} in W", columns.power));
+    }
+    let (total, idle) = (recording.numbers("spindle_power_w"), recording.numbers("no_load_power_w"));
+    match (total, idle, columns.load_loss) {
+        (Some(total), Some(idle), Some((linear, quadratic))) => {
+            let each = total.iter().zip(idle.iter());
+            Ok(each.map(|(total, idle)| Some(balance(total? - idle?, linear, quadratic)?.cutting_power_w)).collect())
+        }
+        (Some(_), _, _) => Err(format!(
+            "there is no column {}; spindle_power_w alone holds the no-load power: add no_load_power_w (an export of the \
+             history has it) and --load-loss A0 A1 (identify load-loss)",
+            columns.power
+        )),
+        _ => Err(format!("there is no column {}", columns.power)),
+    }
+}
+
+struct Rows<'a> {
+    recording: &'a Recording,
+    factors: Vec<&'a Numbers>,
+    power: Numbers,
+}
+
+impl Rows<'_> {
+    fn cut(&self, row: usize) -> Option<Cut> {
+        let engaged = self.recording.numbers("engaged").and_then(|engaged| engaged.get(row));
+        if engaged.is_some_and(|engaged| engaged < 0.5) {
+            return None;
+        }
+        let mut values = [0.0; 4];
+        for (value, column) in values.iter_mut().zip(&self.factors) {
+            *value = column.get(row)?;
+        }
+        // Without speed or feed nothing is removed, whatever the recording says of the engagement.
+        let removes = values[1] > 0.0 && values[2] > 0.0;
+        removes.then_some(Cut { conditions: Conditions::of(values), cutting_power_w: self.power.get(row)? })
+    }
+
+    fn same_group(&self, a: usize, b: usize) -> bool {
+        let same = |name: &&str| self.recording.words(name).is_none_or(|words| words.code(a) == words.code(b));
+        GROUPS.iter().all(same)
+    }
+
+    fn gather(&self, each_row: bool) -> Result<Gathered, Refusal> {
+        let groups = settled(self.groups(each_row));
+        let rows: usize = groups.iter().map(|group| group.members.len()).sum();
+        if groups.is_empty() {
+            let what = "no row has wear, speed, feed, depth and cutting power at once, with the tool in the work";
+            return Err(Refusal::new(RefusalKind::TooFew, what, "look at the columns with --json of `history query`"));
+        }
+        let cuts = self.merged(groups, each_row).iter().map(|group| mean(&group.members)).collect();
+        Ok(Gathered { cuts, rows, left_out: self.recording.rows() - rows })
+    }
+
+    /// Consecutive rows of the same conditions.
+    fn groups(&self, each_row: bool) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for row in 0..self.recording.rows() {
+            let Some(cut) = self.cut(row) else { continue };
+            match groups.last_mut() {
+                Some(group) if !each_row && self.same_group(group.last_row, row) && group.takes(&cut) => {
+                    group.last_row = row;
+                    group.members.push(cut);
+                }
+                _ => groups.push(Group { last_row: row, members: vec![cut] }),
+            }
+        }
+        groups
+    }
+
+    /// Neighbours that only a transition stood between are one cut.
+    fn merged(&self, groups: Vec<Group>, each_row: bool) -> Vec<Group> {
+        let mut merged: Vec<Group> = Vec::new();
+        for group in groups {
+            match merged.last_mut() {
+                Some(before)
+                    if !each_row
+                        && self.same_group(before.last_row, group.last_row)
+                        && before.takes(&mean(&group.members)) =>
+                {
+                    before.last_row = group.last_row;
+                    before.members.extend(group.members);
+                }
+                _ => merged.push(group),
+            }
+        }
+        merged
+    }
+}
+
+/// Consecutive rows of one cut.
+struct Group {
+    last_row: usize,
+    members: Vec<Cut>,
+}
+
+impl Group {
+    fn takes(&self, cut: &Cut) -> bool {
+        self.members.first().is_some_and(|first| alike(&first.conditions, &cut.conditions))
+    }
+}
+
+/// Without transitions: groups much shorter than is usual in this recording.
+fn settled(mut groups: Vec<Group>) -> Vec<Group> {
+    let mut lengths: Vec<usize> = groups.iter().map(|group| group.members.len()).collect();
+    lengths.sort_unstable();
+    let usual = lengths.get(lengths.len() * 3 / 4).copied().unwrap_or(0);
+    groups.retain(|group| group.members.len() * TRANSITION >= usual);
+    groups
+}
+
+fn alike(a: &Conditions, b: &Conditions) -> bool {
+    let close = |x: f64, y: f64| (x - y).abs() <= SAME_SHARE * x.abs();
+    (a.flank_wear_mm - b.flank_wear_mm).abs() <= SAME_MM
+        && (a.depth_of_cut_mm - b.depth_of_cut_mm).abs() <= SAME_MM
+        && close(a.cutting_speed_m_min, b.cutting_speed_m_min)
+        && close(a.feed_per_rev_mm, b.feed_per_rev_mm)
+}
+
+fn mean(cuts: &[Cut]) -> Cut {
+    let count = cuts.len() as f64;
+    let mean = |read: &dyn Fn(&Cut) -> f64| cuts.iter().map(read).sum::<f64>() / count;
+    let conditions = std::array::from_fn(|at| mean(&|cut: &Cut| cut.conditions.vector()[at]));
+    Cut { conditions: Conditions::of(conditions), cutting_power_w: mean(&|cut| cut.cutting_power_w) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::recording::{Cells, Words};
+
+    fn recording(rows: usize, columns: &[(&str, f64)]) -> Recording {
+        let mut recording = Recording::new("test", (0..rows).map(|row| row as f64).collect(), None);
+        for (name, value) in columns {
+            recording.set_column(name, Cells::Numbers(Numbers::full(vec![*value; rows])));
+        }
+        recording
+    }
+
+    const CONDITIONS: [(&str, f64); 5] = [
+        ("flank_wear_mm", 0.1),
+        ("diameter_mm", 79.0),
+        ("spindle_speed_rpm", 800.0),
+        ("feed_mm_min", 122.4),
+        ("depth_of_cut_mm", 1.0),
+    ];
+
+    #[test]
+    fn rows_of_one_cut_are_averaged_and_speed_and_feed_are_derived() {
+        let mut recording = recording(6, &CONDITIONS);
+        let power = Numbers::full(vec![780.0, 790.0, 800.0, 900.0, 910.0, 0.0]);
+        recording.set_column("cutting_power_w", Cells::Numbers(power));
+        recording.set_column("run", Cells::Words(Words::from_iter(["1", "1", "1", "2", "2", "2"])));
+        recording.set_column("engaged", Cells::Numbers(Numbers::full(vec![1.0, 1.0, 1.0, 1.0, 1.0, 0.0])));
+        let gathered = gather(&recording, &Columns::default()).expect("cuts");
+        let powers: Vec<f64> = gathered.cuts.iter().map(|cut| cut.cutting_power_w).collect();
+        assert_eq!((powers, gathered.rows, gathered.left_out), (vec![790.0, 905.0], 5, 1));
+        assert!((gathered.cuts[0].conditions.cutting_speed_m_min - 198.5).abs() < 0.1);
+        assert!((gathered.cuts[0].conditions.feed_per_rev_mm - 0.153).abs() < 1e-9);
+        let each = gather(&recording, &Columns { each_row: true, ..Columns::default() }).expect("cuts");
+        assert_eq!(each.cuts.len(), 5);
+    }
+
+    #[test]
+    fn the_cutting_power_is_separated_where_it_has_no_column() {
+        let columns = [&CONDITIONS[..], &[("spindle_power_w", 1460.0), ("no_load_power_w", 500.0)]].concat();
+        let known = Columns { load_loss: Some((0.1807, 4e-5)), ..Columns::default() };
+        let gathered = gather(&recording(3, &columns), &known).expect("a cut");
+        assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
+        let told = gather(&recording(3, &columns), &Columns::default()).expect_err("refused").to_string();
+        assert!(told.contains("--load-loss"), "{told}");
+    }
+
+    #[test]
+    fn missing_columns_are_told_at_once() {
+        let told =
+            gather(&recording(3, &[("cutting_power_kw", 0.8)]), &Columns::default()).expect_err("refused").to_string();
+        for part in ["flank_wear_mm (read under", "depth_of_cut_mm (no controller", "cutting_power_kw is in kW"] {
+            assert!(told.contains(part), "{part}: {told}");
+        }
+    }
+}

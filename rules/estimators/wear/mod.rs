@@ -1,0 +1,59 @@
+//! Tool wear from cutting power: which cuts to make, models of the power that they take, the power at which the tool is
+//! worn, and the wear that a power means.
+//!
+//! Source: tool-wear threshold from cutting power (patent, lathe CHK460): `dPc = mu H VB s vc`, a second-order response
+//! surface over coded variables, threshold `[Pc]` at the criterion VB.
+//!
+//! | file | what |
+//! |---|---|
+//! | `orthogonal_array`, `design` | the cuts to make: L4 to L27, as a work list |
+//! | `conditions`, `coding`, `term` | VB, vc, f, ap with units and ranges; coded variables; terms |
+//! | `surface`, `fit_surface`, `anova` | the response surface, backward elimination, analysis of variance |
+//! | `gather` | from recordings and tables to cuts |
+//! | `identify`, `report` | everything learned from a set of cuts, for programs and readers |
+//! | `record` | a model and what it is for: file and library |
+//! | `physical` | the physical form, which extrapolates |
+//! | `short` | the physical form as a script holds it |
+//! | `compare` | both forms on cuts that they have not seen |
+//! | `model`, `predicted` | either form, and what it says of a cut |
+//! | `threshold` | the limit [Pc], the wear from a power, observable here or not |
+//! | `alarm` | raised on repeated violation only |
+
+mod alarm;
+mod anova;
+mod coding;
+mod compare;
+mod conditions;
+mod design;
+mod fit_surface;
+mod gather;
+mod identify;
+mod model;
+mod orthogonal_array;
+mod physical;
+mod predicted;
+mod record;
+mod report;
+mod short;
+mod surface;
+mod term;
+mod threshold;
+
+pub use alarm::{AlarmRule, Change, WearAlarm};
+pub use anova::{Anova, Source};
+pub use coding::{Coding, Range};
+pub use compare::{Comparison, FormErrors, compare};
+pub use conditions::{CUTTING_POWER, Conditions, Cut, FACTORS, Factor, WEAR, cutting_speed_m_min, unit_trouble};
+pub use design::{Alias, Design, Levels, PlannedCut, plan};
+pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
+pub use gather::{Columns, Gathered, gather};
+pub use identify::{LearnedWear, Place, WearOptions, identify_tool_wear};
+pub use model::WearModel;
+pub use orthogonal_array::Array;
+pub use physical::{Fitted, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
+pub use predicted::Predicted;
+pub use record::{Key, WearRecord};
+pub use short::{SHORT_FORM, SHORT_LENGTH};
+pub use surface::{Surface, published, published_over};
+pub use term::{Term, second_order};
+pub use threshold::{OBSERVABLE_SHARE, Observability, Threshold, WearEstimate, estimate_wear, threshold};
