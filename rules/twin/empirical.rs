@@ -1,7 +1,7 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
-//! A form is a bent line over one channel (slope and three hinges at its quartiles), by itself, in the cut only, or in
-//! proportion to the removal rate. It is the yardstick for "something real remains that no candidate explains".
+//! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed or something that
+//! fades through each pass; by itself, in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no candidate explains".
 
 use super::designs::Design;
 use super::frame::Frame;
@@ -21,13 +21,24 @@ pub enum Factor {
     Turning,
 }
 
-/// A bent line over one channel.
+/// What is drawn over a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// A line that bends at these values, increasing.
+    Bent(Vec<f64>),
+    /// A peak at one value, of this half width; whatever resonates stands out at one speed.
+    Peak(f64, f64),
+    /// What is there at first and fades over this distance.
+    Fading(f64),
+}
+
+/// A shape over one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Empirical {
     /// The channel, or one of the words `time in the run`, `time`.
     pub channel: String,
-    /// Where the line bends, increasing.
-    pub knots: Vec<f64>,
+    /// What is drawn over the channel.
+    pub shape: Shape,
     /// Channel value that counts as zero.
     pub origin: f64,
     /// Channel distance that counts as one.
@@ -48,6 +59,12 @@ const TORQUE: &str = "simulated_cut_per_krpm";
 const TIME: &str = "time_s";
 
 impl Empirical {
+    /// Is it one height of a given shape, rather than a line that bends where the recording asks for it?
+    #[must_use]
+    pub fn is_simple(&self) -> bool {
+        !matches!(self.shape, Shape::Bent(_))
+    }
+
     /// One column per coefficient: level, slope and hinges.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
@@ -56,11 +73,22 @@ impl Empirical {
         let along = |x: f64| (x - self.origin) / self.scale;
         let column =
             |law: &dyn Fn(f64) -> f64| values.iter().zip(&factor).map(|(x, factor)| factor * law(along(*x))).collect();
+        let knots = match &self.shape {
+            Shape::Bent(knots) => knots,
+            Shape::Peak(centre, width) => {
+                let (centre, width) = (along(*centre), width / self.scale);
+                return Some(vec![("level".to_owned(), column(&|x| (-0.5 * ((x - centre) / width).powi(2)).exp()))]);
+            }
+            Shape::Fading(over) => {
+                let over = over / self.scale;
+                return Some(vec![("level".to_owned(), column(&|x| (-x / over).exp()))]);
+            }
+        };
         let mut columns = vec![("slope".to_owned(), column(&|x| x))];
         if self.factor != Factor::Always {
             columns.insert(0, ("level".to_owned(), column(&|_| 1.0)));
         }
-        for (index, knot) in self.knots.iter().enumerate() {
+        for (index, knot) in knots.iter().enumerate() {
             let bend = along(*knot);
             columns.push((format!("bend_{}", index + 1), column(&|x| (x - bend).max(0.0))));
         }
@@ -70,35 +98,55 @@ impl Empirical {
     /// The form in words, for the report.
     #[must_use]
     pub fn equation(&self) -> String {
-        let knots: Vec<String> = self.knots.iter().map(|knot| format!("{knot:.4}")).collect();
         let factor = match self.factor {
             Factor::Always => "",
             Factor::InTheCut => "engaged * ",
             Factor::WithTheCut => "removal rate * ",
             Factor::Turning => "(spindle turning) * ",
         };
-        format!("y = {factor}bent line over {} with bends at {}", self.channel, knots.join(", "))
+        let shape = match &self.shape {
+            Shape::Bent(knots) => {
+                let knots: Vec<String> = knots.iter().map(|knot| format!("{knot:.4}")).collect();
+                format!("bent line over {} with bends at {}", self.channel, knots.join(", "))
+            }
+            Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
+            Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
+        };
+        format!("y = {factor}{shape}")
     }
 
     /// The form as a `rhai` expression over columns and the part's parameters, so that a model can carry it.
     #[must_use]
     pub fn expression(&self) -> String {
         let x = format!("(({} - {:?}) / {:?})", self.channel, self.origin, self.scale);
-        let mut terms = vec![format!("slope * {x}")];
-        if self.factor != Factor::Always {
-            terms.insert(0, "level".to_owned());
-        }
-        for (index, knot) in self.knots.iter().enumerate() {
-            let bend = (knot - self.origin) / self.scale;
-            terms.push(format!("bend_{} * (if {x} > {bend:?} {{ {x} - {bend:?} }} else {{ 0.0 }})", index + 1));
-        }
+        let form = self.shape_expression(&x);
         let factor = match self.factor {
             Factor::Always => "1.0",
             Factor::InTheCut => "engaged",
             Factor::WithTheCut => "engaged * removal_rate_cm3_min",
             Factor::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
         };
-        format!("({factor}) * ({})", terms.join(" + "))
+        format!("({factor}) * ({form})")
+    }
+
+    fn shape_expression(&self, x: &str) -> String {
+        let along = |value: f64| (value - self.origin) / self.scale;
+        let knots = match &self.shape {
+            Shape::Bent(knots) => knots,
+            Shape::Peak(centre, width) => {
+                return format!("level * exp(-0.5 * (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
+            }
+            Shape::Fading(over) => return format!("level * exp(-{x} / {:?})", over / self.scale),
+        };
+        let mut terms = vec![format!("slope * {x}")];
+        if self.factor != Factor::Always {
+            terms.insert(0, "level".to_owned());
+        }
+        for (index, knot) in knots.iter().enumerate() {
+            let bend = along(*knot);
+            terms.push(format!("bend_{} * (if {x} > {bend:?} {{ {x} - {bend:?} }} else {{ 0.0 }})", index + 1));
+        }
+        terms.join(" + ")
     }
 }
 
@@ -157,7 +205,8 @@ pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Des
         scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect();
     channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, LOAD, TORQUE].map(str::to_owned));
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
-    let forms = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
+    let bent = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
+    let forms = bent.chain(peaks(scene).into_iter().map(Some)).chain(fading(scene).into_iter().map(Some));
     // What always drifts has a name.
     let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
     let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
@@ -188,12 +237,60 @@ fn form(scene: &Scene, frame: &Frame, channel: &str, factor: Factor) -> Option<E
     let mut knots: Vec<f64> =
         [0.25, 0.5, 0.75].iter().filter_map(|share| at(*share)).filter(|knot| *knot > low && *knot < high).collect();
     knots.dedup();
-    Some(Empirical { channel: channel.to_owned(), knots, origin: low, scale: high - low, factor })
+    Some(Empirical { channel: channel.to_owned(), shape: Shape::Bent(knots), origin: low, scale: high - low, factor })
 }
+
+/// Peaks over the spindle speed, at the speeds that the recording visits.
+fn peaks(scene: &Scene) -> Vec<Empirical> {
+    let (Some(channel), Some(speed)) = (scene.role_name(Role::Speed), scene.role(Role::Speed)) else {
+        return Vec::new();
+    };
+    let mut turning: Vec<f64> = speed.iter().map(|n| n.abs()).filter(|n| *n > 1.0).collect();
+    turning.sort_by(f64::total_cmp);
+    let Some(top) = turning.last().copied() else { return Vec::new() };
+    let mut centres: Vec<f64> = (0..PEAKS).map(|k| turning[k * (turning.len() - 1) / (PEAKS - 1)]).collect();
+    centres.dedup_by(|a, b| (*a - *b).abs() < 0.04 * *b);
+    let one = |centre: f64, share: f64, factor: Factor| Empirical {
+        channel: channel.to_owned(),
+        shape: Shape::Peak(centre, share * centre),
+        origin: 0.0,
+        scale: top,
+        factor,
+    };
+    let of = |centre: &f64| [0.06, 0.12, 0.25].map(|share| (*centre, share));
+    let all: Vec<(f64, f64)> = centres.iter().flat_map(of).collect();
+    let factors = [Factor::Turning, Factor::InTheCut, Factor::WithTheCut];
+    all.iter().flat_map(|(centre, share)| factors.map(|factor| one(*centre, *share, factor))).collect()
+}
+
+/// What each pass begins with and loses over seconds.
+fn fading(scene: &Scene) -> Vec<Empirical> {
+    let told = |over_s: &f64| *over_s >= FADING_PERIODS * scene.period_s();
+    let one = |over_s: f64, factor: Factor| Empirical {
+        channel: TIME_IN_CUT.to_owned(),
+        shape: Shape::Fading(over_s),
+        origin: 0.0,
+        scale: 1.0,
+        factor,
+    };
+    let times = [3.0, 6.0, 12.0, 24.0].into_iter().filter(told);
+    times.flat_map(|over_s| [Factor::InTheCut, Factor::WithTheCut].map(|factor| one(over_s, factor))).collect()
+}
+
+/// Places at which a peak is tried, before neighbours are joined.
+const PEAKS: usize = 12;
+/// Sampling periods below which what fades is an edge.
+const FADING_PERIODS: f64 = 4.0;
 
 fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
     let columns = form.columns(scene)?;
     let any = (f64::NEG_INFINITY, f64::INFINITY);
+    // Where a peak stands and how wide it is has been chosen, as has how fast something fades.
+    let chosen = match form.shape {
+        Shape::Bent(_) => 0,
+        Shape::Peak(..) => 2,
+        Shape::Fading(_) => 1,
+    };
     let parameters = columns.iter().map(|(name, _)| Parameter {
         name: name.clone(),
         value: 0.0,
@@ -213,7 +310,7 @@ fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
     Some(Design {
         kind: "unknown".to_owned(),
         ranges: vec![any; columns.len()],
-        freedom: columns.len(),
+        freedom: columns.len() + chosen,
         ln_choices: 0.0,
         reluctance: 0.0,
         part,

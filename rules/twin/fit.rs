@@ -97,7 +97,7 @@ impl Fit {
 }
 
 /// Units below which their disagreement says nothing.
-const UNITS_MIN: usize = 5;
+pub(super) const UNITS_MIN: usize = 5;
 
 /// Variances of the parameters from the sums of each unit; zero for too few units.
 fn disagreement(columns: &[Vec<f64>], innovations: &[f64], inverse: &[Vec<f64>], unit: &[usize]) -> Vec<f64> {

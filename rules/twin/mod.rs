@@ -11,6 +11,7 @@
 //!    separates them. What no candidate explains is `unknown`, located, with an empirical form.
 //! 6. Every fit is shown on runs that took no part in fitting, choosing or stopping.
 
+mod agreement;
 pub mod bind;
 mod corroborated;
 pub mod designs;

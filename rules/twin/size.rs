@@ -1,5 +1,6 @@
 //! Size: what is too small to be claimed, however surely it is there.
 
+use super::agreement::differs_by_run;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::Fit;
 use super::noise::count;
@@ -15,7 +16,7 @@ const SMALL_INFORMATION: f64 = 100.0;
 const OUTPUT_FLOOR: f64 = 0.1;
 
 impl Case<'_> {
-    /// Drops members whose remaining part is too small to claim, smallest first.
+    /// Drops members whose remaining part is too small to claim, and those beside others on which the runs disagree.
     pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit) -> Found {
         while let Some(position) = self.smallest_unclaimable(&found.best, base) {
             let Some(less) = self.without(&found.best, position) else { break };
@@ -27,7 +28,12 @@ impl Case<'_> {
 
     fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit) -> Option<usize> {
         let deviation = ordinary_noise(&best.fit);
+        let first = best.fit.parts.len() - best.members.len();
+        let several = best.members.len() > 1;
         (0..best.members.len()).find(|position| {
+            if several && differs_by_run(&best.fit, &self.frame, first + position) {
+                return true;
+            }
             let without =
                 if best.members.len() == 1 { Some(base.clone()) } else { self.without(best, *position).map(|h| h.fit) };
             without.is_some_and(|without| {

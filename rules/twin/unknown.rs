@@ -4,6 +4,8 @@
 //! more than all of them, or much on top of them in a way that leaves the names little to explain; and where nothing is
 //! named, a line that explains enough is an alarm without a name.
 
+use super::agreement::differs_by_run;
+use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
 use super::empirical::empirical_designs;
 use super::fit::{Fit, fit};
@@ -26,6 +28,10 @@ const STANDS_SHARE: f64 = 0.6;
 const BETTER_SHARE: f64 = 0.1;
 /// The same in units of information.
 const BETTER_INFORMATION: f64 = 15.0;
+/// The same for a nameless cause as simple as the named ones, in units of information.
+const SIMPLE_INFORMATION: f64 = 4.0;
+/// Share of what is named that must be left without an effect, or that effect is most of it.
+const MOST: f64 = 0.5;
 
 /// What remains unexplained, described.
 pub struct Unknown {
@@ -35,6 +41,15 @@ pub struct Unknown {
     pub information: f64,
     /// The gate's answer.
     pub p_value: f64,
+}
+
+/// What an empirical form must explain beyond what is named: a bent line over any channel is a yardstick, a peak at one
+/// speed or what fades through every pass is as good a cause as those with a name.
+fn margin(form: &Design, named: f64) -> f64 {
+    match &form.part.body {
+        Body::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
+        _ => (BETTER_SHARE * named).max(BETTER_INFORMATION),
+    }
 }
 
 impl Case<'_> {
@@ -60,14 +75,16 @@ impl Case<'_> {
         let least = if anything { UNKNOWN_INFORMATION } else { NOTHING_NAMED_INFORMATION };
         let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
         let better = anything
-            && alone.information > named + (BETTER_SHARE * named).max(BETTER_INFORMATION)
+            && alone.information > named + margin(&bank.designs[alone.members[0]], named)
             && !self.is_friction(&alone, &bank, &found.best.fit);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: Hypothesis| named + on_top.information - given.information > STANDS_SHARE * named;
+        let unlike = anything && self.unlike(&found.best);
         let doubted = remains && !(anything && self.with_form(base, &bank, on_top.members[0]).is_some_and(stands));
-        if !(doubted || better) {
+        if !(doubted || better || unlike) {
             return None;
         }
+        let better = better || unlike;
         let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
         let small = self.negligible(&from.residual, &to.fit.residual, noise, to.information);
@@ -79,6 +96,16 @@ impl Case<'_> {
             return None;
         }
         Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
+    }
+
+    /// Is what explains most of it another one in every run?
+    fn unlike(&mut self, best: &Hypothesis) -> bool {
+        let first = best.fit.parts.len() - best.members.len();
+        (0..best.members.len()).any(|position| {
+            differs_by_run(&best.fit, &self.frame, first + position)
+                && (best.members.len() == 1
+                    || self.without(best, position).is_some_and(|rest| rest.information < MOST * best.information))
+        })
     }
 
     /// Is a bent line over the velocity of the axis no more than the shape of a friction that has been named? No law of

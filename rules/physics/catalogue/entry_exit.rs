@@ -11,13 +11,13 @@ pub struct EntryExit;
 static DOC: EffectDoc = EffectDoc {
     kind: "entry_exit",
     family: "cutting",
-    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: entry alone",
+    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L",
     parameters: &[
         ParameterDoc {
             name: "entry",
             unit: "1",
             entry: Entry::Linear,
-            range: (-1.0, 1.0),
+            range: (-1.0, 0.0),
             en: "share by which the cut differs on entry",
             zh: "切入时的差异比例",
         },
@@ -25,9 +25,17 @@ static DOC: EffectDoc = EffectDoc {
             name: "exit",
             unit: "1",
             entry: Entry::Linear,
-            range: (-1.0, 1.0),
+            range: (-1.0, 0.0),
             en: "share by which it differs on exit",
             zh: "切出时的差异比例",
+        },
+        ParameterDoc {
+            name: "settling",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-1.0, 1.0),
+            en: "share by which the cut differs at first and then settles",
+            zh: "走刀初期的差异比例，随后稳定",
         },
         ParameterDoc {
             name: "length_s",
@@ -45,14 +53,14 @@ static DOC: EffectDoc = EffectDoc {
     en: Texts {
         name: "entry and exit",
         statement: "The cut builds up when the tool enters and fades when it leaves",
-        absence: "in the first and last seconds of every pass the recording lies below (or above) the simulation",
+        absence: "in the first and last seconds of every pass the recording lies below the simulation",
         confused_with: "a late meter (also where speed changes), a late engagement flag (a full step, not a ramp)",
         experiment: "cut one pass with half the feed: the ramps last twice as long",
     },
     zh: Texts {
         name: "切入切出",
         statement: "刀具切入时切削逐渐建立，切出时逐渐消失",
-        absence: "每次走刀最初和最后几秒实测低于（或高于）仿真",
+        absence: "每次走刀最初和最后几秒实测低于仿真",
         confused_with: "仪表滞后（转速变化处也有）、切入标志滞后（整体跳变而非斜坡）",
         experiment: "进给减半走刀一次：斜坡持续时间加倍",
     },
@@ -89,7 +97,7 @@ impl Effect for EntryExit {
             }
         }
         if form.name == "settling" {
-            return Some(vec![("entry", cut_times(scene, |row| entry[row])?)]);
+            return Some(vec![("settling", cut_times(scene, |row| entry[row])?)]);
         }
         Some(vec![("entry", cut_times(scene, |row| entry[row])?), ("exit", cut_times(scene, |row| exit[row])?)])
     }

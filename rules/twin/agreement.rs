@@ -1,0 +1,117 @@
+//! Do the runs agree on an effect? A law has the same coefficient in all of them; what comes and goes by itself, and is
+//! only imitated by a law on average, has not.
+
+use super::fit::{Fit, UNITS_MIN};
+use super::frame::Frame;
+use super::linear::{dot, extend_basis, project_out};
+use super::model::{Body, Part};
+use super::noise::count;
+
+/// Deviation of the runs' own coefficients, as a share of the common one, beyond which they do not share it. Effects
+/// that are there, in other forms than the catalogue's, stay below 0.4 (`tests/concealed`).
+const SHARE: f64 = 0.45;
+/// Normal deviate of Cochran's Q beyond which that is no chance (p = 0.025).
+const DEVIATE: f64 = 1.96;
+/// Share of all that is known of a coefficient below which a unit tells nothing of it.
+const TELLS: f64 = 1e-3;
+
+/// Kinds whose coefficients belong to a tool, a lot, a stretch of time or a place, not to the machine.
+const OWN: [&str; 10] = [
+    "flank_wear",
+    "hardness_batch",
+    "recipe_error",
+    "auxiliary_switch",
+    "ripple_alias",
+    "zero_drift",
+    "sensor_gain",
+    "built_up_edge",
+    "edge_force",
+    "chatter",
+];
+
+/// Does no parameter of this part have one value for all runs?
+#[must_use]
+pub(super) fn differs_by_run(fit: &Fit, frame: &Frame, part: usize) -> bool {
+    if OWN.contains(&fit.parts[part].kind.as_str()) || !is_law(&fit.parts[part]) {
+        return false;
+    }
+    let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
+    let told: Vec<Disagreement> = of_part.filter_map(|index| disagreement(fit, frame, index)).collect();
+    !told.is_empty() && told.iter().all(|told| told.share > SHARE && told.deviate() > DEVIATE)
+}
+
+fn is_law(part: &Part) -> bool {
+    matches!(&part.body, Body::Effect(_, form) if form.place.is_none() && form.name != "latent")
+}
+
+/// How far the units of hold-out disagree on one parameter.
+struct Disagreement {
+    /// Deviation of their own values beyond their noise, over the common value.
+    share: f64,
+    /// Cochran's Q.
+    q: f64,
+    /// Its degrees of freedom.
+    freedom: f64,
+}
+
+impl Disagreement {
+    /// Q as a normal deviate (Wilson and Hilferty, 1931).
+    fn deviate(&self) -> f64 {
+        let spread = 2.0 / (9.0 * self.freedom);
+        ((self.q / self.freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
+    }
+}
+
+/// `None` for fewer units than can disagree. Everything else in the fit moves along; the deviation is that of DerSimonian
+/// and Laird, Controlled Clinical Trials 7 (1986).
+fn disagreement(fit: &Fit, frame: &Frame, index: usize) -> Option<Disagreement> {
+    let own = cleared(fit, frame, index);
+    let innovations = fit.innovations(frame);
+    let rows = count(frame.len().saturating_sub(fit.free.len()).max(1));
+    let variance = dot(&innovations, &innovations) / rows;
+    let units = frame.unit.last().map_or(0, |last| last + 1);
+    let mut told = vec![(0.0, 0.0); units];
+    for (row, unit) in frame.unit.iter().enumerate() {
+        told[*unit].0 += own[row] * own[row];
+        told[*unit].1 += own[row] * innovations[row];
+    }
+    let total: f64 = told.iter().map(|(weight, _)| weight).sum();
+    told.retain(|(weight, _)| *weight > TELLS * total);
+    let free = fit.free[index];
+    let value = fit.parts[free.part].parameters[free.parameter].value.abs();
+    if told.len() < UNITS_MIN || variance <= 0.0 || value <= 0.0 {
+        return None;
+    }
+    let q = told.iter().map(|(weight, score)| score * score / weight).sum::<f64>() / variance;
+    let freedom = count(told.len() - 1);
+    let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
+    let squares: f64 = told.iter().map(|(weight, _)| weight * weight).sum();
+    let between = ((q - freedom) * variance / (sum - squares / sum)).max(0.0);
+    Some(Disagreement { share: between.sqrt() / value, q, freedom })
+}
+
+/// A parameter's whitened tangent with those of all others taken out.
+fn cleared(fit: &Fit, frame: &Frame, index: usize) -> Vec<f64> {
+    let white = |column: &Vec<f64>| frame.whiten(column, fit.noise);
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for (_, column) in fit.tangent.iter().enumerate().filter(|(other, _)| *other != index) {
+        let _ = extend_basis(&mut basis, white(column), 1e-8);
+    }
+    let mut own = white(&fit.tangent[index]);
+    project_out(&basis, &mut own);
+    project_out(&basis, &mut own);
+    own
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_deviate_of_cochrans_q_is_that_of_the_table() {
+        for (q, freedom, deviate) in [(19.02, 9.0, 1.96), (23.34, 12.0, 1.96), (4.17, 9.0, -1.28), (13.36, 8.0, 1.28)] {
+            let told = Disagreement { share: 0.0, q, freedom };
+            assert!((told.deviate() - deviate).abs() < 0.03, "{q} of {freedom}: {}", told.deviate());
+        }
+    }
+}
