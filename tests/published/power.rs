@@ -54,9 +54,9 @@ fn balances() -> Vec<Row> {
         Row::new("Pc, W, constant 0.15 on Pu 505", 830.4, cut(955.0, 0.15), 0.05, "000, recomputed"),
         Row::new("Pc, W, constant 0.25 on Pu 500", 768.0, cut(960.0, 0.25), 0.05, "000, recomputed"),
         Row::new("Pc, W, constant 0.25 on Pu 505", 764.0, cut(955.0, 0.25), 0.05, "000, recomputed"),
-        Row::misprint("Pc, W, constant 0.15, as printed", 830.0, cut(960.0, 0.15), "000, table 5", sign),
-        Row::misprint("Pc, W, constant 0.25, as printed", 750.0, cut(960.0, 0.25), "000, table 5", not_from_formula),
-        Row::misprint("a0 as printed", 1.807, 0.1807, "000, equation 2", garbled),
+        Row::misprint("Pc, W, constant 0.15, as printed", 830.0, cut(960.0, 0.15), "000, text", sign),
+        Row::misprint("Pc, W, constant 0.25, as printed", 750.0, cut(960.0, 0.25), "000, text", not_from_formula),
+        Row::misprint("a0 as printed", 1.807, 0.1807, "000, text", garbled),
         Row::new("Pu measured over interpolated, %", 0.99, 100.0 * (1.0 - 500.0 / 505.0), 0.005, "000, test group"),
     ]
 }
