@@ -187,7 +187,7 @@ pub struct WearStatus {
     pub form: &'static str,
     /// Flank wear at which the edge is worn, mm.
     pub criterion_mm: f64,
-    /// Limit [Pc] of the cut, W.
+    /// Limit `[Pc]` of the cut, W.
     pub limit_w: Option<f64>,
     /// Half the 95 % interval of a single cut at the limit, W.
     pub limit_uncertainty_w: Option<f64>,

@@ -1,4 +1,4 @@
-//! The wear model beside the running machine: the limit [Pc] of the cut at this moment, the wear that its power means, and an
+//! The wear model beside the running machine: the limit `[Pc]` of the cut at this moment, the wear that its power means, and an
 //! alarm on repeated violation. The models come from the library in the history (`identify tool-wear --store`), the depth and
 //! the diameter from the controller or the operations recipe.
 

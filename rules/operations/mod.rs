@@ -15,7 +15,7 @@
 //! ```
 //!
 //! [`parse`] reads the text and tells everything that is wrong with it, [`Recipe::find`] looks a block up,
-//! [`Recipe::complete`] fills in what the sources of a sample do not deliver. What was filled in says so: the channel
+//! [`Completion::apply`] fills in what the sources of a sample do not deliver. What was filled in says so: the channel
 //! `recipe` names the operation and the version of the table.
 
 mod complete;

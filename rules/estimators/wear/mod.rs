@@ -16,7 +16,7 @@
 //! | `short` | the physical form as a script holds it |
 //! | `compare` | both forms on cuts that they have not seen |
 //! | `model`, `predicted` | either form, and what it says of a cut |
-//! | `threshold` | the limit [Pc], the wear from a power, observable here or not |
+//! | `threshold` | the limit `[Pc]`, the wear from a power, observable here or not |
 //! | `alarm` | raised on repeated violation only |
 
 mod alarm;

@@ -31,12 +31,12 @@ impl Observability {
     }
 }
 
-/// The power limit [Pc] of one cut.
+/// The power limit `[Pc]` of one cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Threshold {
     /// Criterion of the flank wear, mm.
     pub criterion_mm: f64,
-    /// [Pc], W.
+    /// `[Pc]`, W.
     pub power_w: f64,
     /// Standard deviation of a single cut with an edge worn to the criterion, W.
     pub sd_w: f64,
