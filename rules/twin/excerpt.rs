@@ -7,7 +7,7 @@ use crate::physics::{Block, Role, Scene};
 use std::ops::Range;
 
 /// Rows beyond which only pieces are fitted.
-const ROWS_MAX: usize = 12_000;
+const ROWS_MAX: usize = 14_000;
 /// Rows of all pieces together, about.
 const FITTED_ROWS: usize = 8_000;
 /// Rows of a piece, about.

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Groups beyond which neighbouring rows are averaged.
-const GROUPS_MAX: usize = 12_000;
+const GROUPS_MAX: usize = 14_000;
 
 /// Rows to a group where all of them are fitted.
 #[must_use]
