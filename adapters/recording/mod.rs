@@ -141,11 +141,8 @@ impl Words {
     /// The words of these rows, with the same numbers.
     #[must_use]
     pub fn at_rows(&self, rows: impl Iterator<Item = usize>) -> Self {
-        Self { codes: rows.map(|row| self.code(row)).collect(), ..self.clone_words() }
-    }
-
-    fn clone_words(&self) -> Self {
-        Self { codes: Vec::new(), words: self.words.clone(), numbers: self.numbers.clone() }
+        let codes = rows.map(|row| self.code(row)).collect();
+        Self { codes, words: self.words.clone(), numbers: self.numbers.clone() }
     }
 
     /// The distinct words, in the order of first appearance.

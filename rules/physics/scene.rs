@@ -13,8 +13,8 @@ use thiserror::Error;
 
 /// Relative change of the spindle speed from one row to the next that starts a new pass.
 const PASS_JUMP: f64 = 0.05;
-/// Periods for which an input is held across a pause.
-const DRIVEN_PERIODS: f64 = 10.0;
+/// Periods between two rows beyond which they lie on two sides of a pause; for so long an input is held across it.
+pub const PAUSE_PERIODS: f64 = 10.0;
 
 /// The parts that columns play for the effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -313,7 +313,7 @@ impl Scene {
     /// How long the row before this one drove a state, s: until this row, but for ten periods at most; `row` from 1 on.
     #[must_use]
     pub fn driven_s(&self, row: usize) -> f64 {
-        let since_s = || (self.clock_s[row] - self.clock_s[row - 1]).clamp(0.0, DRIVEN_PERIODS * self.period_s);
+        let since_s = || (self.clock_s[row] - self.clock_s[row - 1]).clamp(0.0, PAUSE_PERIODS * self.period_s);
         self.driven_s.as_ref().map_or_else(since_s, |driven_s| driven_s[row])
     }
 
@@ -476,16 +476,8 @@ fn running_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
 }
 
 fn median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
-    let mut steps: Vec<f64> = runs
-        .iter()
-        .flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]))
-        .filter(|step| *step > 0.0)
-        .collect();
-    if steps.is_empty() {
-        return 1.0;
-    }
-    let middle = steps.len() / 2;
-    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    let steps = runs.iter().flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]));
+    super::excitation::median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0)
 }
 
 fn hold_fill(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {

@@ -35,8 +35,11 @@ pub(super) fn differs_by_run(fit: &Fit, frame: &Frame, part: usize) -> bool {
     if OWN.contains(&fit.parts[part].kind.as_str()) || !is_law(&fit.parts[part]) {
         return false;
     }
+    let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| frame.whiten(column, fit.noise)).collect();
+    let innovations = fit.innovations(frame);
     let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
-    let told: Vec<Disagreement> = of_part.filter_map(|index| disagreement(fit, frame, index)).collect();
+    let told = of_part.filter_map(|index| disagreement(fit, frame, &cleared(&white, index), &innovations, index));
+    let told: Vec<Disagreement> = told.collect();
     !told.is_empty() && told.iter().all(|told| told.share > SHARE && told.deviate() > DEVIATE)
 }
 
@@ -64,11 +67,9 @@ impl Disagreement {
 
 /// `None` for fewer units than can disagree. Everything else in the fit moves along; the deviation is that of DerSimonian
 /// and Laird, Controlled Clinical Trials 7 (1986).
-fn disagreement(fit: &Fit, frame: &Frame, index: usize) -> Option<Disagreement> {
-    let own = cleared(fit, frame, index);
-    let innovations = fit.innovations(frame);
+fn disagreement(fit: &Fit, frame: &Frame, own: &[f64], innovations: &[f64], index: usize) -> Option<Disagreement> {
     let rows = count(frame.len().saturating_sub(fit.free.len()).max(1));
-    let variance = dot(&innovations, &innovations) / rows;
+    let variance = dot(innovations, innovations) / rows;
     let units = frame.unit.last().map_or(0, |last| last + 1);
     let mut told = vec![(0.0, 0.0); units];
     for (row, unit) in frame.unit.iter().enumerate() {
@@ -91,13 +92,12 @@ fn disagreement(fit: &Fit, frame: &Frame, index: usize) -> Option<Disagreement> 
 }
 
 /// A parameter's whitened tangent with those of all others taken out.
-fn cleared(fit: &Fit, frame: &Frame, index: usize) -> Vec<f64> {
-    let white = |column: &Vec<f64>| frame.whiten(column, fit.noise);
+fn cleared(white: &[Vec<f64>], index: usize) -> Vec<f64> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
-    for (_, column) in fit.tangent.iter().enumerate().filter(|(other, _)| *other != index) {
-        let _ = extend_basis(&mut basis, white(column), 1e-8);
+    for (_, column) in white.iter().enumerate().filter(|(other, _)| *other != index) {
+        let _ = extend_basis(&mut basis, column.clone(), 1e-8);
     }
-    let mut own = white(&fit.tangent[index]);
+    let mut own = white[index].clone();
     project_out(&basis, &mut own);
     project_out(&basis, &mut own);
     own

@@ -3,6 +3,7 @@
 use super::bind::bind;
 use super::designs::{Design, designs};
 use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
+use super::excerpt;
 use super::fit::{Data, Fit, fit};
 use super::frame::{Frame, Unit, group_size, held_out, units};
 use super::holdout::{Noise, Prediction, predict, rmse};
@@ -28,22 +29,16 @@ const CREEPING: [&str; 3] = ["zero_drift", "bearing_warm_up", "preload_growth"];
 /// Everything that makes the input unusable, with what to record instead.
 pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let mut whole = Case::new(recording, model)?;
-    let Some(ways) = super::excerpt::ways(&whole.scene, &whole.units) else { return Ok(whole.diagnosed(seed)) };
-    let mut answer: Option<Diagnosis> = None;
-    for blocks in ways {
-        let mut short = whole.shortened(&blocks);
-        let found = short.diagnosed(seed);
-        let Some(back) = short.whole.take() else { return Ok(found) };
-        whole = *back;
-        let nothing = found.verdict == Verdict::NoMismatch;
-        if answer.is_none() || matches!(found.verdict, Verdict::Explained | Verdict::Ambiguous) {
-            answer = Some(found);
-        }
-        if !nothing {
-            break;
-        }
+    if !excerpt::is_long(&whole.scene) {
+        return Ok(whole.diagnosed(seed));
     }
-    Ok(answer.unwrap_or_else(|| whole.diagnosed(seed)))
+    let pieces = excerpt::close(&whole.scene, &whole.units);
+    let (first, whole) = whole.seen_through(&pieces, seed);
+    let Some(whole) = whole.filter(|_| first.verdict == Verdict::NoMismatch) else { return Ok(first) };
+    let means = excerpt::from_afar(&whole.scene, &whole.units);
+    let (second, _) = whole.seen_through(&means, seed);
+    let named = matches!(second.verdict, Verdict::Explained | Verdict::Ambiguous);
+    Ok(if named { second } else { first })
 }
 
 /// A recording prepared for comparison with a model.
@@ -85,7 +80,8 @@ impl<'a> Case<'a> {
         let faults = clean(&mut scene, &nominal.total);
         let units = units(&scene);
         let held = held_out(&units);
-        let size = group_size(&scene);
+        // Of a long recording an excerpt is fitted, and every row counts where the answer is told.
+        let size = if excerpt::is_long(&scene) { 1 } else { group_size(&scene) };
         Ok(Self::of(model, scene, parts, units, held, size, faults))
     }
 
@@ -105,16 +101,14 @@ impl<'a> Case<'a> {
         Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, whole }
     }
 
-    /// An excerpt of this case, from which its answer is found.
-    fn shortened(self, blocks: &[Block]) -> Self {
+    /// The diagnosis found from an excerpt and told over the whole, and the whole again.
+    fn seen_through(self, blocks: &[Block], seed: u64) -> (Diagnosis, Option<Box<Self>>) {
         let unit = |unit: &Unit| Unit { name: unit.name.clone(), rows: blocks_of(blocks, &unit.rows) };
         let units = self.units.iter().map(unit).collect();
         let (scene, parts, held) = (self.scene.excerpt(blocks), self.parts.clone(), self.held.clone());
         let mut short = Self::of(self.model, scene, parts, units, held, 1, self.faults.clone());
-        // Every row counts where the answer is told.
-        let Self { model, scene, parts, units, held, faults, .. } = self;
-        short.whole = Some(Box::new(Self::of(model, scene, parts, units, held, 1, faults)));
-        short
+        short.whole = Some(Box::new(self));
+        (short.diagnosed(seed), short.whole)
     }
 
     /// From the baseline to the verdict.

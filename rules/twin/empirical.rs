@@ -1,7 +1,8 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
-//! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed or something that
-//! fades through each pass; by itself, in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no candidate explains".
+//! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed or something
+//! that fades through each pass; by itself, in the cut only, or in proportion to the removal rate. It is the yardstick
+//! for "something real remains that no candidate explains".
 
 use super::designs::Design;
 use super::frame::Frame;
@@ -47,6 +48,10 @@ pub struct Empirical {
     pub factor: Factor,
 }
 
+/// Places at which a peak is tried, before neighbours are joined.
+const PEAKS: usize = 12;
+/// Sampling periods below which what fades is an edge.
+const FADING_PERIODS: f64 = 4.0;
 /// Seconds since the first row of the run.
 const TIME_IN_RUN: &str = "time_in_run_s";
 /// Seconds since the tool went into the cut; zero outside it.
@@ -276,11 +281,6 @@ fn fading(scene: &Scene) -> Vec<Empirical> {
     let times = [3.0, 6.0, 12.0, 24.0].into_iter().filter(told);
     times.flat_map(|over_s| [Factor::InTheCut, Factor::WithTheCut].map(|factor| one(over_s, factor))).collect()
 }
-
-/// Places at which a peak is tried, before neighbours are joined.
-const PEAKS: usize = 12;
-/// Sampling periods below which what fades is an edge.
-const FADING_PERIODS: f64 = 4.0;
 
 fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
     let columns = form.columns(scene)?;

@@ -2,12 +2,10 @@
 //! lies between them in coarse rows that only carry states on; and where they show nothing, means over all of it. The
 //! answer is then told over every row.
 
-use super::frame::Unit;
-use crate::physics::{Block, Role, Scene};
+use super::frame::{ROWS_MAX, Unit};
+use crate::physics::{Block, PAUSE_PERIODS, Role, Scene};
 use std::ops::Range;
 
-/// Rows beyond which only pieces are fitted.
-const ROWS_MAX: usize = 14_000;
 /// Rows of all pieces together, about.
 const FITTED_ROWS: usize = 8_000;
 /// Rows of a piece, about.
@@ -18,55 +16,51 @@ const LEAD_ROWS: usize = 20;
 const COARSE_ROWS: usize = 8_000;
 /// Time within which neighbouring rows of a fast recording may be averaged instead: no law here is faster.
 const AVERAGED_S: f64 = 0.02;
-/// Periods between two rows that are a pause.
-const PAUSE_PERIODS: f64 = 10.0;
 /// Relative change of a pace within a mean that is still compared.
 const STEADY: f64 = 0.02;
 /// What a coarse row must not mix.
 const WORDS: [&str; 6] = ["pass", "part", "tool", "lot", "operation", "program"];
 
-/// The two ways to look at a long recording; `None` for one that is short, or so fast that averaging does no harm.
-pub(super) fn ways(scene: &Scene, units: &[Unit]) -> Option<[Vec<Block>; 2]> {
-    let rows = scene.rows();
-    let averaged_s = (rows as f64) / (ROWS_MAX as f64) * scene.period_s();
-    if rows <= ROWS_MAX || averaged_s <= AVERAGED_S {
-        return None;
-    }
-    let edges = edges(scene, units);
-    Some([close(scene, units, &edges), from_afar(scene, &edges)])
+/// Is the recording longer than can be fitted row by row, and not so fast that averaging does no harm?
+pub(super) fn is_long(scene: &Scene) -> bool {
+    let averaged_s = (scene.rows() as f64) / (ROWS_MAX as f64) * scene.period_s();
+    scene.rows() > ROWS_MAX && averaged_s > AVERAGED_S
 }
 
 /// Pieces at full rate, for whatever acts from row to row.
-fn close(scene: &Scene, units: &[Unit], edges: &[bool]) -> Vec<Block> {
-    let fine = fine_rows(scene, units);
-    let longest = scene.rows().div_ceil(COARSE_ROWS);
+pub(super) fn close(scene: &Scene, units: &[Unit]) -> Vec<Block> {
+    let (fine, edges) = (fine_rows(scene, units), edges(scene, units));
     let coarse = |row: usize| fine[row] == Resolution::Coarse && fine[row - 1] == Resolution::Coarse;
-    let mut blocks = joined(scene.rows(), longest, |row| coarse(row) && !edges[row]);
+    let mut blocks = joined(scene.rows(), |row| coarse(row) && !edges[row]);
     blocks.iter_mut().for_each(|block| block.compared = fine[block.rows.start] == Resolution::Fitted);
     blocks
 }
 
 /// Means over all of it, for what is slow and so small that every row is needed. Means in which the machine changes its
 /// pace are not compared: a law of means is no mean of a law.
-fn from_afar(scene: &Scene, edges: &[bool]) -> Vec<Block> {
-    let longest = scene.rows().div_ceil(COARSE_ROWS);
-    let paces: Vec<&[f64]> = [scene.role(Role::Speed), scene.column("feed_mm_min"), scene.role(Role::Engaged)]
-        .into_iter()
-        .flatten()
-        .collect();
+pub(super) fn from_afar(scene: &Scene, units: &[Unit]) -> Vec<Block> {
+    let edges = edges(scene, units);
+    let paces = [scene.role(Role::Speed), scene.column("feed_mm_min"), scene.role(Role::Engaged)];
+    let paces: Vec<&[f64]> = paces.into_iter().flatten().collect();
     let steady = |rows: &Range<usize>| {
         let first = rows.start;
         paces.iter().all(|pace| rows.clone().all(|row| (pace[row] - pace[first]).abs() <= STEADY * pace[first].abs()))
     };
-    let mut blocks = joined(scene.rows(), longest, |row| !edges[row]);
+    let mut blocks = joined(scene.rows(), |row| !edges[row]);
     for block in &mut blocks {
-        block.compared = 2 * block.rows.len() > longest && steady(&block.rows);
+        block.compared = 2 * block.rows.len() > longest(scene.rows()) && steady(&block.rows);
     }
     blocks
 }
 
-/// Blocks of at most `longest` rows; a row begins a new one where it must not `join` the row before.
-fn joined(rows: usize, longest: usize, join: impl Fn(usize) -> bool) -> Vec<Block> {
+/// Rows of a coarse row at most.
+fn longest(rows: usize) -> usize {
+    rows.div_ceil(COARSE_ROWS)
+}
+
+/// Blocks of at most the longest coarse row; a row begins a new one where it must not `join` the row before.
+fn joined(rows: usize, join: impl Fn(usize) -> bool) -> Vec<Block> {
+    let longest = longest(rows);
     let mut blocks: Vec<Block> = Vec::new();
     for row in 0..rows {
         match blocks.last_mut() {
@@ -171,7 +165,8 @@ mod tests {
     #[test]
     fn both_ways_cover_every_row_once_and_mix_no_pass() {
         let scene = scene();
-        for blocks in ways(&scene, &units(&scene)).expect("a long recording") {
+        assert!(is_long(&scene));
+        for blocks in [close(&scene, &units(&scene)), from_afar(&scene, &units(&scene))] {
             let mut next = 0;
             for block in &blocks {
                 assert_eq!(block.rows.start, next);
@@ -186,7 +181,7 @@ mod tests {
     #[test]
     fn pieces_are_spread_over_the_whole_length() {
         let scene = scene();
-        let [close, afar] = ways(&scene, &units(&scene)).expect("a long recording");
+        let (close, afar) = (close(&scene, &units(&scene)), from_afar(&scene, &units(&scene)));
         let compared = |blocks: &[Block], from: usize| {
             blocks.iter().filter(|block| block.compared && (from..from + 10_000).contains(&block.rows.start)).count()
         };

@@ -4,19 +4,19 @@
 //! rate, so that edges keep their shape.
 
 use super::levels::Levels;
-use super::noise::{Arma, count, log_likelihood, whiten};
+use super::noise::{Arma, log_likelihood, whiten};
 use super::quality::median;
-use crate::physics::Scene;
+use crate::physics::{Scene, mean};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// Groups beyond which neighbouring rows are averaged.
-const GROUPS_MAX: usize = 14_000;
+/// Rows that are fitted one by one; beyond, neighbours are averaged or an excerpt is fitted.
+pub(super) const ROWS_MAX: usize = 14_000;
 
 /// Rows to a group where all of them are fitted.
 #[must_use]
 pub fn group_size(scene: &Scene) -> usize {
-    scene.rows().div_ceil(GROUPS_MAX).max(1)
+    scene.rows().div_ceil(ROWS_MAX).max(1)
 }
 
 /// A stretch of rows that is held out, or not, as a whole.
@@ -192,14 +192,7 @@ impl Frame {
     /// The mean of a full-rate column over each group.
     #[must_use]
     pub fn reduce(&self, column: &[f64]) -> Vec<f64> {
-        let mean = |rows: &Range<usize>| {
-            if rows.len() == 1 {
-                column[rows.start]
-            } else {
-                column[rows.clone()].iter().sum::<f64>() / count(rows.len())
-            }
-        };
-        self.groups.iter().map(mean).collect()
+        self.groups.iter().map(|rows| mean(&column[rows.clone()])).collect()
     }
 
     /// The other way: each group's value in all of its rows, zero in rows that take no part.

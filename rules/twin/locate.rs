@@ -1,6 +1,5 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
-use super::frame::Unit;
 use super::noise::count;
 use crate::physics::{Role, Scene};
 
@@ -268,10 +267,4 @@ pub fn holds(scene: &Scene, condition: &Condition) -> Vec<bool> {
             None => vec![false; scene.rows()],
         },
     }
-}
-
-/// The unit in which a row lies.
-#[must_use]
-pub fn unit_of(units: &[Unit], row: usize) -> Option<&Unit> {
-    units.iter().find(|unit| unit.rows.contains(&row))
 }

@@ -1,6 +1,7 @@
 //! Faults of a recording that do not bias the comparison: they are noted, and their rows are left out.
 
 use crate::physics::Scene;
+pub use crate::physics::median;
 
 /// One kind of fault found in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -129,14 +130,4 @@ fn quantised(scene: &Scene) -> usize {
     values.sort_by(f64::total_cmp);
     values.dedup();
     if rows > 200 && values.len() * 20 < rows { rows } else { 0 }
-}
-
-/// The median of finite values.
-#[must_use]
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -1,6 +1,6 @@
 //! The verdict: names, intervals, alternatives, regions, the next experiment, and the sentence for the machinist.
 
-use super::diagnose::{Case, Outcome, ordinary_noise};
+use super::diagnose::{Case, Outcome};
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
 use super::fit::Fit;
 use super::locate::{Region, region};
@@ -210,7 +210,7 @@ fn absorbed(case: &Case<'_>, outcome: &Outcome, part: &Part) -> f64 {
 fn alternatives(outcome: &Outcome) -> Vec<Alternative> {
     let best = &outcome.found.best;
     let kind = |member: &usize| outcome.designs[*member].kind.as_str();
-    let mut kinds: Vec<&str> = best.members.iter().map(kind).collect();
+    let kinds: Vec<&str> = best.members.iter().map(kind).collect();
     if outcome.unknown.is_some() {
         return kinds.iter().map(|name| alternative(name, "unknown", 0.0)).collect();
     }
@@ -229,7 +229,6 @@ fn alternatives(outcome: &Outcome) -> Vec<Alternative> {
             all.push(alternative(new, gone, delta.max(0.0)));
         }
     }
-    kinds.clear();
     all
 }
 
@@ -281,12 +280,6 @@ fn shifts(case: &Case<'_>, outcome: &Outcome) -> Vec<Shift> {
 /// The model with what was found, refitted.
 fn extended(case: &Case<'_>, fit: &Fit) -> Model {
     Model { parts: fit.parts.clone(), ..case.model.clone() }
-}
-
-/// The noise floor of a fit.
-#[must_use]
-pub fn noise_floor(fit: &Fit) -> f64 {
-    ordinary_noise(fit)
 }
 
 /// The leading hypotheses with their information.

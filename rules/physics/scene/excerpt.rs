@@ -4,6 +4,7 @@
 //! an excerpt differs from it only in how finely time is resolved.
 
 use super::Scene;
+use crate::physics::excitation::{mean, median};
 use std::ops::Range;
 
 /// Neighbouring rows of the whole that are one row of the excerpt.
@@ -61,13 +62,8 @@ impl Scene {
     /// Median time from one compared block to the next.
     fn period_between(&self, blocks: &[Block]) -> f64 {
         let compared = blocks.windows(2).filter(|pair| pair[0].compared && pair[1].compared);
-        let mut steps: Vec<f64> =
-            compared.map(|pair| self.clock_s[pair[1].rows.start] - self.clock_s[pair[0].rows.start]).collect();
-        if steps.is_empty() {
-            return self.period_s;
-        }
-        let middle = steps.len() / 2;
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+        let steps = compared.map(|pair| self.clock_s[pair[1].rows.start] - self.clock_s[pair[0].rows.start]);
+        median(steps.collect()).unwrap_or(self.period_s)
     }
 
     /// For each block, how long the rows since the block before drove a state.
@@ -76,10 +72,6 @@ impl Scene {
             |pair: &[Block]| (pair[0].rows.start + 1..=pair[1].rows.start).map(|row| self.driven_s(row)).sum();
         std::iter::once(0.0).chain(blocks.windows(2).map(between)).collect()
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    if values.len() == 1 { values[0] } else { values.iter().sum::<f64>() / (values.len() as f64) }
 }
 
 /// The blocks that begin within these rows.
