@@ -7,4 +7,5 @@ pub mod estimators;
 pub mod operations;
 pub mod physics;
 pub mod script;
+mod statistics;
 pub mod twin;

@@ -55,7 +55,7 @@ struct Edge {
 /// See the [module](self).
 pub struct Wear {
     machine: String,
-    library: Library,
+    model_library: Library,
     channels: Channels,
     /// Tool, material and operation of the cut, and the model for them.
     texts: [Option<Arc<str>>; 3],
@@ -77,7 +77,7 @@ impl Wear {
         let (library, told) = Library::watch(&config.history.path);
         Self {
             machine: config.gateway.name.clone(),
-            library,
+            model_library: library,
             channels: Channels {
                 diameter: of("diameter_mm"),
                 speed: of("spindle_speed_rpm"),
@@ -100,11 +100,11 @@ impl Wear {
         if let Some(notice) = self.told.take() {
             health.event(sample.at_ns, SOURCE, &notice);
         }
-        let fresh = self.library.take();
-        if let Some(problem) = self.library.problem() {
+        let fresh = self.model_library.take();
+        if let Some(problem) = self.model_library.problem() {
             health.event(sample.at_ns, SOURCE, &problem);
         }
-        if self.library.is_empty() {
+        if self.model_library.is_empty() {
             return;
         }
         self.follow(sample, fresh);
@@ -132,7 +132,7 @@ impl Wear {
         self.texts = now.map(|text| text.map(Arc::from));
         let text = |at: usize| now[at].unwrap_or_default().to_owned();
         let cut = Key { machine: self.machine.clone(), tool: text(0), work_material: text(1), operation: text(2) };
-        let model = self.library.best(&cut);
+        let model = self.model_library.best(&cut);
         if model != self.model {
             (self.model, self.last) = (model, None);
         }

@@ -5,6 +5,7 @@
 //! One pulse in the window is removed exactly, two leak. The sums are formed anew every time: a running sum would drift.
 //! Values that are missing must not be pushed; the delay is that of a plain mean, (N - 1)/2 samples.
 
+use crate::statistics::count;
 use serde::{Deserialize, Serialize};
 
 /// The last N values and their anti-pulse mean.
@@ -67,11 +68,6 @@ fn trimmed_mean(values: &[f64]) -> f64 {
         greatest = greatest.max(*value);
     }
     (sum - least - greatest) / count(values.len() - 2)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "lengths are at most a few hundred")]
-pub(super) fn count(n: usize) -> f64 {
-    n as f64
 }
 
 #[cfg(test)]

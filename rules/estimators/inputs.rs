@@ -81,7 +81,7 @@ fn stage(number: Input) -> Result<usize, Absence> {
         Err(Absence::NotProvided) => Ok(0),
         Err(absence) => Err(absence),
         Ok(number) => {
-            (0..STAGES).find(|stage| (number - super::filter::count(*stage)).abs() < 0.5).ok_or(Absence::OutOfRange)
+            (0..STAGES).find(|stage| (number - crate::statistics::count(*stage)).abs() < 0.5).ok_or(Absence::OutOfRange)
         }
     }
 }

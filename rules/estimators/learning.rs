@@ -10,11 +10,11 @@
 
 use super::bound::{self, Normal};
 use super::estimate::NoLoadOrigin;
-use super::filter::count;
 use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::Noise;
 use super::settings::Settings;
 use super::signals::{length, seconds};
+use crate::statistics::count;
 use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

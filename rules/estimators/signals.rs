@@ -1,10 +1,11 @@
 //! The recent past of the inputs: filtered power, steadiness of the speed, feed with its debounce.
 
-use super::filter::{AntiPulse, count};
+use super::filter::AntiPulse;
 use super::inputs::Inputs;
 use super::noise::Noise;
 use super::settings::Settings;
 use super::window::{Means, Window};
+use crate::statistics::count;
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
 

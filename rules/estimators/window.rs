@@ -4,8 +4,8 @@
 //! kept: (1) `(max - min) / mean <= c1`, (2) `max |g - mean| / mean <= c1`. One window alone passes while a slow
 //! start-up still decays (bias up to 83 % at tau = 2 s), hence the second one and the slope between them.
 
-use super::filter::count;
 use super::settings::Settings;
+use crate::statistics::count;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -13,30 +13,6 @@ pub(crate) fn varies(values: &[f64]) -> bool {
     spread(values) > 1e-3 * greatest(values)
 }
 
-/// The median of finite values, the upper of two; `None` for none.
-#[must_use]
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
-/// The mean of at least one value.
-#[must_use]
-pub fn mean(values: &[f64]) -> f64 {
-    if values.len() == 1 { values[0] } else { values.iter().sum::<f64>() / (values.len() as f64) }
-}
-
-/// The value below which this share of the values lies.
-pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    values.get(((last as f64) * share).round() as usize).copied()
-}
-
 /// Separate stretches of rows in which `holds`; a new run starts a new stretch.
 pub(crate) fn visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
     scene

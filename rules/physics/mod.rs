@@ -15,7 +15,6 @@ mod tool_load;
 mod unit;
 
 pub use catalogue::{CATALOGUE, effect};
-pub use excitation::{mean, median};
 pub use scene::{Block, LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError, blocks_of};
 pub use unit::{unit_in, unit_of_quantity};
 

@@ -5,7 +5,7 @@ use super::fit::{Fit, UNITS_MIN};
 use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
 use super::model::{Body, Part};
-use super::noise::count;
+use crate::statistics::count;
 
 /// Deviation of the runs' own coefficients, as a share of the common one, beyond which they do not share it. Effects
 /// that are there, in other forms than the catalogue's, stay below 0.4 (`tests/concealed`).

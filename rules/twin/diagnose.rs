@@ -8,13 +8,14 @@ use super::fit::{Data, Fit, fit};
 use super::frame::{Frame, Unit, group_size, held_out, units};
 use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
-use super::noise::{Arma, count};
-use super::quality::{Fault, clean, median};
+use super::noise::Arma;
+use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
 use super::unknown::Unknown;
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
+use crate::statistics::{count, median};
 use adapters::Recording;
 use std::collections::BTreeSet;
 

@@ -232,7 +232,7 @@ fn form(scene: &Scene, frame: &Frame, channel: &str, factor: Factor) -> Option<E
     inside.sort_by(f64::total_cmp);
     let at = |share: f64| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-        let index = (share * super::noise::count(inside.len().saturating_sub(1))) as usize;
+        let index = (share * crate::statistics::count(inside.len().saturating_sub(1))) as usize;
         inside.get(index).copied()
     };
     let (low, high) = (at(0.0)?, at(1.0)?);

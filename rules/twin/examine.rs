@@ -4,10 +4,9 @@
 use super::bind::bind;
 use super::inputs::columns;
 use super::model::{Model, Part, simulate};
-use super::noise::count;
-use super::quality::median;
 use super::verdicts::unit_of;
 use crate::physics::Scene;
+use crate::statistics::{count, median};
 use adapters::Recording;
 use adapters::channel::ChannelId;
 use adapters::recording::Numbers;

@@ -3,8 +3,9 @@
 use super::frame::Frame;
 use super::linear::{Solution, dot, least_squares};
 use super::model::{Part, simulate};
-use super::noise::{Arma, count};
+use super::noise::Arma;
 use crate::physics::{Entry, Scene};
+use crate::statistics::{count, rms};
 
 /// Gauss-Newton steps at most, per noise model.
 const STEPS_MAX: usize = 8;
@@ -239,10 +240,6 @@ impl State {
         }
         parts
     }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (dot(values, values) / count(values.len().max(1))).sqrt()
 }
 
 /// Recorded minus simulated, per group.

@@ -5,8 +5,8 @@
 
 use super::levels::Levels;
 use super::noise::{Arma, log_likelihood, whiten};
-use super::quality::median;
-use crate::physics::{Scene, mean};
+use crate::physics::Scene;
+use crate::statistics::{mean, median};
 use std::collections::BTreeSet;
 use std::ops::Range;
 

@@ -6,8 +6,8 @@
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, project_out};
-use super::noise::count;
 use super::scan::{Bank, Stage, price};
+use crate::statistics::count;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 

@@ -6,11 +6,10 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::latent::{self, Switching};
 use super::model::simulate;
-use super::noise::count;
-use super::quality::median;
 use super::ripple;
 use super::wave::{self, Wave};
 use crate::physics::{Form, OutputKind, Role};
+use crate::statistics::{count, median};
 use std::ops::Range;
 
 /// Rows of a spell in the cut from which a frequency can be read.

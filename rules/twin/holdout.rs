@@ -3,8 +3,9 @@
 
 use super::frame::{Frame, Unit};
 use super::model::{Body, Part, simulate};
-use super::noise::{Arma, count};
+use super::noise::Arma;
 use crate::physics::Scene;
+use crate::statistics::count;
 use std::collections::BTreeSet;
 
 /// What a set of parts says about every row, and what each of its effects adds.

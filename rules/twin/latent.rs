@@ -3,8 +3,7 @@
 //! The most likely sequence of two levels (Viterbi) with a price per switching; levels and sequence are found in turn.
 //! A drift is no switch: both levels must be far apart for their scatter, and it must have switched often enough.
 
-use super::noise::count;
-use super::quality::median;
+use crate::statistics::{count, median};
 use std::ops::Range;
 
 /// Switchings that must be seen, counted over all runs.

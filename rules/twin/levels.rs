@@ -8,9 +8,9 @@
 
 use super::frame::Frame;
 use super::linear::{dot, subtract};
-use super::noise::{Arma, count, fit_near};
-use super::quality::median;
+use super::noise::{Arma, fit_near};
 use crate::physics::Scene;
+use crate::statistics::{count, median};
 use std::ops::Range;
 
 /// Passes below which scatter between them cannot be told from an effect.

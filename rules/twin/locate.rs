@@ -1,7 +1,7 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
-use super::noise::count;
 use crate::physics::{Role, Scene};
+use crate::statistics::count;
 
 /// Share of the greatest contribution above which a row counts as affected.
 const ACTIVE_SHARE: f64 = 0.1;

@@ -5,6 +5,7 @@
 
 use super::frame::Frame;
 use super::linear::dot;
+use crate::statistics::count;
 use std::ops::Range;
 
 /// Parameters of the noise.
@@ -85,14 +86,6 @@ pub fn whiten(column: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f6
 pub fn log_likelihood(rss: f64, rows: usize, stretches: usize, noise: Arma) -> f64 {
     let rows_f = count(rows);
     -0.5 * rows_f * (rss / rows_f).max(f64::MIN_POSITIVE).ln() + count(stretches) * noise.first_weight().ln()
-}
-
-/// A count as a number.
-#[must_use]
-pub fn count(n: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "counts of rows stay far below 2^52")]
-    let n = n as f64;
-    n
 }
 
 /// The noise of residuals by maximum likelihood: best of the grid, then refined by a pattern search.

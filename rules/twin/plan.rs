@@ -5,9 +5,9 @@
 
 use super::diagnosis::Diagnosis;
 use super::experiments::moves;
-use super::quality::median;
 use crate::physics::explain::Language;
 use crate::physics::{Role, Scene, effect};
+use crate::statistics::median;
 use adapters::Recording;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! Faults of a recording that do not bias the comparison: they are noted, and their rows are left out.
 
 use crate::physics::Scene;
-pub use crate::physics::median;
+use crate::statistics::median;
 
 /// One kind of fault found in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]

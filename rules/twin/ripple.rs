@@ -4,8 +4,9 @@
 //! A line of the spectrum gives the start; frequency, memory, size and noise are those that make the residual likeliest
 //! (`wave`). Whether it is the mains is judged by whether the frequency stays while feed and speed change.
 
-use super::noise::{Arma, PHI_MAX, count, whiten};
+use super::noise::{Arma, PHI_MAX, whiten};
 use super::wave::{Wave, likelihood, smoothed, variance};
+use crate::statistics::count;
 use std::f64::consts::TAU;
 use std::ops::Range;
 

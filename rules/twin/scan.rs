@@ -8,7 +8,8 @@ use super::designs::Design;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
-use super::noise::{Arma, count};
+use super::noise::Arma;
+use crate::statistics::count;
 use std::cell::OnceCell;
 
 /// Share of a column's length that must lie outside what the fit can absorb: below it the hypothesis leaves no trace.

@@ -4,9 +4,9 @@ use super::designs::excludes;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::noise::count;
 use super::scan::{Bank, Score, price};
 use crate::physics::{OutputKind, Scene};
+use crate::statistics::count;
 
 /// Effects that may be found at once.
 const EFFECTS_MAX: usize = 4;

@@ -3,8 +3,8 @@
 use super::agreement::differs_by_run;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::Fit;
-use super::noise::count;
 use super::search::{Found, Hypothesis};
+use crate::statistics::count;
 
 /// Size, in deviations of the ordinary noise, below which an effect is not claimed.
 const SIZE_DEVIATIONS: f64 = 0.3;

@@ -5,9 +5,9 @@ use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Ro
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
-use super::noise::count;
 use super::ripple::Ripple;
 use crate::physics::{effect, unit_in};
+use crate::statistics::count;
 
 /// Information within which two explanations cannot be told apart.
 const CLASS_INFORMATION: f64 = 6.0;

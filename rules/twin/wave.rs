@@ -3,7 +3,8 @@
 //! beside ARMA(1,1) noise. The Kalman filter gives the likelihood and foretells the next row; its smoother reads the wave.
 
 use super::linear::dot;
-use super::noise::{Arma, count};
+use super::noise::Arma;
+use crate::statistics::count;
 use std::f64::consts::TAU;
 use std::ops::Range;
 

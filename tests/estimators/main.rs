@@ -14,3 +14,5 @@ mod score;
 mod scoring;
 mod simulated;
 mod transitions;
+#[path = "../support/weights.rs"]
+mod weights;

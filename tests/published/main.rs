@@ -6,6 +6,8 @@ mod current;
 mod power;
 mod thermal;
 mod wear;
+#[path = "../support/weights.rs"]
+mod weights;
 
 /// One line of the table.
 pub(crate) struct Row {

@@ -34,7 +34,7 @@ pub(super) struct ToolWearArguments {
     #[command(flatten)]
     design: design::DesignArguments,
     #[command(flatten)]
-    library: library::LibraryArguments,
+    model_library: library::LibraryArguments,
 }
 
 /// Where the numbers stand.
@@ -98,8 +98,8 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     if arguments.design.wanted() {
         return design::run(arguments);
     }
-    if arguments.library.list {
-        return library::list(&arguments.library, arguments.json);
+    if arguments.model_library.list {
+        return library::list(&arguments.model_library, arguments.json);
     }
     let recording = arguments.reading().read()?;
     let recording = match &arguments.table.operations {
@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     };
     let learned = match learn(arguments, &recording) {
         Ok((mut learned, record)) => {
-            learned.text += &library::store(&arguments.library, &record)?.unwrap_or_default();
+            learned.text += &library::store(&arguments.model_library, &record)?.unwrap_or_default();
             Ok(learned)
         }
         Err(refusal) => Err(refusal),
@@ -120,7 +120,7 @@ fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(Learne
     let gathered = gather(recording, &arguments.table.columns())?;
     let learned = identify_tool_wear(gathered.cuts, &arguments.fit.options())?;
     let origin = (arguments.recording.join(", "), learned.cuts.len(), learned.r2);
-    let record = WearRecord::new(arguments.library.key(), learned.criterion_mm, origin, learned.model.clone());
+    let record = WearRecord::new(arguments.model_library.key(), learned.criterion_mm, origin, learned.model.clone());
     let file = record.to_toml().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
     let text = format!("{} rows used, {} left out; {learned}", gathered.rows, gathered.left_out);
     let mut json = learned.json();

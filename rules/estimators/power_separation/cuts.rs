@@ -4,8 +4,8 @@ use super::reference::Referenced;
 use super::rows::Row;
 use super::stretches::{SAME_SPEED, Stretch, settled_from};
 use crate::estimators::State;
-use crate::estimators::filter::count;
 use crate::estimators::regression::{Level, level, without_pulses};
+use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
 

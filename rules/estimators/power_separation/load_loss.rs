@@ -7,10 +7,10 @@ use super::reference::{Reference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
 use crate::estimators::STAGES;
-use crate::estimators::filter::count;
 use crate::estimators::regression::{
     CONFIDENCE, Column, FTest, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile,
 };
+use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
 

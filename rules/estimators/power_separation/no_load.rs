@@ -2,11 +2,11 @@
 
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, Stretch, stretches};
-use crate::estimators::filter::count;
 use crate::estimators::regression::{
     CONFIDENCE, Coefficient, Column, Intercept, Refusal, RefusalKind, fit, t_quantile,
 };
 use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
+use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
 

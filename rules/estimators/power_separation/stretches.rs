@@ -2,8 +2,8 @@
 
 use super::rows::Row;
 use crate::estimators::State;
-use crate::estimators::filter::count;
 use crate::estimators::regression::{Level, level, without_pulses};
+use crate::statistics::{count, mean};
 use serde::Serialize;
 
 /// Speeds closer than this share are one speed.
@@ -100,11 +100,8 @@ pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> us
     let block = time_s.len() / 12;
     let mut from = 0;
     while block >= 2 && from + block <= time_s.len() / 2 {
-        let (Some(head), Some(rest)) =
-            (mean(&power_w[from..from + block]), level(&time_s[from + block..], &power_w[from + block..]))
-        else {
-            break;
-        };
+        let head = mean(&power_w[from..from + block]);
+        let Some(rest) = level(&time_s[from + block..], &power_w[from + block..]) else { break };
         let samples = count(block).min(rest.independent);
         // The rest may drift; the head is compared with where the drift began.
         let begun = rest.mean - 0.5 * rest.slope_per_s * (time_s[time_s.len() - 1] - time_s[from]);
@@ -114,8 +111,4 @@ pub(in crate::estimators) fn settled_from(time_s: &[f64], power_w: &[f64]) -> us
         from += block;
     }
     from
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / count(values.len()))
 }

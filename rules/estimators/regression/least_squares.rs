@@ -8,6 +8,7 @@ use super::CONFIDENCE;
 use super::distributions::{t_quantile, t_two_sided};
 use super::orthogonal::{Factored, back_substitute, factor, inverse, product, singular_values};
 use super::refusal::{Refusal, RefusalKind};
+use crate::statistics::count;
 use serde::Serialize;
 
 /// Least to greatest singular value of the scaled columns below which they count as dependent.
@@ -235,7 +236,7 @@ struct Work<'a> {
 impl Work<'_> {
     fn regression(self) -> Regression {
         let rows = self.y.len();
-        let count = self.design.len();
+        let columns = self.design.len();
         let along: Vec<f64> = self.factored.q.iter().map(|q| product(q, &self.y)).collect();
         let scaled = back_substitute(&self.factored.r, &along);
         let values: Vec<f64> = scaled.iter().zip(&self.factored.lengths).map(|(x, length)| x / length).collect();
@@ -246,9 +247,9 @@ impl Work<'_> {
         let inverse = self.inverse();
         let rss = product(&residuals, &residuals);
         let total = self.total();
-        let degrees_of_freedom = number(rows - count);
+        let degrees_of_freedom = count(rows - columns);
         let residual_sd = (rss / degrees_of_freedom).sqrt();
-        let spare = number(rows - usize::from(self.intercept == Intercept::Fitted));
+        let spare = count(rows - usize::from(self.intercept == Intercept::Fitted));
         let share = |lost: f64| if total > 0.0 { 1.0 - lost / total } else { 0.0 };
         Regression {
             coefficients: self.coefficients(&values, &inverse, residual_sd, degrees_of_freedom),
@@ -327,11 +328,6 @@ fn press(residuals: &[f64], leverage: &[f64]) -> Option<f64> {
         (rest > 1e-9).then(|| (residual / rest).powi(2))
     });
     left_out.sum()
-}
-
-#[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-pub(super) fn number(count: usize) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]

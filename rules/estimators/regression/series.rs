@@ -3,8 +3,8 @@
 //! The number of independent samples follows from the integrated autocorrelation time, summed while the sums of pairs are
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
-use super::least_squares::number;
 use super::orthogonal::product;
+use crate::statistics::{count, median};
 use serde::Serialize;
 
 /// What a trend leaves of slow noise is corrected by no more than the inverse of this.
@@ -39,7 +39,7 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
     if n < 4 || time_s.len() != n || !increasing || values.iter().chain(time_s).any(|value| !value.is_finite()) {
         return None;
     }
-    let count = number(n);
+    let count = count(n);
     let mean = values.iter().sum::<f64>() / count;
     let middle_s = time_s.iter().sum::<f64>() / count;
     let about: Vec<f64> = time_s.iter().map(|time_s| time_s - middle_s).collect();
@@ -64,15 +64,10 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
 /// mean by more than all noise together. Far is six standard deviations, as the median deviation tells them.
 #[must_use]
 pub fn without_pulses(time_s: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let middle = median(values.to_vec());
-    let sd = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect());
+    let middle = median(values.to_vec()).unwrap_or(0.0);
+    let sd = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect()).unwrap_or(0.0);
     let near = |(_, value): &(&f64, &f64)| sd <= 0.0 || (*value - middle).abs() <= PULSE_SD * sd;
     time_s.iter().zip(values).filter(near).map(|(time_s, value)| (*time_s, *value)).unzip()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// By how much the memory of the noise multiplies the variance of a mean; 1 for independent samples, never less. The
@@ -97,7 +92,7 @@ pub fn integrated_autocorrelation(residuals: &[f64]) -> f64 {
         last = pair;
         lags = lag + 1;
     }
-    let taken = 2.0 * number(2 * lags + 1) / number(residuals.len());
+    let taken = 2.0 * count(2 * lags + 1) / count(residuals.len());
     (sum / (1.0 - taken).max(LEFT_MIN)).max(1.0)
 }
 

@@ -149,7 +149,7 @@ impl PhaseFeature {
     /// Rectangles of one sample each; the last one is split between this window and the next.
     fn known(&mut self, sample_a: f64, hz: f64) -> Option<Feature> {
         let one = Sums { samples: 1.0, absolute: sample_a.abs(), square: sample_a * sample_a };
-        let length = super::super::filter::count(self.halves) * 0.5 * self.rate_hz / hz;
+        let length = crate::statistics::count(self.halves) * 0.5 * self.rate_hz / hz;
         let rest = length - self.window.samples;
         if rest > 1.0 {
             self.window.add(one);
@@ -171,7 +171,7 @@ impl PhaseFeature {
             FeatureKind::Rms => (square / samples).sqrt(),
             FeatureKind::AbsoluteIntegral => absolute / self.rate_hz,
         };
-        Feature { value, window_s, frequency_hz: super::super::filter::count(self.halves) / (2.0 * window_s) }
+        Feature { value, window_s, frequency_hz: crate::statistics::count(self.halves) / (2.0 * window_s) }
     }
 }
 

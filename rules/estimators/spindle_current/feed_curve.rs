@@ -6,10 +6,10 @@
 use super::cubic::Cubic;
 use super::family::{CurveAtDepth, Family};
 use super::plateaus::{Plateau, SAME, plateaus};
-use crate::estimators::filter::count;
 use crate::estimators::regression::{
     Coefficient, Column, FTest, Intercept, Refusal, RefusalKind, Regression, f_upper_tail, fit_weighted,
 };
+use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
 

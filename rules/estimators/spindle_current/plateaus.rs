@@ -1,8 +1,8 @@
 //! Stretches of constant speed, depth and feed in a recording, and the level of the feature in each.
 
-use crate::estimators::filter::count;
 use crate::estimators::power_separation::settled_from;
 use crate::estimators::regression::{Level, Plausible, Refusal, RefusalKind, level, without_pulses};
+use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
 

@@ -30,7 +30,7 @@ impl FeedCurves {
             );
         }
         let levels = self.plateaus.iter().map(|plateau| plateau.level.mean);
-        let wanted = levels.clone().sum::<f64>() / super::super::filter::count(levels.count().max(1));
+        let wanted = levels.clone().sum::<f64>() / crate::statistics::count(levels.count().max(1));
         let (feed, feature) = (&self.feed, &self.feature);
         Some(format!(
             "// Constant load by {feature}: curves over {feed}, identified from recordings. 由主轴电流的恒负荷进给\n\

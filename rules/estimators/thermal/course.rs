@@ -2,6 +2,7 @@
 
 use super::quantities::{self, Series};
 use crate::estimators::regression::{Column, Refusal, RefusalKind};
+use crate::statistics::mean;
 use std::ops::Range;
 
 /// A named temperature, one value per row, °C.
@@ -180,10 +181,6 @@ impl Course {
         let columns = columns.iter().map(|c| Column::new(c.name.as_str(), averaged(&c.values))).collect();
         (course, columns)
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 impl Sensor {

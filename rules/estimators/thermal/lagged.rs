@@ -12,8 +12,9 @@ use super::course::Course;
 use super::cross_validation::{HeldOut, outside, squares, trained};
 use super::law::{Path, first_order};
 use super::quantities::THERMAL_ERROR;
-use super::regression::{Design, ROWS_MAX, Tau, ThermalFit, column, finish, rms};
+use super::regression::{Design, ROWS_MAX, Tau, ThermalFit, column, finish};
 use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
+use crate::statistics::rms;
 use std::ops::Range;
 
 /// Which terms are late.

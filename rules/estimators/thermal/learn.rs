@@ -199,7 +199,7 @@ fn hysteresis_um(course: &Course, sensors: &[usize], residuals_um: &[f64]) -> Op
     let values = &course.sensors()[*sensors.first()?].values;
     let behind = late(course, values, (20.0 * course.period_s()).min(0.1 * course.longest_s()));
     let ahead: Vec<f64> = values.iter().zip(&behind).map(|(value, state)| value - state).collect();
-    let threshold = 0.3 * super::regression::rms(&ahead);
+    let threshold = 0.3 * crate::statistics::rms(&ahead);
     let mean = |sign: f64| {
         let rows = residuals_um.iter().zip(&ahead).filter(|(_, ahead)| sign * **ahead > threshold);
         let chosen: Vec<f64> = rows.map(|(residual, _)| *residual).collect();

@@ -10,6 +10,7 @@ use super::quantities::{self, THERMAL_ERROR};
 use crate::estimators::regression::{
     Coefficient, Column, Intercept, Refusal, Regression, fit, t_quantile, t_two_sided,
 };
+use crate::statistics::rms;
 use serde::Serialize;
 
 /// Rows that a regression under memory works on; more are averaged first.
@@ -157,10 +158,6 @@ pub(super) fn finish(design: &Design<'_>) -> Result<ThermalFit, Refusal> {
         residuals_um,
         likelihood: averaged.likelihood,
     })
-}
-
-pub(super) fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 fn coefficients(design: &Design<'_>, plain: &Regression, averaged: &Averaged) -> Vec<ThermalCoefficient> {

@@ -4,6 +4,7 @@
 
 use super::conditions::Cut;
 use crate::estimators::regression::{Regression, f_upper_tail};
+use crate::statistics::count;
 use serde::Serialize;
 
 /// One row of the table.
@@ -52,11 +53,6 @@ pub(super) fn anova(cuts: &[Cut], regression: &Regression) -> Anova {
     sources.push(plain("total", (regression.explained + regression.rss, count(regression.rows - 1))));
     let Regression { r2, adjusted_r2, predicted_r2, .. } = *regression;
     Anova { sources, r2, adjusted_r2, predicted_r2 }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "numbers of cuts and terms are small")]
-fn count(number: usize) -> f64 {
-    number as f64
 }
 
 fn plain(source: &str, (sum_of_squares, degrees_of_freedom): (f64, f64)) -> Source {

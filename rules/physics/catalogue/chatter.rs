@@ -1,8 +1,8 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::excitation::quantile;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::quantile;
 
 /// Self-excited vibration in the cut.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,9 @@
 //! A controller holds the load by turning the feed: what the cut gains, the feed loses.
 
 use crate::physics::cut::engaged;
-use crate::physics::excitation::{quantile, varies};
+use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::quantile;
 
 /// Feed that a load controller turns down.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! The meter or drive shows no more than its ceiling.
 
-use crate::physics::excitation::quantile;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::quantile;
 
 /// Ceiling of the meter.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,9 @@
 //! Faster cutting heats the chip and softens it: the specific force falls.
 
 use crate::physics::cut::{cut_times, cutting_rows};
-use crate::physics::excitation::{quantile, varies};
+use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::quantile;
 
 /// Specific force that falls with cutting speed.
 #[derive(Debug, Clone, Copy)]

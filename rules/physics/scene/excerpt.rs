@@ -4,7 +4,7 @@
 //! an excerpt differs from it only in how finely time is resolved.
 
 use super::Scene;
-use crate::physics::excitation::{mean, median};
+use crate::statistics::{mean, median};
 use std::ops::Range;
 
 /// Neighbouring rows of the whole that are one row of the excerpt.

@@ -2,7 +2,7 @@
 
 use super::learn::Block;
 use super::regime::Regime;
-use crate::twin::noise::count;
+use crate::statistics::count;
 use std::collections::BTreeMap;
 
 /// Seconds in a block.

@@ -226,7 +226,7 @@ impl Chart {
             return None;
         }
         let sum: f64 = self.recent.iter().rev().take(blocks).sum();
-        Some(sum / crate::twin::noise::count(blocks))
+        Some(sum / crate::statistics::count(blocks))
     }
 
     /// After a change: is the level back where it was, for twenty blocks?

@@ -4,8 +4,8 @@
 //! fits one cut better than another; the noise around it is shared within the regime.
 
 use super::chart::{Healthy, Point};
-use crate::twin::noise::{self, Arma, PHI_MAX, count};
-use crate::twin::quality::median;
+use crate::statistics::{count, median};
+use crate::twin::noise::{self, Arma, PHI_MAX};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

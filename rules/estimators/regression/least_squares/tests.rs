@@ -161,8 +161,8 @@ fn stated_intervals_cover_as_often_as_they_say() {
             inside[at] += usize::from(low <= truth && truth <= high);
         }
     }
-    for count in inside {
-        let share = number(count) / number(runs);
+    for covered in inside {
+        let share = count(covered) / count(runs);
         assert!((share - 0.95).abs() < 0.012, "{share}");
     }
 }
