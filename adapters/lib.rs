@@ -14,6 +14,7 @@ pub mod address;
 pub mod channel;
 pub mod clock;
 pub mod driver;
+pub mod fanuc;
 pub mod merge;
 pub mod open;
 pub mod reading;

@@ -1,0 +1,500 @@
+//! The captured calls.
+
+use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Refusal, Status, System};
+use crate::fanuc::code::ReturnCode;
+use crate::fanuc::item::{Area, Item, Position, Servo, Spindle, Stretch, Timer, Width, Write};
+
+/// What the row is about.
+pub(super) enum Says {
+    /// Items and their values.
+    Read(Vec<Item>, Vec<ItemResult>),
+    /// A write.
+    Written(Write),
+}
+
+/// One call of the vendor's client.
+pub(super) struct Row {
+    pub(super) call: &'static str,
+    pub(super) versions: &'static [u16],
+    pub(super) asked: &'static str,
+    pub(super) answered: &'static str,
+    pub(super) says: Says,
+}
+
+const ALL: &[u16] = &[2, 3, 4];
+const NEWER: &[u16] = &[3, 4];
+const OLDER: &[u16] = &[2];
+
+fn read(
+    call: &'static str,
+    versions: &'static [u16],
+    asked: &'static str,
+    answered: &'static str,
+    says: Vec<(Item, Answer)>,
+) -> Row {
+    let (items, answers) = says.into_iter().map(|(item, answer)| (item, Ok(answer))).unzip();
+    Row { call, versions, asked, answered, says: Says::Read(items, answers) }
+}
+
+fn write(call: &'static str, versions: &'static [u16], asked: &'static str, write: Write) -> Row {
+    Row { call, versions, asked, answered: "", says: Says::Written(write) }
+}
+
+fn refused(call: &'static str, asked: &'static str, answered: &'static str, item: Item, code: i16, detail: i16) -> Row {
+    let refusal = Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail }));
+    Row { call, versions: ALL, asked, answered, says: Says::Read(vec![item], vec![refusal]) }
+}
+
+fn number(value: f64) -> Answer {
+    Answer::Number(Some(value))
+}
+
+fn numbers(values: &[f64], places: usize) -> Answer {
+    let mut values: Vec<Option<f64>> = values.iter().map(|value| Some(*value)).collect();
+    values.resize(places.max(values.len()), Some(0.0));
+    Answer::Numbers(values)
+}
+
+fn data(kind: i16, value: f64) -> Answer {
+    Answer::Data { kind, values: vec![Some(value)] }
+}
+
+fn names(names: &[&str]) -> Answer {
+    Answer::Names(names.iter().map(ToString::to_string).collect())
+}
+
+fn modal(value: i32) -> Answer {
+    Answer::Modal { value, flags: [0x40, 0] }
+}
+
+/// Every captured call, in the order of the captures.
+pub(super) fn all() -> Vec<Row> {
+    let mut rows = state();
+    rows.extend(speeds());
+    rows.extend(program());
+    rows.extend(dynamic());
+    rows.extend(values());
+    rows.extend(memory());
+    rows.extend(writes());
+    rows.extend(rest());
+    rows
+}
+
+fn state() -> Vec<Row> {
+    use Answer::Whole;
+    let status = Status { automatic: 1, run: 3, motion: 1, ..Status::default() };
+    let system = |axes_max| {
+        Answer::System(System {
+            additional: 0x0402,
+            axes_max,
+            kind: "0".into(),
+            machine: "M".into(),
+            series: "D4F1".into(),
+            version: "27.0".into(),
+            axes: "03".into(),
+        })
+    };
+    let (short, long) = (Answer::Status(status), Answer::Status(status));
+    let flags = [(Item::HandleRetrace, Whole(0)), (Item::ToolMode, Whole(0))];
+    vec![
+        read(
+            "cnc_sysinfo",
+            NEWER,
+            "1/18",
+            "0402 0020 2030 204d 44344631 32372e30 3033",
+            vec![(Item::System, system(32))],
+        ),
+        read(
+            "cnc_sysinfo",
+            OLDER,
+            "1/18",
+            "0402 0008 2030 204d 44344631 32372e30 3033",
+            vec![(Item::System, system(8))],
+        ),
+        read(
+            "cnc_statinfo",
+            ALL,
+            "1/19 | 1/e1 | 1/98",
+            "0001000300010000000000000000 | 0000 | 0000",
+            [(Item::Status, short)].into_iter().chain(flags.clone()).collect(),
+        ),
+        read(
+            "cnc_statinfo2",
+            ALL,
+            "1/e2 | 1/e1 | 1/98",
+            "0001000300010000000000000000 0000000000000000 | 0000 | 0000",
+            [(Item::StatusLong, long)].into_iter().chain(flags).collect(),
+        ),
+    ]
+}
+
+fn speeds() -> Vec<Row> {
+    use Answer::Whole;
+    let spindle = |what, value| (Item::Spindles(what), numbers(&[value], 1));
+    let count = |which, count| (Item::Count(which), Whole(count));
+    let none = |parameter| (Item::Parameter(parameter, 0), data(3, 0.0));
+    let servo = (Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
+    let axis_names = (Item::AxisNames, names(&["X", "Y", "Z"]));
+    vec![
+        read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(Item::Feed, number(1200.0))]),
+        read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(Item::SpindleSpeed, number(8000.0))]),
+        read(
+            "cnc_acts2",
+            NEWER,
+            "1/a4 1 | 1/40 3 -1 | 1/a4 1",
+            "0001 | 00001f40000a0000 | 0001",
+            vec![count(1, 1), spindle(Spindle::Speed, 8000.0), count(1, 1)],
+        ),
+        read("cnc_acts2", OLDER, "1/40 3 -1", "00001f40000a0000", vec![spindle(Spindle::Speed, 8000.0)]),
+        read(
+            "cnc_rdspeed",
+            NEWER,
+            "1/a4 3 | 1/8a 1 | 1/88 3 | 1/88 4 | 1/24 | 1/25 | 1/a4 3",
+            "0001 | 53310000 | 0000 | 0002 | 000004b0000a0000 | 00001f40000a0000 | 0001",
+            vec![
+                count(3, 1),
+                (Item::SpindleNames(1), names(&["S1"])),
+                (Item::SpeedUnit(3), Whole(0)),
+                (Item::SpeedUnit(4), Whole(2)),
+                (Item::Feed, number(1200.0)),
+                (Item::SpindleSpeed, number(8000.0)),
+                count(3, 1),
+            ],
+        ),
+        read(
+            "cnc_rdspeed",
+            OLDER,
+            "1/24 | 1/25 | 1/88 | 1/e c22 c22 | 1/e c23 c23 | 1/e 26d0 26d0 | 1/21 4 | 2/8001 1c 1c",
+            "000004b0000a0000 | 00001f40000a0000 | 0000 | 00000c2200000003 ..4x8 | 00000c2300000003 ..4x8 \
+             | 000026d000000003 ..4x8 | 0000 | 00",
+            vec![
+                (Item::Feed, number(1200.0)),
+                (Item::SpindleSpeed, number(8000.0)),
+                (Item::SpeedUnit(0), Whole(0)),
+                none(3106),
+                none(3107),
+                none(9936),
+                (Item::ModalGroup(4), Answer::Groups(vec![0])),
+                (Item::Pmc(Stretch::bytes(Area::G, 28, 1)), Answer::Memory(vec![0])),
+            ],
+        ),
+        read(
+            "cnc_rdspmeter",
+            NEWER,
+            "1/a4 1 | 1/8a -1 | 1/40 4 -1 | 1/40 5 -1 | 1/a4 1",
+            "0001 | 53310000 | 00000113000a0001 | 00001f4c000a0000 | 0001",
+            vec![
+                count(1, 1),
+                (Item::SpindleNames(-1), names(&["S1"])),
+                spindle(Spindle::Load, 27.5),
+                spindle(Spindle::MotorSpeed, 8012.0),
+                count(1, 1),
+            ],
+        ),
+        read(
+            "cnc_rdspmeter",
+            OLDER,
+            "1/40 4 -1 | 1/40 5 -1 | 1/8a",
+            "00000113000a0001 | 00001f4c000a0000 | 53310000",
+            vec![
+                spindle(Spindle::Load, 27.5),
+                spindle(Spindle::MotorSpeed, 8012.0),
+                (Item::SpindleNames(0), names(&["S1"])),
+            ],
+        ),
+        read(
+            "cnc_rdspload",
+            NEWER,
+            "1/a4 1 | 1/40 0 -1 | 1/a4 1",
+            "0001 | 0000001b000a0000 | 0001",
+            vec![count(1, 1), spindle(Spindle::PlainLoad, 27.0), count(1, 1)],
+        ),
+        read("cnc_rdspload", OLDER, "1/40 0 -1", "0000001b000a0000", vec![spindle(Spindle::PlainLoad, 27.0)]),
+        read(
+            "cnc_rdsvmeter",
+            NEWER,
+            "1/a4 2 | 1/89 | 1/56 1 | 1/a4 2",
+            "0003 | 58000000590000005a000000 | ffffffe1000a0000 00000034000a0000 00000076000a0000 ..8x29 | 0003",
+            vec![count(2, 3), axis_names.clone(), servo, count(2, 3)],
+        ),
+        read(
+            "cnc_rdsvmeter",
+            OLDER,
+            "1/56 1 | 1/89",
+            "ffffffe1000a0000 00000034000a0000 00000076000a0000 ..8x5 | 58000000590000005a000000",
+            vec![(Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 8)), axis_names],
+        ),
+    ]
+}
+
+fn program() -> Vec<Row> {
+    let path = "//CNC_MEM/USER/PATH1/O1234";
+    vec![
+        read(
+            "cnc_rdprgnum",
+            ALL,
+            "1/1c",
+            "000004d2000003e8",
+            vec![(Item::Program, Answer::Program { running: 1234, main: 1000 })],
+        ),
+        read(
+            "cnc_exeprgname",
+            ALL,
+            "1/cf",
+            "000004d2 4f31323334 ..31x1",
+            vec![(Item::ProgramName, Answer::Named { number: 1234, name: "O1234".into() })],
+        ),
+        read(
+            "cnc_exeprgname2",
+            ALL,
+            "1/fc",
+            "2f2f434e435f4d454d2f555345522f50415448312f4f31323334 ..230x1",
+            vec![(Item::ProgramPath, Answer::Text(path.into()))],
+        ),
+        read("cnc_rdseqnum", ALL, "1/1d", "00000078", vec![(Item::Sequence, Answer::Whole(120))]),
+    ]
+}
+
+fn dynamic() -> Vec<Row> {
+    let head = || {
+        vec![
+            (Item::AlarmBits, Answer::Whole(0)),
+            (Item::Program, Answer::Program { running: 1234, main: 1000 }),
+            (Item::Sequence, Answer::Whole(120)),
+            (Item::Feed, number(1200.0)),
+            (Item::SpindleSpeed, number(8000.0)),
+        ]
+    };
+    let kinds = [Position::Absolute, Position::Machine, Position::Relative, Position::ToGo];
+    let one = kinds.iter().zip([123.456, 223.456, 1.0, 0.5]).map(|(kind, at)| (Item::Position(*kind, 1), number(at)));
+    let every = [[123.456, -98.765, 10.5], [223.456, -198.765, -10.5], [1.0, 2.0, -3.0], [0.5, 0.0, -0.25]];
+    let all = |places| {
+        let position = move |(kind, at): (&Position, [f64; 3])| (Item::Position(*kind, -1), numbers(&at, places));
+        head().into_iter().chain(kinds.iter().zip(every).map(position)).collect::<Vec<_>>()
+    };
+    vec![
+        read(
+            "cnc_rddynamic2 of one axis",
+            ALL,
+            "1/1a | 1/1c | 1/1d | 1/24 | 1/25 | 1/26 4 1 | 1/26 1 1 | 1/26 6 1 | 1/26 7 1",
+            "00000000 | 000004d2000003e8 | 00000078 | 000004b0000a0000 | 00001f40000a0000 | 0001e240000a0003 \
+             | 000368e0000a0003 | 000003e8000a0003 | 000001f4000a0003",
+            head().into_iter().chain(one).collect(),
+        ),
+        read(
+            "cnc_rddynamic2 of all axes",
+            NEWER,
+            "1/1a | 1/1c | 1/1d | 1/24 | 1/25 | 1/26 4 -1 | 1/26 1 -1 | 1/26 6 -1 | 1/26 7 -1",
+            "00000000 | 000004d2000003e8 | 00000078 | 000004b0000a0000 | 00001f40000a0000 \
+             | 0001e240000a0003 fffe7e33000a0003 00002904000a0003 ..8x29 \
+             | 000368e0000a0003 fffcf793000a0003 ffffd6fc000a0003 ..8x29 \
+             | 000003e8000a0003 000007d0000a0003 fffff448000a0003 ..8x29 \
+             | 000001f4000a0003 00000000000a0003 ffffff06000a0003 ..8x29",
+            all(32),
+        ),
+        read(
+            "cnc_rddynamic2 of all axes",
+            OLDER,
+            "1/1a | 1/1c | 1/1d | 1/24 | 1/25 | 1/26 4 -1 | 1/26 1 -1 | 1/26 6 -1 | 1/26 7 -1",
+            "00000000 | 000004d2000003e8 | 00000078 | 000004b0000a0000 | 00001f40000a0000 \
+             | 0001e240000a0003 fffe7e33000a0003 00002904000a0003 ..8x5 \
+             | 000368e0000a0003 fffcf793000a0003 ffffd6fc000a0003 ..8x5 \
+             | 000003e8000a0003 000007d0000a0003 fffff448000a0003 ..8x5 \
+             | 000001f4000a0003 00000000000a0003 ffffff06000a0003 ..8x5",
+            all(8),
+        ),
+    ]
+}
+
+fn values() -> Vec<Row> {
+    let alarms = vec![
+        Alarm { number: 100, kind: 3, axis: 0, text: "PARAMETER ENABLE SWITCH ON".into() },
+        Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".into() },
+    ];
+    // 1704562278 / 2^26, which is how an older control holds 25.4.
+    let nearly = f64::from(0x6599_9999u32) / f64::from(1u32 << 26);
+    vec![
+        read("cnc_modal of F", ALL, "1/22 5", "000004b0 40000000", vec![(Item::ModalWord(5), modal(1200))]),
+        read("cnc_modal of M", ALL, "1/22 b", "00000003 40000000", vec![(Item::ModalWord(11), modal(3))]),
+        read("cnc_modal of T", ALL, "1/22 16", "0000000c 40000000", vec![(Item::ModalWord(22), modal(12))]),
+        read(
+            "cnc_rdalmmsg2",
+            ALL,
+            "1/23 -1 8 2 40",
+            "00000064 00000003 00000000 0000001a 504152414d4554455220454e41424c4520535749544348204f4e ..38x1 \
+             000001a1 00000006 00000002 0000000b 534552564f20414c41524d ..53x1",
+            vec![(Item::Alarms(8), Answer::Alarms(alarms))],
+        ),
+        read("cnc_alarm2", ALL, "1/1a", "00000048", vec![(Item::AlarmBits, Answer::Whole(72))]),
+        read("cnc_rdmacro", NEWER, "1/15 1f4 1f4", "000000fe000a0001", vec![(Item::Macro(500), number(25.4))]),
+        read("cnc_rdmacro", OLDER, "1/15 1f4 1f4", "659999990002001a", vec![(Item::Macro(500), number(nearly))]),
+        read(
+            "cnc_rdmacro vacant",
+            ALL,
+            "1/15 1f5 1f5",
+            "00000000ffffffff",
+            vec![(Item::Macro(501), Answer::Number(None))],
+        ),
+        refused("cnc_rdmacro of none", "1/15 1389 1389", "!3.0", Item::Macro(5001), 3, 0),
+    ]
+}
+
+fn memory() -> Vec<Row> {
+    let pmc = |area, from, to, width| Stretch { area, from, to, width };
+    vec![
+        write(
+            "cnc_wrmacro",
+            NEWER,
+            "1/16 1fe 1fe = 075bcd15000a0006",
+            Write::Macro { number: 510, mantissa: 123_456_789, places: 6 },
+        ),
+        write(
+            "cnc_wrmacro",
+            OLDER,
+            "1/16 1fe 1fe = 7b74f01f00020018",
+            Write::Macro { number: 510, mantissa: 123_456_789, places: 6 },
+        ),
+        write(
+            "cnc_wrmacro negative",
+            NEWER,
+            "1/16 1ff 1ff = ffffffe7000a0001",
+            Write::Macro { number: 511, mantissa: -25, places: 1 },
+        ),
+        write(
+            "cnc_wrmacro negative",
+            OLDER,
+            "1/16 1ff 1ff = b00000000002001d",
+            Write::Macro { number: 511, mantissa: -25, places: 1 },
+        ),
+        read(
+            "cnc_rdmacro of what was written",
+            NEWER,
+            "1/15 1ff 1ff",
+            "ffffffe7000a0001",
+            vec![(Item::Macro(511), number(-2.5))],
+        ),
+        read(
+            "cnc_rdmacro of what was written",
+            OLDER,
+            "1/15 1ff 1ff",
+            "b00000000002001d",
+            vec![(Item::Macro(511), number(-2.5))],
+        ),
+        read(
+            "cnc_rdparam",
+            NEWER,
+            "1/8d 1a37 1a37",
+            "00001a37 0000 0003 000001c8000a0000 ..8x31",
+            vec![(Item::Parameter(6711, 0), data(3, 456.0))],
+        ),
+        read(
+            "cnc_rdparam",
+            OLDER,
+            "1/e 1a37 1a37",
+            "00001a37 0000 0003 000001c8 ..4x7",
+            vec![(Item::Parameter(6711, 0), data(3, 456.0))],
+        ),
+        read(
+            "cnc_diagnoss",
+            NEWER,
+            "1/93 134 134 1",
+            "00000134 0001 0002 00000029000a0000 ..8x31",
+            vec![(Item::Diagnosis(308, 1), data(2, 41.0))],
+        ),
+        read(
+            "cnc_diagnoss",
+            OLDER,
+            "1/30 134 134 1",
+            "00000134 0001 0002 00000029 ..4x7",
+            vec![(Item::Diagnosis(308, 1), data(2, 41.0))],
+        ),
+        read(
+            "pmc_rdpmcrng of G12",
+            ALL,
+            "2/8001 c c",
+            "9b",
+            vec![(Item::Pmc(pmc(Area::G, 12, 12, Width::Byte)), Answer::Memory(vec![155]))],
+        ),
+        read(
+            "pmc_rdpmcrng of R100",
+            ALL,
+            "2/8001 64 67 5 2",
+            "fffe1dc0",
+            vec![(Item::Pmc(pmc(Area::R, 100, 103, Width::Long)), Answer::Memory(vec![-123_456]))],
+        ),
+    ]
+}
+
+fn writes() -> Vec<Row> {
+    let d900 = Stretch { area: Area::D, from: 900, to: 903, width: Width::Word };
+    let mut signals = [0; 16];
+    signals[5] = 8;
+    vec![
+        write(
+            "pmc_wrpmcrng of G12",
+            ALL,
+            "2/8002 c c = af",
+            Write::Pmc { stretch: Stretch::bytes(Area::G, 12, 1), values: vec![175] },
+        ),
+        write(
+            "pmc_wrpmcrng of D900",
+            ALL,
+            "2/8002 384 387 9 1 = 1234fffe",
+            Write::Pmc { stretch: d900, values: vec![4660, -2] },
+        ),
+        read(
+            "pmc_rdpmcrng of D900",
+            ALL,
+            "2/8001 384 387 9 1",
+            "1234fffe",
+            vec![(Item::Pmc(d900), Answer::Memory(vec![4660, -2]))],
+        ),
+        write(
+            "cnc_wrtofs",
+            ALL,
+            "1/9 1 1 3e8 = fffffb2e0000ffff",
+            Write::ToolOffset { number: 1, kind: 0, value: -1234 },
+        ),
+        read("cnc_rdtofs", ALL, "1/8 1 1 3e8", "fffffb2e000a0003", vec![(Item::ToolOffset(1, 0), number(-1.234))]),
+        write("cnc_wrzofs", ALL, "1/c 0 0 1 = ffffff060000ffff", Write::WorkOffset { number: 0, axis: 1, value: -250 }),
+        read("cnc_rdzofs", ALL, "1/b 0 0 1", "ffffff06000a0003", vec![(Item::WorkOffset(0, 1), number(-0.25))]),
+        write(
+            "cnc_wropnlsgnl",
+            ALL,
+            "1/5e 20 = 00000000000000000000 0008 0000000000000000000000000000000000000000",
+            Write::PanelSignals { mask: 0x20, signals },
+        ),
+    ]
+}
+
+fn rest() -> Vec<Row> {
+    let text = "N120 G01 X10.5 F1200\nN130 Z-2.\nM30\n%";
+    let mut signals = vec![0; 16];
+    (signals[0], signals[5], signals[6]) = (1, 8, 5);
+    vec![
+        read(
+            "cnc_rdexecprog",
+            ALL,
+            "1/20 80",
+            "00000000 4e31323020473031205831302e352046313230300a4e313330205a2d322e0a4d33300a25",
+            vec![(Item::ExecutedText(128), Answer::Named { number: 0, name: text.into() })],
+        ),
+        read(
+            "cnc_rdtimer",
+            ALL,
+            "1/120",
+            "00003039 00001770",
+            vec![(Item::Timer(Timer::PowerOn), Answer::Time { minutes: 12345, milliseconds: 6000 })],
+        ),
+        read("cnc_rdopmode", ALL, "1/57", "0000", vec![(Item::TuningMode, Answer::Whole(0))]),
+        // The captured reading came before the write and shows 10; this one shows what was written.
+        read(
+            "cnc_rdopnlsgnl",
+            ALL,
+            "1/5d 20",
+            "0001 0000 0000 0000 0000 0008 0005 ..18x1",
+            vec![(Item::PanelSignals(0x20), Answer::Signals(signals))],
+        ),
+        refused("option missing", "1/24", "!6.2", Item::Feed, 6, 2),
+    ]
+}

@@ -1,0 +1,234 @@
+//! FOCAS2/Ethernet spoken by ourselves.
+//!
+//! One TCP connection (the vendor's library takes two), one question outstanding, every answer checked against its
+//! question: kind of frame, number of blocks, device, path, function, every length. Whatever does not fit ends the
+//! connection, because there is no other way to find the beginning of the next frame. The deadline holds for the whole
+//! exchange, also when the answer comes byte by byte. Leaving says so: a controller has only a few connections.
+
+use super::answer::{ItemError, ItemResult, Refusal};
+use super::code::ReturnCode;
+use super::decode;
+use super::focas::{Focas, FocasError};
+use super::item::{Item, Write};
+use super::opening::{Generation, Opening};
+use super::request;
+use super::statistics::Statistics;
+use super::wire::{Frame, FrameKind, HEADER_LEN, Header, Reply, Request, WireError, frame, replies, request_body};
+use crate::address::Endpoint;
+use std::io::{ErrorKind, Read, Write as _};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+/// Longest request that is sent; older controllers take 1450 bytes.
+const REQUEST_MAX: usize = 1400;
+
+/// Version word of a client.
+const CLIENT: u16 = 1;
+
+/// Connection of the second kind: questions, no program transfer.
+const FOR_QUESTIONS: [u8; 2] = [0, 2];
+
+/// How a native connection is made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NativeSettings {
+    /// Where the controller is.
+    pub at: Endpoint,
+    /// Path from 1.
+    pub path: u16,
+    /// Longest time for connecting, and for one exchange.
+    pub timeout: Duration,
+}
+
+/// A connection to a controller.
+#[derive(Debug)]
+pub struct Native {
+    stream: TcpStream,
+    settings: NativeSettings,
+    opening: Opening,
+    statistics: Statistics,
+}
+
+impl Native {
+    /// Connects and opens.
+    ///
+    /// # Errors
+    /// See [`FocasError`].
+    pub fn connect(settings: NativeSettings) -> Result<Self, FocasError> {
+        let deadline = Instant::now() + settings.timeout;
+        let mut stream = tcp(&settings.at, settings.timeout)?;
+        let line = |error| io_error(&error, settings.timeout);
+        stream.set_nodelay(true).map_err(line)?;
+        send(&mut stream, &frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
+        let answer = receive(&mut stream, deadline, settings.timeout)?;
+        let opening = match answer.kind {
+            FrameKind::Opened => Opening::read(Generation::of(answer.version), &answer.body, settings.path),
+            FrameKind::OpenRefused => return Err(FocasError::NoSession),
+            other => return Err(FocasError::Protocol(format!("{other:?} in answer to the opening"))),
+        };
+        let opening = opening.map_err(|error| protocol(&error))?;
+        if settings.path > opening.paths.max(1) {
+            return Err(FocasError::Refused(Refusal { code: ReturnCode::PATH, detail: 0 }));
+        }
+        Ok(Self { stream, settings, opening, statistics: Statistics::default() })
+    }
+
+    /// Frames and bytes so far.
+    #[must_use]
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// One frame there and one back; shows every answer to `take`.
+    fn exchange(&mut self, requests: &[Request], mut take: impl FnMut(usize, &Reply<'_>)) -> Result<(), FocasError> {
+        let began = Instant::now();
+        let bytes = frame(CLIENT, FrameKind::Request, &request_body(requests));
+        send(&mut self.stream, &bytes, self.settings.timeout)?;
+        let answer = receive(&mut self.stream, began + self.settings.timeout, self.settings.timeout)?;
+        self.statistics.frame(requests.len(), bytes.len(), HEADER_LEN + answer.body.len(), began.elapsed());
+        checked(&answer, self.opening.generation, requests, &mut take)
+    }
+
+    /// How many of the items fit into one frame in both directions; at least one.
+    fn fitting(&self, items: &[Item]) -> usize {
+        let (mut asked, mut answered) = (2, 2);
+        let fits = |item: &&Item| {
+            asked += request::reading(**item, self.opening.generation).wire_len();
+            answered += request::answer_len(**item, &self.opening);
+            asked <= REQUEST_MAX && answered <= self.opening.generation.answer_max()
+        };
+        items.iter().take_while(fits).count().max(1)
+    }
+
+    fn blocks(&self, items: &[Item]) -> Vec<Request> {
+        let block = |item: &Item| request::reading(*item, self.opening.generation).on_path(self.settings.path);
+        items.iter().map(block).collect()
+    }
+}
+
+/// Is the frame the answer to these questions? Shows each answer to `take`, or none.
+fn checked(
+    answer: &Frame,
+    generation: Generation,
+    requests: &[Request],
+    take: &mut impl FnMut(usize, &Reply<'_>),
+) -> Result<(), FocasError> {
+    let differs = |what: String| Err(FocasError::Protocol(what));
+    if answer.kind != FrameKind::Answer {
+        return differs(format!("{:?} in answer to a request", answer.kind));
+    }
+    if answer.version != generation.version() {
+        return differs(format!("version word {} where {} was before", answer.version, generation.version()));
+    }
+    let found = replies(&answer.body).map_err(|error| protocol(&error))?;
+    if found.len() != requests.len() {
+        return differs(format!("{} answers to {} questions", found.len(), requests.len()));
+    }
+    for (reply, request) in found.iter().zip(requests) {
+        reply.answers(request).map_err(|error| protocol(&error))?;
+    }
+    found.iter().enumerate().for_each(|(index, reply)| take(index, reply));
+    Ok(())
+}
+
+impl Focas for Native {
+    fn opening(&self) -> &Opening {
+        &self.opening
+    }
+
+    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+        let before = out.len();
+        let mut rest = items;
+        while !rest.is_empty() {
+            let (now, later) = rest.split_at(self.fitting(rest));
+            let (generation, requests) = (self.opening.generation, self.blocks(now));
+            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index], generation, reply)));
+            asked.inspect_err(|_| out.truncate(before))?;
+            rest = later;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, write: &Write) -> Result<(), FocasError> {
+        let request = request::writing(write, self.opening.generation).on_path(self.settings.path);
+        let mut refusal = None;
+        self.exchange(std::slice::from_ref(&request), |_, reply| refusal = refused(reply))?;
+        refusal.map_or(Ok(()), |refusal| Err(FocasError::Refused(refusal)))
+    }
+}
+
+impl Drop for Native {
+    fn drop(&mut self) {
+        let _gone_already = self.stream.write_all(&frame(CLIENT, FrameKind::Close, &[]));
+    }
+}
+
+fn refused(reply: &Reply<'_>) -> Option<Refusal> {
+    (reply.code != 0).then_some(Refusal { code: ReturnCode(reply.code), detail: reply.detail })
+}
+
+fn result(item: Item, generation: Generation, reply: &Reply<'_>) -> ItemResult {
+    match refused(reply) {
+        Some(refusal) => Err(ItemError::Refused(refusal)),
+        None => decode::answer(item, generation, reply.data).map_err(|error| ItemError::Malformed(error.to_string())),
+    }
+}
+
+fn protocol(error: &WireError) -> FocasError {
+    FocasError::Protocol(error.to_string())
+}
+
+fn tcp(at: &Endpoint, timeout: Duration) -> Result<TcpStream, FocasError> {
+    let found = (at.host.as_str(), at.port).to_socket_addrs();
+    let addresses: Vec<SocketAddr> = found.map_err(|error| FocasError::Name(error.to_string()))?.take(4).collect();
+    let mut last = FocasError::Name("it has no address".to_owned());
+    for address in addresses {
+        match TcpStream::connect_timeout(&address, timeout) {
+            Ok(stream) => return Ok(stream),
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
+                last = FocasError::NobodyThere(error.to_string());
+            }
+            Err(error) => last = FocasError::Unreachable(error.to_string()),
+        }
+    }
+    Err(last)
+}
+
+fn io_error(error: &std::io::Error, timeout: Duration) -> FocasError {
+    match error.kind() {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut => FocasError::Timeout(timeout),
+        _ => FocasError::Broken(error.to_string()),
+    }
+}
+
+fn send(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), FocasError> {
+    let line = |error| io_error(&error, timeout);
+    stream.set_write_timeout(Some(timeout)).map_err(line)?;
+    stream.write_all(bytes).map_err(line)
+}
+
+fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<Frame, FocasError> {
+    let mut head = [0; HEADER_LEN];
+    fill(stream, &mut head, deadline, timeout)?;
+    let header = Header::of(&head).map_err(|error| protocol(&error))?;
+    let mut body = vec![0; header.body_len];
+    fill(stream, &mut body, deadline, timeout)?;
+    Ok(Frame { version: header.version, kind: header.kind, body })
+}
+
+/// Reads until the buffer is full or the deadline is over.
+fn fill(stream: &mut TcpStream, mut buffer: &mut [u8], deadline: Instant, timeout: Duration) -> Result<(), FocasError> {
+    while !buffer.is_empty() {
+        let left = deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(FocasError::Timeout(timeout));
+        }
+        stream.set_read_timeout(Some(left)).map_err(|error| io_error(&error, timeout))?;
+        match stream.read(buffer) {
+            Ok(0) => return Err(FocasError::Broken("the controller closed it".to_owned())),
+            Ok(count) => buffer = &mut buffer[count..],
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(io_error(&error, timeout)),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,241 @@
+//! Items and writes as blocks on the wire, in the encoding of the controller's generation.
+
+use super::item::{Item, Position, Servo, Spindle, Timer, Write};
+use super::opening::{Generation, Opening};
+use super::wire::{Number, Request};
+
+/// Numbers of the functions that are asked.
+pub mod function {
+    #![expect(missing_docs, reason = "the names of the items say it")]
+    pub const TOOL_OFFSET: u16 = 0x08;
+    pub const TOOL_OFFSET_WRITE: u16 = 0x09;
+    pub const WORK_OFFSET: u16 = 0x0B;
+    pub const WORK_OFFSET_WRITE: u16 = 0x0C;
+    pub const PARAMETER_OLDER: u16 = 0x0E;
+    pub const MACRO: u16 = 0x15;
+    pub const MACRO_WRITE: u16 = 0x16;
+    pub const SYSTEM: u16 = 0x18;
+    pub const STATUS: u16 = 0x19;
+    pub const ALARM_BITS: u16 = 0x1A;
+    pub const PROGRAM: u16 = 0x1C;
+    pub const SEQUENCE: u16 = 0x1D;
+    pub const EXECUTED_TEXT: u16 = 0x20;
+    pub const MODAL_GROUP: u16 = 0x21;
+    pub const MODAL_WORD: u16 = 0x22;
+    pub const ALARMS: u16 = 0x23;
+    pub const FEED: u16 = 0x24;
+    pub const SPINDLE_SPEED: u16 = 0x25;
+    pub const POSITION: u16 = 0x26;
+    pub const DIAGNOSIS_OLDER: u16 = 0x30;
+    pub const BLOCK_COUNT: u16 = 0x35;
+    pub const SPINDLES: u16 = 0x40;
+    pub const SERVOS: u16 = 0x56;
+    pub const TUNING_MODE: u16 = 0x57;
+    pub const PANEL_SIGNALS: u16 = 0x5D;
+    pub const PANEL_SIGNALS_WRITE: u16 = 0x5E;
+    pub const SPEED_UNIT: u16 = 0x88;
+    pub const AXIS_NAMES: u16 = 0x89;
+    pub const SPINDLE_NAMES: u16 = 0x8A;
+    pub const PARAMETER: u16 = 0x8D;
+    pub const DIAGNOSIS: u16 = 0x93;
+    pub const TOOL_MODE: u16 = 0x98;
+    pub const COUNT: u16 = 0xA4;
+    pub const MAIN_PROGRAM: u16 = 0xB9;
+    pub const PROGRAM_NAME: u16 = 0xCF;
+    pub const HANDLE_RETRACE: u16 = 0xE1;
+    pub const STATUS_LONG: u16 = 0xE2;
+    pub const PROGRAM_PATH: u16 = 0xFC;
+    pub const TIMER: u16 = 0x120;
+    pub const PMC_READ: u16 = 0x8001;
+    pub const PMC_WRITE: u16 = 0x8002;
+}
+
+/// Longest text of an alarm that is asked for.
+pub const ALARM_TEXT_LEN: usize = 64;
+
+impl Position {
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::Absolute => 4,
+            Self::Machine => 1,
+            Self::Relative => 6,
+            Self::ToGo => 7,
+        }
+    }
+}
+
+impl Spindle {
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::PlainLoad => 0,
+            Self::MaxSpeed => 1,
+            Self::Gear => 2,
+            Self::Speed => 3,
+            Self::Load => 4,
+            Self::MotorSpeed => 5,
+        }
+    }
+}
+
+impl Servo {
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::Load => 1,
+            Self::Speed => 2,
+            Self::Current => 3,
+        }
+    }
+}
+
+impl Timer {
+    /// Its number on the wire and in the library.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::PowerOn => 0,
+            Self::Operating => 1,
+            Self::Cutting => 2,
+            Self::Cycle => 3,
+        }
+    }
+}
+
+fn by_generation(generation: Generation, newer: u16, older: u16) -> u16 {
+    if matches!(generation, Generation::Newer(_)) { newer } else { older }
+}
+
+/// The block that asks for an item.
+#[must_use]
+pub fn reading(item: Item, generation: Generation) -> Request {
+    use function as f;
+    let number = i32::from;
+    match item {
+        Item::System => Request::cnc(f::SYSTEM, &[]),
+        Item::Status => Request::cnc(f::STATUS, &[]),
+        Item::StatusLong => Request::cnc(f::STATUS_LONG, &[]),
+        Item::HandleRetrace => Request::cnc(f::HANDLE_RETRACE, &[]),
+        Item::ToolMode => Request::cnc(f::TOOL_MODE, &[]),
+        Item::Feed => Request::cnc(f::FEED, &[]),
+        Item::SpindleSpeed => Request::cnc(f::SPINDLE_SPEED, &[]),
+        Item::Spindles(what) => Request::cnc(f::SPINDLES, &[what.number(), -1]),
+        Item::Servos(what) => Request::cnc(f::SERVOS, &[what.number()]),
+        Item::Count(what) => Request::cnc(f::COUNT, &[number(what)]),
+        Item::AxisNames => Request::cnc(f::AXIS_NAMES, &[]),
+        Item::SpindleNames(which) => Request::cnc(f::SPINDLE_NAMES, &[number(which)]),
+        Item::SpeedUnit(of) => Request::cnc(f::SPEED_UNIT, &[number(of)]),
+        Item::Program => Request::cnc(f::PROGRAM, &[]),
+        Item::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
+        Item::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
+        Item::MainProgram => Request::cnc(f::MAIN_PROGRAM, &[]),
+        Item::Sequence => Request::cnc(f::SEQUENCE, &[]),
+        Item::BlockCount => Request::cnc(f::BLOCK_COUNT, &[]),
+        Item::AlarmBits => Request::cnc(f::ALARM_BITS, &[]),
+        Item::Alarms(most) => Request::cnc(f::ALARMS, &[-1, i32::from(most), 2, signed(ALARM_TEXT_LEN)]),
+        Item::ModalGroup(group) => Request::cnc(f::MODAL_GROUP, &[number(group)]),
+        Item::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[number(word)]),
+        Item::Position(what, axis) => Request::cnc(f::POSITION, &[what.number(), number(axis)]),
+        Item::Macro(variable) => Request::cnc(f::MACRO, &twice(variable)),
+        Item::Parameter(parameter, axis) => {
+            let [first, last] = twice(parameter);
+            Request::cnc(by_generation(generation, f::PARAMETER, f::PARAMETER_OLDER), &[first, last, number(axis)])
+        }
+        Item::Diagnosis(diagnosis, axis) => {
+            let [first, last] = twice(diagnosis);
+            Request::cnc(by_generation(generation, f::DIAGNOSIS, f::DIAGNOSIS_OLDER), &[first, last, number(axis)])
+        }
+        Item::Pmc(stretch) => Request::pmc(f::PMC_READ, &pmc(stretch)),
+        Item::ToolOffset(offset, kind) => Request::cnc(f::TOOL_OFFSET, &tool(offset, kind)),
+        Item::WorkOffset(offset, axis) => Request::cnc(f::WORK_OFFSET, &work(offset, axis)),
+        Item::ExecutedText(most) => Request::cnc(f::EXECUTED_TEXT, &[i32::from(most)]),
+        Item::Timer(timer) => Request::cnc(f::TIMER, &[timer.number()]),
+        Item::TuningMode => Request::cnc(f::TUNING_MODE, &[]),
+        Item::PanelSignals(mask) => Request::cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
+    }
+}
+
+fn signed(length: usize) -> i32 {
+    i32::try_from(length).unwrap_or(i32::MAX)
+}
+
+fn twice(number: u16) -> [i32; 2] {
+    [i32::from(number); 2]
+}
+
+fn pmc(stretch: super::item::Stretch) -> [i32; 4] {
+    [i32::from(stretch.from), i32::from(stretch.to), stretch.area.number(), stretch.width.number()]
+}
+
+fn tool(offset: u16, kind: u16) -> [i32; 3] {
+    [i32::from(offset), i32::from(offset), 1000 + i32::from(kind)]
+}
+
+fn work(offset: u16, axis: i16) -> [i32; 3] {
+    [i32::from(offset), i32::from(offset), i32::from(axis)]
+}
+
+/// The block that writes.
+#[must_use]
+pub fn writing(write: &Write, generation: Generation) -> Request {
+    use function as f;
+    match write {
+        Write::Macro { number, mantissa, places } => {
+            let value = match generation {
+                _ if *places < 0 => Number::VACANT,
+                Generation::Newer(_) => Number::decimal(*mantissa, *places),
+                Generation::Older(_) => Number::binary(*mantissa, *places),
+            };
+            Request::cnc(f::MACRO_WRITE, &twice(*number)).writing(value.bytes().to_vec())
+        }
+        Write::Pmc { stretch, values } => {
+            let bytes = usize::from(stretch.width.bytes());
+            let data = values.iter().flat_map(|value| value.to_be_bytes()[4 - bytes..].to_vec()).collect();
+            Request::pmc(f::PMC_WRITE, &pmc(*stretch)).writing(data)
+        }
+        Write::WorkOffset { number, axis, value } => {
+            Request::cnc(f::WORK_OFFSET_WRITE, &work(*number, *axis)).writing(increments(*value))
+        }
+        Write::ToolOffset { number, kind, value } => {
+            Request::cnc(f::TOOL_OFFSET_WRITE, &tool(*number, *kind)).writing(increments(*value))
+        }
+        Write::PanelSignals { mask, signals } => {
+            let data = signals.iter().flat_map(|signal| signal.to_be_bytes()).collect();
+            Request::cnc(f::PANEL_SIGNALS_WRITE, &[i32::from(*mask)]).writing(data)
+        }
+    }
+}
+
+/// An offset in least input increments: no base, exponent -1.
+fn increments(value: i32) -> Vec<u8> {
+    Number { mantissa: value, base: 0, exponent: -1 }.bytes().to_vec()
+}
+
+/// About how many bytes the answer to an item takes, its head included, for a frame that the controller can send.
+#[must_use]
+pub fn answer_len(item: Item, opening: &Opening) -> usize {
+    let (axes, spindles) = (usize::from(opening.axes_max), usize::from(opening.spindles_max));
+    let values = match opening.generation {
+        Generation::Newer(_) => 8 * axes,
+        Generation::Older(_) => 4 * axes,
+    };
+    let data = match item {
+        Item::Servos(_) | Item::Position(_, -1) => 8 * axes,
+        Item::Spindles(_) => 8 * spindles,
+        Item::AxisNames => 4 * axes,
+        Item::SpindleNames(_) => 4 * spindles,
+        Item::Parameter(..) | Item::Diagnosis(..) => 8 + values,
+        Item::Alarms(most) => usize::from(most) * (16 + ALARM_TEXT_LEN),
+        Item::ModalGroup(-1) => 80,
+        Item::ExecutedText(most) => 4 + usize::from(most),
+        Item::ProgramPath | Item::MainProgram => 256,
+        Item::ProgramName | Item::PanelSignals(_) => 40,
+        Item::Pmc(stretch) => stretch.len(),
+        _ => 28,
+    };
+    16 + data
+}

@@ -1,0 +1,273 @@
+//! Connections, sessions and frames of the server: one thread per connection, at most [`ServerSettings::sessions_max`].
+
+use super::answer::answer_body;
+use super::controller::Controller;
+use super::fault::Fault;
+use crate::fanuc::wire::{Frame, FrameKind, HEADER_LEN, Header, frame, requests};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// A control that is served.
+pub trait Served: Send {
+    /// Brings the values up to date and shows them; `None` while the control is switched off.
+    fn now(&mut self) -> Option<&mut Controller>;
+}
+
+impl Served for Controller {
+    fn now(&mut self) -> Option<&mut Controller> {
+        Some(self)
+    }
+}
+
+/// Limits of a server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServerSettings {
+    /// Connections at a time; a client of the vendor's library takes two.
+    pub sessions_max: usize,
+    /// A connection without a request for this long is closed.
+    pub idle: Duration,
+}
+
+impl Default for ServerSettings {
+    fn default() -> Self {
+        Self { sessions_max: 10, idle: Duration::from_secs(60) }
+    }
+}
+
+struct Shared {
+    served: Mutex<Box<dyn Served>>,
+    settings: ServerSettings,
+    fault: Mutex<Fault>,
+    stop: AtomicBool,
+    sessions: AtomicUsize,
+    opened: AtomicU64,
+    frames: AtomicU64,
+}
+
+/// A server on its own threads; they end when it is dropped.
+pub struct Server {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+}
+
+/// How often a waiting thread looks whether it shall end.
+const LOOK: Duration = Duration::from_millis(50);
+
+impl Server {
+    /// Serves on this listener from now on.
+    ///
+    /// # Errors
+    /// The system gives no thread, or the listener is broken.
+    pub fn start(listener: TcpListener, served: Box<dyn Served>, settings: ServerSettings) -> std::io::Result<Self> {
+        let address = listener.local_addr()?;
+        listener.set_nonblocking(true)?;
+        let shared = Arc::new(Shared {
+            served: Mutex::new(served),
+            settings,
+            fault: Mutex::new(Fault::None),
+            stop: AtomicBool::new(false),
+            sessions: AtomicUsize::new(0),
+            opened: AtomicU64::new(0),
+            frames: AtomicU64::new(0),
+        });
+        let own = shared.clone();
+        std::thread::Builder::new().name("focas-listen".to_owned()).spawn(move || accept(&listener, &own))?;
+        Ok(Self { shared, address })
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// From now on this goes wrong.
+    pub fn fault(&self, fault: Fault) {
+        *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = fault;
+    }
+
+    /// Connections at this moment.
+    #[must_use]
+    pub fn sessions(&self) -> usize {
+        self.shared.sessions.load(Ordering::SeqCst)
+    }
+
+    /// Connections ever opened.
+    #[must_use]
+    pub fn opened(&self) -> u64 {
+        self.shared.opened.load(Ordering::SeqCst)
+    }
+
+    /// Requests answered.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.shared.frames.load(Ordering::SeqCst)
+    }
+
+    /// Looks at the control, or changes it.
+    pub fn with<T>(&self, look: impl FnOnce(Option<&mut Controller>) -> T) -> T {
+        look(self.shared.served.lock().unwrap_or_else(PoisonError::into_inner).now())
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::SeqCst);
+    }
+}
+
+fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+    while !shared.stop.load(Ordering::SeqCst) {
+        match listener.accept() {
+            Ok((stream, _)) => begin(stream, shared),
+            Err(_) => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+}
+
+fn begin(stream: TcpStream, shared: &Arc<Shared>) {
+    let own = shared.clone();
+    // Without a thread for it the connection is closed, which is what a busy controller does.
+    let _no_thread = std::thread::Builder::new().name("focas-session".to_owned()).spawn(move || {
+        let mut session = Session { stream, shared: own, counted: false };
+        let _ended = session.run();
+    });
+}
+
+struct Session {
+    stream: TcpStream,
+    shared: Arc<Shared>,
+    counted: bool,
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if self.counted {
+            self.shared.sessions.fetch_sub(1, Ordering::SeqCst);
+        }
+        let _closed_already = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+/// Why a session ends.
+enum End {
+    Closed,
+    Line,
+}
+
+impl From<std::io::Error> for End {
+    fn from(_: std::io::Error) -> Self {
+        Self::Line
+    }
+}
+
+impl Session {
+    fn run(&mut self) -> Result<(), End> {
+        self.stream.set_nonblocking(false)?;
+        self.stream.set_nodelay(true)?;
+        self.stream.set_read_timeout(Some(LOOK))?;
+        self.stream.set_write_timeout(Some(Duration::from_secs(2)))?;
+        loop {
+            let request = self.frame()?;
+            self.answer(&request)?;
+        }
+    }
+
+    fn fault(&self) -> Fault {
+        *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn frame(&mut self) -> Result<Frame, End> {
+        let mut head = [0; HEADER_LEN];
+        self.fill(&mut head)?;
+        let header = Header::of(&head).map_err(|_| End::Closed)?;
+        let mut body = vec![0; header.body_len];
+        self.fill(&mut body)?;
+        Ok(Frame { version: header.version, kind: header.kind, body })
+    }
+
+    fn fill(&mut self, mut buffer: &mut [u8]) -> Result<(), End> {
+        let mut waited = Duration::ZERO;
+        while !buffer.is_empty() {
+            match self.stream.read(buffer) {
+                Ok(0) => return Err(End::Closed),
+                Ok(count) => buffer = &mut buffer[count..],
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                    waited += LOOK;
+                    let over = waited >= self.shared.settings.idle || self.fault() == Fault::PowerOff;
+                    if over || self.shared.stop.load(Ordering::SeqCst) {
+                        return Err(End::Closed);
+                    }
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, request: &Frame) -> Result<(), End> {
+        let fault = self.fault();
+        if fault == Fault::PowerOff {
+            return Err(End::Closed);
+        }
+        let reply = self.reply(request)?;
+        let opening = !matches!(request.kind, FrameKind::Request);
+        self.send(reply, if opening { Fault::None } else { fault })?;
+        if matches!(request.kind, FrameKind::Close) { Err(End::Closed) } else { Ok(()) }
+    }
+
+    fn reply(&mut self, request: &Frame) -> Result<Vec<u8>, End> {
+        let shared = self.shared.clone();
+        let mut served = shared.served.lock().unwrap_or_else(PoisonError::into_inner);
+        let controller = served.now().ok_or(End::Closed)?;
+        let version = controller.opening.generation.version();
+        match request.kind {
+            FrameKind::Open => {
+                let free = self.counted || self.take_place();
+                let body = if free { controller.opening.body() } else { Vec::new() };
+                Ok(frame(version, if free { FrameKind::Opened } else { FrameKind::OpenRefused }, &body))
+            }
+            FrameKind::Close => Ok(frame(version, FrameKind::Closed, &[])),
+            FrameKind::Request if self.counted => {
+                shared.frames.fetch_add(1, Ordering::SeqCst);
+                let Ok(asked) = requests(&request.body) else { return Ok(frame(version, FrameKind::Error, &[])) };
+                Ok(frame(version, FrameKind::Answer, &answer_body(controller, &asked)))
+            }
+            _ => Err(End::Closed),
+        }
+    }
+
+    fn take_place(&mut self) -> bool {
+        if self.fault() == Fault::NoSession {
+            return false;
+        }
+        let most = self.shared.settings.sessions_max;
+        let more = |now: usize| (now < most).then_some(now + 1);
+        self.counted = self.shared.sessions.fetch_update(Ordering::SeqCst, Ordering::SeqCst, more).is_ok();
+        self.shared.opened.fetch_add(u64::from(self.counted), Ordering::SeqCst);
+        self.counted
+    }
+
+    fn send(&mut self, bytes: Vec<u8>, fault: Fault) -> Result<(), End> {
+        let bytes = fault.spoil(bytes);
+        match fault {
+            Fault::Silence => Ok(()),
+            Fault::Reset => {
+                self.stream.write_all(&bytes)?;
+                Err(End::Closed)
+            }
+            Fault::ByteByByte(pause) => bytes.iter().try_for_each(|byte| {
+                std::thread::sleep(pause);
+                self.stream.write_all(&[*byte]).map_err(End::from)
+            }),
+            Fault::Delay(delay) => {
+                std::thread::sleep(delay);
+                self.stream.write_all(&bytes).map_err(End::from)
+            }
+            _ => self.stream.write_all(&bytes).map_err(End::from),
+        }
+    }
+}

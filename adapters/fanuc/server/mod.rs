@@ -1,0 +1,26 @@
+//! The other side of the wire: a controller that answers FOCAS2/Ethernet, for integrators without a machine, for other
+//! people's clients and for the tests.
+//!
+//! | file | what |
+//! |---|---|
+//! | `controller` | what a control holds, as plain values |
+//! | `memory` | PMC memory |
+//! | `answer` | one question to one answer, in the encoding of the generation |
+//! | `write` | what a question writes |
+//! | `listen` | connections, sessions, frames |
+//! | `fault` | faults on purpose |
+//! | `ladder` | the ladder of the sample machine: who decides about the feed override |
+//! | `machine` | the simulated machine behind a control |
+
+mod answer;
+mod controller;
+mod fault;
+mod listen;
+mod memory;
+mod write;
+
+pub use answer::answer_body;
+pub use controller::{Axis, Controller, Data, SpindleState};
+pub use fault::Fault;
+pub use listen::{Served, Server, ServerSettings};
+pub use memory::Memory;

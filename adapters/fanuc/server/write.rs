@@ -1,0 +1,80 @@
+//! What a question writes.
+
+use super::answer::{ATTRIB, FUNC, LENGTH, NUMBER, stretch};
+use super::controller::Controller;
+use crate::fanuc::item::Area;
+use crate::fanuc::request::function as f;
+use crate::fanuc::wire::{Cursor, Number, Request};
+
+/// Not now.
+const REJECT: i16 = 13;
+
+pub(super) fn take(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+    let announced = usize::try_from(request.arguments[4]).unwrap_or(usize::MAX);
+    if announced != request.data.len() {
+        return Err(LENGTH);
+    }
+    let [first, _, third, ..] = request.arguments;
+    match request.function {
+        f::PMC_WRITE => memory(controller, request),
+        f::MACRO_WRITE => {
+            let value = number(request)?;
+            let place = controller.macros.get_mut(&first).ok_or(NUMBER)?;
+            *place = value.value();
+            Ok(())
+        }
+        f::TOOL_OFFSET_WRITE => {
+            controller.tool_offsets.insert((first, third - 1000), number(request)?.mantissa);
+            Ok(())
+        }
+        f::WORK_OFFSET_WRITE => work_offset(controller, first, third, number(request)?.mantissa),
+        f::PANEL_SIGNALS_WRITE => panel(controller, request),
+        _ => Err(FUNC),
+    }
+}
+
+fn number(request: &Request) -> Result<Number, i16> {
+    let mut cursor = Cursor::new("written number", &request.data);
+    let number = Number::read(&mut cursor).map_err(|_| LENGTH)?;
+    cursor.end().map(|()| number).map_err(|_| LENGTH)
+}
+
+fn memory(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+    let stretch = stretch(request)?;
+    if matches!(stretch.area, Area::F | Area::X) {
+        return Err(ATTRIB);
+    }
+    if controller.memory.read(stretch).is_none() {
+        return Err(NUMBER);
+    }
+    if controller.memory.write(stretch, &request.data) { Ok(()) } else { Err(LENGTH) }
+}
+
+fn work_offset(controller: &mut Controller, number: i32, axis: i32, value: i32) -> Result<(), i16> {
+    if !(0..=54).contains(&number) {
+        return Err(NUMBER);
+    }
+    if !(1..=i32::from(controller.opening.axes)).contains(&axis) {
+        return Err(ATTRIB);
+    }
+    if controller.offsets_only_at_rest && controller.status.run != 0 {
+        return Err(REJECT);
+    }
+    controller.work_offsets.insert((number, axis), value);
+    Ok(())
+}
+
+/// Bit 5 of the mask is the feed override, which stands at the sixth place.
+fn panel(controller: &mut Controller, request: &Request) -> Result<(), i16> {
+    let mut cursor = Cursor::new("signals of the panel", &request.data);
+    let mut signals = [0; 16];
+    for signal in &mut signals {
+        *signal = cursor.i16().map_err(|_| LENGTH)?;
+    }
+    for (bit, signal) in signals.into_iter().enumerate() {
+        if request.arguments[0] >> bit & 1 == 1 {
+            controller.panel[bit] = signal;
+        }
+    }
+    Ok(())
+}

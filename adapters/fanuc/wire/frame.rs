@@ -1,0 +1,123 @@
+//! The outer frame.
+
+use super::{BODY_MAX, Cursor, WireError};
+
+/// Bytes before the body.
+pub const HEADER_LEN: usize = 10;
+
+const MAGIC: [u8; 4] = [0xA0; 4];
+
+/// What a frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FrameKind {
+    /// A client wants a connection.
+    Open,
+    /// It is open.
+    Opened,
+    /// It is not: every connection the controller has is in use.
+    OpenRefused,
+    /// A client leaves.
+    Close,
+    /// It has left.
+    Closed,
+    /// Questions.
+    Request,
+    /// Their answers.
+    Answer,
+    /// The controller could not make sense of the request.
+    Error,
+}
+
+impl FrameKind {
+    /// Every kind with its number.
+    pub const ALL: [(Self, u16); 8] = [
+        (Self::Open, 0x0101),
+        (Self::Opened, 0x0102),
+        (Self::OpenRefused, 0x0103),
+        (Self::Close, 0x0201),
+        (Self::Closed, 0x0202),
+        (Self::Request, 0x2101),
+        (Self::Answer, 0x2102),
+        (Self::Error, 0x2103),
+    ];
+
+    /// The number on the wire.
+    #[must_use]
+    pub fn number(self) -> u16 {
+        Self::ALL.iter().find(|(kind, _)| *kind == self).map_or(0, |(_, number)| *number)
+    }
+
+    fn of(number: u16) -> Result<Self, WireError> {
+        let known = Self::ALL.iter().find(|(_, known)| *known == number);
+        known.map(|(kind, _)| *kind).ok_or(WireError::Kind(number))
+    }
+}
+
+/// What stands before the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// 1 from a client; from a controller its generation.
+    pub version: u16,
+    /// What the frame is.
+    pub kind: FrameKind,
+    /// Bytes of the body.
+    pub body_len: usize,
+}
+
+impl Header {
+    /// Looks at the first bytes of a frame.
+    ///
+    /// # Errors
+    /// They are of something else, or announce more than is accepted.
+    pub fn of(bytes: &[u8; HEADER_LEN]) -> Result<Self, WireError> {
+        let [a, b, c, d, ..] = *bytes;
+        if [a, b, c, d] != MAGIC {
+            return Err(WireError::Magic([a, b, c, d]));
+        }
+        let mut rest = Cursor::new("header", &bytes[4..]);
+        let version = rest.u16()?;
+        let kind = FrameKind::of(rest.u16()?)?;
+        let body_len = usize::from(rest.u16()?);
+        if body_len > BODY_MAX { Err(WireError::TooLong(body_len)) } else { Ok(Self { version, kind, body_len }) }
+    }
+}
+
+/// A whole frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// See [`Header::version`].
+    pub version: u16,
+    /// What it is.
+    pub kind: FrameKind,
+    /// What it carries.
+    pub body: Vec<u8>,
+}
+
+impl Frame {
+    /// Exactly one frame.
+    ///
+    /// # Errors
+    /// The bytes are something else, too few or too many.
+    pub fn of(bytes: &[u8]) -> Result<Self, WireError> {
+        let short = WireError::Short { what: "header", needed: HEADER_LEN, left: bytes.len() };
+        let (head, body) = bytes.split_first_chunk::<HEADER_LEN>().ok_or(short)?;
+        let header = Header::of(head)?;
+        let mut rest = Cursor::new("body", body);
+        let body = rest.bytes(header.body_len)?.to_vec();
+        rest.end()?;
+        Ok(Self { version: header.version, kind: header.kind, body })
+    }
+}
+
+/// The bytes of a frame. A body beyond [`BODY_MAX`] is cut off there; no builder here makes one.
+#[must_use]
+pub fn frame(version: u16, kind: FrameKind, body: &[u8]) -> Vec<u8> {
+    let body = &body[..body.len().min(BODY_MAX)];
+    let mut bytes = Vec::with_capacity(HEADER_LEN + body.len());
+    bytes.extend_from_slice(&MAGIC);
+    bytes.extend_from_slice(&version.to_be_bytes());
+    bytes.extend_from_slice(&kind.number().to_be_bytes());
+    bytes.extend_from_slice(&u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes());
+    bytes.extend_from_slice(body);
+    bytes
+}
