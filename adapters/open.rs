@@ -1,6 +1,6 @@
 //! From an address to something that can be read.
 
-use crate::address::{Address, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
+use crate::address::{Address, FanucBackend, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
 use crate::clock::TimeNs;
 use crate::driver::{Actuator, Pull, Source};
 use crate::recording::{RecordingError, RowProblem, read_path};
@@ -78,6 +78,11 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
     match address.target() {
         Target::Simulated(target) => Ok(simulated(address, target, now_ns)),
         Target::Replay(target) => replay(address, target, now_ns),
+        Target::Fanuc { at, path, backend: FanucBackend::Native, options } => {
+            let opened = crate::fanuc::open::native(address.text(), at, *path, options);
+            let refused = Refused::default();
+            Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
+        }
         other => Err(not_built(address, other)),
     }
 }
@@ -156,7 +161,7 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
 #[must_use]
 pub fn missing_driver(address: &Address) -> Option<OpenError> {
     match address.target() {
-        Target::Simulated(_) | Target::Replay(_) => None,
+        Target::Simulated(_) | Target::Replay(_) | Target::Fanuc { backend: FanucBackend::Native, .. } => None,
         other => Some(not_built(address, other)),
     }
 }
@@ -164,7 +169,7 @@ pub fn missing_driver(address: &Address) -> Option<OpenError> {
 fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",
-        Target::Fanuc { .. } => "the FANUC driver (FOCAS2)",
+        Target::Fanuc { .. } => "the FANUC driver through the vendor's library",
         Target::NcLink { .. } => "the Huazhong driver (NC-Link)",
         Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",
         Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "the Modbus meter driver",
@@ -210,8 +215,8 @@ mod tests {
 
     #[test]
     fn what_is_not_built_says_so() {
-        let error = open(&address("fanuc://cnc"), 0).err().map(|error| error.to_string()).unwrap_or_default();
-        assert!(error.contains("fanuc://cnc") && error.contains("not built yet"), "{error}");
+        let error = open(&address("waveform://cnc:5000"), 0).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("waveform://cnc") && error.contains("not built yet"), "{error}");
         assert!(open_pull(&address("replay:/does/not/exist.csv"), 0).is_err());
     }
 }

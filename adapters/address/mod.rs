@@ -1,8 +1,10 @@
 //! Sources and sinks as addresses: the same notation in the configuration, on the command line and in messages.
 
+mod fanuc;
 mod keys;
 mod target;
 
+pub use fanuc::{FanucOptions, WriteMethod};
 pub use target::{
     Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
     Speed, Target,
@@ -107,6 +109,7 @@ mod tests {
             "replay:/data/with space.csv",
             "fanuc://10.0.0.5:8193?path=1&backend=native",
             "fanuc://cnc?backend=vendor&library=/opt/fwlib/libfwlib32.so",
+            "fanuc://cnc?write=mailbox&mailbox=D900&period_ms=50&duty_pct=25&allow=#500-#509,EXT",
             "nclink://broker:1883/SERIAL",
             "nclinks://broker:8883/SERIAL",
             "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
@@ -150,6 +153,21 @@ mod tests {
     fn a_vendor_library_must_be_named() {
         assert!(refused("fanuc://cnc?backend=vendor").contains("library"));
         assert!(refused("hncnet://cnc").contains("library"));
+    }
+
+    #[test]
+    fn the_ways_of_writing_to_a_fanuc_are_read() {
+        let write = |text| match parse(text) {
+            Target::Fanuc { options, .. } => options.write,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(write("fanuc://cnc"), WriteMethod::None, "nothing is written unless it is asked for");
+        assert_eq!(write("fanuc://cnc?write=direct"), WriteMethod::Direct);
+        assert_eq!(write("fanuc://cnc?write=macro&macro=501"), WriteMethod::Macro { variable: 501 });
+        let place = WriteMethod::Mailbox { area: crate::fanuc::item::Area::D, at: 900 };
+        assert_eq!(write("fanuc://cnc?write=mailbox&mailbox=D900"), place);
+        assert!(refused("fanuc://cnc?write=mailbox&mailbox=G12").contains("R, D or E"));
+        assert!(refused("fanuc://cnc?allow=G12").contains("allow=G12"));
     }
 
     proptest::proptest! {

@@ -1,6 +1,7 @@
 //! What each scheme of an address means, typed.
 
 use super::SCHEMES;
+use super::fanuc::FanucOptions;
 use super::keys::Keys;
 use crate::channel::nearest;
 use std::path::PathBuf;
@@ -131,6 +132,8 @@ pub enum Target {
         path: u8,
         /// How.
         backend: FanucBackend,
+        /// Pace, limits and the way of writing.
+        options: Box<FanucOptions>,
     },
     /// A Huazhong controller by NC-Link over MQTT.
     NcLink {
@@ -269,7 +272,8 @@ fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
     let path = keys.number("path", 1, 1, 10);
     let vendor = keys.choice("backend", &[("native", false), ("vendor", true)]);
     let backend = if vendor { library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
-    Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend? })
+    let options = Box::new(FanucOptions::read(keys));
+    Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
 fn nclink(body: &str, _keys: &mut Keys, tls: bool) -> Result<Target, String> {

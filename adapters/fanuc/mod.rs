@@ -19,6 +19,12 @@
 //! | `focas` | the one narrow trait over what the adapter needs |
 //! | `native` | FOCAS2/Ethernet spoken by ourselves |
 //! | `statistics` | what the round trips cost |
+//! | `line` | the one connection that everything shares: opening, loss, power-off, duty cycle, allowed writes |
+//! | `poll`, `source` | what is asked for at which pace; the groups as sources |
+//! | `states`, `readings` | status words and signals as states, answers as channels; pure |
+//! | `feed_override` | the inverted byte, and nothing else |
+//! | `allow` | what may be written |
+//! | `open` | from an address to all of this |
 //! | `server` | the other side of the wire |
 //!
 //! Where the facts come from: frames and layouts were fixed by watching the vendor's own client talk to a server of
@@ -28,15 +34,23 @@
 //! What is deliberately absent: no retry inside a connection (a frame that does not fit ends it), no second
 //! connection, no thread, no write outside the allowed addresses.
 
+pub mod allow;
 pub mod answer;
 pub mod code;
 pub mod decode;
+pub mod feed_override;
 pub mod focas;
 pub mod item;
+pub mod line;
 pub mod native;
+pub mod open;
 pub mod opening;
+pub mod poll;
+pub mod readings;
 pub mod request;
 pub mod server;
+pub mod source;
+pub mod states;
 pub mod statistics;
 pub mod wire;
 

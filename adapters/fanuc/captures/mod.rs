@@ -8,6 +8,7 @@
 
 mod fixture;
 mod rows;
+mod values;
 
 use super::answer::ItemResult;
 use super::decode;

@@ -1,0 +1,126 @@
+//! What follows the question mark of a `fanuc://` address.
+
+use super::keys::Keys;
+use crate::fanuc::item::Area;
+use std::time::Duration;
+
+/// How the feed override reaches the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WriteMethod {
+    /// Not at all; nothing is ever written.
+    None,
+    /// Through a mailbox in PMC memory that the ladder reads, with a heartbeat.
+    Mailbox {
+        /// Area of the mailbox: R, D or E.
+        area: Area,
+        /// Its first byte.
+        at: u16,
+    },
+    /// Through a byte from which the ladder makes the second override; the operator's dial stays sovereign.
+    SecondOverride {
+        /// Area of the byte.
+        area: Area,
+        /// Which.
+        at: u16,
+    },
+    /// Through a custom macro variable in percent, for programs that say `F[#501*...]` or a ladder that reads it.
+    Macro {
+        /// Number of the variable.
+        variable: u16,
+    },
+    /// Straight into G012. The ladder usually writes it in every scan and takes it back.
+    Direct,
+}
+
+/// Keys of a `fanuc://` address besides path and backend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FanucOptions {
+    /// Pace of what changes quickly.
+    pub period: Duration,
+    /// Pace of what changes slowly.
+    pub slow: Duration,
+    /// At most this share of the time the controller is busy with us, percent.
+    pub duty_pct: u8,
+    /// Longest wait for connecting and for an answer.
+    pub timeout: Duration,
+    /// How the feed override is written.
+    pub write: WriteMethod,
+    /// An override is looked at again after this time: several scans of the ladder.
+    pub settle: Duration,
+    /// Texts of further addresses that may be written.
+    pub allow: Vec<String>,
+}
+
+impl Default for FanucOptions {
+    fn default() -> Self {
+        Self::read(&mut Keys::of(""))
+    }
+}
+
+impl FanucOptions {
+    pub(super) fn read(keys: &mut Keys) -> Self {
+        let ms = |keys: &mut Keys, key, default, least, greatest| {
+            Duration::from_millis(keys.number(key, default, least, greatest))
+        };
+        let allow = keys.text("allow").map(|text| text.split(',').map(|one| one.trim().to_owned()).collect());
+        let allow: Vec<String> = allow.unwrap_or_default();
+        for text in allow.iter().filter(|text| crate::fanuc::allow::Allowed::read(text).is_none()) {
+            keys.problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
+        }
+        Self {
+            period: ms(keys, "period_ms", 100, 20, 60_000),
+            slow: ms(keys, "slow_ms", 1000, 100, 600_000),
+            duty_pct: keys.number("duty_pct", 50, 1, 100),
+            timeout: ms(keys, "timeout_ms", 2000, 50, 30_000),
+            settle: ms(keys, "settle_ms", 50, 0, 2000),
+            write: write(keys),
+            allow,
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Word {
+    None,
+    Mailbox,
+    Second,
+    Macro,
+    Direct,
+}
+
+fn write(keys: &mut Keys) -> WriteMethod {
+    let words = [
+        ("none", Word::None),
+        ("mailbox", Word::Mailbox),
+        ("second_override", Word::Second),
+        ("macro", Word::Macro),
+        ("direct", Word::Direct),
+    ];
+    match keys.choice("write", &words) {
+        Word::None => WriteMethod::None,
+        Word::Mailbox => {
+            let (area, at) = place(keys, "mailbox", (Area::R, 900));
+            WriteMethod::Mailbox { area, at }
+        }
+        Word::Second => {
+            let (area, at) = place(keys, "second_override", (Area::R, 910));
+            WriteMethod::SecondOverride { area, at }
+        }
+        Word::Macro => WriteMethod::Macro { variable: keys.number("macro", 500, 100, 999) },
+        Word::Direct => WriteMethod::Direct,
+    }
+}
+
+/// `R900`: a byte of an area that belongs to the ladder's data.
+fn place(keys: &mut Keys, key: &'static str, default: (Area, u16)) -> (Area, u16) {
+    let Some(text) = keys.text(key) else { return default };
+    let mut letters = text.chars();
+    let area = letters.next().and_then(Area::of_letter).filter(|area| matches!(area, Area::R | Area::D | Area::E));
+    match (area, letters.as_str().parse::<u16>()) {
+        (Some(area), Ok(at)) if at < 60_000 => (area, at),
+        _ => {
+            keys.problem(format!("{key}={text}: give a byte of R, D or E, for example R900"));
+            default
+        }
+    }
+}

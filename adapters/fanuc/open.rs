@@ -1,0 +1,52 @@
+//! From an address to sources and the way to the feed override.
+
+use super::allow::{AllowList, Allowed};
+use super::line::{Connect, Line};
+use super::native::{Native, NativeSettings};
+use super::readings::Manner;
+use super::source::FanucSource;
+use crate::address::{Endpoint, FanucOptions, WriteMethod};
+use crate::driver::{Actuator, Source};
+
+/// What an address opens.
+pub struct OpenedFanuc {
+    /// The groups, the quick one first.
+    pub sources: Vec<Box<dyn Source>>,
+    /// The way to the feed override, where the address names one.
+    pub actuator: Option<Box<dyn Actuator>>,
+    /// The connection they share.
+    pub line: Line,
+}
+
+/// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
+#[must_use]
+pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
+    let settings = NativeSettings { at: at.clone(), path: u16::from(path), timeout: options.timeout };
+    let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
+    opened(name, connect, path, options)
+}
+
+/// Opens a controller through any way of talking to it.
+#[must_use]
+pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
+    let line = Line::new(name, connect, allowed(options), options.duty_pct);
+    let manner = Manner { path, second_override: matches!(options.write, WriteMethod::SecondOverride { .. }) };
+    let sources: Vec<Box<dyn Source>> = vec![
+        Box::new(FanucSource::fast(name, line.clone(), manner, options)),
+        Box::new(FanucSource::slow(name, line.clone(), manner, options)),
+    ];
+    OpenedFanuc { sources, actuator: None, line }
+}
+
+/// What the way of writing needs, and what the address allows besides.
+fn allowed(options: &FanucOptions) -> AllowList {
+    let own = match options.write {
+        WriteMethod::None => return AllowList::default(),
+        WriteMethod::Mailbox { area, at } => Allowed::bytes(area, at, 3),
+        WriteMethod::SecondOverride { area, at } => Allowed::bytes(area, at, 1),
+        WriteMethod::Macro { variable } => Allowed::Macros { from: variable, to: variable },
+        WriteMethod::Direct => Allowed::bytes(super::item::Area::G, super::feed_override::AT, 1),
+    };
+    let more = options.allow.iter().filter_map(|text| Allowed::read(text));
+    AllowList(std::iter::once(own).chain(more).collect())
+}

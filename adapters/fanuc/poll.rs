@@ -1,0 +1,72 @@
+//! What is asked for, group by group. Every group is a source with its own period; both share one connection.
+
+use super::item::{Area, Item, Position, Servo, Spindle, Stretch};
+
+/// Signals of one path lie this many bytes after those of the one before.
+const PATH_STEP: u16 = 1000;
+
+/// From the control to the ladder: F000 to F004.
+#[must_use]
+pub fn control_signals(path: u8) -> Stretch {
+    Stretch::bytes(Area::F, PATH_STEP * u16::from(path.saturating_sub(1)), 5)
+}
+
+/// From the ladder to the control: G006 to G030, with the overrides.
+#[must_use]
+pub fn ladder_signals(path: u8) -> Stretch {
+    Stretch::bytes(Area::G, PATH_STEP * u16::from(path.saturating_sub(1)) + FIRST_LADDER_BYTE, 25)
+}
+
+/// Where [`ladder_signals`] begins.
+pub const FIRST_LADDER_BYTE: u16 = 6;
+
+/// Numbers of the modal words F, S and T.
+pub const MODAL_F: Item = Item::ModalWord(5);
+/// See [`MODAL_F`].
+pub const MODAL_S: Item = Item::ModalWord(20);
+/// See [`MODAL_F`].
+pub const MODAL_T: Item = Item::ModalWord(22);
+
+/// Unit of the feed.
+pub const FEED_UNIT: Item = Item::SpeedUnit(3);
+/// Unit of the feed on older controls.
+pub const FEED_UNIT_OLDER: Item = Item::SpeedUnit(0);
+
+/// The alarms, asked for only when the status says that there are some.
+pub const ALARMS: Item = Item::Alarms(8);
+
+/// What changes quickly: one frame.
+#[must_use]
+pub fn fast(path: u8) -> Vec<Item> {
+    vec![
+        Item::Status,
+        Item::Feed,
+        Item::SpindleSpeed,
+        Item::Spindles(Spindle::Load),
+        Item::Servos(Servo::Load),
+        Item::Servos(Servo::Current),
+        Item::Position(Position::Machine, -1),
+        Item::ProgramName,
+        Item::Program,
+        Item::Sequence,
+        MODAL_F,
+        MODAL_S,
+        MODAL_T,
+        FEED_UNIT,
+        Item::Pmc(control_signals(path)),
+        Item::Pmc(ladder_signals(path)),
+    ]
+}
+
+/// Parameter of the number of parts.
+pub const PART_COUNT: Item = Item::Parameter(6711, 0);
+/// Temperature of the winding of the spindle motor, °C.
+pub const MOTOR_TEMPERATURE: Item = Item::Diagnosis(403, 1);
+/// Gear stages of the spindles.
+pub const GEAR: Item = Item::Spindles(Spindle::Gear);
+
+/// What changes slowly.
+#[must_use]
+pub fn slow() -> Vec<Item> {
+    vec![PART_COUNT, MOTOR_TEMPERATURE, GEAR]
+}

@@ -1,0 +1,261 @@
+//! Signals and status words as states. Pure.
+//!
+//! Signals: B-63943EN, "Signal address list" (F000 to F004 from the control, G006 to G030 to it).
+
+use super::answer::{Alarm, Status};
+use super::feed_override;
+use crate::units::OverridePct;
+use crate::words::{execution, mode, operation};
+
+/// Kinds of alarms, by their number.
+const ALARM_KINDS: [&str; 16] =
+    ["SW", "PW", "IO", "PS", "OT", "OH", "SV", "SR", "MC", "SP", "DS", "IE", "BG", "SN", "", "EX"];
+
+/// At most so many alarms stand in the channel.
+const ALARMS_SHOWN: usize = 4;
+
+/// Bytes F000 to F004 and G006 to G030 of a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Signals {
+    control: Option<[u8; 5]>,
+    ladder: Option<[u8; 25]>,
+}
+
+impl Signals {
+    /// From the two stretches, where they could be read.
+    #[must_use]
+    pub fn new(control: Option<&[i32]>, ladder: Option<&[i32]>) -> Self {
+        Self { control: control.and_then(bytes), ladder: ladder.and_then(bytes) }
+    }
+
+    fn f(&self, byte: usize, bit: u8) -> Option<bool> {
+        self.control.map(|bytes| bytes[byte] >> bit & 1 == 1)
+    }
+
+    fn g(&self, byte: usize) -> Option<u8> {
+        self.ladder.map(|bytes| bytes[byte - 6])
+    }
+
+    /// F000.6 SA: the drives are ready.
+    #[must_use]
+    pub fn drives_ready(&self) -> Option<bool> {
+        self.f(0, 6)
+    }
+
+    /// F001.5 TAP: tapping.
+    #[must_use]
+    pub fn tapping(&self) -> Option<bool> {
+        self.f(1, 5)
+    }
+
+    /// F002.0 INCH: the program is in inches.
+    #[must_use]
+    pub fn inch(&self) -> Option<bool> {
+        self.f(2, 0)
+    }
+
+    /// F002.1 RPDO: rapid traverse.
+    #[must_use]
+    pub fn rapid(&self) -> Option<bool> {
+        self.f(2, 1)
+    }
+
+    /// F002.3 THRD: a thread is cut.
+    #[must_use]
+    pub fn threading(&self) -> Option<bool> {
+        self.f(2, 3)
+    }
+
+    /// F004.3 MSBK: single block is on.
+    #[must_use]
+    pub fn single_block(&self) -> Option<bool> {
+        self.f(4, 3)
+    }
+
+    /// G006.4 OVC: overrides are cancelled.
+    #[must_use]
+    pub fn override_cancelled(&self) -> Option<bool> {
+        self.g(6).map(|byte| byte >> 4 & 1 == 1)
+    }
+
+    /// The feed override in force, %: G012, and G013 where the machine has the second one; 100 where the control takes
+    /// none.
+    #[must_use]
+    pub fn feed_override(&self, second: bool) -> Option<f64> {
+        let first = self.g(12)?;
+        if self.override_cancelled() == Some(true) || self.tapping() == Some(true) || self.threading() == Some(true) {
+            return Some(100.0);
+        }
+        let percent = |byte| f64::from(feed_override::decode(byte).percent());
+        let second = if second { percent(self.g(13)?) } else { 100.0 };
+        Some((percent(first) * second / 100.0).min(f64::from(u8::MAX - 1)))
+    }
+
+    /// G030: spindle override, %, straight binary.
+    #[must_use]
+    pub fn spindle_override(&self) -> Option<f64> {
+        self.g(30).and_then(OverridePct::new).map(|pct| f64::from(pct.percent()))
+    }
+
+    /// What the feed follows the spindle in, if anything.
+    #[must_use]
+    pub fn operation(&self) -> Option<&'static str> {
+        match (self.threading(), self.tapping()) {
+            (_, Some(true)) => Some(operation::TAPPING),
+            (Some(true), _) => Some(operation::THREADING),
+            _ => None,
+        }
+    }
+}
+
+fn bytes<const N: usize>(values: &[i32]) -> Option<[u8; N]> {
+    let bytes: Vec<u8> = values.iter().filter_map(|value| u8::try_from(*value).ok()).collect();
+    bytes.try_into().ok()
+}
+
+/// The word of the channel `mode`; `None` when the control shows none.
+#[must_use]
+pub fn mode(status: &Status, single_block: bool) -> Option<&'static str> {
+    match status.automatic {
+        1 | 10 if single_block => Some(mode::SEMI_AUTOMATIC),
+        1 | 10 => Some(mode::AUTOMATIC),
+        0 => Some(mode::MANUAL_DATA_INPUT),
+        3 => Some(mode::EDIT),
+        4..=9 => Some(mode::MANUAL),
+        _ => None,
+    }
+}
+
+/// The word of the channel `execution`.
+#[must_use]
+pub fn execution(status: &Status, feed_override_pct: Option<f64>) -> Option<&'static str> {
+    if status.emergency != 0 {
+        return Some(execution::STOPPED);
+    }
+    match status.run {
+        0 => Some(execution::READY),
+        1 => Some(execution::STOPPED),
+        2 => Some(execution::FEED_HOLD),
+        3 if feed_override_pct == Some(0.0) => Some(execution::INTERRUPTED),
+        3 | 4 => Some(execution::ACTIVE),
+        _ => None,
+    }
+}
+
+/// The word of the channel `motion`.
+#[must_use]
+pub fn motion(status: &Status) -> Option<&'static str> {
+    match status.motion {
+        0 => Some("NONE"),
+        1 => Some("MOTION"),
+        2 => Some("DWELL"),
+        _ => None,
+    }
+}
+
+/// Does the status say that there is an alarm? A low battery (2 and more) is none.
+#[must_use]
+pub fn alarmed(status: &Status) -> bool {
+    status.alarm == 1
+}
+
+/// The text of the channel `alarm`: empty without one. `alarms` are those that could be read.
+#[must_use]
+pub fn alarm(status: &Status, alarms: &[Alarm], axes: &[String]) -> String {
+    let mut texts = Vec::new();
+    if status.emergency == 1 {
+        texts.push("EMERGENCY STOP".to_owned());
+    }
+    if alarmed(status) {
+        texts.extend(alarms.iter().take(ALARMS_SHOWN).map(|alarm| one(alarm, axes)));
+        if alarms.len() > ALARMS_SHOWN {
+            texts.push(format!("and {} more", alarms.len() - ALARMS_SHOWN));
+        }
+        if alarms.is_empty() {
+            texts.push("ALARM".to_owned());
+        }
+    }
+    texts.join("; ")
+}
+
+fn one(alarm: &Alarm, axes: &[String]) -> String {
+    let kind = usize::try_from(alarm.kind).ok().and_then(|kind| ALARM_KINDS.get(kind)).copied().unwrap_or("");
+    let axis = usize::try_from(alarm.axis - 1).ok().and_then(|axis| axes.get(axis));
+    let axis = axis.map_or(String::new(), |axis| format!(" ({axis})"));
+    format!("{kind}{:04}{axis} {}", alarm.number, alarm.text).trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(automatic: i16, run: i16) -> Status {
+        Status { automatic, run, ..Status::default() }
+    }
+
+    fn signals(changes: &[(char, usize, u8)]) -> Signals {
+        let (mut control, mut ladder) = ([0; 5], [0; 25]);
+        ladder[6] = i32::from(feed_override::encode(OverridePct::FULL));
+        ladder[24] = 100;
+        for (letter, byte, value) in changes {
+            let place = if *letter == 'F' { &mut control[*byte] } else { &mut ladder[byte - 6] };
+            *place = i32::from(*value);
+        }
+        Signals::new(Some(&control), Some(&ladder))
+    }
+
+    #[test]
+    fn every_mode_word_has_a_state() {
+        let words: Vec<_> = (0..=10).map(|word| mode(&status(word, 0), false)).collect();
+        let manual = Some("MANUAL");
+        let expected = [Some("MANUAL_DATA_INPUT"), Some("AUTOMATIC"), None, Some("EDIT")];
+        assert_eq!(words[..4], expected);
+        assert_eq!(words[4..10], [manual; 6]);
+        assert_eq!(words[10], Some("AUTOMATIC"));
+        assert_eq!(mode(&status(1, 0), true), Some("SEMI_AUTOMATIC"));
+        assert_eq!(mode(&status(77, 0), false), None);
+    }
+
+    #[test]
+    fn every_run_word_has_a_state() {
+        let words: Vec<_> = (0..=5).map(|word| execution(&status(1, word), Some(100.0))).collect();
+        assert_eq!(words, [Some("READY"), Some("STOPPED"), Some("FEED_HOLD"), Some("ACTIVE"), Some("ACTIVE"), None]);
+        assert_eq!(execution(&status(1, 3), Some(0.0)), Some("INTERRUPTED"));
+        assert_eq!(execution(&Status { emergency: 1, ..status(1, 3) }, None), Some("STOPPED"));
+    }
+
+    #[test]
+    fn overrides_as_the_signals_give_them() {
+        assert_eq!(signals(&[]).feed_override(false), Some(100.0));
+        assert_eq!(signals(&[('G', 12, 0xAF)]).feed_override(false), Some(80.0));
+        assert_eq!(signals(&[('G', 12, 0x00)]).feed_override(false), Some(0.0), "all bits 0 are 0 %, not 255 %");
+        assert_eq!(signals(&[('G', 12, 0xFF)]).feed_override(false), Some(0.0));
+        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 13, 0xCD)]).feed_override(true), Some(40.0));
+        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 6, 0x10)]).feed_override(false), Some(100.0), "cancelled");
+        assert_eq!(signals(&[('G', 12, 0xAF), ('F', 2, 0x08)]).feed_override(false), Some(100.0), "threading");
+        assert_eq!(signals(&[]).spindle_override(), Some(100.0));
+        assert_eq!(Signals::new(None, None).feed_override(false), None);
+    }
+
+    #[test]
+    fn threads_and_single_block_are_told_by_signals() {
+        assert_eq!(signals(&[('F', 1, 0x20)]).operation(), Some("tapping"));
+        assert_eq!(signals(&[('F', 2, 0x08)]).operation(), Some("threading"));
+        assert_eq!(signals(&[]).operation(), None);
+        assert_eq!(signals(&[('F', 4, 0x08)]).single_block(), Some(true));
+        assert_eq!(signals(&[('F', 2, 0x02)]).rapid(), Some(true));
+    }
+
+    #[test]
+    fn alarms_are_named_with_their_axis() {
+        let axes = ["X".to_owned(), "Y".to_owned()];
+        let alarms = vec![Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".to_owned() }; 6];
+        let on = Status { alarm: 1, ..status(1, 0) };
+        assert_eq!(alarm(&on, &alarms[..1], &axes), "SV0417 (Y) SERVO ALARM");
+        assert!(alarm(&on, &alarms, &axes).ends_with("and 2 more"));
+        assert_eq!(alarm(&on, &[], &axes), "ALARM");
+        assert_eq!(alarm(&status(1, 3), &alarms, &axes), "", "cleared on the control");
+        assert_eq!(alarm(&Status { alarm: 2, ..status(1, 3) }, &[], &axes), "", "a low battery stops nothing");
+        assert_eq!(alarm(&Status { emergency: 1, ..on }, &[], &axes), "EMERGENCY STOP; ALARM");
+    }
+}

@@ -1,0 +1,71 @@
+//! A controller on a free port, and an adapter that reads it.
+
+use adapters::address::Address;
+use adapters::clock::{Clock, SystemClock};
+use adapters::fanuc::item::Area;
+use adapters::fanuc::server::{Controller, Server, ServerSettings};
+use adapters::fanuc::wire::Number;
+use adapters::open::{Opened, open};
+use adapters::{Absence, Reading, Source, SourceError, Value};
+use std::net::TcpListener;
+
+/// A lathe that cuts: 1200 rpm, 0.2 mm per turn, load 41 %.
+pub(crate) fn controller(version: u16) -> Controller {
+    let mut control = Controller::new(version, &['X', 'Z']);
+    (control.status.run, control.status.motion) = (3, 1);
+    control.feed = Number::decimal(240, 0);
+    control.spindles[0].quantities = [41, 4000, 2, 1200, 41, 1200].map(|value| Number::decimal(value, 0));
+    control.axes[0].positions[1] = Number::decimal(79_000, 3);
+    control.axes[1].positions[1] = Number::decimal(-12_345, 3);
+    control.axes[1].load = Number::decimal(-17, 0);
+    control.axes[1].current = Number::decimal(31, 1);
+    control.program = (1001, 1001);
+    control.sequence = 120;
+    control.modal_words.extend([(5, 250), (20, 1200), (22, 303)]);
+    control.parameter(6711, 3, Number::decimal(17, 0));
+    control.parameter(1001, 0, Number::decimal(0, 0));
+    control.diagnosis(403, 1, Number::decimal(48, 0));
+    control.memory.set(Area::G, 12, 0xAF);
+    control.memory.set(Area::G, 30, 100);
+    control.memory.set(Area::F, 0, 0x60);
+    control
+}
+
+pub(crate) fn serve(controller: Controller, settings: ServerSettings) -> Server {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    Server::start(listener, Box::new(controller), settings).expect("threads")
+}
+
+pub(crate) fn address(server: &Server, keys: &str) -> Address {
+    format!("fanuc://{}?{keys}", server.address()).parse().expect("usable")
+}
+
+pub(crate) fn opened(server: &Server, keys: &str) -> Opened {
+    open(&address(server, keys), SystemClock::new().now_ns()).expect("opens")
+}
+
+/// One poll of a source.
+pub(crate) fn poll(source: &mut dyn Source) -> Result<Vec<Reading>, SourceError> {
+    let mut out = Vec::new();
+    source.read(&SystemClock::new(), &mut out).map(|()| out)
+}
+
+/// What a channel says in a poll.
+pub(crate) fn value(readings: &[Reading], channel: &str) -> Result<Value, Absence> {
+    let found = readings.iter().find(|reading| reading.channel.name() == channel);
+    found.unwrap_or_else(|| panic!("no reading of {channel}")).value.clone()
+}
+
+pub(crate) fn number(readings: &[Reading], channel: &str) -> f64 {
+    match value(readings, channel) {
+        Ok(Value::Number(number)) => number,
+        other => panic!("{channel}: {other:?}"),
+    }
+}
+
+pub(crate) fn text(readings: &[Reading], channel: &str) -> String {
+    match value(readings, channel) {
+        Ok(Value::Text(text)) => text.to_string(),
+        other => panic!("{channel}: {other:?}"),
+    }
+}
