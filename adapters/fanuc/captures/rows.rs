@@ -78,6 +78,7 @@ pub(super) fn modal(value: i32) -> Answer {
 pub(super) fn all() -> Vec<Row> {
     let mut rows = state();
     rows.extend(speeds());
+    rows.extend(meters());
     rows.extend(program());
     rows.extend(dynamic());
     rows.extend(super::values::all());
@@ -137,8 +138,6 @@ fn speeds() -> Vec<Row> {
     let spindle = |what, value| (Item::Spindles(what), numbers(&[value], 1));
     let count = |which, count| (Item::Count(which), Whole(count));
     let none = |parameter| (Item::Parameter(parameter, 0), data(3, 0.0));
-    let servo = (Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
-    let axis_names = (Item::AxisNames, names(&["X", "Y", "Z"]));
     vec![
         read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(Item::Feed, number(1200.0))]),
         read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(Item::SpindleSpeed, number(8000.0))]),
@@ -182,6 +181,15 @@ fn speeds() -> Vec<Row> {
                 (Item::Pmc(Stretch::bytes(Area::G, 28, 1)), Answer::Memory(vec![0])),
             ],
         ),
+    ]
+}
+
+fn meters() -> Vec<Row> {
+    let spindle = |what, value| (Item::Spindles(what), numbers(&[value], 1));
+    let count = |which, count| (Item::Count(which), Answer::Whole(count));
+    let servo = (Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
+    let axis_names = (Item::AxisNames, names(&["X", "Y", "Z"]));
+    vec![
         read(
             "cnc_rdspmeter",
             NEWER,

@@ -5,7 +5,7 @@ use crate::fanuc::answer::{Alarm, Answer};
 use crate::fanuc::item::{Area, Item, Stretch, Timer, Width, Write};
 
 pub(super) fn all() -> Vec<Row> {
-    [values(), memory(), writes(), rest()].into_iter().flatten().collect()
+    [values(), variables(), parameters(), writes(), rest()].into_iter().flatten().collect()
 }
 
 fn values() -> Vec<Row> {
@@ -41,8 +41,7 @@ fn values() -> Vec<Row> {
     ]
 }
 
-fn memory() -> Vec<Row> {
-    let pmc = |area, from, to, width| Stretch { area, from, to, width };
+fn variables() -> Vec<Row> {
     vec![
         write(
             "cnc_wrmacro",
@@ -82,6 +81,12 @@ fn memory() -> Vec<Row> {
             "b00000000002001d",
             vec![(Item::Macro(511), number(-2.5))],
         ),
+    ]
+}
+
+fn parameters() -> Vec<Row> {
+    let pmc = |area, from, to, width| Stretch { area, from, to, width };
+    vec![
         read(
             "cnc_rdparam",
             NEWER,
