@@ -12,6 +12,7 @@
 
 pub mod address;
 pub mod channel;
+pub mod child;
 pub mod clock;
 pub mod driver;
 pub mod fanuc;

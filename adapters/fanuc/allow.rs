@@ -57,8 +57,9 @@ impl Allowed {
 
     fn holds(self, write: &Write) -> bool {
         match (self, write) {
-            (Self::Memory { area, from, to }, Write::Pmc { stretch, .. }) => {
-                area == stretch.area && !stretch.is_empty() && from <= stretch.from && stretch.to <= to
+            (Self::Memory { area, from, to }, Write::Pmc { stretch, values }) => {
+                let whole = values.len() * usize::from(stretch.width.bytes()) == stretch.len();
+                area == stretch.area && whole && from <= stretch.from && stretch.to <= to && !stretch.is_empty()
             }
             (Self::Macros { from, to }, Write::Macro { number, .. }) => (from..=to).contains(number),
             (Self::ExternalOffset, Write::WorkOffset { number: 0, .. }) => true,

@@ -24,6 +24,8 @@
 //! | `states`, `readings` | status words and signals as states, answers as channels; pure |
 //! | `feed_override` | the inverted byte, and nothing else |
 //! | `allow` | what may be written |
+//! | `actuator` | the feed override: mailbox, second override, macro variable, direct |
+//! | `work_offset` | the external work offset between programs |
 //! | `open` | from an address to all of this |
 //! | `server` | the other side of the wire |
 //!
@@ -34,6 +36,7 @@
 //! What is deliberately absent: no retry inside a connection (a frame that does not fit ends it), no second
 //! connection, no thread, no write outside the allowed addresses.
 
+pub mod actuator;
 pub mod allow;
 pub mod answer;
 pub mod code;
@@ -53,6 +56,9 @@ pub mod source;
 pub mod states;
 pub mod statistics;
 pub mod wire;
+pub mod work_offset;
 
 #[cfg(test)]
 mod captures;
+#[cfg(test)]
+mod tests;

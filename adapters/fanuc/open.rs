@@ -1,5 +1,6 @@
 //! From an address to sources and the way to the feed override.
 
+use super::actuator::FanucActuator;
 use super::allow::{AllowList, Allowed};
 use super::line::{Connect, Line};
 use super::native::{Native, NativeSettings};
@@ -35,7 +36,8 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
         Box::new(FanucSource::fast(name, line.clone(), manner, options)),
         Box::new(FanucSource::slow(name, line.clone(), manner, options)),
     ];
-    OpenedFanuc { sources, actuator: None, line }
+    let actuator = FanucActuator::new(name, line.clone(), options.write, options.settle);
+    OpenedFanuc { sources, actuator: actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>), line }
 }
 
 /// What the way of writing needs, and what the address allows besides.

@@ -15,7 +15,9 @@
 mod answer;
 mod controller;
 mod fault;
+pub mod ladder;
 mod listen;
+mod machine;
 mod memory;
 mod write;
 
@@ -23,4 +25,5 @@ pub use answer::answer_body;
 pub use controller::{Axis, Controller, Data, SpindleState};
 pub use fault::Fault;
 pub use listen::{Served, Server, ServerSettings};
+pub use machine::SimulatedControl;
 pub use memory::Memory;

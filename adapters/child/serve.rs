@@ -1,0 +1,33 @@
+//! The child's side: requests from standard input, answers back on the same socket.
+
+use super::message;
+use std::io::ErrorKind;
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+
+/// The hidden subcommand with which the program starts as a child: `cnc-gateway vendor-child KIND ARGUMENT...`.
+pub const SUBCOMMAND: &str = "vendor-child";
+
+/// Answers requests until the parent is gone. `handler` makes the answer to a request; it is never called from another
+/// thread.
+///
+/// # Errors
+/// Standard input is no socket of a parent, or the line failed in another way than by the parent's going.
+pub fn serve(mut handler: impl FnMut(&[u8]) -> Vec<u8>) -> std::io::Result<()> {
+    let mut stream = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
+    loop {
+        let request = match message::receive(&mut stream) {
+            Err(error) if gone(error.kind()) => return Ok(()),
+            other => other?,
+        };
+        let answer = handler(&request);
+        match message::send(&mut stream, &answer) {
+            Err(error) if gone(error.kind()) => return Ok(()),
+            other => other?,
+        }
+    }
+}
+
+fn gone(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset)
+}

@@ -1,0 +1,168 @@
+//! The feed override of a FANUC machine, written in the way that the address names. Only the gate may hold one.
+//!
+//! | way | what is written | what says that it is in force |
+//! |---|---|---|
+//! | mailbox | three bytes: 0xA5, percent, heartbeat | the ladder's byte +3, with its state in +4 |
+//! | second override | one byte, percent | G013 |
+//! | macro | a custom macro variable, percent | the variable |
+//! | direct | G012, inverted | G012, after the ladder had its scans |
+//!
+//! The mailbox is laid out in [`server::ladder`](super::server::ladder), with the rungs that a machine's maker needs.
+//! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
+//! that the ladder left it there.
+
+use super::answer::Answer;
+use super::feed_override;
+use super::item::{Area, Item, Stretch, Write};
+use super::line::Line;
+use super::server::ladder::ENABLED;
+use crate::address::WriteMethod;
+use crate::clock::{Clock, TimeNs};
+use crate::driver::{Actuator, SourceError};
+use crate::units::OverridePct;
+use std::time::Duration;
+
+/// States of a mailbox, as the ladder's byte +4 tells them.
+const TAKEN: [i32; 2] = [1, 3];
+const HEARTBEAT_LOST: i32 = 2;
+
+/// The way to the feed override of one path.
+pub struct FanucActuator {
+    name: String,
+    line: Line,
+    method: WriteMethod,
+    settle_ns: i64,
+    heartbeat: u8,
+    written: Option<(OverridePct, TimeNs)>,
+}
+
+impl FanucActuator {
+    /// `None` when the address names no way of writing.
+    #[must_use]
+    pub fn new(name: &str, line: Line, method: WriteMethod, settle: Duration) -> Option<Self> {
+        let settle_ns = i64::try_from(settle.as_nanos()).unwrap_or(i64::MAX);
+        let actuator = Self { name: name.to_owned(), line, method, settle_ns, heartbeat: 0, written: None };
+        (method != WriteMethod::None).then_some(actuator)
+    }
+
+    fn wish(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
+        let percent = i32::from(wanted.percent());
+        let bytes = |area, at, values: Vec<i32>| {
+            let count = u16::try_from(values.len()).unwrap_or(0);
+            Write::Pmc { stretch: Stretch::bytes(area, at, count), values }
+        };
+        Ok(match self.method {
+            WriteMethod::Mailbox { area, at } => {
+                self.heartbeat = self.heartbeat.wrapping_add(1);
+                bytes(area, at, vec![i32::from(ENABLED), percent, i32::from(self.heartbeat)])
+            }
+            WriteMethod::SecondOverride { area, at } if percent > 0 => bytes(area, at, vec![percent]),
+            WriteMethod::SecondOverride { .. } => {
+                let what = "0 % cannot be asked for: 0 in this byte is no wish";
+                return Err(self.refused(what, "Stop the feed with feed hold, on the machine"));
+            }
+            WriteMethod::Macro { variable } => Write::Macro { number: variable, mantissa: percent, places: 0 },
+            WriteMethod::Direct => bytes(Area::G, feed_override::AT, vec![i32::from(feed_override::encode(wanted))]),
+            WriteMethod::None => return Err(self.refused("no way of writing", "Write write=mailbox in the address")),
+        })
+    }
+
+    fn item(&self) -> Item {
+        match self.method {
+            WriteMethod::Mailbox { area, at } => Item::Pmc(Stretch::bytes(area, at, 5)),
+            WriteMethod::SecondOverride { .. } => Item::Pmc(Stretch::bytes(Area::G, feed_override::SECOND_AT, 1)),
+            WriteMethod::Macro { variable } => Item::Macro(variable),
+            WriteMethod::Direct | WriteMethod::None => Item::Pmc(Stretch::bytes(Area::G, feed_override::AT, 1)),
+        }
+    }
+
+    fn refused(&self, what: &str, next: &str) -> SourceError {
+        SourceError::Refused {
+            source_name: self.name.clone(),
+            request: "the feed override".to_owned(),
+            what: what.to_owned(),
+            next: next.to_owned(),
+        }
+    }
+
+    fn decode(&self, what: &str) -> SourceError {
+        SourceError::Decode {
+            source_name: self.name.clone(),
+            request: "the feed override".to_owned(),
+            what: what.to_owned(),
+        }
+    }
+
+    /// The override that the ladder says it has taken.
+    fn of_mailbox(&self, bytes: &[i32]) -> Result<OverridePct, SourceError> {
+        let [enabled, _, _, taken, state] = *bytes else { return Err(self.decode("the mailbox has five bytes")) };
+        let asked = enabled == i32::from(ENABLED) && self.written.is_some();
+        if asked && state == HEARTBEAT_LOST {
+            let what = "not held: the ladder misses the heartbeat";
+            return Err(self.refused(what, "The gateway writes too seldom; look at the load of box and network"));
+        }
+        if asked && !TAKEN.contains(&state) {
+            let what = "not held: no ladder reads the mailbox";
+            let next = "Let the machine's maker add the rungs, or compare the mailbox's address with the ladder";
+            return Err(self.refused(what, next));
+        }
+        let taken = u8::try_from(taken).ok().and_then(OverridePct::new);
+        if !asked && state == 0 {
+            return Ok(OverridePct::FULL);
+        }
+        taken.ok_or_else(|| self.decode("the ladder's byte is no override"))
+    }
+
+    fn of_direct(&self, byte: i32) -> Result<OverridePct, SourceError> {
+        let byte = u8::try_from(byte).map_err(|_| self.decode("G012 is a byte"))?;
+        let found = feed_override::decode(byte);
+        match self.written {
+            Some((asked, _)) if asked != found => {
+                let what = format!("not held: {asked} was written to G012 and the ladder made it {found}");
+                Err(self.refused(&what, "Write through a mailbox (write=mailbox); the ladder owns G012"))
+            }
+            _ => Ok(found),
+        }
+    }
+
+    fn percent(&self, value: f64) -> Result<OverridePct, SourceError> {
+        let whole = value.round();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 to 254")]
+        let percent = (0.0..=254.0).contains(&whole).then_some(whole as u8);
+        percent.and_then(OverridePct::new).ok_or_else(|| self.decode(&format!("{value} is no override")))
+    }
+}
+
+impl Actuator for FanucActuator {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
+        let write = self.wish(wanted)?;
+        self.line.write(clock, &write)?;
+        self.written = Some((wanted, clock.now_ns()));
+        Ok(())
+    }
+
+    fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError> {
+        if let Some((_, at_ns)) = self.written {
+            clock.sleep_until(at_ns.saturating_add(self.settle_ns));
+        }
+        let item = self.item();
+        let asked = self.line.ask(clock, &[item])?;
+        match (asked.of(item), self.method) {
+            (Some(Ok(Answer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
+            (Some(Ok(Answer::Memory(bytes))), WriteMethod::SecondOverride { .. }) => {
+                let byte = bytes.first().and_then(|byte| u8::try_from(*byte).ok());
+                byte.map(feed_override::decode).ok_or_else(|| self.decode("G013 is a byte"))
+            }
+            (Some(Ok(Answer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
+            // A vacant variable asks for nothing.
+            (Some(Ok(Answer::Number(None))), _) => Ok(OverridePct::FULL),
+            (Some(Ok(Answer::Number(Some(value)))), _) => self.percent(*value),
+            (Some(Err(error)), _) => Err(self.refused(&format!("it cannot be read back: {error:?}"), "See doctor")),
+            _ => Err(self.decode("another kind of answer")),
+        }
+    }
+}

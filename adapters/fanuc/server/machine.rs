@@ -1,0 +1,173 @@
+//! The simulated machine behind a control.
+
+use super::controller::{Controller, Data};
+use super::ladder::{Ladder, SCAN_NS};
+use super::listen::Served;
+use crate::address::SimulatedMachine;
+use crate::clock::{Clock, TimeNs};
+use crate::driver::Actuator;
+use crate::fanuc::answer::{Alarm, Status};
+use crate::fanuc::feed_override;
+use crate::fanuc::item::Area;
+use crate::fanuc::wire::Number;
+use crate::simulated::{Moment, Panel, Simulated, SimulatedOverride};
+use crate::units::OverridePct;
+use crate::words::{execution, mode, operation};
+use std::sync::Arc;
+
+/// After a pause without questions the ladder makes up for at most so many scans.
+const SCANS_MAX: i64 = 1000;
+
+/// A control with its ladder, and the simulated machine under it.
+pub struct SimulatedControl {
+    machine: Simulated,
+    clock: Arc<dyn Clock>,
+    register: SimulatedOverride,
+    controller: Controller,
+    ladder: Ladder,
+    scanned_ns: TimeNs,
+    written: OverridePct,
+}
+
+impl SimulatedControl {
+    /// The machine as a control of the generation with this version word. `clock` is the machine's time.
+    #[must_use]
+    pub fn new(machine: Simulated, clock: Arc<dyn Clock>, version: u16) -> Self {
+        let lathe = machine.settings().machine == SimulatedMachine::Lathe;
+        let axes: &[char] = if lathe { &['X', 'Z'] } else { &['X', 'Y', 'Z'] };
+        let mut controller = Controller::new(version, axes);
+        controller.system.machine = if lathe { "T" } else { "M" }.to_owned();
+        controller.offsets_only_at_rest = true;
+        controller.parameter(1001, 0, Number::decimal(0, 0));
+        [3106, 3107, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
+        let (register, scanned_ns) = (machine.feed_override(), clock.now_ns());
+        let (ladder, written) = (Ladder::default(), OverridePct::FULL);
+        Self { machine, clock, register, controller, ladder, scanned_ns, written }
+    }
+
+    /// Every scan since the last look, and what they mean for the machine.
+    fn scan(&mut self, now_ns: TimeNs) {
+        self.scanned_ns = self.scanned_ns.max(now_ns - SCANS_MAX * SCAN_NS);
+        while self.scanned_ns + SCAN_NS <= now_ns {
+            self.scanned_ns += SCAN_NS;
+            self.ladder.scan(&mut self.controller.memory, self.scanned_ns);
+        }
+        let byte = |at| feed_override::decode(self.controller.memory.byte(Area::G, at)).percent();
+        let product = u16::from(byte(feed_override::AT)) * u16::from(byte(feed_override::SECOND_AT)) / 100;
+        let wanted = u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(OverridePct::FULL);
+        if wanted != self.written && self.register.write_feed_override(self.clock.as_ref(), wanted).is_ok() {
+            self.written = wanted;
+        }
+    }
+}
+
+impl Served for SimulatedControl {
+    fn now(&mut self) -> Option<&mut Controller> {
+        let now_ns = self.clock.now_ns();
+        let moment = self.machine.moment(now_ns);
+        if !moment.panel.booted {
+            self.controller.memory.power_off();
+            self.ladder.power_off();
+            self.scanned_ns = now_ns;
+            return None;
+        }
+        self.scan(now_ns);
+        show(&mut self.controller, &moment);
+        Some(&mut self.controller)
+    }
+}
+
+/// The moment on the control's screen.
+fn show(control: &mut Controller, moment: &Moment) {
+    let panel = &moment.panel;
+    control.status = status(panel);
+    control.feed = whole(panel.feed_mm_min);
+    let load = whole(moment.electric.spindle_load_pct);
+    let speed = whole(panel.spindle_speed_rpm.abs());
+    let gear = Number::decimal(i32::from(panel.gear_stage), 0);
+    control.spindles[0].quantities = [load, whole(6000.0), gear, speed, load, speed];
+    axes(control, panel);
+    control.program = (i32::from(panel.program), i32::from(panel.program));
+    control.program_path = format!("//CNC_MEM/USER/PATH1/O{:04}", panel.program);
+    control.sequence = i32::from(panel.block);
+    control.executed = (i32::from(panel.block), format!("N{} F{:.0}\n%", panel.block, panel.feed_programmed_mm_min));
+    let modal = [(5, panel.feed_programmed_mm_min), (20, panel.spindle_programmed_rpm.abs())];
+    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value).mantissa)));
+    control.modal_words.insert(22, i32::from(panel.tool));
+    let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
+    control.parameters.insert(6711, Data { kind: 3, values: vec![Number::decimal(parts, 0)] });
+    control.diagnosis(403, 1, whole(moment.electric.motor_temperature_c));
+    alarms(control, panel);
+    signals(control, panel);
+}
+
+fn whole(value: f64) -> Number {
+    #[expect(clippy::cast_possible_truncation, reason = "saturates, which is what a display does")]
+    let mantissa = value.round() as i32;
+    Number::decimal(mantissa, 0)
+}
+
+fn status(panel: &Panel) -> Status {
+    let automatic = match panel.mode {
+        mode::MANUAL_DATA_INPUT => 0,
+        mode::EDIT => 3,
+        mode::MANUAL => 5,
+        _ => 1,
+    };
+    let run = match panel.execution {
+        execution::ACTIVE | execution::INTERRUPTED => 3,
+        execution::FEED_HOLD => 2,
+        execution::STOPPED => 1,
+        _ => 0,
+    };
+    let motion = i16::from(panel.feed_mm_min > 0.0);
+    Status { automatic, run, motion, alarm: i16::from(!panel.alarm.is_empty()), ..Status::default() }
+}
+
+/// Positions in micrometres. The load of an axis is what its friction takes: 3 % and 1 % more per 200 mm/min.
+fn axes(control: &mut Controller, panel: &Panel) {
+    for axis in &mut control.axes {
+        let index = match axis.name {
+            'X' => 0,
+            'Y' => 1,
+            _ => 2,
+        };
+        let position = Number { exponent: 3, ..whole(panel.position_mm[index] * 1000.0) };
+        axis.positions = [position, position, position, Number::decimal(0, 3)];
+        let velocity = panel.velocity_mm_min[index];
+        let load = if panel.drives_on { 3.0 + velocity.abs() / 200.0 } else { 0.0 };
+        axis.load = whole(load.min(150.0).copysign(velocity));
+        axis.current = Number { exponent: 1, ..whole(load.min(150.0)) };
+    }
+}
+
+fn alarms(control: &mut Controller, panel: &Panel) {
+    control.alarm_bits = i32::from(!panel.alarm.is_empty()) << 15;
+    control.alarms.clear();
+    if !panel.alarm.is_empty() {
+        control.alarms.push(Alarm { number: 2001, kind: 15, axis: 0, text: panel.alarm.to_owned() });
+    }
+}
+
+fn signals(control: &mut Controller, panel: &Panel) {
+    let active = panel.execution == execution::ACTIVE;
+    let thread = |word| active && panel.override_locked && panel.operation.contains(word);
+    let tapping = thread(operation::TAPPING);
+    let threading = active && panel.override_locked && !tapping;
+    let cutting = active && !panel.rapid && panel.feed_mm_min > 0.0;
+    let bits = [
+        (0, 4, panel.execution == execution::FEED_HOLD),
+        (0, 5, active),
+        (0, 6, panel.drives_on),
+        (0, 7, active),
+        (1, 0, !panel.alarm.is_empty()),
+        (1, 5, tapping),
+        (1, 7, true),
+        (2, 1, panel.rapid),
+        (2, 3, threading),
+        (2, 6, cutting),
+        (4, 3, panel.mode == mode::SEMI_AUTOMATIC),
+    ];
+    bits.into_iter().for_each(|(byte, bit, on)| control.memory.set_bit(Area::F, byte, bit, on));
+    control.memory.set(Area::G, 30, 100);
+}

@@ -1,0 +1,138 @@
+//! Writing to a served simulated control over a real socket: every way of writing, the ladder that fights, the offset.
+
+use super::item::Area;
+use super::line::Line;
+use super::open::{OpenedFanuc, native};
+use super::server::{Controller, Served, Server, ServerSettings, SimulatedControl};
+use super::work_offset::{ExternalOffset, ShiftLimits};
+use crate::address::{Address, Target};
+use crate::clock::{Clock, ScaledClock, SystemClock};
+use crate::driver::{Actuator, SourceError};
+use crate::simulated::{Simulated, SimulatedSettings};
+use crate::units::OverridePct;
+use std::net::TcpListener;
+use std::sync::Arc;
+
+fn serve(served: Box<dyn Served>) -> Server {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    Server::start(listener, served, ServerSettings::default()).expect("threads")
+}
+
+/// A simulated lathe in the middle of its morning, 20 times as fast as real.
+fn lathe() -> Server {
+    let clock = Arc::new(ScaledClock::new(20.0));
+    let origin_ns = clock.now_ns() - 1800 * crate::clock::SECOND_NS;
+    let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
+    serve(Box::new(SimulatedControl::new(machine, clock, 4)))
+}
+
+fn opened(server: &Server, keys: &str) -> OpenedFanuc {
+    let address: Address = format!("fanuc://{}?{keys}", server.address()).parse().expect("usable");
+    match address.target() {
+        Target::Fanuc { at, path, options, .. } => native(address.text(), at, *path, options),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn actuator(server: &Server, keys: &str) -> Box<dyn Actuator> {
+    opened(server, keys).actuator.expect("a way of writing")
+}
+
+fn pct(percent: u8) -> OverridePct {
+    OverridePct::new(percent).expect("exists")
+}
+
+fn write(actuator: &mut dyn Actuator, percent: u8) -> Result<OverridePct, SourceError> {
+    let clock = SystemClock::new();
+    actuator.write_feed_override(&clock, pct(percent))?;
+    actuator.read_feed_override(&clock)
+}
+
+#[test]
+fn an_address_without_a_way_of_writing_has_no_actuator() {
+    assert!(opened(&lathe(), "").actuator.is_none());
+}
+
+#[test]
+fn the_ladder_takes_what_comes_through_the_mailbox() {
+    let server = lathe();
+    let mut actuator = actuator(&server, "write=mailbox");
+    assert_eq!(actuator.read_feed_override(&SystemClock::new()), Ok(OverridePct::FULL), "before the first write");
+    assert_eq!(write(actuator.as_mut(), 90), Ok(pct(90)));
+    assert_eq!(write(actuator.as_mut(), 80), Ok(pct(80)));
+    assert_eq!(write(actuator.as_mut(), 20), Ok(pct(50)), "the ladder has limits of its own");
+    let g12 = server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
+    assert_eq!(g12, Some(super::feed_override::encode(pct(50))));
+}
+
+#[test]
+fn the_second_override_has_a_byte_of_its_own() {
+    let server = lathe();
+    let mut actuator = actuator(&server, "write=second_override");
+    assert_eq!(write(actuator.as_mut(), 70), Ok(pct(70)));
+    let g12 = server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
+    assert_eq!(g12, Some(0x9B), "the operator's dial is untouched");
+    assert!(matches!(write(actuator.as_mut(), 0), Err(SourceError::Refused { .. })));
+}
+
+#[test]
+fn a_macro_variable_is_written_and_read_back() {
+    let server = serve(Box::new(Controller::new(2, &['X', 'Z'])));
+    let mut actuator = actuator(&server, "write=macro&macro=501");
+    assert_eq!(actuator.read_feed_override(&SystemClock::new()), Ok(OverridePct::FULL), "vacant");
+    assert_eq!(write(actuator.as_mut(), 85), Ok(pct(85)));
+    assert_eq!(server.with(|control| control.map(|control| control.macros[&501])), Some(Some(85.0)));
+}
+
+#[test]
+fn a_direct_write_is_reported_not_held_when_the_ladder_takes_it_back() {
+    let server = lathe();
+    let mut direct = actuator(&server, "write=direct");
+    let error = write(direct.as_mut(), 60).expect_err("the ladder fights").to_string();
+    assert!(error.contains("not held") && error.contains("100 %") && error.contains("write=mailbox"), "{error}");
+    let without_ladder = serve(Box::new(Controller::new(4, &['X'])));
+    assert_eq!(write(actuator(&without_ladder, "write=direct").as_mut(), 60), Ok(pct(60)), "nobody fights");
+}
+
+#[test]
+fn a_mailbox_that_no_ladder_reads_is_not_held() {
+    let server = serve(Box::new(Controller::new(4, &['X'])));
+    let error = write(actuator(&server, "write=mailbox").as_mut(), 80).expect_err("nobody there").to_string();
+    assert!(error.contains("no ladder reads the mailbox"), "{error}");
+}
+
+fn line(server: &Server, keys: &str) -> Line {
+    opened(server, keys).line
+}
+
+#[test]
+fn the_external_offset_moves_by_steps_between_programs_and_is_given_back() {
+    let mut control = Controller::new(4, &['X', 'Z']);
+    control.offsets_only_at_rest = true;
+    control.work_offsets.insert((0, 2), 40);
+    let server = serve(Box::new(control));
+    let clock = SystemClock::new();
+    let limits = ShiftLimits { step_um: 5.0, total_um: 12.0 };
+    let mut offset = ExternalOffset::new("fanuc://x", line(&server, "write=mailbox&allow=EXT"), 2, limits);
+    let shifts: Vec<i32> = (0..4).map(|_| offset.shift(&clock, 30.0).expect("at rest").after).collect();
+    assert_eq!(shifts, [45, 50, 52, 52], "5 µm at a time, 12 µm in all, on top of the operator's 40 µm");
+    server.with(|control| control.expect("on").status.run = 3);
+    let error = offset.shift(&clock, 0.0).expect_err("a program runs").to_string();
+    assert!(error.contains("a program runs"), "{error}");
+    server.with(|control| control.expect("on").status.run = 0);
+    server.with(|control| control.expect("on").work_offsets.insert((0, 2), 100));
+    let moved = offset.shift(&clock, 3.0).expect("at rest");
+    assert!(moved.changed_by_others && moved.after == 103, "{moved:?}");
+    let restored = offset.restore(&clock).expect("at rest").expect("something to give back");
+    assert_eq!((restored.after, restored.shift), (100, 0));
+}
+
+#[test]
+fn what_is_not_allowed_is_not_sent() {
+    let server = serve(Box::new(Controller::new(4, &['X', 'Z'])));
+    let limits = ShiftLimits { step_um: 5.0, total_um: 12.0 };
+    let mut offset = ExternalOffset::new("fanuc://x", line(&server, "write=mailbox"), 1, limits);
+    let error = offset.shift(&SystemClock::new(), 3.0).expect_err("not on the list").to_string();
+    assert!(error.contains("allow="), "{error}");
+    assert_eq!(server.with(|control| control.map(|control| control.writes)), Some(0));
+}
