@@ -228,6 +228,16 @@ pub static CHANNELS: &[Channel] = &[
         "Operation of the recipe that filled in this sample, and the version of the recipe",
         "所用工序配方及其版本",
     ),
+    number(
+        "feed_override_dial_pct",
+        "%",
+        (0.0, 254.0),
+        Kind::Held,
+        "Feed override as the operator's dial has it, before the gateway's",
+        "操作面板进给倍率",
+    ),
+    number("single_block", "1", (0.0, 1.0), Kind::Held, "Single block is switched on", "单段开关"),
+    number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关"),
 ];
 
 /// Index into [`CHANNELS`].

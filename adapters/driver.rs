@@ -123,12 +123,60 @@ pub trait Pull: Send {
     fn pull(&mut self, out: &mut Vec<Reading>) -> Result<(), SourceError>;
 }
 
+/// How the ladder makes one override of the operator's dial and the gateway's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LadderRule {
+    /// The lesser one: the gateway never raises the feed above the dial.
+    #[default]
+    Least,
+    /// One of the other: dial 50 % and gateway 120 % are 60 %. A dial at zero still stops the feed.
+    Product,
+}
+
+impl LadderRule {
+    /// What is in force with this dial and this override in the mailbox.
+    #[must_use]
+    pub fn combine(self, dial: OverridePct, mail: OverridePct) -> OverridePct {
+        match self {
+            Self::Least => dial.min(mail),
+            Self::Product => {
+                let product = u32::from(dial.percent()) * u32::from(mail.percent()) / 100;
+                u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mail))
+            }
+        }
+    }
+}
+
+/// What the ladder can be asked for besides an override. It latches the request and acts as the machine's builder decided;
+/// the operator ends it at the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum LadderRequest {
+    /// The axes stop now; the spindle turns on.
+    FeedHold,
+    /// The program stops after the part that is running.
+    Stop,
+}
+
+impl LadderRequest {
+    /// Every request.
+    pub const ALL: [Self; 2] = [Self::FeedHold, Self::Stop];
+
+    /// The word in the history and in scripts.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::FeedHold => "feed_hold",
+            Self::Stop => "stop",
+        }
+    }
+}
+
 /// Something that accepts a feed override. Only the gate holds one.
 pub trait Actuator: Send {
     /// The address, as in the configuration.
     fn name(&self) -> &str;
 
-    /// Writes the override.
+    /// Writes the override; the same one again is the sign of life that the ladder waits for.
     ///
     /// # Errors
     /// See [`SourceError`].
@@ -139,4 +187,38 @@ pub trait Actuator: Send {
     /// # Errors
     /// See [`SourceError`].
     fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError>;
+
+    /// Reads the operator's dial; `None` where the machine does not tell it apart from the override in force.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    fn read_dial(&mut self, _clock: &dyn Clock) -> Result<Option<OverridePct>, SourceError> {
+        Ok(None)
+    }
+
+    /// Gives the machine back to its dial. A machine without such a letter gets 100 %.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.write_feed_override(clock, OverridePct::FULL)
+    }
+
+    /// Asks the ladder for a feed hold or a stop.
+    ///
+    /// # Errors
+    /// See [`SourceError`]; a driver that has no way to ask refuses.
+    fn ask(&mut self, _clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        Err(SourceError::Refused {
+            source_name: self.name().to_owned(),
+            request: request.word().to_owned(),
+            what: "this driver has no way to ask the ladder for it".to_owned(),
+            next: "raise an alarm instead, and let the operator stop the machine".to_owned(),
+        })
+    }
+
+    /// The machine may take this long to show what was written.
+    fn settles_within(&self) -> Duration {
+        Duration::from_secs(1)
+    }
 }

@@ -29,7 +29,7 @@ pub mod worker;
 
 pub use address::Address;
 pub use channel::{Channel, ChannelId};
-pub use driver::{Actuator, Pull, Source, SourceError};
+pub use driver::{Actuator, LadderRequest, LadderRule, Pull, Source, SourceError};
 pub use reading::{Absence, Reading, Stamp, Value};
 pub use recording::Recording;
 pub use sample::{Sample, Slot};

@@ -4,6 +4,7 @@ use super::SCHEMES;
 use super::fanuc::FanucOptions;
 use super::keys::Keys;
 use crate::channel::nearest;
+use crate::driver::LadderRule;
 use std::path::PathBuf;
 
 /// How fast a replay or a simulated machine runs against the clock.
@@ -66,6 +67,8 @@ pub struct SimulatedTarget {
     pub change_cut_pct: f64,
     /// Friction of the spindle after the change, percent of that before.
     pub change_friction_pct: f64,
+    /// How the ladder combines the operator's dial and the gateway's override.
+    pub ladder: LadderRule,
 }
 
 /// A recording.
@@ -237,6 +240,7 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         change_h: keys.number("change_h", f64::INFINITY, 0.0, 1e5),
         change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
         change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
+        ladder: keys.choice("ladder", &[("least", LadderRule::Least), ("product", LadderRule::Product)]),
     };
     match body.strip_prefix("//").unwrap_or(body) {
         "lathe" => Ok(Target::Simulated(target)),

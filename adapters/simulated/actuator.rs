@@ -1,11 +1,12 @@
-//! The feed override of the simulated machine.
+//! The way to the mailbox of the simulated machine's ladder.
 
 use super::Simulated;
+use super::ladder::Letter;
 use crate::clock::Clock;
-use crate::driver::{Actuator, SourceError};
+use crate::driver::{Actuator, LadderRequest, SourceError};
 use crate::units::OverridePct;
 
-/// Writes and reads back the feed override of the simulated machine.
+/// Posts overrides and requests to the ladder of the simulated machine, and reads back what is in force.
 pub struct SimulatedOverride {
     name: String,
     machine: Simulated,
@@ -14,6 +15,12 @@ pub struct SimulatedOverride {
 impl SimulatedOverride {
     pub(super) fn new(name: String, machine: Simulated) -> Self {
         Self { name, machine }
+    }
+
+    fn post(&self, clock: &dyn Clock, letter: Letter) -> Result<(), SourceError> {
+        self.refuse_unless_booted(clock)?;
+        self.machine.locked().post(clock.now_ns(), letter);
+        Ok(())
     }
 
     fn refuse_unless_booted(&self, clock: &dyn Clock) -> Result<(), SourceError> {
@@ -28,13 +35,25 @@ impl Actuator for SimulatedOverride {
     }
 
     fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.refuse_unless_booted(clock)?;
-        self.machine.locked().write_override(clock.now_ns(), wanted.percent());
-        Ok(())
+        self.post(clock, Letter::Override(wanted))
     }
 
     fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError> {
         self.refuse_unless_booted(clock)?;
-        Ok(OverridePct::new(self.machine.locked().written_override()).unwrap_or(OverridePct::FULL))
+        let shown = self.machine.moment(clock.now_ns()).panel.feed_override_pct;
+        Ok(OverridePct::new(shown).unwrap_or(OverridePct::FULL))
+    }
+
+    fn read_dial(&mut self, clock: &dyn Clock) -> Result<Option<OverridePct>, SourceError> {
+        self.refuse_unless_booted(clock)?;
+        Ok(OverridePct::new(self.machine.moment(clock.now_ns()).panel.dial_pct))
+    }
+
+    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.post(clock, Letter::Release)
+    }
+
+    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.post(clock, Letter::Ask(request))
     }
 }

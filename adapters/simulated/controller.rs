@@ -42,12 +42,13 @@ impl Word {
 
 type Entry = (&'static str, Get);
 
-const COMMON: [Entry; 24] = [
+const COMMON: [Entry; 25] = [
     ("spindle_programmed_rpm", Get::Number(|moment| moment.panel.spindle_programmed_rpm)),
     ("spindle_speed_rpm", Get::Speed),
     ("feed_programmed_mm_min", Get::Number(|moment| moment.panel.feed_programmed_mm_min.round())),
     ("feed_mm_min", Get::Number(|moment| tenth(moment.panel.feed_mm_min))),
     ("feed_override_pct", Get::Number(|moment| f64::from(moment.panel.feed_override_pct))),
+    ("feed_override_dial_pct", Get::Number(|moment| f64::from(moment.panel.dial_pct))),
     ("spindle_override_pct", Get::Number(|_| 100.0)),
     ("spindle_load_pct", Get::Number(|moment| moment.electric.spindle_load_pct.round())),
     ("motor_temperature_c", Get::Number(|moment| moment.electric.motor_temperature_c.round())),

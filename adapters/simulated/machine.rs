@@ -2,12 +2,14 @@
 
 use super::cutting::{self, Circumstances, Load};
 use super::frame::Frame;
+use super::ladder::{Ladder, LadderCounts, Letter};
 use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
 use super::plant::{Plant, Spin};
 use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
 use super::settings::{CutLevel, SimulatedSettings};
 use crate::address::SimulatedMachine;
 use crate::clock::{SECOND_NS, TimeNs};
+use crate::units::OverridePct;
 use crate::words::{execution, mode};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -24,9 +26,6 @@ const DRIFT_STEPS: i64 = 20;
 /// So many steps are remembered: four seconds.
 const REMEMBERED: usize = 800;
 
-/// At most so many overrides wait for their time.
-const OVERRIDES_MAX: usize = 1024;
-
 pub(super) struct Machine {
     settings: SimulatedSettings,
     frame: &'static Frame,
@@ -36,8 +35,7 @@ pub(super) struct Machine {
     remembered: VecDeque<Moment>,
     plant: Plant,
     control: Control,
-    overrides: VecDeque<(TimeNs, u8)>,
-    override_pct: u8,
+    ladder: Ladder,
     cut: Cut,
     diameter_mm: f64,
     engaged: f64,
@@ -66,8 +64,7 @@ impl Machine {
             remembered: VecDeque::with_capacity(REMEMBERED),
             plant: Plant::new(frame, settings.tau_s, settings.start_peak_w, rng(2)),
             control: Control::new(planner, rng(3), frame, settings.wear_mm),
-            overrides: VecDeque::new(),
-            override_pct: 100,
+            ladder: Ladder::new(settings.ladder),
             cut: Cut::default(),
             diameter_mm: 0.0,
             engaged: 0.0,
@@ -81,19 +78,13 @@ impl Machine {
         machine
     }
 
-    /// The override register gets this value at `at_ns`, or at once when the machine is already further. Writes take
-    /// effect in the order in which they came; when too many wait for their time, the newest replaces the one before.
-    pub(super) fn write_override(&mut self, at_ns: TimeNs, percent: u8) {
-        if self.overrides.len() >= OVERRIDES_MAX {
-            self.overrides.pop_back();
-        }
-        let earliest_ns = self.overrides.back().map_or(at_ns, |(due_ns, _)| *due_ns);
-        self.overrides.push_back((at_ns.max(earliest_ns), percent));
+    /// The ladder takes a letter at `at_ns`, or at once when the machine is already further.
+    pub(super) fn post(&mut self, at_ns: TimeNs, letter: Letter) {
+        self.ladder.post(at_ns, letter);
     }
 
-    /// The override register as it will be when everything written has taken effect.
-    pub(super) fn written_override(&self) -> u8 {
-        self.overrides.back().map_or(self.override_pct, |(_, percent)| *percent)
+    pub(super) fn ladder_counts(&self) -> LadderCounts {
+        self.ladder.counts()
     }
 
     fn time_of(&self, step: i64) -> TimeNs {
@@ -139,13 +130,16 @@ impl Machine {
 
     fn step(&mut self) {
         let at_ns = self.time_of(self.steps);
-        while self.overrides.front().is_some_and(|(due_ns, _)| *due_ns <= at_ns) {
-            self.override_pct = self.overrides.pop_front().map_or(100, |(_, percent)| percent);
-        }
+        self.ladder.scan(at_ns);
         let since_s = seconds(at_ns - self.origin_ns);
-        self.control.step(&self.plant, self.override_pct, since_s, STEP_S);
-        if let Some(percent) = self.control.override_request.take() {
-            self.override_pct = percent;
+        self.control.hold_asked = self.ladder.holds(at_ns);
+        self.control.stop_asked = self.ladder.stop_asked();
+        self.control.step(&self.plant, self.ladder.in_force().percent(), since_s, STEP_S);
+        if let Some(stood_s) = self.control.stood_s {
+            self.control.attended = self.ladder.attended(stood_s);
+        }
+        if let Some(dial) = self.control.dial_request.take().and_then(OverridePct::new) {
+            self.ladder.turn(dial);
         }
         if since_s >= self.settings.change.after_s {
             self.plant.friction = self.settings.change.friction;
@@ -303,7 +297,8 @@ impl Machine {
             spindle_speed_rpm: self.plant.speed_rpm,
             feed_programmed_mm_min: programmed,
             feed_mm_min: control.feed_mm_min,
-            feed_override_pct: self.override_pct,
+            feed_override_pct: self.ladder.in_force().percent(),
+            dial_pct: self.ladder.dial().percent(),
             rapid: control.motion == Motion::Rapid,
             override_locked: locked,
             gear_stage: control.demand.gear_stage,

@@ -2,9 +2,10 @@
 //!
 //! The model has its own forms of the laws; an estimator that finds them has found them. A part programme runs for
 //! hours: power-up, standby, warm-up, facing, roughing and finishing of two diameters, tool changes, wear, thermal
-//! growth, pauses, small trouble, the night. The machine obeys the feed override except in threading and tapping.
+//! growth, pauses, small trouble, the night. The machine obeys the feed override except in threading and tapping; what the
+//! gateway writes goes through the builder's ladder (`ladder`), behind the operator's dial.
 //!
-//! Everything is a function of the seed, the time and the overrides written: asking more often, or not at all for a
+//! Everything is a function of the seed, the time and what was written: asking more often, or not at all for a
 //! while, changes nothing. The same machine runs against the clock ([`Source`](crate::Source)) or as fast as possible
 //! ([`Pull`](crate::Pull)).
 //!
@@ -15,6 +16,7 @@ mod controller;
 mod cutting;
 mod device;
 mod frame;
+mod ladder;
 mod machine;
 mod meter;
 mod moment;
@@ -28,12 +30,15 @@ mod tests;
 
 pub use actuator::SimulatedOverride;
 pub use controller::SimulatedController;
+pub use ladder::{LadderCounts, LadderSettings};
 pub use meter::{MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSettings, SimulatedSettings};
 
 use crate::clock::TimeNs;
+use crate::units::OverridePct;
+use ladder::Letter;
 use machine::Machine;
 use moment::Integrals;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -94,6 +99,17 @@ impl Simulated {
     #[must_use]
     pub fn feed_override(&self) -> SimulatedOverride {
         SimulatedOverride::new(self.device_name("controller"), self.clone())
+    }
+
+    /// The operator turns the dial of the feed override at `at_ns`.
+    pub fn turn_dial(&self, at_ns: TimeNs, dial: OverridePct) {
+        self.locked().post(at_ns, Letter::Dial(dial));
+    }
+
+    /// What was written to the controller since the beginning, as the controller itself has counted it.
+    #[must_use]
+    pub fn written(&self) -> LadderCounts {
+        self.locked().ladder_counts()
     }
 
     /// The machine at `at_ns`, for a partner that serves it over a real protocol. The last four seconds before the

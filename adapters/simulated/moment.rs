@@ -76,6 +76,8 @@ pub struct Panel {
     pub feed_mm_min: f64,
     /// Feed override in force, 0 to 254 %.
     pub feed_override_pct: u8,
+    /// The operator's dial, 0 to 254 %.
+    pub dial_pct: u8,
     /// Rapid traverse active.
     pub rapid: bool,
     /// The override is without effect: threading and tapping.

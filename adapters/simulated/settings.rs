@@ -1,5 +1,6 @@
 //! How the simulated machine and its two devices are set up.
 
+use super::ladder::LadderSettings;
 use crate::address::{SimulatedMachine, SimulatedTarget};
 use std::time::Duration;
 
@@ -115,6 +116,8 @@ pub struct SimulatedSettings {
     pub wear_mm: f64,
     /// What becomes of the machine later.
     pub change: LaterChange,
+    /// The builder's ladder between the gateway and the feed.
+    pub ladder: LadderSettings,
     /// The controller's clock and line.
     pub controller: DeviceSettings,
     /// The meter.
@@ -135,6 +138,7 @@ impl Default for SimulatedSettings {
             annotations: true,
             wear_mm: FRESH_EDGE_MM,
             change: LaterChange { after_s: f64::INFINITY, cut: 1.0, friction: 1.0 },
+            ladder: LadderSettings::default(),
             controller: DeviceSettings {
                 period: Duration::from_millis(100),
                 refresh: Duration::from_millis(8),
@@ -210,6 +214,7 @@ impl SimulatedSettings {
                 cut: target.change_cut_pct / 100.0,
                 friction: target.change_friction_pct / 100.0,
             },
+            ladder: LadderSettings { rule: target.ladder, ..base.ladder },
             meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
             ..base
         }

@@ -4,7 +4,7 @@ use super::*;
 use crate::address::SimulatedMachine;
 use crate::channel::ChannelId;
 use crate::clock::{ManualClock, SECOND_NS};
-use crate::driver::{Actuator, Pull, SourceError};
+use crate::driver::{Actuator, LadderRequest, Pull, SourceError};
 use crate::merge::{Delay, Lockstep};
 use crate::reading::{Absence, Reading};
 use crate::sample::Sample;
@@ -146,13 +146,18 @@ fn the_feed_override_is_obeyed() {
     assert!(matches!(feed.write_feed_override(&clock, OverridePct::FULL), Err(SourceError::Off { .. })));
     clock.set(60 * SECOND_NS);
     let half = OverridePct::new(50).expect("in range");
-    feed.write_feed_override(&clock, half).expect("the control is on");
-    assert_eq!(feed.read_feed_override(&clock), Ok(half));
-    let first_cut = |machine: &Simulated| {
-        let at = |tenth: i64| machine.moment(tenth * SECOND_NS / 10);
+    let mut first_cut = |machine: &Simulated, written: bool| {
+        let at = |tenth: i64| {
+            clock.set(tenth * SECOND_NS / 10);
+            if written {
+                feed.write_feed_override(&clock, half).expect("the control is on");
+            }
+            machine.moment(tenth * SECOND_NS / 10)
+        };
         (600..6000).map(at).find(|moment| moment.truth.engaged > 0.99).expect("a cut begins")
     };
-    let (a, b) = (first_cut(&free), first_cut(&slowed));
+    let (b, a) = (first_cut(&slowed, true), first_cut(&free, false));
+    assert_eq!(feed.read_feed_override(&ManualClock::at(b.truth.at_ns)), Ok(half));
     assert_eq!((a.panel.feed_override_pct, b.panel.feed_override_pct), (100, 50));
     assert!(
         (b.panel.feed_mm_min / a.panel.feed_mm_min - 0.5).abs() < 0.02,
@@ -167,7 +172,7 @@ fn the_feed_override_is_obeyed() {
 fn threading_ignores_the_override() {
     let settings = SimulatedSettings { day: DaySettings { parts_per_lot: 1, ..lathe().day }, ..lathe() };
     let machine = machine(settings);
-    machine.locked().write_override(0, 60);
+    machine.turn_dial(0, OverridePct::new(60).expect("in range"));
     let mut seen = false;
     for tenth in 0..15_000 {
         let panel = machine.moment(tenth * SECOND_NS / 10).panel;
@@ -307,7 +312,7 @@ proptest::proptest! {
 /// The first reading outside its channel's range.
 fn out_of_range(settings: SimulatedSettings, percent: u8) -> Option<Reading> {
     let machine = machine(settings);
-    machine.locked().write_override(40 * SECOND_NS, percent);
+    machine.turn_dial(40 * SECOND_NS, OverridePct::new(percent).expect("in range"));
     let (mut controller, mut meter, mut out) = (machine.controller(), machine.meter(), Vec::new());
     for _ in 0..4000 {
         let _ = controller.pull(&mut out);
@@ -324,4 +329,31 @@ fn three_times_the_planned_cut_at_more_than_twice_the_feed_stays_on_the_display(
     let settings =
         SimulatedSettings { seed: 10_129_099_058_646_574_734, tau_s: 1.098, cut: CutLevel::Planned(2.94), ..lathe() };
     assert_eq!(out_of_range(settings, 246), None);
+}
+
+/// Seconds from the beginning to the first moment of which this is true, looked at every tenth.
+fn first_s(machine: &Simulated, from_s: i64, what: impl Fn(&Moment) -> bool) -> i64 {
+    let at = |tenth: i64| machine.moment(tenth * SECOND_NS / 10);
+    (from_s * 10..from_s * 10 + 20_000).find(|tenth| what(&at(*tenth))).expect("it happens") / 10
+}
+
+#[test]
+fn a_feed_hold_stops_the_axes_and_a_stop_the_program_until_the_operator_comes() {
+    let machine = machine(lathe());
+    let mut ladder = machine.feed_override();
+    let cut_s = first_s(&machine, 60, |moment| moment.truth.engaged > 0.99);
+    let clock = ManualClock::at((cut_s + 1) * SECOND_NS);
+    ladder.ask(&clock, LadderRequest::FeedHold).expect("the control is on");
+    let held = machine.moment((cut_s + 2) * SECOND_NS).panel;
+    assert_eq!((held.execution, held.feed_mm_min), (crate::words::execution::FEED_HOLD, 0.0));
+    let on_s = first_s(&machine, cut_s + 2, |moment| moment.panel.feed_mm_min > 0.0);
+    assert!((44..=47).contains(&(on_s - cut_s)), "{on_s} {cut_s}");
+    clock.set((on_s + 1) * SECOND_NS);
+    ladder.ask(&clock, LadderRequest::Stop).expect("the control is on");
+    let stood_s = first_s(&machine, on_s + 1, |moment| moment.panel.execution == crate::words::execution::STOPPED);
+    let before = machine.moment((stood_s - 1) * SECOND_NS).panel;
+    let after_s = first_s(&machine, stood_s, |moment| moment.panel.execution == crate::words::execution::ACTIVE);
+    let after = machine.moment(after_s * SECOND_NS).panel;
+    assert!(after_s - stood_s >= 45 && after.part_count == 1, "{after:?}");
+    assert!(before.part_count <= 1 && machine.written().writes() == 2);
 }

@@ -17,6 +17,9 @@ const BOOT_S: f64 = 12.0;
 /// A tool change takes this long.
 const TOOL_CHANGE_S: f64 = 2.6;
 
+/// Whoever stands looks this often whether the operator has come.
+const STAND_S: f64 = 1.0;
+
 /// Which motion is going on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) enum Motion {
@@ -58,8 +61,16 @@ pub(in super::super) struct Control {
     pub(in super::super) wear_mm: [f64; TOOLS],
     pub(in super::super) part_count: u32,
     pub(in super::super) alarm: &'static str,
-    /// The operator turned the override to this.
-    pub(in super::super) override_request: Option<u8>,
+    /// The operator turned the dial to this.
+    pub(in super::super) dial_request: Option<u8>,
+    /// The ladder holds the axes.
+    pub(in super::super) hold_asked: bool,
+    /// The ladder wants the program to stand after this part.
+    pub(in super::super) stop_asked: bool,
+    /// How long it has stood for that reason.
+    pub(in super::super) stood_s: Option<f64>,
+    /// The operator has come.
+    pub(in super::super) attended: bool,
     pub(in super::super) hardness: f64,
 }
 
@@ -88,7 +99,11 @@ impl Control {
             wear_mm: [wear_mm; TOOLS],
             part_count: 0,
             alarm: "",
-            override_request: None,
+            dial_request: None,
+            hold_asked: false,
+            stop_asked: false,
+            stood_s: None,
+            attended: false,
             hardness: 1.0,
         }
     }
@@ -120,6 +135,9 @@ impl Control {
         if let Some(block) = self.block {
             return block;
         }
+        if let Some(block) = self.standing() {
+            return block;
+        }
         if self.blocks.is_empty() {
             let worst = self.worst_edge();
             self.planner.refill(&mut self.blocks, since_s, worst);
@@ -136,6 +154,30 @@ impl Control {
         self.begin(&block.action);
         self.block = Some(block);
         block
+    }
+
+    /// Between two parts, when the ladder wants the program to stand: until the operator has changed the edge.
+    fn standing(&mut self) -> Option<Block> {
+        if self.attended {
+            (self.attended, self.stood_s) = (false, None);
+            self.worst_edge().into_iter().for_each(|(tool, _)| self.fresh_edge(usize::from(tool)));
+        }
+        if !self.stop_asked || !self.blocks.is_empty() {
+            return None;
+        }
+        let stood_s = self.stood_s.get_or_insert(0.0);
+        *stood_s += STAND_S;
+        let block = Block {
+            mode: mode::AUTOMATIC,
+            execution: execution::STOPPED,
+            program: 0,
+            number: 0,
+            operation: "",
+            action: Action::Wait(STAND_S),
+        };
+        self.waited_s = 0.0;
+        self.block = Some(block);
+        Some(block)
     }
 
     fn worst_edge(&self) -> Option<(u8, f64)> {
@@ -191,7 +233,7 @@ impl Control {
             Action::NewEdge => self.new_edge(),
             Action::PartDone => self.part_count += 1,
             Action::Alarm(text) => self.alarm = text,
-            Action::Override(percent) => self.override_request = Some(percent),
+            Action::Override(percent) => self.dial_request = Some(percent),
             Action::Hardness(hardness) => self.hardness = hardness,
         }
         true
@@ -220,13 +262,20 @@ impl Control {
     }
 
     fn new_edge(&mut self) {
-        let index = self.tool_index();
+        self.fresh_edge(self.tool_index());
+    }
+
+    fn fresh_edge(&mut self, index: usize) {
         self.edges[index] += 1;
         self.wear_mm[index] = FRESH_EDGE_MM;
     }
 
     fn rapid(&mut self, dt_s: f64) -> bool {
         self.motion = Motion::Rapid;
+        if self.hold_asked {
+            self.holding = true;
+            return false;
+        }
         self.advance(self.rapid_mm_min, dt_s)
     }
 
@@ -259,7 +308,7 @@ impl Control {
             self.hold_left_s = self.rng.random_range(4.0..15.0);
         }
         self.hold_left_s = (self.hold_left_s - dt_s).max(0.0);
-        self.holding = self.hold_left_s > 0.0;
+        self.holding = self.hold_left_s > 0.0 || self.hold_asked;
         self.holding
     }
 
