@@ -222,3 +222,33 @@ pub trait Actuator: Send {
         Duration::from_secs(1)
     }
 }
+
+impl<A: Actuator + ?Sized> Actuator for Box<A> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
+        (**self).write_feed_override(clock, wanted)
+    }
+
+    fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError> {
+        (**self).read_feed_override(clock)
+    }
+
+    fn read_dial(&mut self, clock: &dyn Clock) -> Result<Option<OverridePct>, SourceError> {
+        (**self).read_dial(clock)
+    }
+
+    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        (**self).release(clock)
+    }
+
+    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        (**self).ask(clock, request)
+    }
+
+    fn settles_within(&self) -> Duration {
+        (**self).settles_within()
+    }
+}

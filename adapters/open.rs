@@ -106,7 +106,7 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
 }
 
 fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Opened {
-    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), now_ns);
+    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun(target, now_ns));
     let mut sources: Vec<Box<dyn Source>> = Vec::new();
     if target.device != SimulatedDevice::Meter {
         sources.push(Box::new(machine.controller()));
@@ -118,8 +118,15 @@ fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Ope
     Opened { sources, actuator, simulated: Some(machine), refused: Refused::default() }
 }
 
+/// When the machine's day began.
+fn begun(target: &SimulatedTarget, now_ns: TimeNs) -> TimeNs {
+    #[expect(clippy::cast_possible_truncation, reason = "at most a day")]
+    let begun_ns = (target.begun_s * 1e9) as i64;
+    now_ns.saturating_sub(begun_ns)
+}
+
 fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs) -> OpenedPull {
-    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), origin_ns);
+    let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun(target, origin_ns));
     let mut sources: Vec<Box<dyn Pull>> = Vec::new();
     if target.device != SimulatedDevice::Meter {
         sources.push(Box::new(machine.controller()));

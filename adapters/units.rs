@@ -102,6 +102,8 @@ pub struct OverridePct(u8);
 impl OverridePct {
     /// 100 %, the programmed feed.
     pub const FULL: Self = Self(100);
+    /// The greatest override that can be written.
+    pub const GREATEST: Self = Self(254);
 
     /// `None` for 255.
     #[must_use]

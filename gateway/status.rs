@@ -111,6 +111,12 @@ pub struct GateStatus {
     pub held: Option<String>,
     /// What was really written, %; `null` in shadow.
     pub written_pct: Option<f64>,
+    /// Who armed the gate, while it is armed.
+    pub armed_by: Option<String>,
+    /// When the arming ends by itself, milliseconds since 1970.
+    pub armed_until_ms: Option<i64>,
+    /// Why it is not armed.
+    pub disarmed: Option<String>,
     /// The latest changes, newest first.
     pub recent: Vec<DecisionStatus>,
 }

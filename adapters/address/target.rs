@@ -67,6 +67,8 @@ pub struct SimulatedTarget {
     pub change_cut_pct: f64,
     /// Friction of the spindle after the change, percent of that before.
     pub change_friction_pct: f64,
+    /// Its day has begun so many seconds ago.
+    pub begun_s: f64,
     /// How the ladder combines the operator's dial and the gateway's override.
     pub ladder: LadderRule,
 }
@@ -240,6 +242,7 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         change_h: keys.number("change_h", f64::INFINITY, 0.0, 1e5),
         change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
         change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
+        begun_s: keys.number("begun_s", 0.0, 0.0, 86_400.0),
         ladder: keys.choice("ladder", &[("least", LadderRule::Least), ("product", LadderRule::Product)]),
     };
     match body.strip_prefix("//").unwrap_or(body) {

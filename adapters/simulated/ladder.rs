@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn an_override_counts_after_a_few_scans_and_as_long_as_the_sign_of_life_lasts() {
         let mut ladder = Ladder::new(LadderSettings::default());
-        let mut at = |ladder: &mut Ladder, ms: i64| {
+        let at = |ladder: &mut Ladder, ms: i64| {
             ladder.scan(ms * MS_NS);
             ladder.in_force().percent()
         };

@@ -28,6 +28,8 @@ enum Question {
     Query(QueryArguments),
     /// Samples into a file: .csv, .csv.gz or .parquet, a recording that replay and diagnose read.
     Export(ExportArguments),
+    /// The audit of the gate: every request, refusal, write and arming.
+    Audit(super::audit::AuditArguments),
     /// How much there is, how fast it grows and how long the disk lasts.
     Info {
         /// Print as JSON.
@@ -116,10 +118,11 @@ pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
             Ok(Outcome::Fine)
         }
         Question::Query(query) => query.answer(&reader, path),
+        Question::Audit(audit) => super::audit::answer(&audit, &reader),
     }
 }
 
-fn cannot(error: &HistoryError) -> CannotRun {
+pub(super) fn cannot(error: &HistoryError) -> CannotRun {
     CannotRun::new(error.to_string(), "")
 }
 

@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
+mod arm;
+mod audit;
 mod bench;
 mod check;
 mod diagnose;
@@ -92,6 +94,12 @@ impl LogArguments {
 enum Command {
     /// Poll, merge, infer, decide, store and serve (the default).
     Run(run::RunArguments),
+    /// Let the gate of the gateway that runs on this box write to the machine for a time.
+    Arm(arm::ArmArguments),
+    /// End that at once: the machine is given back to its dial.
+    Disarm(arm::OrderArguments),
+    /// A feed hold or stop was seen to: the next one may pass.
+    Acknowledge(arm::OrderArguments),
     /// Tell everything that is wrong with configuration, scripts, model and recordings.
     Check(check::CheckArguments),
     /// Run recordings through the same pipeline as fast as possible.
@@ -133,6 +141,9 @@ fn dispatch(arguments: Arguments) -> CommandResult {
     }
     match command {
         Command::Run(run) => run::run(run, arguments.log),
+        Command::Arm(arm) => arm::arm(arm),
+        Command::Disarm(order) => arm::disarm(order),
+        Command::Acknowledge(order) => arm::acknowledge(order),
         Command::Bench(bench) => bench::run(&bench),
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),

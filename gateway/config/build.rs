@@ -66,6 +66,10 @@ fn gate(reading: &Reading<'_>) -> Option<Gate> {
         max_pct: number(reading, "gate", "max_pct")?,
         slew_up_pct_per_s: number(reading, "gate", "slew_up_pct_per_s")?,
         slew_down_pct_per_s: number(reading, "gate", "slew_down_pct_per_s")?,
+        above_dial: flag(reading, "gate", "above_dial")?,
+        dead_band_pct: number(reading, "gate", "dead_band_pct")?,
+        min_interval: seconds(reading, "gate", "min_interval_s")?,
+        heartbeat: seconds(reading, "gate", "heartbeat_s")?,
         stale: seconds(reading, "gate", "stale_s")?,
         armed_for: seconds(reading, "gate", "armed_for_s")?,
     })

@@ -133,6 +133,14 @@ pub struct Gate {
     pub slew_up_pct_per_s: f64,
     /// Greatest fall, percent per second.
     pub slew_down_pct_per_s: f64,
+    /// May the override exceed the operator's dial? Then the ladder multiplies the two.
+    pub above_dial: bool,
+    /// A request within this of the one in force changes nothing, percent.
+    pub dead_band_pct: f64,
+    /// Least time between two changes.
+    pub min_interval: Duration,
+    /// Time between two signs of life.
+    pub heartbeat: Duration,
     /// Data older than this holds 100 %.
     pub stale: Duration,
     /// Arming ends by itself after this.

@@ -34,6 +34,25 @@ pub enum Disarmed {
     Clock,
     /// The machine has given no fresh values for ten seconds.
     Silent,
+    /// Nothing is being stored: what cannot be accounted for is not written.
+    NoAudit,
+}
+
+impl Disarmed {
+    /// The word in the audit.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Person => "person",
+            Self::Expired => "expired",
+            Self::ReadBack => "read_back",
+            Self::Line => "line",
+            Self::Clock => "clock",
+            Self::Silent => "silent",
+            Self::NoAudit => "no_audit",
+        }
+    }
 }
 
 impl fmt::Display for Disarmed {
@@ -45,6 +64,7 @@ impl fmt::Display for Disarmed {
             Self::ReadBack => "the machine did not take the override that was written",
             Self::Line => "the machine could not be reached",
             Self::Clock => "the clock jumped back",
+            Self::NoAudit => "the history takes nothing, so nothing can be accounted for",
             Self::Silent => "no fresh values from the machine for ten seconds",
         })
     }
@@ -61,6 +81,14 @@ pub enum ArmError {
     /// A person has to answer for it.
     #[error("the gate cannot be armed: say who arms it")]
     Nobody,
+    /// Longer than the configuration allows, or no time at all.
+    #[error(
+        "the gate cannot be armed for that long: give more than nothing and at most {0} s (`armed_for_s` under [gate])"
+    )]
+    Lasts(u64),
+    /// What is written could not be accounted for.
+    #[error("the gate cannot be armed: the history takes nothing at the moment; `cnc-gateway history info` says more")]
+    NoAudit,
 }
 
 #[derive(Debug)]
@@ -80,14 +108,18 @@ impl Arming {
         Self { mode, lasts_ns, state: Err(Disarmed::Start), silent_since_ns: None }
     }
 
-    pub(super) fn arm(&mut self, by: &str, at_ns: TimeNs) -> Result<&Armed, ArmError> {
+    pub(super) fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
         if self.mode != GateMode::Armed {
             return Err(ArmError::Mode(self.mode.word()));
         }
         if by.trim().is_empty() {
             return Err(ArmError::Nobody);
         }
-        let until_ns = at_ns.saturating_add(self.lasts_ns);
+        let lasts_ns = lasts.map_or(self.lasts_ns, |lasts| i64::try_from(lasts.as_nanos()).unwrap_or(i64::MAX));
+        if !(1..=self.lasts_ns).contains(&lasts_ns) {
+            return Err(ArmError::Lasts(self.lasts_ns.unsigned_abs() / 1_000_000_000));
+        }
+        let until_ns = at_ns.saturating_add(lasts_ns);
         self.state = Ok(Armed { by: by.trim().to_owned(), since_ns: at_ns, until_ns });
         self.state.as_ref().map_err(|_| ArmError::Nobody)
     }

@@ -26,6 +26,8 @@ pub enum Hold {
     Mdi,
     /// One block at a time.
     SingleBlock,
+    /// The program is tried out without cutting: the feed is not the programmed one.
+    DryRun,
     /// The controller is in another mode than automatic.
     NotAutomatic,
     /// Feed hold was pressed.
@@ -53,6 +55,7 @@ impl Hold {
             Self::Manual => "manual",
             Self::Mdi => "mdi",
             Self::SingleBlock => "single_block",
+            Self::DryRun => "dry_run",
             Self::NotAutomatic => "not_automatic",
             Self::FeedHold => "feed_hold",
             Self::NotRunning => "not_running",
@@ -74,6 +77,7 @@ impl Hold {
             Self::Manual => "手动方式",
             Self::Mdi => "MDI 方式",
             Self::SingleBlock => "单段方式",
+            Self::DryRun => "空运行",
             Self::NotAutomatic => "非自动方式",
             Self::FeedHold => "进给保持",
             Self::NotRunning => "程序未运行",
@@ -96,6 +100,7 @@ impl fmt::Display for Hold {
             Self::Manual => "the controller is in a manual mode",
             Self::Mdi => "the controller is in MDI",
             Self::SingleBlock => "single block",
+            Self::DryRun => "dry run",
             Self::NotAutomatic => "the controller is not in automatic",
             Self::FeedHold => "feed hold",
             Self::NotRunning => "no program runs",
@@ -116,6 +121,7 @@ pub(super) struct Interlocks {
     speed: Option<ChannelId>,
     alarm: Option<ChannelId>,
     rapid: Option<ChannelId>,
+    switches: [(Option<ChannelId>, Hold); 2],
     operation: Option<ChannelId>,
     block: Option<ChannelId>,
     loads: [Option<ChannelId>; 3],
@@ -132,6 +138,7 @@ impl Interlocks {
             speed: channel("spindle_speed_rpm"),
             alarm: channel("alarm"),
             rapid: channel("rapid"),
+            switches: [(channel("single_block"), Hold::SingleBlock), (channel("dry_run"), Hold::DryRun)],
             operation: channel("operation"),
             block: channel("block"),
             loads: ["spindle_power_w", "spindle_current_a", "spindle_load_pct"].map(channel),
@@ -168,7 +175,8 @@ impl Interlocks {
         if let Some((id, why)) = missing {
             return Some(Hold::Missing(id, why));
         }
-        let optional = [self.alarm, self.rapid, self.operation].into_iter().flatten();
+        let switches = self.switches.map(|(id, _)| id);
+        let optional = [self.alarm, self.rapid, self.operation].into_iter().chain(switches).flatten();
         let silent = optional.filter_map(|id| self.absence(sample, id).map(|why| (id, why)));
         // A controller may not have these at all; one that has them and is silent is another matter.
         let mut silent = silent.filter(|(_, why)| !matches!(why, Absence::NotProvided | Absence::NotSupported));
@@ -200,6 +208,10 @@ impl Interlocks {
             mode::MANUAL_DATA_INPUT => return Some(Hold::Mdi),
             mode::MANUAL => return Some(Hold::Manual),
             _ => return Some(Hold::NotAutomatic),
+        }
+        let on = |id: Option<ChannelId>| id.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
+        if let Some((_, hold)) = self.switches.iter().find(|(id, _)| on(*id)) {
+            return Some(*hold);
         }
         match text(self.execution) {
             execution::ACTIVE => None,

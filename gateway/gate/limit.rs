@@ -11,6 +11,8 @@ pub enum Bound {
     Least,
     /// Above the greatest override.
     Greatest,
+    /// Above the operator's dial, which the configuration does not allow.
+    Dial,
     /// The change would be too fast; it goes on at the next ticks.
     Slew,
     /// Not a number from 0 to 254: a mistake, not a wish. It counts as no request.
@@ -26,6 +28,39 @@ pub(super) fn band(wanted_pct: Option<f64>, min_pct: f64, max_pct: f64) -> (f64,
         Some(pct) if pct < min_pct => (min_pct, Some(Bound::Least)),
         Some(pct) if pct > max_pct => (max_pct, Some(Bound::Greatest)),
         Some(pct) => (pct, None),
+    }
+}
+
+/// The target below the ceiling that the operator's dial sets.
+pub(super) fn below(ceiling_pct: f64, target_pct: f64, bound: Option<Bound>) -> (f64, Option<Bound>) {
+    if target_pct > ceiling_pct { (ceiling_pct, Some(Bound::Dial)) } else { (target_pct, bound) }
+}
+
+/// Keeps to a target until another differs by more than the dead band. 100 % is always taken, and what the limits no longer
+/// allow is left at once.
+#[derive(Debug, Clone)]
+pub(super) struct Aim {
+    dead_band_pct: f64,
+    pct: f64,
+}
+
+impl Aim {
+    pub(super) fn new(dead_band_pct: f64) -> Self {
+        Self { dead_band_pct, pct: 100.0 }
+    }
+
+    /// What is aimed at now that this is wanted; never above the ceiling.
+    pub(super) fn take(&mut self, target_pct: f64, ceiling_pct: f64) -> f64 {
+        let far = (target_pct - self.pct).abs() >= self.dead_band_pct;
+        if far || target_pct == 100.0 {
+            self.pct = target_pct;
+        }
+        self.pct = self.pct.min(ceiling_pct);
+        self.pct
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.pct = 100.0;
     }
 }
 
@@ -99,6 +134,16 @@ mod tests {
             assert_eq!(within(mistake), (100.0, Some(Bound::NotPossible)), "{mistake}");
         }
         assert_eq!(band(Some(10.0), 50.5, 120.0), (51.0, Some(Bound::Least)), "a band is rounded inwards");
+    }
+
+    #[test]
+    fn a_small_change_is_left_alone_and_the_way_back_never_is() {
+        let mut aim = Aim::new(2.0);
+        let mut take = |target: f64| aim.take(target, 120.0);
+        assert_eq!([take(90.0), take(91.9), take(88.1), take(92.0)], [90.0, 90.0, 90.0, 92.0]);
+        assert_eq!([take(99.0), take(100.0), take(99.5)], [99.0, 100.0, 100.0]);
+        take(115.0);
+        assert_eq!(aim.take(115.5, 110.0), 110.0, "a ceiling counts at once");
     }
 
     #[test]

@@ -15,38 +15,48 @@
 //! | `thread_cycle` | threading and tapping from the text of NC blocks |
 //! | `limit` | band and slew |
 //! | `verdict` | what was decided, as words |
+//! | `ask` | feed hold and stop: once, and then not before somebody has seen to it |
 //! | `arming` | who let it write, and until when |
 //! | `write` | writing, reading back, restoring |
+//! | `trail` | what of it goes into the audit |
 
 mod arming;
+mod ask;
 mod hold;
 mod limit;
 mod thread_cycle;
+pub mod trail;
 mod verdict;
 mod write;
 
 pub use arming::{ArmError, Armed, Disarmed};
+pub use ask::{Ask, AskOutcome};
 pub use hold::Hold;
 pub use limit::Bound;
 pub use verdict::{Outcome, Verdict};
-pub use write::{Fault, Writer, Written};
+pub use write::{Fault, Occasion, Reaction, Writer, Written};
 
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use arming::Arming;
+use ask::Asks;
 use hold::Interlocks;
-use limit::Slew;
+use limit::{Aim, Slew};
 use rules::estimators::Estimates;
 use rules::script::OverrideRequest;
+use std::time::Duration;
 
 /// Decides about feed overrides. One per machine; remembers the last decision, for the slew limit, and the arming.
 #[derive(Debug)]
 pub struct Gate {
     limits: config::Gate,
     interlocks: Interlocks,
+    dial: Option<ChannelId>,
+    aim: Aim,
     slew: Slew,
     arming: Arming,
+    asks: Asks,
 }
 
 impl Gate {
@@ -56,8 +66,11 @@ impl Gate {
         let stale_ns = i64::try_from(limits.stale.as_nanos()).unwrap_or(i64::MAX);
         Self {
             interlocks: Interlocks::new(stale_ns),
+            dial: channel("feed_override_dial_pct"),
+            aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
             arming: Arming::new(limits.mode, limits.armed_for),
+            asks: Asks::new(),
             limits,
         }
     }
@@ -68,12 +81,12 @@ impl Gate {
         &self.limits
     }
 
-    /// Lets the gate write from now on, for the time that the configuration gives.
+    /// Lets the gate write from now on, for so long, or for the time that the configuration gives and does not let exceed.
     ///
     /// # Errors
     /// The configuration does not allow it, or nobody is named.
-    pub fn arm(&mut self, by: &str, at_ns: TimeNs) -> Result<&Armed, ArmError> {
-        self.arming.arm(by, at_ns)
+    pub fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
+        self.arming.arm(by, lasts, at_ns)
     }
 
     /// Ends the permission to write. The writer restores 100 % at the next verdict.
@@ -100,17 +113,46 @@ impl Gate {
         self.arming.silent(matches!(hold, Some(Hold::Missing(..))), at_ns);
         let wanted_pct = request.map(|request| request.pct);
         let (target_pct, bound) = limit::band(wanted_pct, self.limits.min_pct, self.limits.max_pct);
+        let ceiling_pct = self.ceiling_pct(sample);
+        let (target_pct, bound) = limit::below(ceiling_pct, target_pct, bound);
         let outcome = match (hold, bound) {
             (Some(hold), _) => Outcome::Held(hold),
             (None, Some(Bound::NotPossible)) => Outcome::Refused,
             (None, Some(bound)) => Outcome::Limited(bound),
             (None, None) => Outcome::Permitted,
         };
-        let permitted =
-            if hold.is_some() { self.slew.jump_to_full(at_ns) } else { self.slew.approach(target_pct, at_ns) };
+        let (target_pct, permitted) = if hold.is_some() {
+            self.aim.reset();
+            (target_pct, self.slew.jump_to_full(at_ns))
+        } else {
+            let aim_pct = self.aim.take(target_pct, ceiling_pct);
+            (aim_pct, self.slew.approach(aim_pct, at_ns))
+        };
         let slewing = hold.is_none() && bound.is_none() && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { Outcome::Limited(Bound::Slew) } else { outcome };
         Verdict { at_ns, wanted_pct, permitted, outcome, armed: self.arming.state().is_ok() }
+    }
+
+    /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide`]: each request passes once, and then not
+    /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
+    pub fn ask(&mut self, asks: &[Ask], sample: &Sample) -> Vec<(Ask, AskOutcome)> {
+        let armed = self.arming.state().is_ok();
+        self.asks.judge(asks, sample, armed)
+    }
+
+    /// Somebody has seen to what the ladder was asked for.
+    pub fn acknowledge(&mut self) {
+        self.asks.acknowledge();
+    }
+
+    /// What the ladder's rule and the operator's dial leave: a ladder that takes the lesser one of dial and override makes
+    /// anything above the dial meaningless, and without a known dial nothing above 100 % is asked for.
+    fn ceiling_pct(&self, sample: &Sample) -> f64 {
+        if self.limits.above_dial {
+            return self.limits.max_pct;
+        }
+        let dial_pct = self.dial.and_then(|dial| sample.number(dial).ok());
+        dial_pct.unwrap_or(100.0).clamp(100.0, 254.0)
     }
 }
 

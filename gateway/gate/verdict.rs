@@ -54,6 +54,12 @@ impl Verdict {
             Outcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
             Outcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
             Outcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
+            Outcome::Limited(Bound::Dial) => {
+                format!(
+                    "never above the operator's dial ({} now); `above_dial` under [gate] would allow it",
+                    self.permitted
+                )
+            }
             Outcome::Limited(Bound::Slew) => format!("the change is limited; {} now", self.permitted),
             Outcome::Limited(Bound::NotPossible) | Outcome::Refused => {
                 "a feed override is a number from 0 to 254 %; back to 100 %".to_owned()

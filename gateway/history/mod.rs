@@ -29,11 +29,17 @@
 //! [`Writer::acknowledged_through_ns`] and [`Writer::acknowledged_record`] have reached survives a killed process and a
 //! power cut. A full disk costs the oldest raw samples and nothing else; a clock that goes back begins a new segment.
 //!
+//! # The audit
+//! What the gate was asked for, let through, wrote and read back, and who armed it, stands in rows that are only appended and
+//! each hold the hash of the one before ([`Reader::verify_audit`]). Retention takes the oldest of them last of all, and says
+//! through which number.
+//!
 //! # Who does what
 //! `mailbox` takes in, `keeper` gathers and seals, `commit` makes durable, `house` keeps order, all on `thread`;
 //! [`Reader`] answers on connections of its own: `walk` goes through a range, `query`, `overview`, `list`, `sql` and
 //! `export` ask.
 
+mod audit;
 mod block;
 mod commit;
 mod compact;
@@ -70,6 +76,7 @@ mod walk;
 mod wear_models;
 mod writer;
 
+pub use audit::{AuditCheck, AuditEntry, Break};
 pub use block::{Cells, NumberCells, Summary, WordCells};
 pub use error::HistoryError;
 pub use export::Format;
@@ -80,7 +87,9 @@ pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};
 pub use reader::Reader;
 pub use reason::Reasons;
-pub use record::{Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, Record, StateChange};
+pub use record::{
+    Alarm, AlarmClear, Audit, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
+};
 pub use rounding::rounded;
 pub use rusqlite::types::Value as SqlValue;
 pub use series::{Series, as_stored, decimals_of_unit};

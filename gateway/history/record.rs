@@ -160,6 +160,62 @@ pub struct Diagnosis {
     pub json: String,
 }
 
+/// A row of the gate's audit: what was asked for, what became of it, who or which script was behind it. See the table `audit`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Audit {
+    /// When.
+    pub at_ns: TimeNs,
+    /// `started`, `request`, `write`, `reaction`, `feed_hold`, `stop`, `armed`, `disarmed`, `acknowledged`.
+    pub kind: String,
+    /// What became of it, in one word.
+    pub outcome: String,
+    /// Value in force before.
+    pub before: Option<f64>,
+    /// Value asked for; `None` also where it was no number.
+    pub asked: Option<f64>,
+    /// Value let through (request) or in force after (write, reaction).
+    pub after: Option<f64>,
+    /// Unit of the three.
+    pub unit: String,
+    /// Why, in words.
+    pub reason: String,
+    /// Script that asked; empty when none did.
+    pub script: String,
+    /// Version (hash) of that script.
+    pub script_version: String,
+    /// Person who ordered it; empty when none did.
+    pub person: String,
+}
+
+impl Audit {
+    /// As it comes back from the file: numbers that are none become absent, and -0 becomes 0.
+    pub(crate) fn storable(&self) -> Self {
+        let number = |value: Option<f64>| value.filter(|value| value.is_finite()).map(|value| value + 0.0);
+        Self { before: number(self.before), asked: number(self.asked), after: number(self.after), ..self.clone() }
+    }
+}
+
+/// How long a step of the override took to be seen in force.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ReactionTime {
+    /// When it was seen.
+    pub at_ns: TimeNs,
+    /// What was written, percent.
+    pub asked_pct: f64,
+    /// What is in force, percent.
+    pub found_pct: f64,
+    /// From the sample to the write, ms.
+    pub sample_to_write_ms: f64,
+    /// From the write to the machine showing it, ms.
+    pub write_to_seen_ms: f64,
+    /// Programme; empty when unknown.
+    pub program: String,
+    /// NC block; empty when unknown.
+    pub block: String,
+    /// Tool; empty when unknown.
+    pub tool: String,
+}
+
 /// Any of them, on its way to the writer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
@@ -181,6 +237,10 @@ pub enum Record {
     Model(Model),
     /// See [`Diagnosis`].
     Diagnosis(Diagnosis),
+    /// See [`Audit`].
+    Audit(Audit),
+    /// See [`ReactionTime`].
+    Reaction(ReactionTime),
 }
 
 macro_rules! into_record {
@@ -194,4 +254,5 @@ macro_rules! into_record {
 }
 
 into_record!(Event => Event, Alarm => Alarm, AlarmClear => AlarmClear, StateChange => State, Part => Part,
-    Decision => Decision, Command => Command, Model => Model, Diagnosis => Diagnosis);
+    Decision => Decision, Command => Command, Model => Model, Diagnosis => Diagnosis, Audit => Audit,
+    ReactionTime => Reaction);

@@ -1,6 +1,9 @@
 //! Records into their tables.
 
-use super::record::{Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, Record, StateChange};
+use super::audit;
+use super::record::{
+    Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
+};
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, params};
 
@@ -25,6 +28,8 @@ pub(crate) fn store(db: &Connection, record: &Record) -> Result<(), rusqlite::Er
         Record::Command(command) => store_command(db, command),
         Record::Model(model) => store_model(db, model),
         Record::Diagnosis(diagnosis) => store_diagnosis(db, diagnosis),
+        Record::Audit(row) => audit::append(db, row),
+        Record::Reaction(reaction) => store_reaction(db, reaction),
     }
 }
 
@@ -163,6 +168,24 @@ fn store_diagnosis(db: &Connection, diagnosis: &Diagnosis) -> Result<(), rusqlit
         diagnosis.verdict,
         diagnosis.summary,
         diagnosis.json
+    ])
+    .map(drop)
+}
+
+fn store_reaction(db: &Connection, reaction: &ReactionTime) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO reactions (at_ns, asked_pct, found_pct, sample_to_write_ms, write_to_seen_ms, program, block, tool)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+    )?
+    .execute(params![
+        reaction.at_ns,
+        reaction.asked_pct,
+        reaction.found_pct,
+        reaction.sample_to_write_ms,
+        reaction.write_to_seen_ms,
+        reaction.program,
+        reaction.block,
+        reaction.tool
     ])
     .map(drop)
 }

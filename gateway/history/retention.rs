@@ -1,6 +1,7 @@
 //! What goes when the history is too old or too big: raw samples first, alarms and the audit last. Every step deletes a
 //! bounded number of rows, so that the writer never stalls.
 
+use super::audit;
 use super::error::{Doing, HistoryError};
 use super::options::Retention;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -24,7 +25,7 @@ struct Kind {
 
 const HOUR_NS: i64 = 3_600 * SECOND_NS;
 
-static KINDS: [Kind; 13] = [
+static KINDS: [Kind; 15] = [
     Kind {
         name: "raw samples",
         table: "blocks",
@@ -46,7 +47,10 @@ static KINDS: [Kind; 13] = [
     kind("events", "events", "at_ns", 1, "1", |retention| retention.records_days),
     kind("decisions", "decisions", "at_ns", 1, "1", |retention| retention.audit_days),
     kind("commands", "commands", "at_ns", 1, "1", |retention| retention.audit_days),
+    kind("reactions", "reactions", "at_ns", 1, "1", |retention| retention.audit_days),
     kind("alarms", "alarms", "raised_ns", 1, "cleared_ns IS NOT NULL", |retention| retention.audit_days),
+    // By age only through the oldest rows: the chain is cut at its beginning and nowhere else.
+    kind("audit", "audit", "at_ns", 1, "1", |retention| retention.audit_days),
 ];
 
 const fn kind(
@@ -128,6 +132,7 @@ pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: Ti
 fn remove(db: &mut Connection, kind: &Kind, condition: &str, because: &str) -> Result<Removed, HistoryError> {
     let Kind { name, table, only, rows, time, unit_ns, .. } = kind;
     let time = if *table == "blocks" { "end_ns" } else { time };
+    let condition = &if *table == "audit" { audit::oldest(condition) } else { condition.to_owned() };
     let removing = db.transaction().doing("beginning to remove old rows")?;
     let (count, through): (Option<i64>, Option<i64>) = removing
         .query_row(&format!("SELECT {rows}, max({time}) FROM {table} WHERE {only} AND {condition}"), [], |row| {
@@ -135,6 +140,9 @@ fn remove(db: &mut Connection, kind: &Kind, condition: &str, because: &str) -> R
         })
         .doing("counting old rows")?;
     let (Some(count @ 1..), Some(through)) = (count, through) else { return Ok(Removed::default()) };
+    if *table == "audit" {
+        audit::release(&removing, &format!("{only} AND {condition}")).doing("removing old rows")?;
+    }
     removing.execute(&format!("DELETE FROM {table} WHERE {only} AND {condition}"), []).doing("removing old rows")?;
     removing
         .execute(

@@ -116,6 +116,11 @@ impl Pipeline {
         &self.gate
     }
 
+    /// The gate, for orders of a person and for what the machine says.
+    pub fn gate_mut(&mut self) -> &mut Gate {
+        &mut self.gate
+    }
+
     /// What the gate made of the last request.
     #[must_use]
     pub fn verdict(&self) -> Option<&Verdict> {

@@ -4,7 +4,7 @@
 use super::clock::{BoxClock, ClockStep};
 use super::feed::Feed;
 use super::keep::Kept;
-use crate::history::{Event, ExtraValue, Record};
+use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
 use crate::status::{HistoryStatus, Problem};
@@ -33,6 +33,7 @@ pub struct Health {
     looked: Option<Instant>,
     saved: Instant,
     day: Option<i64>,
+    stores: bool,
     /// Values that are stored beside those of the pipeline.
     beside: Option<[ExtraValue<'static>; 2]>,
 }
@@ -47,6 +48,7 @@ impl Health {
         port: watch::Receiver<Option<String>>,
         memory: PathBuf,
     ) -> Self {
+        let stores = kept.stores();
         Self {
             kept,
             clock,
@@ -57,6 +59,7 @@ impl Health {
             looked: None,
             saved: Instant::now(),
             day: None,
+            stores,
             beside: None,
         }
     }
@@ -75,6 +78,17 @@ impl Health {
         self.kept.record(record);
     }
 
+    /// Hands in a row of the audit; false when it will not be stored.
+    pub fn audit(&mut self, row: Audit) -> bool {
+        self.kept.audit(row)
+    }
+
+    /// Does the history take anything at the moment?
+    #[must_use]
+    pub fn stores(&self) -> bool {
+        self.stores
+    }
+
     /// From now on these values are stored with every sample, after those of the pipeline.
     pub fn beside(&mut self, values: [ExtraValue<'static>; 2]) {
         self.beside = Some(values);
@@ -87,6 +101,7 @@ impl Health {
         }
         self.looked = Some(Instant::now());
         self.kept.look();
+        self.stores = self.kept.stores();
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
         let day = now_ns.div_euclid(DAY_NS);

@@ -2,7 +2,8 @@
 
 use crate::config;
 use crate::history::{
-    self, AlarmClear, DiskRoom, ExtraSeries, HistoryError, Options, Reader, Record, Retention, Span, Writer, disk_room,
+    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Reader, Record, Retention, Span, Writer,
+    disk_room,
 };
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Store, stored_series};
@@ -113,6 +114,17 @@ impl Kept {
             }
             self.told = trouble;
         }
+    }
+
+    /// Does it take what is handed in, and make it durable?
+    #[must_use]
+    pub fn stores(&self) -> bool {
+        self.writer.as_ref().is_some_and(|writer| writer.status().degraded.is_none())
+    }
+
+    /// Hands in a row of the audit; false when it will not be stored.
+    pub fn audit(&mut self, row: Audit) -> bool {
+        self.writer.as_ref().is_some_and(|writer| writer.record(row).is_some())
     }
 
     /// Compacts and removes what is too old, in the background.

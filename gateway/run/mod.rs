@@ -1,7 +1,9 @@
 //! `run`: one machine, live. The tick has a thread of its own, so has every source; tokio only serves.
 
 pub mod clock;
+pub mod command;
 pub mod feed;
+pub mod hand;
 pub mod health;
 pub mod keep;
 pub mod open;
@@ -13,7 +15,8 @@ pub mod twin;
 pub mod wear;
 
 use crate::cli::CannotRun;
-use crate::config::Config;
+use crate::config::{self, Config, GateMode};
+use crate::control;
 use crate::gate::Gate;
 use crate::http::{Published, Server, Shared, bind, port_trouble};
 use crate::log::{Notice, Severity};
@@ -21,8 +24,11 @@ use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
 use ::rules::estimators;
+use adapters::Actuator;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use clock::BoxClock;
+use command::Commands;
+use hand::Hand;
 use health::Health;
 use keep::Kept;
 use open::{MachineSpeed, Sources};
@@ -30,6 +36,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc;
 use std::time::Duration;
 use tick::{Identity, Ticker, Wishes};
 use tokio::net::TcpListener;
@@ -54,6 +61,9 @@ pub struct Plan {
 /// The tick, ready to go, and what it publishes.
 type Begun = (Ticker, watch::Receiver<Option<Published>>);
 
+/// Orders of persons at the box.
+type Orders = mpsc::Receiver<control::Posted>;
+
 /// Runs until told to stop.
 ///
 /// # Errors
@@ -69,12 +79,13 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
     let listener = runtime.block_on(listen(&plan))?;
     let wishes = Arc::new(Wishes::default());
     let (report, port) = watch::channel(None);
-    let (ticker, live) = ticker(&plan, &wishes, port)?;
+    let (order, orders) = control::queue();
+    let (ticker, live) = ticker(&plan, &wishes, port, orders)?;
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, listener, live, &wishes, report));
+    runtime.block_on(serve(&plan, listener, live, &wishes, (report, order)));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -96,7 +107,12 @@ async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
     bind(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
 }
 
-fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String>>) -> Result<Begun, CannotRun> {
+fn ticker(
+    plan: &Plan,
+    wishes: &Arc<Wishes>,
+    port: watch::Receiver<Option<String>>,
+    orders: Orders,
+) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
     let twin = Twin::of(config);
@@ -106,8 +122,9 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &kept, clock.now_ns());
     let opened = open::sources(config, plan.speed, &clock, start_ns);
-    let Sources { feed, pace, simulated, .. } =
+    let Sources { feed, pace, simulated, actuators, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
+    let commands = commands(plan, actuators, orders, &clock)?;
     let memory = data_dir.join("estimators.json");
     let (scripts, watched) = rules::load(config);
     let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
@@ -136,6 +153,8 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
             pace,
             feed,
             pipeline,
+            commands,
+            machines,
             operations,
             twin,
             wear,
@@ -147,6 +166,32 @@ fn ticker(plan: &Plan, wishes: &Arc<Wishes>, port: watch::Receiver<Option<String
         },
         live,
     ))
+}
+
+/// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all.
+fn commands(
+    plan: &Plan,
+    actuators: Vec<(String, Box<dyn Actuator>)>,
+    orders: Orders,
+    clock: &Arc<dyn Clock>,
+) -> Result<Commands, CannotRun> {
+    let gate: &config::Gate = &plan.config.gate;
+    let target = gate.source.clone().unwrap_or_default();
+    if gate.mode != GateMode::Armed {
+        return Ok(Commands::new(Hand::None, target, orders));
+    }
+    let found = actuators.into_iter().find(|(name, _)| *name == target);
+    let missing = || {
+        let what = format!("[gate] source = {target:?} has no feed override that could be written");
+        CannotRun::new(what, "name the controller there, or write mode = \"shadow\"")
+    };
+    let (_, actuator) = found.ok_or_else(missing)?;
+    let hand = match plan.speed {
+        MachineSpeed::Real => Hand::start(actuator, gate, clock.clone())
+            .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
+        MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(actuator, gate),
+    };
+    Ok(Commands::new(hand, target, orders))
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.
@@ -179,8 +224,9 @@ async fn serve(
     listener: Option<TcpListener>,
     live: watch::Receiver<Option<Published>>,
     wishes: &Arc<Wishes>,
-    report: watch::Sender<Option<String>>,
+    (report, orders): (watch::Sender<Option<String>>, mpsc::SyncSender<control::Posted>),
 ) {
+    let _listening = control::listen(&plan.config.gateway.data_dir, orders);
     let shared = Shared::new(live.clone(), plan.config.history.path.clone(), plan.config.gateway.language);
     let server = match address(plan) {
         Ok(Some(address)) => Some(Server::start(address, listener, shared, report)),

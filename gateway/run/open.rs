@@ -7,6 +7,7 @@ use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
 use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
 use adapters::open::{OpenError, open, open_pull};
+use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
 use adapters::{Actuator, Pull, Source};
 use std::sync::Arc;
@@ -43,6 +44,8 @@ pub struct Sources {
     pub pace: Pace,
     /// Ways to the feed override, each with the name of its source.
     pub actuators: Vec<(String, Box<dyn Actuator>)>,
+    /// The simulated machines among them, which count what is written to them.
+    pub machines: Vec<Simulated>,
     /// Is every source simulated?
     pub simulated: bool,
 }
@@ -73,12 +76,14 @@ fn simulated(config: &Config) -> bool {
 
 fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
     let (mut found, mut actuators, mut problems) = (Vec::new(), Vec::new(), Vec::new());
+    let mut machines = Vec::new();
     for source in &config.sources {
         match open(&source.address, clock.now_ns()) {
             Ok(opened) => {
                 let settings = WorkerSettings { deadline: source.deadline, ..WorkerSettings::default() };
                 found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
                 actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+                machines.extend(opened.simulated);
             }
             Err(error) => problems.push(error.to_string()),
         }
@@ -88,7 +93,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     }
     let feed = threads(found, clock).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = Pace::on_clock(clock.clone(), period(config));
-    Ok(Sources { feed, pace, actuators, simulated: simulated(config) })
+    Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
 }
 
 fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Clock>) -> std::io::Result<Feed> {
@@ -100,11 +105,13 @@ fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Cloc
 
 fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
     let (mut found, mut actuators, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
+    let mut machines = Vec::new();
     for source in &config.sources {
         match open_pull(&source.address, start_ns) {
             Ok(opened) => {
                 found.extend(opened.sources);
                 actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+                machines.extend(opened.simulated);
             }
             Err(error) => problems.push(accelerated(&error)),
         }
@@ -115,7 +122,7 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
     let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
     let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names };
     let pace = Pace::stepped(speed.factor(), start_ns, period(config));
-    Ok(Sources { feed, pace, actuators, simulated: simulated(config) })
+    Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
 }
 
 fn accelerated(error: &OpenError) -> String {

@@ -94,18 +94,22 @@ pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
 
 /// The way of an override to the machine.
 #[must_use]
-pub fn gate(pipeline: &Pipeline) -> GateStatus {
+pub fn gate(pipeline: &Pipeline, written_pct: Option<f64>) -> GateStatus {
     let request = pipeline.scripts().decision().request.as_ref();
     let verdict = pipeline.verdict();
     let changed = verdict.filter(|verdict| verdict.outcome != Outcome::Permitted);
     let recent = pipeline.decisions().recent();
+    let armed = pipeline.gate().armed();
     GateStatus {
         mode: mode(pipeline.gate()),
         wanted_pct: request.map(|request| request.pct),
         reason: request.map(|request| format!("{} ({})", request.reason, request.script)),
         permitted_pct: verdict.map(|verdict| f64::from(verdict.permitted.percent())),
         held: changed.map(Verdict::reason),
-        written_pct: None,
+        written_pct,
+        armed_by: armed.ok().map(|armed| armed.by.clone()),
+        armed_until_ms: armed.ok().map(|armed| milliseconds(armed.until_ns)),
+        disarmed: armed.err().map(|why| why.to_string()),
         recent: recent
             .map(|change| DecisionStatus { at_ms: milliseconds(change.at_ns), text: change.text.clone() })
             .collect(),

@@ -1,5 +1,6 @@
 //! The tick thread: waits for the tick, samples, steps the pipeline, hands the status over.
 
+use super::command::Commands;
 use super::feed::Feed;
 use super::health::Health;
 use super::pace::Pace;
@@ -8,11 +9,13 @@ use super::rules::Watched;
 use super::twin::Twin;
 use super::wear::Wear;
 use crate::http::Published;
+use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
 use crate::status::{AlarmStatus, Problem, Status, TickStatus};
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use adapters::simulated::Simulated;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -53,6 +56,10 @@ pub struct Ticker {
     pub feed: Feed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
+    /// Orders, audit, and the hand that writes.
+    pub commands: Commands,
+    /// The simulated machines, which count what is written to them.
+    pub machines: Vec<Simulated>,
     /// How each stretch of a program cuts, where a recipe is configured.
     pub operations: Option<Operations>,
     /// The model beside the machine, where one is configured.
@@ -84,7 +91,9 @@ impl Ticker {
             self.complete(&mut sample, now_ns);
             self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
+            self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
             self.pipeline.step(&sample, &mut self.health);
+            self.commands.step(&mut self.pipeline, &[], &sample, now_ns, &mut self.health);
             self.wear.step(&sample, self.pipeline.estimates(), &mut self.health);
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
@@ -98,12 +107,24 @@ impl Ticker {
                 break;
             }
         }
+        self.commands.close(&sample, self.pipeline.gate_mut(), &mut self.health);
+        self.tell_writes(sample.at_ns);
         self.feed.stop();
         if let Some(twin) = &mut self.twin {
             twin.save();
         }
         self.health.close(&self.pipeline, sample.at_ns);
         self.wishes.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// What the simulated controllers have counted, for whoever does not believe the gateway's own figures.
+    fn tell_writes(&mut self, at_ns: TimeNs) {
+        for machine in &self.machines {
+            let counts = machine.written();
+            let text = format!("the simulated controller has counted {} writes", counts.writes());
+            let notice = Notice::new(Severity::Info, "machine_writes", text).detail(format!("{counts:?}"));
+            self.health.event(at_ns, "controller", &notice);
+        }
     }
 
     /// The recipe fills in what the sources do not deliver.
@@ -137,7 +158,7 @@ impl Ticker {
             alarms: self.alarms(),
             twin: self.twin.as_ref().map(Twin::status),
             parts: self.pipeline.parts().finished(),
-            gate: report::gate(&self.pipeline),
+            gate: report::gate(&self.pipeline, self.commands.written_pct()),
             sources: self.feed.status(now_ns),
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
@@ -149,11 +170,16 @@ impl Ticker {
 
     fn alarms(&self) -> Vec<AlarmStatus> {
         let of_twin = self.twin.iter().flat_map(Twin::alarms);
-        report::alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.wear.alarms()).collect()
+        report::alarms(&self.pipeline)
+            .into_iter()
+            .chain(of_twin)
+            .chain(self.wear.alarms())
+            .chain(self.commands.alarm())
+            .collect()
     }
 
     fn problems(&self) -> Vec<Problem> {
         let recipe = self.operations.as_ref().and_then(Operations::problem);
-        self.health.problems().into_iter().chain(recipe).collect()
+        self.health.problems().into_iter().chain(recipe).chain(self.commands.problem()).collect()
     }
 }

@@ -1,57 +1,19 @@
 //! The gate: nothing is written that should not be, whatever a script asks for.
 
+use super::cut::{Random, TICK_NS, asking, cases, cutting, id, limits, set_number, set_text};
 use adapters::clock::{Clock, ManualClock, SECOND_NS};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
-use adapters::words::{execution, mode, operation};
-use adapters::{Absence, Actuator, ChannelId, Sample, Slot, SourceError, Value};
+use adapters::{Absence, Actuator, Sample, Slot, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, Verdict, Writer};
-use rules::estimators::{Estimates, State};
-use rules::script::{Host, OverrideRequest, ScriptFile, shipped};
+use rules::script::{Host, ScriptFile, shipped};
 use std::path::Path;
 use std::time::Duration;
 
-const TICK_NS: i64 = SECOND_NS / 10;
-
-fn id(name: &str) -> ChannelId {
-    ChannelId::of(name).expect("a channel")
-}
-
-fn set_number(sample: &mut Sample, name: &str, number: f64) {
-    sample.set(id(name), Slot { value: Value::number(number), age_ns: 0 });
-}
-
-fn set_text(sample: &mut Sample, name: &str, text: &str) {
-    sample.set(id(name), Slot { value: Ok(Value::Text(text.into())), age_ns: 0 });
-}
-
-/// A machine in the middle of an ordinary cut.
-fn cutting(at_ns: i64) -> (Sample, Estimates) {
-    let mut sample = Sample::empty(at_ns);
-    for (name, number) in [("feed_mm_min", 200.0), ("spindle_speed_rpm", 1000.0), ("spindle_power_w", 2000.0)] {
-        set_number(&mut sample, name, number);
-    }
-    set_text(&mut sample, "mode", mode::AUTOMATIC);
-    set_text(&mut sample, "execution", execution::ACTIVE);
-    set_text(&mut sample, "alarm", "");
-    let mut estimates = Estimates::none(at_ns);
-    estimates.state = State::Cutting;
-    (sample, estimates)
-}
-
-fn limits(mode: GateMode) -> config::Gate {
-    let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
-    config::Gate { mode, source: Some("test".to_owned()), ..config.gate }
-}
-
-fn asking(pct: f64) -> OverrideRequest {
-    OverrideRequest { pct, reason: "test".into(), script: "test.rhai".into(), version: 1 }
-}
-
 fn armed_gate() -> Gate {
     let mut gate = Gate::new(limits(GateMode::Armed));
-    gate.arm("fitter", 0).expect("the configuration allows it");
+    gate.arm("fitter", None, 0).expect("the configuration allows it");
     gate
 }
 
@@ -76,7 +38,8 @@ impl Actuator for Machine {
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
         self.writes.push(wanted.percent());
-        if self.refuses { Err(SourceError::Off { source_name: "test".to_owned() }) } else { Ok(()) }
+        let broken = || SourceError::Line { source_name: "test".into(), what: "broken".into(), next: "mend it".into() };
+        if self.refuses { Err(broken()) } else { Ok(()) }
     }
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
@@ -86,11 +49,15 @@ impl Actuator for Machine {
     }
 }
 
+fn writer<A: Actuator>(actuator: A) -> Writer<A> {
+    Writer::new(actuator, &limits(GateMode::Armed))
+}
+
 #[test]
 fn by_default_nothing_is_written_in_an_hour() {
     let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
     let mut gate = Gate::new(config.gate);
-    let mut writer = Writer::new(Machine::new());
+    let mut writer = writer(Machine::new());
     let mut host = Host::new();
     let greedy =
         ScriptFile { name: "greedy.rhai".to_owned(), text: "request_feed_override(60, \"greed\");".to_owned() };
@@ -114,58 +81,21 @@ fn by_default_nothing_is_written_in_an_hour() {
 #[test]
 fn arming_needs_the_configuration_a_person_and_ends_by_itself() {
     for mode in [GateMode::Off, GateMode::Shadow] {
-        assert_eq!(Gate::new(limits(mode)).arm("fitter", 0).err(), Some(ArmError::Mode(mode.word())));
+        assert_eq!(Gate::new(limits(mode)).arm("fitter", None, 0).err(), Some(ArmError::Mode(mode.word())));
     }
     let mut gate = Gate::new(limits(GateMode::Armed));
     assert_eq!(gate.armed().err(), Some(Disarmed::Start), "disarmed after each start");
-    assert_eq!(gate.arm("  ", 0).err(), Some(ArmError::Nobody));
-    gate.arm("fitter", 0).expect("allowed");
+    assert_eq!(gate.arm("  ", None, 0).err(), Some(ArmError::Nobody));
+    gate.arm("fitter", None, 0).expect("allowed");
     let lasts_ns = i64::try_from(limits(GateMode::Armed).armed_for.as_nanos()).expect("hours");
     let (sample, estimates) = cutting(lasts_ns - 1);
     assert!(gate.decide(None, &sample, &estimates).armed);
     let (sample, estimates) = cutting(lasts_ns);
     assert!(!gate.decide(None, &sample, &estimates).armed);
     assert_eq!(gate.armed().err(), Some(Disarmed::Expired));
-    gate.arm("fitter", lasts_ns).expect("again");
+    gate.arm("fitter", None, lasts_ns).expect("again");
     let (sample, estimates) = cutting(5);
     assert!(!gate.decide(None, &sample, &estimates).armed, "a clock that jumps back disarms");
-}
-
-/// One thing that is wrong in an otherwise ordinary cut, and why 100 % is held then.
-type Case = (&'static str, fn(&mut Sample, &mut Estimates), Hold);
-
-fn cases() -> Vec<Case> {
-    let missing = |name: &str, why| Hold::Missing(id(name), why);
-    vec![
-        ("rapid flag", |it, _| set_number(it, "rapid", 1.0), Hold::Rapid),
-        ("rapid state", |_, estimates| estimates.state = State::Rapid, Hold::Rapid),
-        ("unknown state", |_, estimates| estimates.state = State::Unknown, Hold::StateUnknown),
-        ("threading", |it, _| set_text(it, "operation", operation::THREADING), Hold::Threading),
-        ("tapping", |it, _| set_text(it, "operation", operation::TAPPING), Hold::Tapping),
-        ("alarm", |it, _| set_text(it, "alarm", "PS0010"), Hold::Alarm),
-        ("manual", |it, _| set_text(it, "mode", mode::MANUAL), Hold::Manual),
-        ("MDI", |it, _| set_text(it, "mode", mode::MANUAL_DATA_INPUT), Hold::Mdi),
-        ("single block", |it, _| set_text(it, "mode", mode::SEMI_AUTOMATIC), Hold::SingleBlock),
-        ("edit", |it, _| set_text(it, "mode", mode::EDIT), Hold::NotAutomatic),
-        ("a word nobody knows", |it, _| set_text(it, "mode", "AUTO?"), Hold::NotAutomatic),
-        ("feed hold", |it, _| set_text(it, "execution", execution::FEED_HOLD), Hold::FeedHold),
-        ("stopped", |it, _| set_text(it, "execution", execution::STOPPED), Hold::NotRunning),
-        ("interrupted", |it, _| set_text(it, "execution", execution::INTERRUPTED), Hold::NotRunning),
-        ("ready", |it, _| set_text(it, "execution", execution::READY), Hold::NotRunning),
-        ("no mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Timeout)), missing("mode", Absence::Timeout)),
-        (
-            "no feed",
-            |it, _| it.set(id("feed_mm_min"), Slot::absent(Absence::Disconnected)),
-            missing("feed_mm_min", Absence::Disconnected),
-        ),
-        (
-            "old speed",
-            |it, _| it.set(id("spindle_speed_rpm"), Slot { value: Value::number(1000.0), age_ns: SECOND_NS }),
-            missing("spindle_speed_rpm", Absence::Stale),
-        ),
-        ("a silent alarm", |it, _| it.set(id("alarm"), Slot::absent(Absence::Stale)), missing("alarm", Absence::Stale)),
-        ("no load", |it, _| it.set(id("spindle_power_w"), Slot::absent(Absence::Stale)), Hold::OnlyEstimated),
-    ]
 }
 
 #[test]
@@ -234,26 +164,6 @@ fn silence_of_the_machine_disarms_after_ten_seconds() {
     assert_eq!(gate.armed().err(), Some(Disarmed::Silent));
 }
 
-/// A generator of numbers for the random test: cheap, seeded, of no quality that matters here.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 >> 33
-    }
-
-    fn request(&mut self) -> Option<OverrideRequest> {
-        let special = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, 300.0, 255.0, 254.0, 0.0, -0.0, 1e300, 49.999];
-        match self.next() % 4 {
-            0 => None,
-            1 => Some(asking(special[(self.next() % special.len() as u64) as usize])),
-            2 => Some(asking(f64::from_bits(self.next() << 33 | self.next()))),
-            _ => Some(asking((self.next() % 2_000) as f64 / 10.0)),
-        }
-    }
-}
-
 /// `GATE_CASES` sets the number of ticks; 100,000 otherwise.
 #[test]
 fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
@@ -295,7 +205,7 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
 
 #[test]
 fn the_pace_and_the_band_are_told() {
-    let mut gate = armed_gate();
+    let mut gate = Gate::new(config::Gate { above_dial: true, ..limits(GateMode::Armed) });
     let mut outcome_at = |tick: i64, pct: f64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
         gate.decide(Some(&asking(pct)), &sample, &estimates)
@@ -306,6 +216,35 @@ fn the_pace_and_the_band_are_told() {
     assert_eq!(outcome_at(2, 10.0).outcome, Outcome::Limited(Bound::Least));
     assert_eq!(outcome_at(3, 200.0).outcome, Outcome::Limited(Bound::Greatest));
     assert_eq!(outcome_at(4, 300.0).outcome, Outcome::Refused);
+}
+
+#[test]
+fn never_above_the_operators_dial_unless_configured() {
+    let decided = |above_dial: bool, dial: Option<f64>| {
+        let mut gate = Gate::new(config::Gate { above_dial, ..limits(GateMode::Armed) });
+        let mut last = None;
+        for tick in 0..60 {
+            let (mut sample, estimates) = cutting(tick * TICK_NS);
+            dial.into_iter().for_each(|dial| set_number(&mut sample, "feed_override_dial_pct", dial));
+            last = Some(gate.decide(Some(&asking(115.0)), &sample, &estimates));
+        }
+        last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
+    };
+    assert_eq!(decided(false, None), (100, Outcome::Limited(Bound::Dial)), "nobody knows the dial");
+    assert_eq!(decided(false, Some(110.0)), (110, Outcome::Limited(Bound::Dial)));
+    assert_eq!(decided(false, Some(60.0)), (100, Outcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
+    assert_eq!(decided(false, Some(120.0)), (115, Outcome::Permitted));
+    assert_eq!(decided(true, Some(60.0)), (115, Outcome::Permitted), "the ladder multiplies: 69 %");
+}
+
+#[test]
+fn arming_lasts_no_longer_than_the_configuration_allows() {
+    let mut gate = Gate::new(limits(GateMode::Armed));
+    for wrong in [Duration::ZERO, Duration::from_secs(8 * 3600 + 1), Duration::MAX] {
+        assert_eq!(gate.arm("fitter", Some(wrong), 0).err(), Some(ArmError::Lasts(8 * 3600)), "{wrong:?}");
+    }
+    let armed = gate.arm("fitter", Some(Duration::from_secs(60)), 0).expect("allowed");
+    assert_eq!(armed.until_ns, 60 * SECOND_NS);
 }
 
 fn run(gate: &mut Gate, writer: &mut Writer<Machine>, ticks: std::ops::Range<i64>, pct: f64) -> Vec<Option<Fault>> {
@@ -328,12 +267,12 @@ fn run(gate: &mut Gate, writer: &mut Writer<Machine>, ticks: std::ops::Range<i64
 #[test]
 fn an_armed_gate_writes_reads_back_and_gives_the_machine_back() {
     let mut gate = armed_gate();
-    let mut writer = Writer::new(Machine::new());
+    let mut writer = writer(Machine::new());
     let faults = run(&mut gate, &mut writer, 0..30, 80.0);
     assert!(faults.iter().all(Option::is_none), "{faults:?}");
     let writes = writer.actuator().writes.clone();
-    assert_eq!(writes[..5], [100, 95, 90, 85, 80], "{writes:?}");
-    assert!(writes.len() < 12, "unchanged, it is written only as a sign of life: {writes:?}");
+    assert_eq!(writes[..3], [100, 90, 80], "{writes:?}");
+    assert!(writes.len() < 14, "unchanged, it is written only as a sign of life: {writes:?}");
     gate.disarm(Disarmed::Person);
     run(&mut gate, &mut writer, 30..40, 80.0);
     assert_eq!(writer.actuator().writes.len(), writes.len() + 1, "given back once");
@@ -343,7 +282,7 @@ fn an_armed_gate_writes_reads_back_and_gives_the_machine_back() {
 #[test]
 fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
     let mut gate = armed_gate();
-    let mut dial = Writer::new(Machine { shown: Some((8, 37)), ..Machine::new() });
+    let mut dial = writer(Machine { shown: Some((4, 37)), ..Machine::new() });
     let told: Vec<_> = run(&mut gate, &mut dial, 0..60, 80.0).into_iter().flatten().collect();
     let mismatch = |asked| Fault::ReadBack {
         asked: OverridePct::new(asked).expect("not 255"),
@@ -353,7 +292,7 @@ fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
     assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));
 
     let mut gate = armed_gate();
-    let mut lagging = Writer::new(Machine { shown: Some((0, 100)), ..Machine::new() });
+    let mut lagging = writer(Machine { shown: Some((0, 100)), ..Machine::new() });
     let faults = run(&mut gate, &mut lagging, 0..60, 80.0);
     let mismatches: Vec<_> = faults.into_iter().flatten().collect();
     assert_eq!(mismatches, [Fault::ReadBack { asked: OverridePct::new(80).expect("80"), found: OverridePct::FULL }]);
@@ -365,7 +304,7 @@ fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
 #[test]
 fn a_broken_line_disarms_the_gate() {
     let mut gate = armed_gate();
-    let mut writer = Writer::new(Machine { refuses: true, ..Machine::new() });
+    let mut writer = writer(Machine { refuses: true, ..Machine::new() });
     let faults = run(&mut gate, &mut writer, 0..20, 80.0);
     assert!(matches!(faults[0], Some(Fault::Line(_))));
     assert_eq!(gate.armed().err(), Some(Disarmed::Line));
@@ -382,8 +321,8 @@ fn the_simulated_machine_follows_an_armed_gate_and_returns_to_its_panel() {
         .expect("it cuts within a day");
     clock.set(cut_ns);
     let mut gate = Gate::new(limits(GateMode::Armed));
-    gate.arm("fitter", cut_ns).expect("allowed");
-    let mut writer = Writer::new(machine.feed_override());
+    gate.arm("fitter", None, cut_ns).expect("allowed");
+    let mut writer = writer(machine.feed_override());
     let mut last = None;
     for tick in 0..20 {
         clock.set(cut_ns + tick * TICK_NS);

@@ -1,0 +1,109 @@
+//! `cnc-gateway arm`, `disarm`, `acknowledge`: orders of a person at the box to the gateway that runs there.
+
+use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::config;
+use crate::control::{self, Order};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Which gateway, and who orders.
+#[derive(Debug, Args)]
+pub(super) struct Where {
+    /// Who answers for it; stands in the audit.
+    #[arg(long, value_name = "NAME")]
+    by: String,
+    /// Configuration of the running gateway, for its data directory.
+    #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
+    config: Option<PathBuf>,
+    /// Data directory of the running gateway.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print the answer as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `arm`.
+#[derive(Debug, Args)]
+pub(super) struct ArmArguments {
+    /// For how long: 90s, 30m, 8h; as long as the configuration allows when left out.
+    #[arg(long = "for", value_name = "TIME", value_parser = seconds)]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    to: Where,
+}
+
+/// Arguments of `disarm` and `acknowledge`.
+#[derive(Debug, Args)]
+pub(super) struct OrderArguments {
+    #[command(flatten)]
+    to: Where,
+}
+
+/// `90s`, `30m`, `8h`, or seconds.
+fn seconds(text: &str) -> Result<f64, String> {
+    let (number, unit_s) = match text.char_indices().last() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = number.parse::<f64>().ok().map(|number| number * unit_s);
+    seconds
+        .filter(|seconds| *seconds >= 1.0 && *seconds <= 86_400.0)
+        .ok_or("give 90s, 30m or 8h, at most a day".to_owned())
+}
+
+/// Lets the gate write.
+pub(super) fn arm(arguments: ArmArguments) -> CommandResult {
+    let ArmArguments { seconds, to } = arguments;
+    send(&to, &Order::Arm { by: to.by.clone(), for_s: seconds })
+}
+
+/// Gives the machine back.
+pub(super) fn disarm(OrderArguments { to }: OrderArguments) -> CommandResult {
+    send(&to, &Order::Disarm { by: to.by.clone() })
+}
+
+/// Lets the next feed hold or stop pass.
+pub(super) fn acknowledge(OrderArguments { to }: OrderArguments) -> CommandResult {
+    send(&to, &Order::Acknowledge { by: to.by.clone() })
+}
+
+fn send(to: &Where, order: &Order) -> CommandResult {
+    let reply = control::order(&data_dir(to)?, order)?;
+    match to.json {
+        true => print_json(&serde_json::json!({ "schema": "order/1", "done": reply.done, "text": reply.text })),
+        false => print(&format!("{}\n", reply.text)),
+    }
+    Ok(if reply.done { Outcome::Fine } else { Outcome::No })
+}
+
+fn data_dir(to: &Where) -> Result<PathBuf, CannotRun> {
+    if let Some(directory) = &to.data_dir {
+        return Ok(directory.clone());
+    }
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let config = config::load(to.config.as_deref(), environment).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })?;
+    Ok(config.gateway.data_dir)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::seconds;
+
+    #[test]
+    fn times_are_said_as_people_say_them() {
+        assert_eq!(
+            (seconds("90s"), seconds("30m"), seconds("8h"), seconds("45")),
+            (Ok(90.0), Ok(1800.0), Ok(28_800.0), Ok(45.0))
+        );
+        for wrong in ["", "m", "-5m", "0s", "25h", "NaNh", "30 min", "5分"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
+    }
+}

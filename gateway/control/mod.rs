@@ -1,0 +1,121 @@
+//! Orders of a person standing at the box: arm the gate, disarm it, acknowledge a stop.
+//!
+//! They come through a socket file in the data directory and from nowhere else: not over the network, not from the page, not
+//! from a script. The file belongs to the user that the gateway runs as and nobody else can open it (mode 600); who opened it
+//! is known by the system (`SO_PEERCRED`) and stands in the audit beside the name that was given. One line of JSON asks, one
+//! answers:
+//!
+//! ```text
+//! {"order":"arm","by":"Li Wei","for_s":1800}
+//! {"done":true,"text":"armed by Li Wei for 1800 s"}
+//! ```
+//!
+//! | file | what |
+//! |---|---|
+//! | `server` | listens, checks, hands each order to the tick and answers with what the tick says |
+//! | `client` | `cnc-gateway arm`, `disarm`, `acknowledge` |
+
+mod client;
+mod server;
+
+pub use client::order;
+pub use server::{Listening, listen};
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Name of the socket in the data directory.
+const SOCKET: &str = "control.sock";
+/// A line may be so long.
+const LINE_MAX: u64 = 4096;
+/// The tick answers within this time, or does not live.
+const ANSWER_WITHIN: Duration = Duration::from_secs(15);
+/// Orders that wait for the tick.
+const WAITING_MAX: usize = 16;
+
+/// What is wanted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "order", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Order {
+    /// Let the gate write for a time.
+    Arm {
+        /// Who answers for it.
+        by: String,
+        /// For so long; without it, as long as the configuration allows.
+        for_s: Option<f64>,
+    },
+    /// Give the machine back to its dial.
+    Disarm {
+        /// Who wants it.
+        by: String,
+    },
+    /// A feed hold or stop has been seen to: the next one may pass.
+    Acknowledge {
+        /// Who has seen to it.
+        by: String,
+    },
+}
+
+impl Order {
+    /// Who orders.
+    #[must_use]
+    pub fn by(&self) -> &str {
+        match self {
+            Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by } => by,
+        }
+    }
+
+    /// The same with the user that the system knows beside the name.
+    fn of_user(mut self, user: Option<u32>) -> Self {
+        let (Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by }) = &mut self;
+        *by = match (by.trim(), user) {
+            ("", _) | (_, None) => by.trim().to_owned(),
+            (name, Some(user)) => format!("{name} (user {user})"),
+        };
+        self
+    }
+}
+
+/// What became of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reply {
+    /// Was it done?
+    pub done: bool,
+    /// What was done, or why not, and what to do next.
+    pub text: String,
+}
+
+impl Reply {
+    /// It was done.
+    pub fn done(text: impl Into<String>) -> Self {
+        Self { done: true, text: text.into() }
+    }
+
+    /// It was not.
+    pub fn refused(text: impl Into<String>) -> Self {
+        Self { done: false, text: text.into() }
+    }
+}
+
+/// An order on its way to the tick, with the way back.
+#[derive(Debug)]
+pub struct Posted {
+    /// What is wanted.
+    pub order: Order,
+    /// Where the answer goes.
+    pub reply: tokio::sync::oneshot::Sender<Reply>,
+}
+
+/// Both ends of the queue of orders.
+#[must_use]
+pub fn queue() -> (mpsc::SyncSender<Posted>, mpsc::Receiver<Posted>) {
+    mpsc::sync_channel(WAITING_MAX)
+}
+
+/// Where the socket of this data directory is.
+#[must_use]
+pub fn socket(data_dir: &Path) -> PathBuf {
+    data_dir.join(SOCKET)
+}

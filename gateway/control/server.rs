@@ -1,0 +1,99 @@
+//! Listens for orders and hands each to the tick.
+
+use super::{ANSWER_WITHIN, LINE_MAX, Order, Posted, Reply, socket};
+use crate::log::{Notice, Severity};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::SyncSender;
+use std::time::Duration;
+use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
+use tokio::net::{UnixListener, UnixStream};
+use tokio::sync::oneshot;
+
+/// Whoever connects has so long to say what he wants.
+const ASK_WITHIN: Duration = Duration::from_secs(5);
+
+/// The socket; it goes with this.
+#[derive(Debug)]
+pub struct Listening {
+    path: PathBuf,
+    task: tokio::task::JoinHandle<()>,
+}
+
+impl Drop for Listening {
+    fn drop(&mut self) {
+        self.task.abort();
+        let _already_gone = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Listens in this directory. Without a socket the box goes on; it cannot be armed then, and says so.
+#[must_use]
+pub fn listen(data_dir: &Path, orders: SyncSender<Posted>) -> Option<Listening> {
+    let path = socket(data_dir);
+    match bind(&path) {
+        Ok(listener) => {
+            let task = tokio::spawn(async move {
+                while let Ok((stream, _)) = listener.accept().await {
+                    tokio::spawn(answer(stream, orders.clone()));
+                }
+            });
+            Some(Listening { path, task })
+        }
+        Err(error) => {
+            let text =
+                format!("{}: no orders can be taken there ({error}), so the gate cannot be armed", path.display());
+            Notice::new(Severity::Warning, "no_control_socket", text).say();
+            None
+        }
+    }
+}
+
+/// Nobody else may ever open it: the file gets its place only when its mode is right. One that a killed gateway has left is
+/// replaced; the history's lock has kept a second gateway away by then.
+fn bind(path: &Path) -> io::Result<UnixListener> {
+    let fresh = path.with_extension(format!("{}.sock", std::process::id()));
+    let _left_behind = std::fs::remove_file(&fresh);
+    let listener = UnixListener::bind(&fresh)?;
+    let placed = std::fs::set_permissions(&fresh, std::fs::Permissions::from_mode(0o600))
+        .and_then(|()| std::fs::rename(&fresh, path));
+    placed.inspect_err(|_| {
+        let _unplaced = std::fs::remove_file(&fresh);
+    })?;
+    Ok(listener)
+}
+
+async fn answer(mut stream: UnixStream, orders: SyncSender<Posted>) {
+    let user = stream.peer_cred().ok().map(|peer| peer.uid());
+    let reply = match tokio::time::timeout(ASK_WITHIN, read(&mut stream)).await {
+        Ok(Ok(line)) => obey(&line, user, &orders).await,
+        Ok(Err(error)) => Reply::refused(format!("the order could not be read: {error}")),
+        Err(_) => Reply::refused("nothing was ordered"),
+    };
+    let line = serde_json::to_string(&reply).unwrap_or_default() + "\n";
+    let _gone = stream.write_all(line.as_bytes()).await;
+}
+
+async fn read(stream: &mut UnixStream) -> io::Result<String> {
+    let mut line = String::new();
+    BufReader::new(stream.take(LINE_MAX)).read_line(&mut line).await?;
+    Ok(line)
+}
+
+async fn obey(line: &str, user: Option<u32>, orders: &SyncSender<Posted>) -> Reply {
+    let order: Order = match serde_json::from_str(line) {
+        Ok(order) => order,
+        Err(error) => return Reply::refused(format!("this is no order: {error}")),
+    };
+    let (reply, answered) = oneshot::channel();
+    if orders.try_send(Posted { order: order.of_user(user), reply }).is_err() {
+        return Reply::refused("the box is busy; look at its log and try again");
+    }
+    match tokio::time::timeout(ANSWER_WITHIN, answered).await {
+        Ok(Ok(reply)) => reply,
+        _ => {
+            Reply::refused("the tick does not answer; look at the log, and restart the gateway if it does not recover")
+        }
+    }
+}

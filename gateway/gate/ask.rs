@@ -1,0 +1,168 @@
+//! What scripts ask of the ladder besides an override: a feed hold, a stop after this part. A request passes once; the ladder
+//! latches it, and the machine's builder decides what it does.
+//!
+//! The same request does not pass again before two things have happened: the script has withdrawn it, and the operator has
+//! seen to it at the machine (started again after a feed hold, changed the tool or the edge after a stop) or has
+//! acknowledged it on the box. A limit that chatters therefore stops the machine once and not fifty times.
+
+use super::channel;
+use adapters::words::execution;
+use adapters::{ChannelId, LadderRequest, Sample};
+use std::sync::Arc;
+
+/// A request of a script.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ask {
+    /// For what.
+    pub request: LadderRequest,
+    /// Why, in the script's words.
+    pub reason: Arc<str>,
+    /// Which script.
+    pub script: Arc<str>,
+    /// Which version of it.
+    pub version: u64,
+}
+
+/// What became of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AskOutcome {
+    /// It goes to the ladder.
+    Sent,
+    /// The gate is not armed: recorded only.
+    Shadow,
+    /// Nobody has seen to the last one yet.
+    Latched,
+}
+
+impl AskOutcome {
+    /// The word in the history.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sent => "written",
+            Self::Shadow => "shadow",
+            Self::Latched => "latched",
+        }
+    }
+}
+
+/// One kind of request.
+#[derive(Debug, Clone, Copy, Default)]
+struct Latch {
+    /// Did a script ask for it at the last tick?
+    wanted: bool,
+    /// Was it sent, and has nobody seen to it?
+    latched: bool,
+}
+
+#[derive(Debug)]
+pub(super) struct Asks {
+    latches: [Latch; 2],
+    execution: Option<ChannelId>,
+    tool: Option<ChannelId>,
+    held: bool,
+    in_use: Option<Arc<str>>,
+}
+
+impl Asks {
+    pub(super) fn new() -> Self {
+        Self {
+            latches: Default::default(),
+            execution: channel("execution"),
+            tool: channel("tool"),
+            held: false,
+            in_use: None,
+        }
+    }
+
+    pub(super) fn judge(&mut self, asks: &[Ask], sample: &Sample, armed: bool) -> Vec<(Ask, AskOutcome)> {
+        self.seen_to(sample);
+        let mut judged = Vec::new();
+        for (latch, request) in self.latches.iter_mut().zip(LadderRequest::ALL) {
+            let ask = asks.iter().find(|ask| ask.request == request);
+            let wanted_before = std::mem::replace(&mut latch.wanted, ask.is_some());
+            let Some(ask) = ask.filter(|_| !wanted_before) else { continue };
+            let outcome = match (latch.latched, armed) {
+                (true, _) => AskOutcome::Latched,
+                (false, true) => AskOutcome::Sent,
+                (false, false) => AskOutcome::Shadow,
+            };
+            latch.latched |= outcome == AskOutcome::Sent;
+            judged.push((ask.clone(), outcome));
+        }
+        judged
+    }
+
+    pub(super) fn acknowledge(&mut self) {
+        self.latches.iter_mut().for_each(|latch| latch.latched = false);
+    }
+
+    /// The operator has started again after a feed hold, or has changed the tool or its edge.
+    fn seen_to(&mut self, sample: &Sample) {
+        if let Some(word) = self.execution.and_then(|id| sample.text(id)) {
+            let held = word == execution::FEED_HOLD;
+            if std::mem::replace(&mut self.held, held) && word == execution::ACTIVE {
+                self.release(LadderRequest::FeedHold);
+            }
+        }
+        let Some(tool) = self.tool.and_then(|id| sample.text(id)) else { return };
+        if self.in_use.as_deref() != Some(tool) && self.in_use.replace(Arc::from(tool)).is_some() {
+            self.release(LadderRequest::Stop);
+        }
+    }
+
+    fn release(&mut self, request: LadderRequest) {
+        let each = self.latches.iter_mut().zip(LadderRequest::ALL);
+        each.filter(|(_, kind)| *kind == request).for_each(|(latch, _)| latch.latched = false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::{Slot, Value};
+
+    fn sample(word: &str, tool: &str) -> Sample {
+        let mut sample = Sample::empty(0);
+        for (name, text) in [("execution", word), ("tool", tool)] {
+            let slot = Slot { value: Ok(Value::Text(text.into())), age_ns: 0 };
+            sample.set(ChannelId::of(name).expect("a channel"), slot);
+        }
+        sample
+    }
+
+    fn hold() -> Vec<Ask> {
+        vec![Ask { request: LadderRequest::FeedHold, reason: "load".into(), script: "a.rhai".into(), version: 1 }]
+    }
+
+    #[test]
+    fn a_request_passes_once_until_it_is_withdrawn_and_seen_to() {
+        let mut asks = Asks::new();
+        let mut judge = |wanted: bool, word: &str| {
+            let asked = if wanted { hold() } else { Vec::new() };
+            asks.judge(&asked, &sample(word, "T1"), true).first().map(|(_, outcome)| *outcome)
+        };
+        assert_eq!(judge(true, execution::ACTIVE), Some(AskOutcome::Sent));
+        assert_eq!(judge(true, execution::FEED_HOLD), None);
+        assert_eq!(
+            (judge(false, execution::FEED_HOLD), judge(true, execution::FEED_HOLD)),
+            (None, Some(AskOutcome::Latched))
+        );
+        assert_eq!(judge(true, execution::ACTIVE), None, "still asked for: started again, but not withdrawn");
+        assert_eq!((judge(false, execution::ACTIVE), judge(true, execution::ACTIVE)), (None, Some(AskOutcome::Sent)));
+    }
+
+    #[test]
+    fn a_new_edge_or_an_acknowledgement_releases_a_stop() {
+        let stop = vec![Ask { request: LadderRequest::Stop, ..hold().remove(0) }];
+        let mut asks = Asks::new();
+        let mut judge = |wanted: bool, tool: &str| {
+            let asked: &[Ask] = if wanted { &stop } else { &[] };
+            asks.judge(asked, &sample(execution::ACTIVE, tool), true).first().map(|(_, outcome)| *outcome)
+        };
+        assert_eq!((judge(true, "T1"), judge(false, "T1")), (Some(AskOutcome::Sent), None));
+        assert_eq!((judge(true, "T1"), judge(false, "T1")), (Some(AskOutcome::Latched), None));
+        assert_eq!(judge(true, "T1-2"), Some(AskOutcome::Sent));
+        assert_eq!(asks.judge(&hold(), &sample(execution::ACTIVE, "T1-2"), false)[0].1, AskOutcome::Shadow);
+    }
+}

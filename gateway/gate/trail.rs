@@ -1,0 +1,264 @@
+//! What goes into the audit: each change of what is asked for and of what becomes of it, each write that is a change, each
+//! arming. A script that asks for something else at every tick fills no disk: beyond [`ROWS_PER_S`] its requests are counted,
+//! and the next row says how many there were.
+
+use super::arming::{Armed, Disarmed};
+use super::ask::{Ask, AskOutcome};
+use super::verdict::{Outcome, Verdict};
+use super::write::{Occasion, Reaction, Written};
+use crate::config;
+use crate::history::{Audit, ReactionTime};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::units::OverridePct;
+use rules::script::OverrideRequest;
+
+/// Rows of requests per second on average; twenty times as many may come at once.
+const ROWS_PER_S: f64 = 10.0;
+const ROWS_AT_ONCE: f64 = 200.0;
+/// A script's words in the audit are cut at so many characters.
+const WORDS_MAX: usize = 200;
+
+/// What was last recorded of requests.
+#[derive(Debug, Clone, PartialEq)]
+struct Told {
+    asked: Option<i64>,
+    outcome: Outcome,
+    armed: bool,
+    script: Option<u64>,
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub struct Trail {
+    told: Option<Told>,
+    tokens: f64,
+    at_ns: TimeNs,
+    left_out: u64,
+}
+
+impl Default for Trail {
+    fn default() -> Self {
+        Self { told: None, tokens: ROWS_AT_ONCE, at_ns: 0, left_out: 0 }
+    }
+}
+
+impl Trail {
+    /// The row of this tick's request, if it or its fate is another than before.
+    pub fn request(&mut self, request: Option<&OverrideRequest>, verdict: &Verdict) -> Option<Audit> {
+        let told = Told {
+            #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
+            asked: request.map(|request| request.pct.round() as i64),
+            outcome: verdict.outcome,
+            armed: verdict.armed,
+            script: request.map(|request| request.version),
+        };
+        // Nothing asked for, nothing in the way of it: not worth a first row.
+        let quiet = self.told.is_none() && request.is_none();
+        if self.told.as_ref() == Some(&told) || quiet {
+            return None;
+        }
+        self.told = Some(told);
+        if !self.may_tell(verdict.at_ns) {
+            self.left_out += 1;
+            return None;
+        }
+        let left_out = std::mem::take(&mut self.left_out);
+        let also = if left_out > 0 { format!("; {left_out} requests before it were left out") } else { String::new() };
+        let wish = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
+        Some(Audit {
+            outcome: outcome(verdict).to_owned(),
+            asked: request.map(|request| request.pct),
+            after: Some(percent(verdict.permitted)),
+            reason: format!("{wish}: {}{also}", verdict.reason()),
+            script: request.map_or(String::new(), |request| words(&request.script)),
+            script_version: request.map_or(String::new(), |request| format!("{:016x}", request.version)),
+            ..of("request", verdict.at_ns)
+        })
+    }
+
+    fn may_tell(&mut self, at_ns: TimeNs) -> bool {
+        let elapsed_s = (at_ns - self.at_ns).max(0) as f64 / SECOND_NS as f64;
+        self.at_ns = at_ns;
+        self.tokens = (self.tokens + elapsed_s * ROWS_PER_S).min(ROWS_AT_ONCE);
+        let may = self.tokens >= 1.0;
+        self.tokens -= if may { 1.0 } else { 0.0 };
+        may
+    }
+}
+
+fn outcome(verdict: &Verdict) -> &'static str {
+    match verdict.outcome {
+        Outcome::Held(_) => "held",
+        Outcome::Refused => "refused",
+        Outcome::Limited(_) => "limited",
+        Outcome::Permitted if verdict.armed => "permitted",
+        Outcome::Permitted => "shadow",
+    }
+}
+
+fn of(kind: &str, at_ns: TimeNs) -> Audit {
+    Audit { at_ns, kind: kind.to_owned(), unit: "%".to_owned(), ..Audit::default() }
+}
+
+fn words(text: &str) -> String {
+    text.chars().take(WORDS_MAX).collect()
+}
+
+fn percent(pct: OverridePct) -> f64 {
+    f64::from(pct.percent())
+}
+
+/// The box has started with these limits.
+#[must_use]
+pub fn started(limits: &config::Gate, at_ns: TimeNs) -> Audit {
+    let config::Gate { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } = limits;
+    let target = limits.source.as_deref().unwrap_or("no source");
+    let reason = format!(
+        "disarmed; {target}, {min_pct} to {max_pct} %, +{up} and -{down} %/s{}",
+        if *above_dial { ", may exceed the dial" } else { "" }
+    );
+    Audit { outcome: limits.mode.word().to_owned(), reason, ..of("started", at_ns) }
+}
+
+/// A write; a sign of life is no news unless it failed.
+#[must_use]
+pub fn write(written: &Written) -> Option<Audit> {
+    if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
+        return None;
+    }
+    let what = match written.occasion {
+        Occasion::Change => "the override was changed",
+        Occasion::SignOfLife => "the sign of life",
+        Occasion::Release => "the machine was given back to its dial",
+    };
+    Some(Audit {
+        outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
+        before: written.before.map(percent),
+        asked: Some(percent(written.asked)),
+        after: written.after.map(percent),
+        reason: written.fault.as_ref().map_or(what.to_owned(), |fault| words(&fault.to_string())),
+        ..of("write", written.at_ns)
+    })
+}
+
+/// A step was seen to be in force.
+#[must_use]
+pub fn reaction(reaction: &Reaction) -> Audit {
+    let times = times(reaction);
+    let reason = format!("seen in force {:.1} ms after it was written", times.write_to_seen_ms);
+    Audit {
+        outcome: "seen".to_owned(),
+        asked: Some(times.asked_pct),
+        after: Some(times.found_pct),
+        reason,
+        ..of("reaction", reaction.seen_ns)
+    }
+}
+
+/// The times of a step.
+#[must_use]
+pub fn times(reaction: &Reaction) -> ReactionTime {
+    let ms = |from_ns: TimeNs, to_ns: TimeNs| (to_ns - from_ns) as f64 / 1e6;
+    ReactionTime {
+        at_ns: reaction.seen_ns,
+        asked_pct: percent(reaction.asked),
+        found_pct: percent(reaction.found),
+        sample_to_write_ms: ms(reaction.sample_ns, reaction.issued_ns),
+        write_to_seen_ms: ms(reaction.issued_ns, reaction.seen_ns),
+        ..ReactionTime::default()
+    }
+}
+
+/// A request to the ladder, and what the machine said to it where it was sent.
+#[must_use]
+pub fn asked(ask: &Ask, outcome: AskOutcome, failed: Option<&str>, at_ns: TimeNs) -> Audit {
+    let more = match (outcome, failed) {
+        (_, Some(failed)) => words(failed),
+        (AskOutcome::Sent, None) => "handed to the ladder".to_owned(),
+        (AskOutcome::Shadow, None) => "the gate is not armed: recorded, not written".to_owned(),
+        (AskOutcome::Latched, None) => "nobody has seen to the last one yet".to_owned(),
+    };
+    Audit {
+        outcome: if failed.is_some() { "failed" } else { outcome.word() }.to_owned(),
+        reason: format!("{}: {more}", words(&ask.reason)),
+        script: words(&ask.script),
+        script_version: format!("{:016x}", ask.version),
+        unit: String::new(),
+        ..of(ask.request.word(), at_ns)
+    }
+}
+
+/// Somebody armed the gate.
+#[must_use]
+pub fn armed(armed: &Armed) -> Audit {
+    let seconds = (armed.until_ns - armed.since_ns) / SECOND_NS;
+    Audit {
+        outcome: "armed".to_owned(),
+        reason: format!("for {seconds} s"),
+        person: words(&armed.by),
+        unit: String::new(),
+        ..of("armed", armed.since_ns)
+    }
+}
+
+/// The arming has ended.
+#[must_use]
+pub fn disarmed(why: Disarmed, by: &str, at_ns: TimeNs) -> Audit {
+    Audit {
+        outcome: why.word().to_owned(),
+        reason: why.to_string(),
+        person: words(by),
+        unit: String::new(),
+        ..of("disarmed", at_ns)
+    }
+}
+
+/// Somebody wanted something of the gate that it refused, or has seen to a request.
+#[must_use]
+pub fn order(kind: &str, outcome: &str, reason: &str, by: &str, at_ns: TimeNs) -> Audit {
+    Audit {
+        outcome: outcome.to_owned(),
+        reason: words(reason),
+        person: words(by),
+        unit: String::new(),
+        ..of(kind, at_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(at_ns: TimeNs, outcome: Outcome) -> Verdict {
+        Verdict { at_ns, wanted_pct: None, permitted: OverridePct::FULL, outcome, armed: true }
+    }
+
+    fn asking(pct: f64) -> OverrideRequest {
+        OverrideRequest { pct, reason: "x".repeat(5000).as_str().into(), script: "a.rhai".into(), version: 7 }
+    }
+
+    #[test]
+    fn a_request_is_recorded_when_it_or_its_fate_changes() {
+        let mut trail = Trail::default();
+        assert_eq!(trail.request(None, &verdict(0, Outcome::Permitted)), None, "nothing has ever been asked for");
+        let first = trail.request(Some(&asking(80.0)), &verdict(1, Outcome::Permitted)).expect("new");
+        assert_eq!((first.asked, first.outcome.as_str()), (Some(80.0), "permitted"));
+        assert!(first.reason.len() < 300, "a script's words are cut");
+        assert_eq!(trail.request(Some(&asking(80.2)), &verdict(2, Outcome::Permitted)), None);
+        let refused = trail.request(Some(&asking(f64::NAN)), &verdict(3, Outcome::Refused)).expect("new");
+        assert_eq!(refused.outcome, "refused");
+        assert!(trail.request(None, &verdict(4, Outcome::Permitted)).is_some_and(|row| row.asked.is_none()));
+    }
+
+    #[test]
+    fn a_script_that_never_rests_is_counted_instead() {
+        let mut trail = Trail::default();
+        let mut rows = Vec::new();
+        for tick in 0..100_000 {
+            let at_ns = tick * SECOND_NS / 1000;
+            rows.extend(trail.request(Some(&asking(60.0 + (tick % 50) as f64)), &verdict(at_ns, Outcome::Permitted)));
+        }
+        assert!((1000..1300).contains(&rows.len()), "{} rows in 100 s", rows.len());
+        assert!(rows.last().is_some_and(|row| row.reason.contains("were left out")));
+    }
+}

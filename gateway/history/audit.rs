@@ -1,0 +1,269 @@
+//! The audit of the gate: every request, refusal, write and arming as a row that holds the hash of the one before.
+//!
+//! A row's hash is the SHA-256 (FIPS 180-4) over the JSON array of its fields and the hash before it, so a row that is
+//! changed, removed or put in breaks the chain at that place. The newest number and hash stand in `meta` besides, in the same
+//! transaction, so a chain that was cut at its end is noticed too. This shows what was tampered with by hand or lost by a
+//! disk; somebody who rewrites the whole chain and `meta` with a program of their own is met by keeping the head elsewhere:
+//! `history audit --verify` prints it.
+
+use super::error::{Doing, HistoryError};
+use super::reader::Reader;
+use super::record::Audit;
+use adapters::clock::TimeNs;
+use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+
+/// What the first row holds in place of the hash before it.
+pub(crate) const BEGINNING: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+
+/// A row of the audit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AuditEntry {
+    /// From 1, without holes.
+    pub number: i64,
+    /// What it says.
+    #[serde(flatten)]
+    pub audit: Audit,
+    /// Hash of the row before.
+    pub previous: String,
+    /// Hash of this row.
+    pub hash: String,
+}
+
+/// What checking the chain found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AuditCheck {
+    /// Rows that were looked at.
+    pub rows: u64,
+    /// Number of the oldest row there is; retention may have taken those before. 0 without any.
+    pub first: i64,
+    /// Number of the newest row; 0 without any.
+    pub last: i64,
+    /// Hash of the newest row: keep it elsewhere to notice a chain that was rewritten as a whole.
+    pub head: String,
+    /// The first place at which the chain is broken.
+    pub broken: Option<Break>,
+}
+
+/// The first row that is not as it was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Break {
+    /// Its number.
+    pub number: i64,
+    /// What is wrong with it.
+    pub what: String,
+}
+
+/// The hash of a row.
+fn hash(previous: &str, number: i64, audit: &Audit) -> String {
+    let Audit { at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person } = audit;
+    let fields = (
+        (previous, number, at_ns, kind, outcome),
+        (before, asked, after, unit),
+        (reason, script, script_version, person),
+    );
+    // Numbers are written so that they come back the same; none of these types can fail to be written.
+    let text = serde_json::to_string(&fields).unwrap_or_default();
+    Sha256::digest(text.as_bytes()).iter().fold(String::with_capacity(64), |mut hex, byte| {
+        let _infallible = write!(hex, "{byte:02x}");
+        hex
+    })
+}
+
+/// Number and hash of the newest row.
+fn head(db: &Connection) -> Result<(i64, String), rusqlite::Error> {
+    let newest = db
+        .prepare_cached("SELECT number, hash FROM audit ORDER BY number DESC LIMIT 1")?
+        .query_row([], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()?;
+    match newest {
+        Some(newest) => Ok(newest),
+        // After retention has taken everything the chain goes on from where it was.
+        None => Ok(noted_head(db)?.unwrap_or((0, BEGINNING.to_owned()))),
+    }
+}
+
+/// The head that stands in `meta`.
+fn noted_head(db: &Connection) -> Result<Option<(i64, String)>, rusqlite::Error> {
+    let text: Option<String> = db
+        .prepare_cached("SELECT value FROM meta WHERE key = 'audit_head'")?
+        .query_row([], |row| row.get(0))
+        .optional()?;
+    Ok(text
+        .as_deref()
+        .and_then(|text| text.split_once(' '))
+        .and_then(|(number, hash)| Some((number.parse().ok()?, hash.to_owned()))))
+}
+
+/// Appends a row, in the transaction of the caller.
+pub(crate) fn append(db: &Connection, audit: &Audit) -> Result<(), rusqlite::Error> {
+    let (last, previous) = head(db)?;
+    let (number, audit) = (last + 1, audit.storable());
+    let hash = hash(&previous, number, &audit);
+    db.prepare_cached(
+        "INSERT INTO audit (number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person,
+         previous, hash) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)",
+    )?
+    .execute(params![
+        number,
+        audit.at_ns,
+        audit.kind,
+        audit.outcome,
+        audit.before,
+        audit.asked,
+        audit.after,
+        audit.unit,
+        audit.reason,
+        audit.script,
+        audit.script_version,
+        audit.person,
+        previous,
+        hash
+    ])?;
+    db.prepare_cached("INSERT OR REPLACE INTO meta (key, value) VALUES ('audit_head', ?1)")?
+        .execute([format!("{number} {hash}")])
+        .map(drop)
+}
+
+const COLUMNS: &str =
+    "number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person, previous, hash";
+
+fn entry(row: &Row<'_>) -> Result<AuditEntry, rusqlite::Error> {
+    let audit = Audit {
+        at_ns: row.get(1)?,
+        kind: row.get(2)?,
+        outcome: row.get(3)?,
+        before: row.get(4)?,
+        asked: row.get(5)?,
+        after: row.get(6)?,
+        unit: row.get(7)?,
+        reason: row.get(8)?,
+        script: row.get(9)?,
+        script_version: row.get(10)?,
+        person: row.get(11)?,
+    };
+    Ok(AuditEntry { number: row.get(0)?, audit, previous: row.get(12)?, hash: row.get(13)? })
+}
+
+/// Follows the chain row by row.
+struct Chain {
+    rows: u64,
+    first: i64,
+    last: i64,
+    head: String,
+}
+
+impl Chain {
+    /// The next row, or why it cannot be the next one.
+    fn follow(&mut self, entry: &AuditEntry) -> Result<(), Break> {
+        let broken = |what: String| Err(Break { number: entry.number, what });
+        if entry.number != self.last + 1 {
+            return broken(format!("the rows {} to {} before it are missing", self.last + 1, entry.number - 1));
+        }
+        if self.rows > 0 && entry.previous != self.head || entry.number == 1 && entry.previous != BEGINNING {
+            return broken("it does not follow from the row before it".to_owned());
+        }
+        if hash(&entry.previous, entry.number, &entry.audit) != entry.hash {
+            return broken("it is not as it was written".to_owned());
+        }
+        (self.last, self.head, self.rows) = (entry.number, entry.hash.clone(), self.rows + 1);
+        if self.first == 0 {
+            self.first = entry.number;
+        }
+        Ok(())
+    }
+
+    fn check(self, broken: Option<Break>) -> AuditCheck {
+        AuditCheck { rows: self.rows, first: self.first, last: self.last, head: self.head, broken }
+    }
+}
+
+impl Reader {
+    /// Does the file have the table? One of an older version that nobody has written since does not.
+    fn has_audit(&self) -> Result<bool, HistoryError> {
+        self.db
+            .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'audit'", [], |_| Ok(()))
+            .optional()
+            .map(|found| found.is_some())
+            .doing("looking for the audit")
+    }
+
+    /// Rows of the time range, the newest `limit` of them, oldest first.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn audit(&self, from_ns: TimeNs, to_ns: TimeNs, limit: u32) -> Result<Vec<AuditEntry>, HistoryError> {
+        if !self.has_audit()? {
+            return Ok(Vec::new());
+        }
+        let select =
+            format!("SELECT {COLUMNS} FROM audit WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY number DESC LIMIT ?3");
+        let mut statement = self.db.prepare(&select).doing("reading the audit")?;
+        let rows = statement.query_map(params![from_ns, to_ns, limit], entry);
+        let mut rows: Vec<AuditEntry> = rows.and_then(Iterator::collect).doing("reading the audit")?;
+        rows.reverse();
+        Ok(rows)
+    }
+
+    /// Checks the whole chain from the oldest row on, and its end against the head that was noted with it.
+    ///
+    /// # Errors
+    /// What `SQLite` says; a chain that is broken is no error but the answer.
+    pub fn verify_audit(&self) -> Result<AuditCheck, HistoryError> {
+        let released = self.released().doing("looking where the audit begins")?;
+        let mut chain = Chain { rows: 0, first: 0, last: released, head: BEGINNING.to_owned() };
+        if !self.has_audit()? {
+            return Ok(chain.check(None));
+        }
+        // One view of the file, also while a gateway appends to it.
+        let reading = self.db.unchecked_transaction().doing("reading the audit")?;
+        let mut statement =
+            reading.prepare(&format!("SELECT {COLUMNS} FROM audit ORDER BY number")).doing("reading the audit")?;
+        let mut rows = statement.query([]).doing("reading the audit")?;
+        while let Some(row) = rows.next().doing("reading the audit")? {
+            let number: i64 = row.get(0).doing("reading the audit")?;
+            let followed = match entry(row) {
+                Ok(entry) => chain.follow(&entry),
+                Err(error) => Err(Break { number, what: format!("it cannot be read: {error}") }),
+            };
+            if let Err(broken) = followed {
+                return Ok(chain.check(Some(broken)));
+            }
+        }
+        let noted = noted_head(&reading).doing("reading the head of the audit")?;
+        let cut = noted.filter(|(number, hash)| {
+            (*number, hash.as_str()) != (chain.last, chain.head.as_str()) && *number != released
+        });
+        let broken = cut.map(|(number, _)| Break {
+            number: chain.last + 1,
+            what: format!("the chain ends before it; its last row was number {number}"),
+        });
+        Ok(chain.check(broken))
+    }
+
+    /// Number of the last row that retention has taken.
+    fn released(&self) -> Result<i64, rusqlite::Error> {
+        let value = self.db.query_row("SELECT value FROM meta WHERE key = 'audit_released'", [], |row| row.get(0));
+        Ok(value.optional()?.unwrap_or(0))
+    }
+}
+
+/// Of the rows of this condition those at the beginning of the chain, also when the clock has gone back in between.
+pub(crate) fn oldest(condition: &str) -> String {
+    format!(
+        "number < (SELECT coalesce(min(number), 9223372036854775807) FROM audit WHERE NOT coalesce(({condition}), 0))"
+    )
+}
+
+/// Says through which number retention removes rows, in its transaction.
+pub(crate) fn release(db: &Connection, condition: &str) -> Result<(), rusqlite::Error> {
+    db.execute(
+        &format!(
+            "INSERT OR REPLACE INTO meta (key, value) SELECT 'audit_released', max(number) FROM audit WHERE {condition}"
+        ),
+        [],
+    )
+    .map(drop)
+}

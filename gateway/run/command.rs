@@ -1,0 +1,259 @@
+//! From the gate's verdict to the machine, and from the machine's answer to the history: orders of a person, the audit, the
+//! hand that writes, the alarm when it has to let go.
+
+use super::hand::{Hand, Said};
+use super::health::Health;
+use super::report::milliseconds;
+use crate::control::{Order, Posted, Reply};
+use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Written, trail};
+use crate::history::{Alarm, AlarmClear, Command, ReactionTime};
+use crate::log::{Notice, Severity};
+use crate::pipeline::Pipeline;
+use crate::status::{AlarmStatus, Problem};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{ChannelId, Sample};
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+/// Who raises the alarm.
+const SOURCE: &str = "gate";
+const CODE: &str = "gate_disarmed";
+
+/// See the [module](self).
+pub struct Commands {
+    hand: Hand,
+    /// Name of the source that is written to.
+    target: String,
+    orders: Receiver<Posted>,
+    trail: trail::Trail,
+    /// Who armed it last.
+    by: String,
+    was_armed: bool,
+    alarm: Option<(TimeNs, String)>,
+    written: Option<f64>,
+    begun: bool,
+    where_: [Option<ChannelId>; 3],
+}
+
+impl Commands {
+    /// Writes through this hand to the source of this name.
+    #[must_use]
+    pub fn new(hand: Hand, target: String, orders: Receiver<Posted>) -> Self {
+        Self {
+            hand,
+            target,
+            orders,
+            trail: trail::Trail::default(),
+            by: String::new(),
+            was_armed: false,
+            alarm: None,
+            written: None,
+            begun: false,
+            where_: ["program", "block", "tool"].map(ChannelId::of),
+        }
+    }
+
+    /// Before the tick is decided: what persons at the box have ordered meanwhile.
+    pub fn obey(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
+        if !std::mem::replace(&mut self.begun, true) {
+            self.keep(trail::started(gate.limits(), sample.at_ns), gate, health);
+        }
+        while let Ok(Posted { order, reply }) = self.orders.try_recv() {
+            let answer = self.order(&order, gate, sample.at_ns, health);
+            // Whoever has gone meanwhile finds it in the audit.
+            let _gone = reply.send(answer);
+        }
+        if !health.stores() {
+            gate.disarm(Disarmed::NoAudit);
+        }
+    }
+
+    fn order(&mut self, order: &Order, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
+        match order {
+            Order::Arm { by, for_s } => self.arm(by, *for_s, gate, at_ns, health),
+            Order::Disarm { by } => {
+                let was = gate.armed().is_ok();
+                gate.disarm(Disarmed::Person);
+                self.by.clone_from(by);
+                if !was {
+                    self.keep(trail::order("disarmed", "was_not_armed", "", by, at_ns), gate, health);
+                }
+                Reply::done(if was { "disarmed; the machine is given back to its dial" } else { "it was not armed" })
+            }
+            Order::Acknowledge { by } => {
+                gate.acknowledge();
+                self.keep(
+                    trail::order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
+                    gate,
+                    health,
+                );
+                Reply::done("the next feed hold or stop may pass")
+            }
+        }
+    }
+
+    fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
+        let lasts = for_s.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO));
+        let armed = match health.stores() {
+            true => gate.arm(by, lasts, at_ns).cloned(),
+            false => Err(ArmError::NoAudit),
+        };
+        match armed {
+            Ok(armed) => {
+                self.by = by.to_owned();
+                self.keep(trail::armed(&armed), gate, health);
+                self.clear_alarm(at_ns, health);
+                let text = told(&armed, &self.target);
+                health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
+                Reply::done(text)
+            }
+            Err(why) => {
+                self.keep(trail::order("armed", "refused", &why.to_string(), by, at_ns), gate, health);
+                Reply::refused(why.to_string())
+            }
+        }
+    }
+
+    /// What cannot be accounted for is not written.
+    fn keep(&self, row: crate::history::Audit, gate: &mut Gate, health: &mut Health) {
+        if !health.audit(row) {
+            gate.disarm(Disarmed::NoAudit);
+        }
+    }
+
+    /// After the tick was decided: into the audit first, then to the machine.
+    pub fn step(
+        &mut self,
+        pipeline: &mut Pipeline,
+        asks: &[Ask],
+        sample: &Sample,
+        now_ns: TimeNs,
+        health: &mut Health,
+    ) {
+        let Some(mut verdict) = pipeline.verdict().copied() else { return };
+        let row = self.trail.request(pipeline.scripts().decision().request.as_ref(), &verdict);
+        let judged = pipeline.gate_mut().ask(asks, sample);
+        let gate = pipeline.gate_mut();
+        row.into_iter().for_each(|row| self.keep(row, gate, health));
+        let mut sent = Vec::new();
+        for (ask, outcome) in judged {
+            match outcome {
+                AskOutcome::Sent => sent.push(ask),
+                _ => self.keep(trail::asked(&ask, outcome, None, sample.at_ns), gate, health),
+            }
+        }
+        verdict.armed &= gate.armed().is_ok();
+        let mut said = Vec::new();
+        self.hand.step(&verdict, &sent, now_ns, |it| said.push(it));
+        self.hand.listen(|it| said.push(it));
+        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+        self.follow_arming(gate, sample.at_ns, health);
+    }
+
+    fn heard(&mut self, said: Said, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        match said {
+            Said::Written(written) => {
+                self.written = (written.occasion != Occasion::Release).then(|| f64::from(written.asked.percent()));
+                trail::write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
+                if written.occasion != Occasion::SignOfLife {
+                    health.keep(self.command(&written).into());
+                }
+                written.fault.into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
+            }
+            Said::Seen(reaction) => {
+                self.keep(trail::reaction(&reaction), gate, health);
+                let [program, block, tool] =
+                    self.where_.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
+                health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
+            }
+            Said::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
+            Said::Asked(ask, failed) => {
+                self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
+                if let Some(failed) = failed {
+                    health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
+                }
+            }
+        }
+    }
+
+    fn command(&self, written: &Written) -> Command {
+        let percent = |pct: adapters::units::OverridePct| f64::from(pct.percent());
+        Command {
+            at_ns: written.at_ns,
+            command: "feed_override_pct".to_owned(),
+            target: self.target.clone(),
+            before: written.before.map(percent),
+            asked: Some(percent(written.asked)),
+            after: written.after.map(percent),
+            unit: "%".to_owned(),
+            outcome: if written.fault.is_some() { "failed" } else { "done" }.to_owned(),
+            reason: written.fault.as_ref().map_or_else(|| format!("{:?}", written.occasion), ToString::to_string),
+            ..Command::default()
+        }
+    }
+
+    fn fail(&mut self, fault: &Fault, at_ns: TimeNs, gate: &mut Gate, health: &mut Health) {
+        gate.disarm(fault.disarmed());
+        let en = fault.to_string();
+        if self.alarm.is_none() {
+            let (code, source, severity) = (CODE.to_owned(), SOURCE.to_owned(), "critical".to_owned());
+            let zh = "写入的进给倍率未生效，闸门已解除；请检查梯形图与面板倍率".to_owned();
+            health.keep(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
+            Notice::new(Severity::Error, CODE, en.clone()).say();
+            self.alarm = Some((at_ns, en));
+        }
+    }
+
+    fn clear_alarm(&mut self, at_ns: TimeNs, health: &mut Health) {
+        if self.alarm.take().is_some() {
+            health.keep(AlarmClear { at_ns, code: CODE.to_owned(), source: SOURCE.to_owned() }.into());
+        }
+    }
+
+    fn follow_arming(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
+        let armed = gate.armed().is_ok();
+        if std::mem::replace(&mut self.was_armed, armed) && !armed {
+            let why = gate.armed().err().unwrap_or(Disarmed::Person);
+            let by = if why == Disarmed::Person { self.by.clone() } else { String::new() };
+            self.keep(trail::disarmed(why, &by, at_ns), gate, health);
+            let text = format!("the gate is disarmed: {why}");
+            health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, CODE, text));
+        }
+    }
+
+    /// Gives the machine back and ends.
+    pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        let mut said = Vec::new();
+        self.hand.close(|it| said.push(it));
+        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+    }
+
+    /// What stands in the machine's mailbox, percent.
+    #[must_use]
+    pub fn written_pct(&self) -> Option<f64> {
+        self.written
+    }
+
+    /// The alarm that stands.
+    pub fn alarm(&self) -> Option<AlarmStatus> {
+        self.alarm.as_ref().map(|(since_ns, text)| AlarmStatus {
+            code: CODE.to_owned(),
+            severity: "critical".to_owned(),
+            text: text.clone(),
+            since_ms: milliseconds(*since_ns),
+        })
+    }
+
+    /// What is wrong with the way to the machine.
+    #[must_use]
+    pub fn problem(&self) -> Option<Problem> {
+        let (_, text) = self.alarm.as_ref()?;
+        let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
+        Some(Problem { what: text.clone(), next })
+    }
+}
+
+fn told(armed: &Armed, target: &str) -> String {
+    let seconds = (armed.until_ns - armed.since_ns) / SECOND_NS;
+    format!("the gate is armed by {} for {seconds} s: overrides are written to {target}", armed.by)
+}

@@ -1,0 +1,11 @@
+//! The gate: what is decided, what reaches the machine, what stands in the audit, and what happens when the gateway dies.
+
+mod audit;
+mod cut;
+mod day;
+mod decisions;
+mod outputs;
+#[path = "../box/process.rs"]
+#[allow(dead_code, reason = "the suite of the box uses more of it")]
+mod process;
+mod running;
