@@ -107,13 +107,15 @@ fn arming_ends_by_itself_and_does_not_survive_a_restart() {
         assert!(not_yet || disarmed == "the time of arming is over", "{disarmed}");
         (!not_yet).then_some(())
     });
+    wait_for("the end in the audit", Duration::from_secs(20), || {
+        has(&audit(directory.path()), "disarmed", "expired").then_some(())
+    });
     assert_eq!(order(&config, &["arm", "--by", "fitter"]).0, Some(0));
     gateway.kill();
     let (gateway, address) = start(&config, "20");
     wait_for("a decision", Duration::from_secs(60), || gate(&address)["permitted_pct"].is_number().then_some(()));
     assert_eq!(gate(&address)["disarmed"], "not armed since the start");
     gateway.stop();
-    assert!(has(&audit(directory.path()), "disarmed", "expired"));
 }
 
 #[test]
