@@ -1,5 +1,5 @@
 //! What goes into the audit: each change of what is asked for and of what becomes of it, each write that is a change, each
-//! arming. A script that asks for something else at every tick fills no disk: beyond [`ROWS_PER_S`] its requests are counted,
+//! arming. A script that asks for something else at every tick fills no disk: beyond ten rows a second its requests are counted,
 //! and the next row says how many there were.
 
 use super::arming::{Armed, Disarmed};
