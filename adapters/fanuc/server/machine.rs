@@ -5,12 +5,11 @@ use super::ladder::{Ladder, SCAN_NS};
 use super::listen::Served;
 use crate::address::SimulatedMachine;
 use crate::clock::{Clock, TimeNs};
-use crate::driver::Actuator;
 use crate::fanuc::answer::{Alarm, Status};
 use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
 use crate::fanuc::wire::Number;
-use crate::simulated::{Moment, Panel, Simulated, SimulatedOverride};
+use crate::simulated::{Moment, Panel, Simulated};
 use crate::units::OverridePct;
 use crate::words::{execution, mode, operation};
 use std::sync::Arc;
@@ -22,7 +21,6 @@ const SCANS_MAX: i64 = 1000;
 pub struct SimulatedControl {
     machine: Simulated,
     clock: Arc<dyn Clock>,
-    register: SimulatedOverride,
     controller: Controller,
     ladder: Ladder,
     scanned_ns: TimeNs,
@@ -40,9 +38,9 @@ impl SimulatedControl {
         controller.offsets_only_at_rest = true;
         controller.parameter(1001, 0, Number::decimal(0, 0));
         [3106, 3107, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
-        let (register, scanned_ns) = (machine.feed_override(), clock.now_ns());
+        let scanned_ns = clock.now_ns();
         let (ladder, written) = (Ladder::default(), OverridePct::FULL);
-        Self { machine, clock, register, controller, ladder, scanned_ns, written }
+        Self { machine, clock, controller, ladder, scanned_ns, written }
     }
 
     /// Every scan since the last look, and what they mean for the machine.
@@ -55,7 +53,9 @@ impl SimulatedControl {
         let byte = |at| feed_override::decode(self.controller.memory.byte(Area::G, at)).percent();
         let product = u16::from(byte(feed_override::AT)) * u16::from(byte(feed_override::SECOND_AT)) / 100;
         let wanted = u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(OverridePct::FULL);
-        if wanted != self.written && self.register.write_feed_override(self.clock.as_ref(), wanted).is_ok() {
+        // What this control's ladder has made of dial and mailbox is all that the machine below sees.
+        if wanted != self.written {
+            self.machine.turn_dial(now_ns, wanted);
             self.written = wanted;
         }
     }
