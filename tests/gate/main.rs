@@ -4,6 +4,7 @@ mod audit;
 mod cut;
 mod day;
 mod decisions;
+mod killed;
 mod outputs;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]

@@ -1,0 +1,111 @@
+//! One machine with everything that a gateway has between its samples and its ladder, in the machine's own time.
+
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::merge::{Delay, Lockstep};
+use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
+use adapters::{Actuator, LadderRule, Pull, Sample};
+use gateway::config::{self, BUILT_IN_TEXT, GateMode};
+use gateway::gate::{Gate, Reaction};
+use gateway::pipeline::{NoStore, Pipeline};
+use gateway::run::hand::{Hand, Said};
+use rules::estimators;
+use rules::script::{Host, ScriptFile};
+use std::path::Path;
+
+pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
+/// The machine is looked at this often.
+const LOOK_NS: i64 = SECOND_NS / 50;
+
+/// The gate of a shop whose ladder multiplies dial and override.
+pub(crate) fn limits(min_pct: f64, max_pct: f64) -> config::Gate {
+    let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
+    let source = Some("lathe".to_owned());
+    config::Gate { mode: GateMode::Armed, source, min_pct, max_pct, above_dial: true, ..config.gate }
+}
+
+pub(crate) fn script(name: &str, text: impl Into<String>) -> ScriptFile {
+    ScriptFile { name: name.to_owned(), text: text.into() }
+}
+
+/// A machine, and the gateway beside it.
+pub(crate) struct Bench {
+    pub(crate) machine: Simulated,
+    lockstep: Lockstep,
+    pub(crate) pipeline: Pipeline,
+    hand: Hand,
+    sample: Sample,
+    now_ns: TimeNs,
+    /// Steps seen in force.
+    pub(crate) reactions: Vec<Reaction>,
+    /// What went wrong on the way to the machine.
+    pub(crate) faults: Vec<String>,
+}
+
+impl Bench {
+    /// An experiment in place of the day's work, under these scripts.
+    pub(crate) fn new(
+        mut settings: SimulatedSettings,
+        steps: &[ExperimentStep],
+        scripts: &[ScriptFile],
+        limits: &config::Gate,
+    ) -> Self {
+        settings.ladder.rule = LadderRule::Product;
+        let machine = Simulated::experiment("simulated://lathe", settings, 0, steps);
+        let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
+        let mut host = Host::new();
+        host.load(scripts).expect("the scripts are accepted");
+        let actuator: Box<dyn Actuator> = Box::new(machine.feed_override());
+        let estimators = estimators::Pipeline::new(estimators::Settings::default());
+        Self {
+            lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
+            pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
+            hand: Hand::inline(actuator, limits),
+            machine,
+            sample: Sample::empty(0),
+            now_ns: 0,
+            reactions: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+
+    /// Armed from the next tick on, as a person would.
+    pub(crate) fn arm(&mut self) {
+        self.pipeline.gate_mut().arm("fitter", None, self.sample.at_ns).expect("allowed");
+    }
+
+    /// One tick; gives the sample.
+    pub(crate) fn tick(&mut self) -> &Sample {
+        self.now_ns += TICK_NS;
+        self.lockstep.sample_into(&mut self.sample, self.now_ns);
+        self.pipeline.step(&self.sample, &mut NoStore);
+        let verdict = *self.pipeline.verdict().expect("decided");
+        let (mut said, gate) = (Vec::new(), self.pipeline.gate_mut());
+        self.hand.step(&verdict, &[], self.now_ns, |it| said.push(it));
+        for it in said {
+            let fault = match it {
+                Said::Written(written) => written.fault,
+                Said::Fault(fault) => Some(fault),
+                Said::Seen(reaction) => {
+                    self.reactions.push(reaction);
+                    None
+                }
+                Said::Asked(..) => None,
+            };
+            if let Some(fault) = fault {
+                gate.disarm(fault.disarmed());
+                self.faults.push(fault.to_string());
+            }
+        }
+        &self.sample
+    }
+
+    pub(crate) fn now_s(&self) -> f64 {
+        self.now_ns as f64 / SECOND_NS as f64
+    }
+
+    /// The machine at every look of the last tick.
+    pub(crate) fn looks(&self) -> impl Iterator<Item = Moment> + '_ {
+        let from_ns = self.now_ns - TICK_NS;
+        (0..TICK_NS / LOOK_NS).map(move |look| self.machine.moment(from_ns + look * LOOK_NS))
+    }
+}

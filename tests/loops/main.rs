@@ -1,0 +1,8 @@
+//! The loops closed on the simulated machine: sample, estimates, script, gate, ladder, machine, and what comes of it. What is
+//! true is asked of the machine, never of the gateway.
+
+mod bench;
+mod constant_load;
+mod steps;
+mod thermal;
+mod wear;

@@ -1,0 +1,138 @@
+//! The thermal error over a day of the simulated machine, before and after compensation, through an external offset of whole
+//! micrometres and through the model of a pulse inserter between encoder and controller.
+//!
+//! The law is identified from another day (another seed) with a gauge that is noisy; the machine's true error (bearing,
+//! housing and air, three time constants) is no function of the three temperatures that are measured.
+
+use adapters::recording::{Cells, Numbers};
+use adapters::simulated::{Simulated, SimulatedSettings};
+use adapters::{Absence, Recording};
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use rules::estimators::thermal::{
+    AxisSituation, CompensationSettings, Compensator, Decoder, EDGES_PER_PULSE, Lines, Predictor, PulseInserter,
+    SelectionSettings, collect, learn,
+};
+
+const SECOND_NS: i64 = 1_000_000_000;
+const STEP_S: i64 = 5;
+const SENSORS: [&str; 3] = ["bearing_temperature_c", "motor_temperature_c", "ambient_temperature_c"];
+/// The inserter lets edges leave at least so far apart.
+const SPACING_NS: u64 = 1_000;
+
+fn machine(seed: u64) -> Simulated {
+    Simulated::new("simulated://lathe", SimulatedSettings { seed, ..SimulatedSettings::default() }, 0)
+}
+
+/// Sensors with a tenth of a kelvin of noise, and the true error.
+fn look(machine: &Simulated, at_s: i64, dice: &mut Pcg64Mcg) -> ([f64; 3], f64) {
+    let moment = machine.moment(at_s * SECOND_NS);
+    let mut noisy = |true_c: f64| true_c + 0.1 * dice.sample::<f64, _>(StandardNormal);
+    let electric = moment.electric;
+    let sensors = [electric.bearing_temperature_c, electric.motor_temperature_c, electric.ambient_temperature_c];
+    (sensors.map(&mut noisy), moment.truth.thermal_error_um)
+}
+
+/// A row per minute of this many hours, with a gauge that is wrong by half a micrometre.
+fn recorded(seed: u64, hours: i64) -> Recording {
+    let (machine, mut dice) = (machine(seed), Pcg64Mcg::seed_from_u64(seed));
+    let rows: Vec<([f64; 3], f64)> = (0..hours * 60).map(|minute| look(&machine, minute * 60, &mut dice)).collect();
+    let mut recording = Recording::new("a day", (0..rows.len()).map(|row| row as f64 * 60.0).collect(), None);
+    for (at, name) in SENSORS.into_iter().enumerate() {
+        recording.set_column(name, Cells::Numbers(Numbers::full(rows.iter().map(|row| row.0[at]).collect())));
+    }
+    let gauge = rows.iter().map(|row| row.1 + 0.5 * dice.sample::<f64, _>(StandardNormal)).collect();
+    recording.set_column("thermal_error_um", Cells::Numbers(Numbers::full(gauge)));
+    recording
+}
+
+/// Root of the mean square and greatest magnitude.
+fn size(errors: &[f64]) -> (f64, f64) {
+    let squares: f64 = errors.iter().map(|it| it * it).sum();
+    ((squares / errors.len() as f64).sqrt(), errors.iter().fold(0.0, |worst, it| worst.max(it.abs())))
+}
+
+/// An axis that goes to and fro under the inserter; what its controller counts besides is the offset.
+struct Axis {
+    inserter: PulseInserter,
+    controller: Decoder,
+    encoder_edges: i64,
+    at_ns: u64,
+}
+
+impl Axis {
+    fn new() -> Self {
+        let lines = Lines::at(0);
+        Self {
+            inserter: PulseInserter::new(lines, 0, SPACING_NS),
+            controller: Decoder::new(lines, 0),
+            encoder_edges: 0,
+            at_ns: 0,
+        }
+    }
+
+    /// Forty edges one way, forty back, with time for the pulses in between; then the offset, in pulses.
+    fn traverse(&mut self, pulses: i64) -> i64 {
+        self.inserter.request(pulses);
+        for step in 0..80 {
+            self.encoder_edges += if step < 40 { 1 } else { -1 };
+            self.at_ns += 100_000;
+            let mut left = Vec::new();
+            let lines = Lines::at(self.encoder_edges);
+            self.inserter.advance(self.at_ns, lines, |edge| left.push(edge)).expect("slow enough");
+            for edge in left {
+                self.controller.see(edge.lines, edge.at_ns).expect("no edge is lost");
+            }
+        }
+        (self.controller.position_edges() - self.encoder_edges) / EDGES_PER_PULSE
+    }
+}
+
+fn day(hours: i64) {
+    let collected = collect(&recorded(11, hours)).expect("usable");
+    let learned = learn(&collected.course, SelectionSettings::default(), None).expect("a law");
+    let law = learned.best().fit.law.clone();
+    println!("law: {} terms, late {:?} s, residual {:.2} um", law.terms.len(), law.tau_s, law.residual_sd_um);
+    let settings = CompensationSettings { pulse_um: 1.0, limit_um: 150.0, ..CompensationSettings::default() };
+    let (mut offset, mut inserted) =
+        (Compensator::new(settings).expect("usable"), Compensator::new(settings).expect("usable"));
+    let mut predictor = Predictor::new(law, &SENSORS).expect("usable");
+    let (machine, mut dice, mut axis) = (machine(12), Pcg64Mcg::seed_from_u64(12), Axis::new());
+    let (mut before, mut after, mut through) = (Vec::new(), Vec::new(), Vec::new());
+    for step in 0..hours * 3600 / STEP_S {
+        let at_s = step * STEP_S;
+        let (temperatures, error_um) = look(&machine, at_s, &mut dice);
+        let off = !machine.moment(at_s * SECOND_NS).panel.booted;
+        let read = temperatures.map(|value| if off { Err(Absence::MachineOff) } else { Ok(value) });
+        let prediction = predictor.predict(at_s * SECOND_NS, &read).ok();
+        let situation = AxisSituation::default();
+        let sink = offset.step(STEP_S as f64, prediction.as_ref(), situation);
+        let pulses = inserted.step(STEP_S as f64, prediction.as_ref(), situation).increment_pulses;
+        let counted = axis.traverse(pulses);
+        if !off {
+            before.push(error_um);
+            after.push(error_um + sink.sent_um);
+            through.push(error_um + counted as f64 * settings.pulse_um);
+        }
+    }
+    let ((b, b_max), (a, a_max), (p, p_max)) = (size(&before), size(&after), size(&through));
+    println!(
+        "thermal error over {hours} h, machine on: before RMS {b:.1} um, greatest {b_max:.1} um; external offset RMS {a:.2} um, \
+         greatest {a_max:.1} um; pulse inserter RMS {p:.2} um, greatest {p_max:.1} um"
+    );
+    assert!(a < 0.35 * b && p < 0.35 * b, "{b} {a} {p}");
+    assert!((a - p).abs() < 0.2, "both ways carry the same increments: {a} {p}");
+}
+
+#[test]
+fn the_thermal_error_is_compensated_through_both_sinks() {
+    day(5);
+}
+
+/// `cargo test --release --test loops a_day_of -- --ignored --nocapture`
+#[test]
+#[ignore = "two days of the machine: half a minute"]
+fn a_day_of_thermal_error() {
+    day(24);
+}
