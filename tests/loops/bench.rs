@@ -16,11 +16,19 @@ pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
 /// The machine is looked at this often.
 const LOOK_NS: i64 = SECOND_NS / 50;
 
-/// The gate of a shop whose ladder multiplies dial and override.
+/// The gate of a shop whose ladder multiplies dial and override, and which lets the feed rise as quickly as it falls.
 pub(crate) fn limits(min_pct: f64, max_pct: f64) -> config::Gate {
     let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
     let source = Some("lathe".to_owned());
-    config::Gate { mode: GateMode::Armed, source, min_pct, max_pct, above_dial: true, ..config.gate }
+    config::Gate {
+        mode: GateMode::Armed,
+        source,
+        min_pct,
+        max_pct,
+        above_dial: true,
+        slew_up_pct_per_s: 50.0,
+        ..config.gate
+    }
 }
 
 pub(crate) fn script(name: &str, text: impl Into<String>) -> ScriptFile {
