@@ -17,6 +17,8 @@ pub mod clock;
 pub mod driver;
 pub mod fanuc;
 pub mod merge;
+pub mod mqtt;
+pub mod nclink;
 pub mod open;
 pub mod reading;
 pub mod recording;

@@ -1,0 +1,106 @@
+//! A small synchronous MQTT 3.1.1 client: what a driver on its own thread needs of a broker, and nothing else.
+//!
+//! - Quality of service 0 and 1, clean session, keep-alive, user and password. No TLS, no will, no retained messages of
+//!   its own, no session that outlives the connection: the protocols above ask again after a reconnect.
+//! - `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before, 40 ms and more.
+//! - One thread per connection reads, answers the broker and fills a bounded queue, so that a message is stamped when it
+//!   arrives and not when somebody has time for it. When nobody takes, the oldest message goes and is counted.
+//! - A connection that broke stays broken ([`Client::receive`] tells why); the caller connects again, and the name of the
+//!   broker is looked up again then.
+//!
+//! Limits: a packet of at most [`PACKET_MAX`] bytes, a queue of at most [`QUEUE_MESSAGES`] messages and [`QUEUE_BYTES`].
+//!
+//! Source: MQTT Version 3.1.1, OASIS Standard, 29 October 2014 (sections are named beside the code).
+
+mod client;
+mod inbox;
+mod packet;
+mod reader;
+
+pub use client::Client;
+pub use packet::Qos;
+
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// A packet is refused when it is longer than this.
+pub const PACKET_MAX: usize = 8 * 1024 * 1024;
+/// At most so many messages wait to be taken.
+pub const QUEUE_MESSAGES: usize = 4096;
+/// At most so many bytes of payload wait to be taken.
+pub const QUEUE_BYTES: usize = 32 * 1024 * 1024;
+
+/// How to talk to a broker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Options {
+    /// Host name or number.
+    pub host: String,
+    /// TCP port.
+    pub port: u16,
+    /// Name of this client at the broker; another client of the same name is thrown out by the broker.
+    pub client_id: String,
+    /// User and password, where the broker wants them.
+    pub login: Option<(String, String)>,
+    /// Longest silence: half of it without a packet and the broker is asked for a sign of life.
+    pub keep_alive: Duration,
+    /// Longest wait for the connection and for each acknowledgement.
+    pub deadline: Duration,
+}
+
+impl Options {
+    /// A client with a name that nobody else has, 20 s of keep-alive and a deadline of 2 s.
+    #[must_use]
+    pub fn new(host: &str, port: u16, role: &str) -> Self {
+        let client_id = format!("{role}-{}", unique());
+        let (keep_alive, deadline) = (Duration::from_secs(20), Duration::from_secs(2));
+        Self { host: host.to_owned(), port, client_id, login: None, keep_alive, deadline }
+    }
+}
+
+/// Twelve hexadecimal digits that differ between processes, threads and calls.
+#[must_use]
+pub fn unique() -> String {
+    use std::hash::{BuildHasher, Hasher, RandomState};
+    format!("{:012x}", RandomState::new().build_hasher().finish() & 0xffff_ffff_ffff)
+}
+
+/// One message of a subscription.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Message {
+    /// Its topic.
+    pub topic: String,
+    /// Its payload.
+    pub payload: Vec<u8>,
+    /// When its last byte had arrived.
+    pub arrived: Instant,
+}
+
+/// Why the broker cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum MqttError {
+    /// No connection to the broker.
+    #[error("no connection to the broker {broker}: {what}")]
+    Unreachable {
+        /// Host and port.
+        broker: String,
+        /// What the system said.
+        what: String,
+    },
+    /// The broker refused the connection or a subscription.
+    #[error("the broker refuses: {0}")]
+    Refused(String),
+    /// The connection broke.
+    #[error("the connection to the broker broke: {0}")]
+    Closed(String),
+    /// The broker did not acknowledge in time.
+    #[error("the broker did not acknowledge {what} within {deadline_ms} ms")]
+    Unacknowledged {
+        /// What was to be acknowledged.
+        what: &'static str,
+        /// How long was waited.
+        deadline_ms: u128,
+    },
+    /// The message cannot be sent at all.
+    #[error("the message cannot be sent: {0}")]
+    Unsendable(String),
+}

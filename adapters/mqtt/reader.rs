@@ -1,0 +1,108 @@
+//! The thread that reads: it fills the inbox, acknowledges, and keeps the connection alive.
+
+use super::inbox::Inbox;
+use super::packet::{Frames, Incoming, PING, acknowledge};
+use super::{Message, MqttError};
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A read waits this long, then the clock is looked at.
+pub(super) const READ_PAUSE: Duration = Duration::from_millis(200);
+
+/// The writing half of the connection; one packet at a time.
+#[derive(Debug)]
+pub(super) struct Writer {
+    stream: Mutex<(TcpStream, Instant)>,
+}
+
+impl Writer {
+    pub(super) fn new(stream: TcpStream) -> Self {
+        Self { stream: Mutex::new((stream, Instant::now())) }
+    }
+
+    pub(super) fn write(&self, packet: &[u8]) -> std::io::Result<()> {
+        let mut held = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
+        held.1 = Instant::now();
+        held.0.write_all(packet)
+    }
+
+    /// Ends the connection in both directions; the reading thread ends by it.
+    pub(super) fn shut(&self) {
+        let held = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
+        let _already_gone = held.0.shutdown(std::net::Shutdown::Both);
+    }
+
+    fn idle(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.stream.lock().unwrap_or_else(PoisonError::into_inner).1)
+    }
+}
+
+pub(super) struct Reader {
+    pub(super) stream: TcpStream,
+    pub(super) frames: Frames,
+    pub(super) writer: Arc<Writer>,
+    pub(super) inbox: Arc<Inbox>,
+    pub(super) keep_alive: Duration,
+}
+
+impl Reader {
+    /// Reads until the connection ends, and says why it did.
+    pub(super) fn run(mut self) {
+        let why = self.read().err().unwrap_or_else(|| "closed by the broker".to_owned());
+        self.inbox.close(MqttError::Closed(why));
+        self.writer.shut();
+    }
+
+    fn read(&mut self) -> Result<(), String> {
+        let mut buffer = vec![0; 64 * 1024];
+        let mut heard = Instant::now();
+        self.dispatch()?;
+        loop {
+            match self.stream.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(count) => {
+                    heard = Instant::now();
+                    self.frames.push(&buffer[..count]);
+                    self.dispatch()?;
+                }
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error.to_string()),
+            }
+            self.keep_alive(heard)?;
+        }
+    }
+
+    fn dispatch(&mut self) -> Result<(), String> {
+        while let Some(packet) = self.frames.next()? {
+            match packet {
+                Incoming::Publish { topic, payload, acknowledge: id } => {
+                    self.inbox.put(Message { topic, payload, arrived: Instant::now() });
+                    if let Some(id) = id {
+                        self.writer.write(&acknowledge(id)).map_err(|error| error.to_string())?;
+                    }
+                }
+                Incoming::PubAck(id) => self.inbox.acknowledge(id, Vec::new()),
+                Incoming::SubAck { id, codes } => self.inbox.acknowledge(id, codes),
+                Incoming::PingResp | Incoming::ConnAck { .. } => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Half of the keep-alive without a packet from us: a sign of life is sent. One and a half without one from the
+    /// broker: it is gone (section 3.1.2.10 gives the other side the same measure).
+    fn keep_alive(&self, heard: Instant) -> Result<(), String> {
+        let now = Instant::now();
+        let silent = now.saturating_duration_since(heard);
+        if silent > self.keep_alive.mul_f64(1.5) {
+            return Err(format!("the broker has been silent for {} s", silent.as_secs()));
+        }
+        if self.writer.idle(now) >= self.keep_alive / 2 {
+            self.writer.write(&PING).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+}
