@@ -22,6 +22,14 @@ pub enum OpenError {
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A file with a password cannot be read.
+    #[error("{file}: the password cannot be read: {what}")]
+    Secret {
+        /// The file named in the address.
+        file: String,
+        /// What the system said.
+        what: String,
+    },
     /// The address needs another way of running.
     #[error("{address}: {what}")]
     Unsuitable {
@@ -83,6 +91,7 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
             let refused = Refused::default();
             Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
         }
+        Target::NcLink(target) => crate::nclink::open(address, target),
         other => Err(not_built(address, other)),
     }
 }
@@ -169,6 +178,7 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
 pub fn missing_driver(address: &Address) -> Option<OpenError> {
     match address.target() {
         Target::Simulated(_) | Target::Replay(_) | Target::Fanuc { backend: FanucBackend::Native, .. } => None,
+        Target::NcLink(target) if !target.tls => None,
         other => Some(not_built(address, other)),
     }
 }
@@ -177,7 +187,8 @@ fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",
         Target::Fanuc { .. } => "the FANUC driver through the vendor's library",
-        Target::NcLink { .. } => "the Huazhong driver (NC-Link)",
+        Target::NcLink(target) if target.tls => "TLS to the broker",
+        Target::NcLink(_) => "another pace than that of the clock for a real controller",
         Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",
         Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "the Modbus meter driver",
         Target::Eda9033a { .. } => "the EDA9033A meter driver",

@@ -56,6 +56,16 @@ impl Keys {
         }
     }
 
+    /// A number within a range, if it was given.
+    pub(super) fn optional<T>(&mut self, key: &'static str, least: T, greatest: T) -> Option<T>
+    where
+        T: FromStr + PartialOrd + Display + Copy,
+    {
+        let given = self.given.iter().any(|(given, _)| given == key);
+        let number = self.number(key, least, least, greatest);
+        given.then_some(number)
+    }
+
     /// One of several words, or the first of them.
     pub(super) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> T {
         let Some(text) = self.text(key) else { return choices[0].1 };

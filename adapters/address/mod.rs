@@ -6,8 +6,8 @@ mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use target::{
-    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
-    Speed, Target,
+    Endpoint, FanucBackend, NcLinkTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine,
+    SimulatedTarget, Speed, Target,
 };
 
 use keys::Keys;
@@ -111,6 +111,7 @@ mod tests {
             "fanuc://cnc?backend=vendor&library=/opt/fwlib/libfwlib32.so",
             "fanuc://cnc?write=mailbox&mailbox=D900&period_ms=50&duty_pct=25&allow=#500-#509,EXT",
             "nclink://broker:1883/SERIAL",
+            "nclink://broker/SN1?user=u&password_file=/etc/pw&period_ms=50&f_channel=6400&spindle_axis=3",
             "nclinks://broker:8883/SERIAL",
             "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",

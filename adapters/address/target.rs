@@ -122,6 +122,27 @@ pub struct SerialTarget {
     pub parity: Parity,
 }
 
+/// A Huazhong controller behind a broker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NcLinkTarget {
+    /// The broker.
+    pub at: Endpoint,
+    /// Serial number of the device.
+    pub serial: String,
+    /// Encrypted?
+    pub tls: bool,
+    /// User at the broker.
+    pub user: Option<String>,
+    /// File that holds the user's password.
+    pub password_file: Option<PathBuf>,
+    /// Pace of the queries, ms.
+    pub period_ms: u64,
+    /// Index of the channel's first F word: 2560 in configuration HNC-30, 6400 in HNC-80.
+    pub f_channel: u32,
+    /// Number of the spindle among the axes, where it is not 5.
+    pub spindle_axis: Option<u32>,
+}
+
 /// What an address means.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
@@ -141,14 +162,7 @@ pub enum Target {
         options: Box<FanucOptions>,
     },
     /// A Huazhong controller by NC-Link over MQTT.
-    NcLink {
-        /// The broker.
-        at: Endpoint,
-        /// Serial number of the device.
-        serial: String,
-        /// Encrypted?
-        tls: bool,
-    },
+    NcLink(NcLinkTarget),
     /// A Huazhong controller through its vendor library.
     HncNet {
         /// Where.
@@ -283,14 +297,19 @@ fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
     Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
-fn nclink(body: &str, _keys: &mut Keys, tls: bool) -> Result<Target, String> {
+fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
+    let (user, password_file) = (keys.text("user"), keys.text("password_file").map(PathBuf::from));
+    let period_ms = keys.number("period_ms", 100, 10, 60_000);
+    let f_channel = keys.number("f_channel", 2560, 0, 65_535);
+    let spindle_axis = keys.optional("spindle_axis", 0, 63);
     let rest = body.strip_prefix("//").unwrap_or(body);
     let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
-    if serial.is_empty() {
+    if serial.is_empty() || serial.contains(['+', '#']) {
         return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
     }
     let at = endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
-    Ok(Target::NcLink { at, serial: serial.to_owned(), tls })
+    let serial = serial.to_owned();
+    Ok(Target::NcLink(NcLinkTarget { at, serial, tls, user, password_file, period_ms, f_channel, spindle_axis }))
 }
 
 fn library(keys: &mut Keys) -> Result<PathBuf, String> {

@@ -54,7 +54,11 @@ impl Client {
         let codes = self.acknowledged(id, "a subscription")?;
         let refused: Vec<&str> =
             filters.iter().zip(&codes).filter(|(_, code)| **code == 0x80).map(|(filter, _)| filter.as_str()).collect();
-        if refused.is_empty() { Ok(()) } else { Err(MqttError::Refused(format!("to subscribe {}", refused.join(", ")))) }
+        if refused.is_empty() {
+            Ok(())
+        } else {
+            Err(MqttError::Refused(format!("to subscribe {}", refused.join(", "))))
+        }
     }
 
     /// Sends a message; with [`Qos::AtLeastOnce`] it waits for the broker's acknowledgement.
@@ -109,7 +113,9 @@ impl Client {
 
     /// 1 to 65535, around and around.
     fn id(&self) -> u16 {
-        self.next_id.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |id| Some(id.checked_add(1).unwrap_or(1))).unwrap_or(1)
+        self.next_id
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |id| Some(id.checked_add(1).unwrap_or(1)))
+            .unwrap_or(1)
     }
 }
 

@@ -67,7 +67,11 @@ impl Inbox {
         self.wait(until, |contents| contents.acknowledged.remove(&id))
     }
 
-    fn wait<T>(&self, until: Instant, mut take: impl FnMut(&mut Contents) -> Option<T>) -> Result<Option<T>, MqttError> {
+    fn wait<T>(
+        &self,
+        until: Instant,
+        mut take: impl FnMut(&mut Contents) -> Option<T>,
+    ) -> Result<Option<T>, MqttError> {
         let mut contents = self.locked();
         loop {
             if let Some(found) = take(&mut contents) {

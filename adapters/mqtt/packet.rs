@@ -199,7 +199,10 @@ mod tests {
         assert_eq!(publish("a/b", b"xy", None).expect("fits"), b"\x30\x07\x00\x03a/bxy");
         assert_eq!(publish("a/b", b"xy", Some(258)).expect("fits"), b"\x32\x09\x00\x03a/b\x01\x02xy");
         let two = ["a/#".to_owned(), "b".to_owned()];
-        assert_eq!(subscribe(10, &two, Qos::AtLeastOnce).expect("fits"), b"\x82\x0c\x00\x0a\x00\x03a/#\x01\x00\x01b\x01");
+        assert_eq!(
+            subscribe(10, &two, Qos::AtLeastOnce).expect("fits"),
+            b"\x82\x0c\x00\x0a\x00\x03a/#\x01\x00\x01b\x01"
+        );
         assert!(publish("a/#", b"", None).is_err() && publish(&"x".repeat(70_000), b"", None).is_err());
     }
 

@@ -1,1 +1,58 @@
-//! x
+//! Huazhong controllers (and others) by NC-Link: JSON messages over an MQTT broker. T/CMTBA 1008, GB/T 41970-2022.
+//!
+//! Device and client both dial the broker; a device is known by its serial number, which is the last part of its topics.
+//!
+//! | file | what |
+//! |---|---|
+//! | `liberal` | reading JSON that several makers write differently |
+//! | `topic` | the topics of a device |
+//! | `message` | query and set: requests as JSON, answers as values or reasons |
+//! | `model` | the answer to a probe: data items with their paths, sample channels |
+//! | `sample` | one message of a sample channel: columns of values, their times |
+//! | `map` | which data item feeds which channel |
+//! | `decode` | state words from the status item and from the channel's F register |
+//! | `connection` | one client at the broker: probe, query, set, by request identifier |
+//! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
+//! | `track` | what sample channels and events have brought, and whether a millisecond is missing |
+//! | `mailbox` | the registers through which the ladder is asked for an override |
+//! | `actuator` | the [`Actuator`](crate::Actuator): a register mailbox that the ladder reads |
+//! | `device` | the other role: the simulated machine as an NC-Link device |
+//!
+//! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for
+//! all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data, uploaded
+//! each 200 ms) and events arrive in between; their columns become readings, one mean per upload, and are handed on whole
+//! to whoever wants the waveform. A question that is not answered in time, a broker that is gone, a device that says `NG`
+//! and an answer without sense are four different errors. After a broken line the next poll connects anew.
+//!
+//! **Dialects.** Read as they come: `setable` and `settable`, `datatype` and `dataType`, `WARNING` and `WARNNING`; items
+//! named by node number (`010302`) or by path, with or without a leading `/` and the device's type; numbers in quotes;
+//! `value` and `values`; samples without `paths` (their order is that of the model) and with `[]` for no value; several
+//! values per instant. Which way a device names its items is seen in its model, and tried the other way round once when
+//! everything is refused.
+//!
+//! **Limits.** A model of at most [`model::ITEMS_MAX`] items, [`sample::VALUES_MAX`] values in a sample message, one
+//! request at a time. `nclinks://` (TLS) is refused: this build has no TLS.
+//!
+//! **Certain and not.** Topics and messages are those of open implementations and their recorded wire samples. Not
+//! published anywhere and to be checked on a machine: the meaning of the status item's numbers (so mode and execution are
+//! taken from the channel's F word, whose bits are known), the unit of the load current (taken as A), and the register
+//! offsets of configurations other than HNC-30 (key `f_channel`).
+
+pub mod connection;
+mod decode;
+pub mod device;
+mod liberal;
+pub mod mailbox;
+mod map;
+mod message;
+pub mod model;
+mod open;
+pub mod sample;
+mod source;
+pub mod topic;
+mod track;
+
+pub use message::{Answer, Ask, Params};
+pub use open::open;
+pub use source::{BlockSink, NcLinkSource};
+pub use track::{ChannelTrack, Track};

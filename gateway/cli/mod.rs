@@ -13,6 +13,7 @@ mod identify;
 mod replay;
 mod rules;
 mod run;
+mod serve;
 mod simulate;
 
 use crate::config::Log;
@@ -118,6 +119,9 @@ enum Command {
     Identify(identify::IdentifyArguments),
     /// What scripts can see, call and set.
     Rules(rules::RulesArguments),
+    /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
+    #[command(subcommand)]
+    Serve(serve::Served),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -153,6 +157,7 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Effects(effects) => effects::effects(effects),
         Command::Identify(identify) => identify::identify(&identify),
         Command::Rules(rules) => rules::run(&rules),
+        Command::Serve(served) => serve::run(&served),
     }
 }
 

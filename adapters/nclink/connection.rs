@@ -1,0 +1,233 @@
+//! One client of one device: a connection to the broker, and questions with their answers.
+
+use super::message::{self, Answer, Ask};
+use super::model::Model;
+use super::topic::Subject;
+use crate::driver::SourceError;
+use crate::mqtt::{self, Client, Message, MqttError, Qos};
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// A device that has not answered by then is not answering (the vendor's own client waits as long).
+pub const DEADLINE: Duration = Duration::from_secs(2);
+/// At most so many messages of sample channels and events wait while an answer is awaited.
+const UNASKED_MAX: usize = 512;
+
+/// What to connect to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Link {
+    /// The address, as in the configuration.
+    pub name: String,
+    /// Host of the broker.
+    pub host: String,
+    /// Its port.
+    pub port: u16,
+    /// Serial number of the device.
+    pub serial: String,
+    /// User and password at the broker.
+    pub login: Option<(String, String)>,
+    /// Longest wait for an answer.
+    pub deadline: Duration,
+}
+
+/// A message that nobody asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unasked {
+    /// Sample or event.
+    pub subject: Subject,
+    /// What stood behind the serial number in its topic.
+    pub tail: String,
+    /// When it had arrived.
+    pub arrived: Instant,
+    /// What it says.
+    pub message: Value,
+}
+
+/// A connection to a device through its broker. Broken, it stays broken: open another one.
+pub struct Connection {
+    link: Link,
+    client: Client,
+    unasked: VecDeque<Unasked>,
+    /// Unasked messages that waited too long or made no sense.
+    lost: u64,
+}
+
+impl Connection {
+    /// Connects and subscribes. With `samples` also to what the device sends by itself.
+    ///
+    /// # Errors
+    /// [`SourceError::Line`] when the broker cannot be reached, [`SourceError::Refused`] when it refuses.
+    pub fn open(link: &Link, samples: bool) -> Result<Self, SourceError> {
+        let mut options = mqtt::Options::new(&link.host, link.port, "cnc-gateway");
+        options.login.clone_from(&link.login);
+        options.deadline = link.deadline;
+        let fault = |error| broker_fault(link, error);
+        let client = Client::connect(&options).map_err(fault)?;
+        let answers = [Subject::ProbeAnswer, Subject::QueryAnswer, Subject::SetAnswer];
+        let more: &[Subject] = if samples { &[Subject::Sample, Subject::Event] } else { &[] };
+        let filters: Vec<String> = answers.iter().chain(more).map(|subject| subject.filter(&link.serial)).collect();
+        client.subscribe(&filters, Qos::AtMostOnce).map_err(fault)?;
+        Ok(Self { link: link.clone(), client, unasked: VecDeque::new(), lost: 0 })
+    }
+
+    /// What the device has.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    pub fn probe(&mut self) -> Result<Model, SourceError> {
+        let what = "the probe of its model";
+        let id = identifier();
+        let answer = self.exchange(Subject::Probe, &id, json!({"@id": id}).to_string().as_bytes(), what)?;
+        if let Some(reason) = message::refusal(&answer) {
+            return Err(self.refused(what, reason));
+        }
+        Model::parse(&answer).map_err(|why| self.nonsense(what, why))
+    }
+
+    /// Asks for values; one answer per ask, `None` where the device said nothing of it.
+    ///
+    /// # Errors
+    /// See [`SourceError`]; a refusal of single items is in the answers.
+    pub fn query(&mut self, asks: &[Ask]) -> Result<Vec<Option<Answer>>, SourceError> {
+        self.request(Subject::Query, asks, "the query of its values")
+    }
+
+    /// Writes values; one answer per ask.
+    ///
+    /// # Errors
+    /// See [`SourceError`]; a refusal of single items is in the answers.
+    pub fn set(&mut self, asks: &[Ask]) -> Result<Vec<Option<Answer>>, SourceError> {
+        self.request(Subject::Set, asks, "the setting of registers")
+    }
+
+    /// Samples and events that have arrived, the oldest first.
+    ///
+    /// # Errors
+    /// [`SourceError::Line`] when the connection is over and everything is taken.
+    pub fn take_unasked(&mut self) -> Result<Vec<Unasked>, SourceError> {
+        while let Some(message) =
+            self.client.receive(Duration::ZERO).map_err(|error| broker_fault(&self.link, error))?
+        {
+            self.keep_unasked(&message);
+        }
+        Ok(self.unasked.drain(..).collect())
+    }
+
+    /// Messages of sample channels and events that were lost in this client: nobody took them, or they made no sense.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.lost + self.client.dropped()
+    }
+
+    fn request(&mut self, subject: Subject, asks: &[Ask], what: &str) -> Result<Vec<Option<Answer>>, SourceError> {
+        let id = identifier();
+        let answer = self.exchange(subject, &id, &message::request(&id, asks), what)?;
+        message::answers(&answer, asks).map_err(|why| match message::refusal(&answer) {
+            Some(reason) => self.refused(what, reason),
+            None => self.nonsense(what, why),
+        })
+    }
+
+    /// Sends a request and waits for the answer with its identifier; what else arrives is kept.
+    fn exchange(&mut self, subject: Subject, id: &str, payload: &[u8], what: &str) -> Result<Value, SourceError> {
+        let fault = |error| broker_fault(&self.link, error);
+        self.client.publish(&subject.topic(&self.link.serial), payload, Qos::AtMostOnce).map_err(fault)?;
+        let until = Instant::now() + self.link.deadline;
+        let mut nonsense = None;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let message = self.client.receive(left).map_err(|error| broker_fault(&self.link, error))?;
+            let Some(message) = message else {
+                return Err(nonsense.map_or_else(|| self.silent(what), |why| self.nonsense(what, why)));
+            };
+            match self.answer_to(subject, id, &message) {
+                Some(Ok(answer)) => return Ok(answer),
+                Some(Err(why)) => nonsense = Some(why),
+                None => self.keep_unasked(&message),
+            }
+        }
+    }
+
+    /// The answer itself; why it cannot be read, where it may have been it; `None` for anything else, as the late answer
+    /// to an earlier question.
+    fn answer_to(&self, subject: Subject, id: &str, message: &Message) -> Option<Result<Value, String>> {
+        let wanted = match subject {
+            Subject::Probe => Subject::ProbeAnswer,
+            Subject::Set => Subject::SetAnswer,
+            _ => Subject::QueryAnswer,
+        };
+        Subject::of(&message.topic, &self.link.serial).filter(|(subject, _)| *subject == wanted)?;
+        match serde_json::from_slice::<Value>(&message.payload) {
+            Ok(answer) => (message::identifier(&answer).as_deref() == Some(id)).then_some(Ok(answer)),
+            Err(error) => Some(Err(format!("it is no JSON ({error})"))),
+        }
+    }
+
+    fn keep_unasked(&mut self, message: &Message) {
+        let Some((subject, tail)) = Subject::of(&message.topic, &self.link.serial) else { return };
+        if !matches!(subject, Subject::Sample | Subject::Event) {
+            return;
+        }
+        match serde_json::from_slice(&message.payload) {
+            Ok(said) => {
+                let (tail, arrived) = (tail.to_owned(), message.arrived);
+                self.unasked.push_back(Unasked { subject, tail, arrived, message: said });
+            }
+            Err(_) => self.lost += 1,
+        }
+        if self.unasked.len() > UNASKED_MAX {
+            self.unasked.pop_front();
+            self.lost += 1;
+        }
+    }
+
+    fn silent(&self, what: &str) -> SourceError {
+        SourceError::Timeout {
+            source_name: self.link.name.clone(),
+            request: what.to_owned(),
+            deadline_ms: u64::try_from(self.link.deadline.as_millis()).unwrap_or(u64::MAX),
+            next: format!(
+                "The broker answers, the device {} does not: check that the machine is on, that its NC-Link adapter \
+                 is connected to this broker, and its serial number.",
+                self.link.serial
+            ),
+        }
+    }
+
+    fn refused(&self, request: &str, what: String) -> SourceError {
+        SourceError::Refused {
+            source_name: self.link.name.clone(),
+            request: request.to_owned(),
+            what,
+            next: "Look into the device's model whether it has this, and may be written.".to_owned(),
+        }
+    }
+
+    fn nonsense(&self, request: &str, what: String) -> SourceError {
+        SourceError::Decode { source_name: self.link.name.clone(), request: request.to_owned(), what }
+    }
+}
+
+fn broker_fault(link: &Link, error: MqttError) -> SourceError {
+    let source_name = link.name.clone();
+    match error {
+        MqttError::Refused(what) => SourceError::Refused {
+            source_name,
+            request: "the connection".to_owned(),
+            what: format!("the broker refuses: {what}"),
+            next: "Check user and password_file in the address, and what the broker allows this user.".to_owned(),
+        },
+        other => SourceError::Line {
+            source_name,
+            what: other.to_string(),
+            next: "Check that the broker runs there and that the network lets its port through.".to_owned(),
+        },
+    }
+}
+
+/// An identifier that no other request has, in the form of a UUID.
+fn identifier() -> String {
+    let (a, b, c) = (mqtt::unique(), mqtt::unique(), mqtt::unique());
+    format!("{}-{}-4{}-8{}-{}", &a[..8], &a[8..], &b[..3], &b[3..6], c)
+}

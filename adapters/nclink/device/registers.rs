@@ -1,0 +1,81 @@
+//! The registers of the simulated controller: memory that the PLC and clients share, F and G as the machine has them, and
+//! the mailbox from which the ladder takes the gateway's override.
+
+use super::values::channel_word;
+use crate::clock::Clock;
+use crate::driver::Actuator;
+use crate::nclink::mailbox::{Letter, Mailbox, Register};
+use crate::simulated::{Moment, Simulated, SimulatedOverride};
+use crate::units::OverridePct;
+use std::collections::BTreeMap;
+
+/// First F and G word of channel 0, configuration HNC-30.
+const CHANNEL: u32 = 2560;
+/// Behind it, in G: the feed override.
+const FEED_OVERRIDE: u32 = 4;
+/// First F word of the system, and behind it the counter of milliseconds.
+const SYSTEM: u32 = 2960;
+const HEARTBEAT: u32 = 149;
+
+/// Memory that can be written, with its size and the width of a register in bits.
+const MEMORY: [(char, u32, u32); 4] = [('R', 2288, 8), ('W', 200, 16), ('D', 200, 32), ('B', 8304, 32)];
+
+/// See the [module](self).
+pub(super) struct Registers {
+    memory: BTreeMap<Register, i64>,
+    mailbox: Mailbox,
+    ladder: SimulatedOverride,
+    heartbeat: Option<i64>,
+}
+
+impl Registers {
+    pub(super) fn new(machine: &Simulated) -> Self {
+        let mailbox = Mailbox::new(super::MAILBOX.parse().unwrap_or(Register { kind: 'D', index: 100 }));
+        Self { memory: BTreeMap::new(), mailbox, ladder: machine.feed_override(), heartbeat: None }
+    }
+
+    /// The value of a register; `None` where there is none.
+    pub(super) fn read(&self, at: Register, moment: &Moment, at_ms: i64) -> Option<i64> {
+        match at.kind {
+            'F' if at.index == CHANNEL => Some(channel_word(&moment.panel)),
+            'F' if at.index == SYSTEM + HEARTBEAT => Some(at_ms & 0xffff),
+            'G' if at.index == CHANNEL + FEED_OVERRIDE => Some(i64::from(moment.panel.feed_override_pct)),
+            'F' | 'G' if at.index < 3120 => Some(0),
+            kind => {
+                let (_, size, _) = MEMORY.iter().find(|(memory, ..)| *memory == kind)?;
+                (at.index < *size).then(|| self.memory.get(&at).copied().unwrap_or(0))
+            }
+        }
+    }
+
+    /// Writes a register, or says why not.
+    pub(super) fn write(&mut self, at: Register, value: i64) -> Result<(), &'static str> {
+        let Some((_, size, bits)) = MEMORY.iter().find(|(memory, ..)| *memory == at.kind) else {
+            return Err("READ_ONLY");
+        };
+        if at.index >= *size {
+            return Err("INDEX_OUT_OF_RANGE");
+        }
+        let limit = 1_i64 << bits;
+        if value < -limit / 2 || value >= limit {
+            return Err("VALUE_OUT_OF_RANGE");
+        }
+        self.memory.insert(at, value);
+        Ok(())
+    }
+
+    /// What the ladder does with the mailbox after a client has written: a heartbeat that has moved delivers the letter.
+    pub(super) fn scan(&mut self, clock: &dyn Clock) {
+        let word = |offset| self.memory.get(&self.mailbox.word(offset)).copied().unwrap_or(0);
+        let heartbeat = word(Mailbox::HEARTBEAT);
+        if self.heartbeat == Some(heartbeat) || heartbeat == 0 {
+            return;
+        }
+        self.heartbeat = Some(heartbeat);
+        // A machine that is off takes no letters; the client sees it by the override in force.
+        let _taken = match Letter::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
+            Some(Letter::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),
+            Some(Letter::Release) | None => self.ladder.write_feed_override(clock, OverridePct::FULL),
+        };
+    }
+}

@@ -1,0 +1,162 @@
+//! Four registers through which the gateway asks the ladder for an override, and what stands in them.
+//!
+//! The ladder rewrites the override register (G2564) in every cycle from the operator's dial, so that a value written
+//! there directly is lost or fights the operator. The builder is asked for a few rungs instead, which read four free
+//! registers (R, W or D; B keeps its contents without power and must not hold a command):
+//!
+//! | register | what |
+//! |---|---|
+//! | +0 | wanted override, percent, 0 to 254 |
+//! | +1 | 1 the override counts, 0 the dial alone |
+//! | +2 | 0 nothing, 1 feed hold, 2 stop after this part |
+//! | +3 | heartbeat: 1 to 100 and around, moved by every letter; the ladder falls back to the dial when it stands still |
+//!
+//! The heartbeat is written last, in the same request: a letter counts when it moves.
+
+use crate::units::OverridePct;
+use std::fmt;
+use std::str::FromStr;
+
+/// A register of the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Register {
+    /// Its kind: X, Y, F, G, R, W, D, B or P.
+    pub kind: char,
+    /// Its number.
+    pub index: u32,
+}
+
+impl fmt::Display for Register {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", self.kind, self.index)
+    }
+}
+
+impl FromStr for Register {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut letters = text.trim().chars();
+        let kind = letters.next().map(|kind| kind.to_ascii_uppercase()).filter(|kind| "XYFGRWDBP".contains(*kind));
+        let index = letters.as_str().parse().ok().filter(|index| *index < 60_000);
+        match (kind, index) {
+            (Some(kind), Some(index)) => Ok(Self { kind, index }),
+            _ => Err(format!("{text} is no register; write it like D100")),
+        }
+    }
+}
+
+/// What the gateway asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Letter {
+    /// This override beside the dial.
+    Override(OverridePct),
+    /// The dial alone.
+    Release,
+}
+
+impl Letter {
+    /// What stands in the registers +1 and +0; `None` when it is no letter.
+    #[must_use]
+    pub fn of(enable: i64, percent: i64) -> Option<Self> {
+        match enable {
+            0 => Some(Self::Release),
+            1 => u8::try_from(percent).ok().and_then(OverridePct::new).map(Self::Override),
+            _ => None,
+        }
+    }
+}
+
+/// The four registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mailbox {
+    first: Register,
+    heartbeat: u8,
+}
+
+impl Mailbox {
+    /// Wanted override.
+    pub const OVERRIDE: u32 = 0;
+    /// Does it count?
+    pub const ENABLE: u32 = 1;
+    /// Feed hold or stop.
+    pub const REQUEST: u32 = 2;
+    /// Sign of life.
+    pub const HEARTBEAT: u32 = 3;
+
+    /// The mailbox that begins at this register.
+    #[must_use]
+    pub fn new(first: Register) -> Self {
+        Self { first, heartbeat: 0 }
+    }
+
+    /// Can a mailbox begin there? It must be memory that clients may write and that forgets without power.
+    #[must_use]
+    pub fn may_begin(at: Register) -> bool {
+        matches!(at.kind, 'R' | 'W' | 'D')
+    }
+
+    /// The register this far behind the first.
+    #[must_use]
+    pub fn word(&self, offset: u32) -> Register {
+        Register { index: self.first.index + offset, ..self.first }
+    }
+
+    /// A letter as registers with their values, in the order in which they are to be written.
+    pub fn post(&mut self, letter: Letter, request: u8) -> [(Register, i64); 4] {
+        self.heartbeat = self.heartbeat % 100 + 1;
+        let (percent, enable) = match letter {
+            Letter::Override(wanted) => (wanted, 1),
+            Letter::Release => (OverridePct::FULL, 0),
+        };
+        [
+            (self.word(Self::OVERRIDE), i64::from(percent.percent())),
+            (self.word(Self::REQUEST), i64::from(request)),
+            (self.word(Self::ENABLE), enable),
+            (self.word(Self::HEARTBEAT), i64::from(self.heartbeat)),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_are_read_and_printed() {
+        assert_eq!("d100".parse(), Ok(Register { kind: 'D', index: 100 }));
+        assert_eq!(Register { kind: 'R', index: 7 }.to_string(), "R7");
+        for bad in ["", "D", "Q1", "D-1", "D1x", "D99999999"] {
+            assert!(bad.parse::<Register>().is_err(), "{bad}");
+        }
+        assert!(
+            !Mailbox::may_begin(Register { kind: 'B', index: 1 })
+                && !Mailbox::may_begin(Register { kind: 'G', index: 1 })
+        );
+    }
+
+    #[test]
+    fn a_letter_moves_the_heartbeat_last_and_never_to_zero() {
+        let mut mailbox = Mailbox::new(Register { kind: 'D', index: 100 });
+        let wanted = OverridePct::new(80).expect("exists");
+        let mut last = 0;
+        for _ in 0..250 {
+            let words = mailbox.post(Letter::Override(wanted), 0);
+            let (heartbeat, value) = words[3];
+            assert_eq!(heartbeat, Register { kind: 'D', index: 103 });
+            assert!(value != last && (1..=100).contains(&value));
+            last = value;
+            assert_eq!(words[0], (Register { kind: 'D', index: 100 }, 80));
+        }
+    }
+
+    #[test]
+    fn a_letter_is_read_back_from_its_registers() {
+        for percent in 0..=254 {
+            let wanted = OverridePct::new(percent).expect("exists");
+            assert_eq!(Letter::of(1, i64::from(percent)), Some(Letter::Override(wanted)));
+        }
+        assert_eq!(Letter::of(0, 80), Some(Letter::Release));
+        assert_eq!((Letter::of(1, 255), Letter::of(1, -1), Letter::of(7, 80)), (None, None, None));
+    }
+}

@@ -1,0 +1,252 @@
+//! Which data item feeds which channel. The paths are those of Huazhong's default model.
+
+use super::decode::{self, ChannelWord};
+use super::liberal::integer;
+use super::message::{Answer, Ask, first_number};
+use super::model::{Item, Model};
+use crate::channel::ChannelId;
+use crate::reading::{Absence, Reading, Stamp};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// What the address says about the controller behind the broker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Layout {
+    /// Index of the channel's first F word.
+    pub(super) f_channel: u32,
+    /// Number of the spindle among the axes, where it is not 5.
+    pub(super) spindle_axis: Option<u32>,
+}
+
+/// Element 23 of the channel data is the flag of rigid tapping, if the elements are those of the vendor's list.
+const RIGID_TAPPING: u32 = 23;
+
+/// How an answer becomes readings.
+#[derive(Debug, Clone, Copy)]
+enum How {
+    Number,
+    Text(fn(&Value) -> Option<String>),
+    Status,
+    ChannelWord,
+    Tapping,
+}
+
+/// Path of an item, the channel it feeds, and how.
+type Row = (&'static str, &'static str, How);
+
+const FIXED: [Row; 10] = [
+    ("FEED_SPEED", "feed_mm_min", How::Number),
+    ("FEED_OVERRIDE", "feed_override_pct", How::Number),
+    ("SPDL_OVERRIDE", "spindle_override_pct", How::Number),
+    ("PART_COUNT", "part_count", How::Number),
+    ("CONTROLLER/PROGRAM", "program", How::Text(decode::program)),
+    ("CONTROLLER/LINE_NUMBER", "block", How::Text(line)),
+    ("CONTROLLER/TOOL_NUMBER", "tool", How::Text(tool)),
+    ("CONTROLLER/WARNING", "alarm", How::Text(alarm)),
+    ("STATUS", "execution", How::Status),
+    ("CONTROLLER/VARIABLE@REG_F", "mode", How::ChannelWord),
+];
+
+/// Below `AXIS@n`: item, ending of the channel's name.
+const LINEAR: [(&str, &str); 3] = [
+    ("SCREW/POSITION", "axis_position_mm"),
+    ("SCREW/SPEED", "axis_velocity_mm_min"),
+    ("MOTOR/CURRENT", "axis_current_a"),
+];
+
+const SPINDLE: [(&str, &str); 3] = [
+    ("SERVO_DRIVER/SPEED", "spindle_programmed_rpm"),
+    ("MOTOR/SPEED", "spindle_speed_rpm"),
+    ("MOTOR/CURRENT", "spindle_current_a"),
+];
+
+fn line(value: &Value) -> Option<String> {
+    integer(value).map(|line| format!("N{line}"))
+}
+
+fn tool(value: &Value) -> Option<String> {
+    integer(value).map(|tool| format!("T{tool}"))
+}
+
+fn alarm(value: &Value) -> Option<String> {
+    Some(decode::alarm(value))
+}
+
+/// Every channel that a device can feed; those that it has not are absent with a reason.
+pub(super) fn channels() -> Vec<ChannelId> {
+    let fixed = FIXED.iter().map(|(_, channel, _)| (*channel).to_owned());
+    let axes =
+        ["x", "y", "z"].into_iter().flat_map(|axis| LINEAR.iter().map(move |(_, name)| format!("{axis}_{name}")));
+    let spindle = SPINDLE.iter().map(|(_, name)| (*name).to_owned());
+    let names = fixed.chain(axes).chain(spindle).chain(["operation".to_owned()]);
+    names.filter_map(|name| ChannelId::of(&name)).collect()
+}
+
+/// One item that is asked for at every poll.
+#[derive(Debug, Clone)]
+struct Entry {
+    channel: ChannelId,
+    how: How,
+}
+
+/// What is asked of this device, and what becomes of its answers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Plan {
+    asks: Vec<Ask>,
+    entries: Vec<Entry>,
+    operation: Option<ChannelId>,
+    execution: Option<ChannelId>,
+    /// Channels that this device does not have.
+    absent: Vec<ChannelId>,
+}
+
+impl Plan {
+    /// The plan for a device; its items are named by path or by node number.
+    pub(super) fn of(model: &Model, layout: Layout, by_path: bool) -> Self {
+        let mut plan =
+            Self { operation: ChannelId::of("operation"), execution: ChannelId::of("execution"), ..Self::default() };
+        for (path, channel, how) in FIXED {
+            let indexes: &[u32] = if matches!(how, How::ChannelWord) { &[layout.f_channel] } else { &[] };
+            plan.add(model, (path, channel, how), indexes, by_path);
+        }
+        plan.add(model, ("CONTROLLER/VARIABLE@CHAN_0", "operation", How::Tapping), &[RIGID_TAPPING], by_path);
+        for (number, letter) in axes(model, layout) {
+            let (rows, beginning): (&[(&str, &str)], _) = match letter {
+                Some(letter) => (&LINEAR, format!("{letter}_")),
+                None => (&SPINDLE, String::new()),
+            };
+            for (item, channel) in rows {
+                let path = format!("AXIS@{number}/{item}");
+                plan.add(model, (&path, &format!("{beginning}{channel}"), How::Number), &[], by_path);
+            }
+        }
+        let fed: Vec<ChannelId> = plan.entries.iter().map(|entry| entry.channel).collect();
+        plan.absent = channels().into_iter().filter(|channel| !fed.contains(channel)).collect();
+        plan
+    }
+
+    fn add(&mut self, model: &Model, row: (&str, &str, How), indexes: &[u32], by_path: bool) {
+        let (path, channel, how) = row;
+        let (Some(item), Some(channel)) = (model.find(path), ChannelId::of(channel)) else { return };
+        self.asks.push(Ask::elements(name(item, by_path).as_str(), indexes));
+        self.entries.push(Entry { channel, how });
+    }
+
+    /// One request for everything.
+    pub(super) fn asks(&self) -> &[Ask] {
+        &self.asks
+    }
+
+    /// The readings of one answer, with a reason for every channel that has none.
+    pub(super) fn readings(&self, answers: &[Option<Answer>], stamp: Stamp, out: &mut Vec<Reading>) {
+        let mut tapping = None;
+        let mut word = None;
+        for (entry, answer) in self.entries.iter().zip(answers) {
+            match entry.how {
+                How::Tapping => tapping = entry.value(answer).ok().and_then(integer),
+                How::ChannelWord => word = entry.value(answer).ok().and_then(integer).map(ChannelWord),
+                _ => {}
+            }
+        }
+        for (entry, answer) in self.entries.iter().zip(answers) {
+            let reading = match entry.how {
+                How::Tapping => continue,
+                How::ChannelWord => {
+                    entry.text(answer, stamp, |value| Some(ChannelWord(integer(value)?).mode().to_owned()))
+                }
+                // The channel's word says it better, where there is one.
+                How::Status if word.is_some() => continue,
+                How::Status => entry.text(answer, stamp, |value| decode::status_word(value).map(str::to_owned)),
+                How::Number => entry.number(answer, stamp),
+                How::Text(text) => entry.text(answer, stamp, text),
+            };
+            out.push(reading);
+        }
+        if let (Some(channel), Some(word)) = (self.execution, word) {
+            out.push(Reading::text(channel, stamp, Arc::from(word.execution())));
+        }
+        self.operation(word, tapping, stamp, out);
+        let none = |channel: &ChannelId| Reading::absent(*channel, stamp, Absence::NotSupported);
+        out.extend(self.absent.iter().filter(|channel| self.operation != Some(**channel)).map(none));
+    }
+
+    /// The device does not name operations; it only tells when the feed follows the spindle.
+    fn operation(&self, word: Option<ChannelWord>, tapping: Option<i64>, stamp: Stamp, out: &mut Vec<Reading>) {
+        let Some(channel) = self.operation else { return };
+        let threading = word.is_some_and(ChannelWord::threading);
+        out.push(match decode::locked_operation(threading, tapping.is_some_and(|flag| flag != 0)) {
+            Some(word) => Reading::text(channel, stamp, Arc::from(word)),
+            None => Reading::absent(channel, stamp, Absence::NotSupported),
+        });
+    }
+}
+
+impl Entry {
+    fn value<'a>(&self, answer: &'a Option<Answer>) -> Result<&'a Value, Absence> {
+        match answer {
+            Some(Ok(values)) => values.first().ok_or(Absence::NotYetRead),
+            Some(Err(_)) => Err(Absence::Refused),
+            None => Err(Absence::NotSupported),
+        }
+    }
+
+    fn number(&self, answer: &Option<Answer>, stamp: Stamp) -> Reading {
+        let found = self.value(answer).and_then(|value| {
+            if value.is_null() {
+                Err(Absence::NotYetRead)
+            } else {
+                first_number(std::slice::from_ref(value)).ok_or(Absence::OutOfRange)
+            }
+        });
+        match found {
+            Ok(number) => Reading::number(self.channel, stamp, number),
+            Err(reason) => Reading::absent(self.channel, stamp, reason),
+        }
+    }
+
+    fn text(&self, answer: &Option<Answer>, stamp: Stamp, text: impl Fn(&Value) -> Option<String>) -> Reading {
+        // No value at all is the way in which some devices say that there is no alarm.
+        let silent_alarm = matches!(answer, Some(Ok(values)) if values.is_empty()) && self.channel.name() == "alarm";
+        let found = match silent_alarm {
+            true => Ok(String::new()),
+            false => self.value(answer).and_then(|value| text(value).ok_or(Absence::OutOfRange)),
+        };
+        match found {
+            Ok(text) => Reading::text(self.channel, stamp, Arc::from(text)),
+            Err(reason) => Reading::absent(self.channel, stamp, reason),
+        }
+    }
+}
+
+fn name(item: &Item, by_path: bool) -> String {
+    if by_path { format!("/{}", item.path) } else { item.id.clone() }
+}
+
+/// The axes of the model that feed channels: X, Y and Z by their letters, the spindle without one.
+fn axes(model: &Model, layout: Layout) -> Vec<(u32, Option<char>)> {
+    let number = |item: &Item| item.path.strip_prefix("AXIS@")?.split('/').next()?.parse().ok();
+    let mut numbers: Vec<u32> = model.items.iter().filter_map(number).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let spindle = layout.spindle_axis.or_else(|| numbers.iter().copied().find(|number| *number == 5));
+    let spindle =
+        spindle.or_else(|| numbers.iter().copied().find(|number| matches!(letter(model, *number), Some('S' | 'C'))));
+    let linear = numbers.into_iter().filter(|number| Some(*number) != spindle);
+    let linear = linear.filter_map(|number| {
+        let letter = letter(model, number)?.to_ascii_lowercase();
+        matches!(letter, 'x' | 'y' | 'z').then_some((number, Some(letter)))
+    });
+    linear.chain(spindle.map(|number| (number, None))).collect()
+}
+
+/// The first letter of the axis' name; without a name 0, 1, 2 are X, Y, Z.
+fn letter(model: &Model, number: u32) -> Option<char> {
+    let named =
+        model.find(&format!("AXIS@{number}/NAME")).and_then(|item| item.value.as_ref()?.as_str()?.chars().next());
+    named
+        .or_else(|| ['X', 'Y', 'Z'].get(usize::try_from(number).ok()?).copied())
+        .map(|letter| letter.to_ascii_uppercase())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,29 @@
+//! From an address to a source and, where a mailbox is named, an actuator.
+
+use super::source::NcLinkSource;
+use crate::address::{Address, NcLinkTarget};
+use crate::open::{OpenError, Opened, Refused};
+
+/// Opens an NC-Link address; nothing is connected before the first poll.
+///
+/// # Errors
+/// TLS, which this build does not have; a password file that cannot be read.
+pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
+    if target.tls {
+        let what = "this build has no TLS for MQTT; use nclink:// to a broker on this box or behind a tunnel";
+        return Err(OpenError::Unsuitable { address: address.text().to_owned(), what });
+    }
+    let login = login(target)?;
+    let source = NcLinkSource::new(address.text(), target, login);
+    Ok(Opened { sources: vec![Box::new(source)], actuator: None, simulated: None, refused: Refused::default() })
+}
+
+fn login(target: &NcLinkTarget) -> Result<Option<(String, String)>, OpenError> {
+    let Some(user) = &target.user else { return Ok(None) };
+    let password = match &target.password_file {
+        Some(file) => std::fs::read_to_string(file)
+            .map_err(|error| OpenError::Secret { file: file.display().to_string(), what: error.to_string() })?,
+        None => String::new(),
+    };
+    Ok(Some((user.clone(), password.trim_end_matches(['\r', '\n']).to_owned())))
+}

@@ -1,0 +1,160 @@
+//! One message of a sample channel: a column of values per item, and when they were true on the device's clock.
+
+use super::liberal::{field, integer, list, number, text};
+use super::model::Model;
+use serde_json::Value;
+
+/// At most so many values are taken from one message.
+pub const VALUES_MAX: usize = 1_000_000;
+
+/// The values of one item.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Path of the item, or its name as the device writes it when the model does not know it.
+    pub path: String,
+    /// In the order of time; `None` where the device had no number. Words are not numbers.
+    pub values: Vec<Option<f64>>,
+    /// Time between two values, ms; 0 with fewer than two.
+    pub step_ms: f64,
+    /// The last word, where the column holds words.
+    pub word: Option<String>,
+}
+
+/// What one message holds. Value `k` of a column was true at `begin_ms + k * step_ms` of the column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Name of the sample channel.
+    pub channel: String,
+    /// Time of the first value on the device's clock, ms since 1970.
+    pub begin_ms: i64,
+    /// Between two instants, ms. An instant may hold several values.
+    pub interval_ms: f64,
+    /// Instants of the longest column.
+    pub instants: usize,
+    /// In the order of the message.
+    pub columns: Vec<Column>,
+}
+
+impl Block {
+    /// Reads a message of the channel named in its topic; what it leaves out is taken from the model.
+    ///
+    /// # Errors
+    /// What makes no sense in it.
+    pub fn parse(message: &Value, tail: &str, model: &Model) -> Result<Self, String> {
+        let channel = text(message, &["id"]).unwrap_or_else(|| tail.to_owned());
+        let known = model.samples.iter().find(|known| known.id == channel || known.id == tail);
+        let data = list(message, &["data"]);
+        let begin = field(message, &["beginTime", "begintime"]).ok_or("there is no \"beginTime\" in it")?;
+        let begin_ms = integer(begin).ok_or_else(|| format!("{begin} is no time in milliseconds"))?;
+        let interval = field(message, &["interval", "sampleInterval"]).and_then(number);
+        let interval_ms = interval.or(known.map(|known| known.interval_ms)).filter(|ms| *ms > 0.0);
+        let interval_ms = interval_ms.ok_or("there is no interval in it, nor in the model")?;
+        let names = names(message, known.map(|known| known.items.as_slice()), data.len())?;
+        let sizes = data.iter().map(|column| list(column, &["data"]));
+        let total: usize = sizes.clone().flatten().map(|value| value.as_array().map_or(1, Vec::len)).sum();
+        if total > VALUES_MAX {
+            return Err(format!("{total} values; at most {VALUES_MAX} are taken from one message"));
+        }
+        let instants = sizes.map(<[Value]>::len).max().unwrap_or(0);
+        let path = |name: &String| model.find(name).map_or_else(|| name.clone(), |item| item.path.clone());
+        let columns =
+            data.iter().zip(&names).map(|(data, name)| column(list(data, &["data"]), path(name), interval_ms));
+        Ok(Self { channel, begin_ms, interval_ms, instants, columns: columns.collect() })
+    }
+
+    /// When the next message of the channel must begin if nothing is lost, ms.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a message holds at most a million instants")]
+    pub fn duration_ms(&self) -> f64 {
+        self.instants as f64 * self.interval_ms
+    }
+}
+
+/// The names of the columns: from the message, else the order of the model.
+fn names(message: &Value, model: Option<&[String]>, columns: usize) -> Result<Vec<String>, String> {
+    let said: Vec<String> = list(message, &["paths", "ids"]).iter().filter_map(name).collect();
+    let names = if said.is_empty() { model.unwrap_or_default().to_vec() } else { said };
+    if names.len() == columns {
+        return Ok(names);
+    }
+    Err(format!("it has {columns} columns and names for {}", names.len()))
+}
+
+fn name(value: &Value) -> Option<String> {
+    value.as_str().map(str::to_owned).or_else(|| text(value, &["id", "path"]))
+}
+
+/// A value may itself be a list: several values within one interval. `[]` is none.
+#[expect(clippy::cast_precision_loss, reason = "a message holds at most a million values")]
+fn column(data: &[Value], path: String, interval_ms: f64) -> Column {
+    let mut values = Vec::with_capacity(data.len());
+    let mut word = None;
+    for value in data {
+        match value {
+            Value::Array(several) if several.is_empty() => values.push(None),
+            Value::Array(several) => values.extend(several.iter().map(number)),
+            Value::String(text) if number(value).is_none() => {
+                word = Some(text.clone());
+                values.push(None);
+            }
+            other => values.push(number(other)),
+        }
+    }
+    let per_instant = if data.is_empty() { 1.0 } else { values.len() as f64 / data.len() as f64 };
+    Column { path, step_ms: interval_ms / per_instant.max(1.0), values, word }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn model() -> Model {
+        Model::parse(&json!({"devices": [{"type": "MACHINE",
+            "configs": [{"id": "s1", "type": "SAMPLE_CHANNEL", "sampleInterval": 1, "uploadInterval": 4,
+                         "ids": [{"id": "01"}, {"id": "02"}]}],
+            "dataItems": [{"id": "01", "type": "STATUS"}, {"id": "02", "type": "FEED_SPEED"}]}]}))
+        .expect("a model")
+    }
+
+    #[test]
+    fn the_recorded_message_is_read() {
+        let message = json!({"@id": "m1", "paths": ["/STATUS"], "id": "s9", "beginTime": "1700000000000",
+            "data": [{"data": [1, 2]}], "interval": 1000, "uploadInterval": 2000});
+        let block = Block::parse(&message, "s9", &model()).expect("sense");
+        assert_eq!((block.begin_ms, block.interval_ms, block.instants), (1_700_000_000_000, 1000.0, 2));
+        assert_eq!(block.columns[0].path, "STATUS");
+        assert_eq!(block.columns[0].values, [Some(1.0), Some(2.0)]);
+        assert!((block.duration_ms() - 2000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_left_out_comes_from_the_model() {
+        let message = json!({"beginTime": 5, "data": [{"data": [1, 2, 3, 4]}, {"data": [[], [], [], []]}]});
+        let block = Block::parse(&message, "s1", &model()).expect("sense");
+        assert_eq!((block.channel.as_str(), block.interval_ms), ("s1", 1.0));
+        assert_eq!(
+            block.columns[1],
+            Column { path: "FEED_SPEED".to_owned(), values: vec![None; 4], step_ms: 1.0, word: None }
+        );
+    }
+
+    #[test]
+    fn several_values_in_one_instant_lie_closer() {
+        let message = json!({"beginTime": "5", "data": [{"data": [[1, 2], [3, 4]]}, {"data": ["O10.nc", "O10.nc"]}]});
+        let block = Block::parse(&message, "s1", &model()).expect("sense");
+        assert_eq!((block.instants, block.columns[0].step_ms), (2, 0.5));
+        assert_eq!(block.columns[0].values.len(), 4);
+        assert_eq!(block.columns[1].word.as_deref(), Some("O10.nc"));
+    }
+
+    #[test]
+    fn nonsense_is_refused_in_words() {
+        let said = |message: Value| Block::parse(&message, "s1", &model()).expect_err("refused");
+        assert!(said(json!({"data": []})).contains("beginTime"));
+        assert!(said(json!({"beginTime": "noon", "data": []})).contains("noon"));
+        assert!(said(json!({"beginTime": 1, "data": [{"data": [1]}]})).contains("1 columns and names for 2"));
+        let other = json!({"id": "sx", "beginTime": 1, "data": []});
+        assert!(Block::parse(&other, "sx", &model()).expect_err("refused").contains("interval"));
+    }
+}

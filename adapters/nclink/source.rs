@@ -1,0 +1,173 @@
+//! An NC-Link device as a source.
+
+use super::connection::{Connection, DEADLINE, Link, Unasked};
+use super::map::{self, Layout, Plan};
+use super::message::Answer;
+use super::model::Model;
+use super::sample::Block;
+use super::topic::Subject;
+use super::track::Track;
+use crate::address::NcLinkTarget;
+use crate::channel::ChannelId;
+use crate::clock::Clock;
+use crate::driver::{Source, SourceError};
+use crate::reading::{Reading, Stamp};
+use std::time::{Duration, Instant};
+
+/// Takes whole blocks of a sample channel, with the moment of their arrival.
+pub type BlockSink = Box<dyn FnMut(&Block, Instant) + Send>;
+
+/// Reads a device at the pace of its address. Connects at the first poll, and anew after the line broke.
+pub struct NcLinkSource {
+    link: Link,
+    layout: Layout,
+    period: Duration,
+    channels: Vec<ChannelId>,
+    session: Option<Session>,
+    track: Track,
+    sink: Option<BlockSink>,
+}
+
+/// What holds as long as the connection does.
+struct Session {
+    connection: Connection,
+    model: Model,
+    plan: Plan,
+    by_path: bool,
+    /// Has any answer been of use? Until then the other way of naming is tried once.
+    understood: bool,
+    turned: bool,
+    /// It was silent: when it comes back it may be another machine.
+    doubtful: bool,
+}
+
+impl NcLinkSource {
+    /// A source of this name for what the address says.
+    #[must_use]
+    pub fn new(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
+        let link = Link {
+            name: name.to_owned(),
+            host: target.at.host.clone(),
+            port: target.at.port,
+            serial: target.serial.clone(),
+            login,
+            deadline: DEADLINE,
+        };
+        let layout = Layout { f_channel: target.f_channel, spindle_axis: target.spindle_axis };
+        let period = Duration::from_millis(target.period_ms);
+        Self { link, layout, period, channels: map::channels(), session: None, track: Track::default(), sink: None }
+    }
+
+    /// Whole blocks of every sample channel go there from now on.
+    pub fn on_block(&mut self, sink: BlockSink) {
+        self.sink = Some(sink);
+    }
+
+    /// What the sample channels have brought so far.
+    #[must_use]
+    pub fn track(&self) -> &Track {
+        &self.track
+    }
+
+    /// What the device says it has; `None` while it is not connected.
+    #[must_use]
+    pub fn model(&self) -> Option<&Model> {
+        self.session.as_ref().map(|session| &session.model)
+    }
+
+    fn poll(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let mut session = match self.session.take() {
+            Some(session) => session,
+            None => Session::open(&self.link, self.layout)?,
+        };
+        let answers = session.ask(self.layout, clock);
+        // What came by itself is taken in any case: a device that does not answer may still send.
+        let unasked = session.connection.take_unasked()?;
+        self.track.lost_messages(session.connection.lost());
+        for message in &unasked {
+            self.take(message, &session.model);
+        }
+        let outcome = answers.map(|(answers, stamp)| session.plan.readings(&answers, stamp, out));
+        session.doubtful = matches!(outcome, Err(SourceError::Timeout { .. }));
+        // Only a broken line needs another connection.
+        self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some(session);
+        outcome
+    }
+
+    fn take(&mut self, message: &Unasked, model: &Model) {
+        match message.subject {
+            Subject::Sample => match Block::parse(&message.message, &message.tail, model) {
+                Ok(block) => {
+                    self.track.block(&block);
+                    if let Some(sink) = &mut self.sink {
+                        sink(&block, message.arrived);
+                    }
+                }
+                Err(why) => self.track.nonsense(why),
+            },
+            _ => self.track.event(&message.message),
+        }
+    }
+}
+
+impl Session {
+    fn open(link: &Link, layout: Layout) -> Result<Self, SourceError> {
+        let mut connection = Connection::open(link, true)?;
+        let model = connection.probe()?;
+        let by_path = model.names_by_path();
+        let plan = Plan::of(&model, layout, by_path);
+        if plan.asks().is_empty() {
+            return Err(SourceError::Decode {
+                source_name: link.name.clone(),
+                request: "the probe of its model".to_owned(),
+                what: format!("none of its {} data items is one that the gateway knows", model.items.len()),
+            });
+        }
+        Ok(Self { connection, model, plan, by_path, understood: false, turned: false, doubtful: false })
+    }
+
+    /// Asks a device that was silent for its model again.
+    fn renew(&mut self, layout: Layout) -> Result<(), SourceError> {
+        self.model = self.connection.probe()?;
+        self.plan = Plan::of(&self.model, layout, self.by_path);
+        self.doubtful = false;
+        Ok(())
+    }
+
+    /// One query for everything. When a device refuses everything it is asked once by its other names.
+    fn ask(&mut self, layout: Layout, clock: &dyn Clock) -> Result<(Vec<Option<Answer>>, Stamp), SourceError> {
+        if self.doubtful {
+            self.renew(layout)?;
+        }
+        loop {
+            let began_ns = clock.now_ns();
+            let answers = self.connection.query(self.plan.asks())?;
+            let stamp = Stamp::of_request(began_ns, clock.now_ns());
+            self.understood |= answers.iter().any(|answer| matches!(answer, Some(Ok(_))));
+            if self.understood || self.turned {
+                return Ok((answers, stamp));
+            }
+            self.turned = true;
+            self.by_path = !self.by_path;
+            self.plan = Plan::of(&self.model, layout, self.by_path);
+        }
+    }
+}
+
+impl Source for NcLinkSource {
+    fn name(&self) -> &str {
+        &self.link.name
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        self.poll(clock, out)
+    }
+}

@@ -1,0 +1,92 @@
+//! The topics of a device with a serial number.
+
+/// What a topic is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Subject {
+    /// A device makes itself known. Its topic has no serial number.
+    Register,
+    /// Ask for the model.
+    Probe,
+    /// The answer to it.
+    ProbeAnswer,
+    /// Ask for values.
+    Query,
+    /// The answer to it.
+    QueryAnswer,
+    /// Write values.
+    Set,
+    /// The answer to it.
+    SetAnswer,
+    /// Values of a sample channel.
+    Sample,
+    /// Something happened.
+    Event,
+    /// Are you there?
+    Ping,
+    /// I am.
+    Pong,
+}
+
+/// Every subject with the beginning of its topic.
+const TABLE: [(Subject, &str); 11] = [
+    (Subject::Register, "Register/Request"),
+    (Subject::Probe, "Probe/Query/Request"),
+    (Subject::ProbeAnswer, "Probe/Query/Response"),
+    (Subject::Query, "Query/Request"),
+    (Subject::QueryAnswer, "Query/Response"),
+    (Subject::Set, "Set/Request"),
+    (Subject::SetAnswer, "Set/Response"),
+    (Subject::Sample, "Sample"),
+    (Subject::Event, "Event"),
+    (Subject::Ping, "Ping"),
+    (Subject::Pong, "Pong"),
+];
+
+impl Subject {
+    fn beginning(self) -> &'static str {
+        TABLE.iter().find(|(subject, _)| *subject == self).map_or("", |(_, beginning)| beginning)
+    }
+
+    /// The topic of this subject for a device.
+    #[must_use]
+    pub fn topic(self, serial: &str) -> String {
+        match self {
+            Self::Register => self.beginning().to_owned(),
+            _ => format!("{}/{serial}", self.beginning()),
+        }
+    }
+
+    /// The filter that takes this subject, with anything behind the serial number: the name of a sample channel, or the
+    /// name of a client.
+    #[must_use]
+    pub fn filter(self, serial: &str) -> String {
+        format!("{}/#", self.topic(serial))
+    }
+
+    /// The subject of a topic of this device, and what stands behind the serial number.
+    #[must_use]
+    pub fn of<'a>(topic: &'a str, serial: &str) -> Option<(Self, &'a str)> {
+        let matching = TABLE.iter().filter_map(|(subject, beginning)| {
+            let rest = topic.strip_prefix(beginning)?.strip_prefix('/')?.strip_prefix(serial)?;
+            if rest.is_empty() { Some((*subject, "")) } else { Some((*subject, rest.strip_prefix('/')?)) }
+        });
+        matching.into_iter().next()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn topics_are_found_again_with_and_without_a_tail() {
+        for (subject, _) in TABLE.into_iter().filter(|(subject, _)| *subject != Subject::Register) {
+            let topic = subject.topic("SN/1");
+            assert_eq!(Subject::of(&topic, "SN/1"), Some((subject, "")));
+            assert_eq!(Subject::of(&format!("{topic}/client"), "SN/1"), Some((subject, "client")));
+            assert_eq!(Subject::of(&format!("{topic}7"), "SN/1"), None, "another device");
+        }
+        assert_eq!(Subject::Sample.filter("A1"), "Sample/A1/#");
+        assert_eq!(Subject::of("Register/Request", "A1"), None);
+    }
+}

@@ -1,0 +1,140 @@
+//! What sample channels and events have brought: how much, and whether a millisecond is missing.
+
+use super::decode;
+use super::sample::Block;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// At most so many sample channels are followed.
+const CHANNELS_MAX: usize = 64;
+/// So many last events are kept.
+const EVENTS_KEPT: usize = 32;
+
+/// One sample channel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ChannelTrack {
+    /// Messages.
+    pub messages: u64,
+    /// Instants: rows of the messages.
+    pub instants: u64,
+    /// Instants between two messages that neither holds.
+    pub missing: u64,
+    /// Messages that begin before the one before has ended.
+    pub overlapping: u64,
+    expected_ms: Option<f64>,
+}
+
+/// Every sample channel, and the last events.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Track {
+    channels: BTreeMap<String, ChannelTrack>,
+    events: Vec<String>,
+    event_count: u64,
+    lost: u64,
+    nonsense: u64,
+    why: Option<String>,
+}
+
+impl Track {
+    /// Every sample channel by its name.
+    pub fn channels(&self) -> impl Iterator<Item = (&str, &ChannelTrack)> {
+        self.channels.iter().map(|(name, channel)| (name.as_str(), channel))
+    }
+
+    /// The last events, the newest last.
+    #[must_use]
+    pub fn events(&self) -> &[String] {
+        &self.events
+    }
+
+    /// Events so far.
+    #[must_use]
+    pub fn event_count(&self) -> u64 {
+        self.event_count
+    }
+
+    /// Messages that were lost in this client or made no sense, and why the last of them did not.
+    #[must_use]
+    pub fn unusable(&self) -> (u64, Option<&str>) {
+        (self.lost + self.nonsense, self.why.as_deref())
+    }
+
+    pub(super) fn lost_messages(&mut self, lost: u64) {
+        self.lost = lost;
+    }
+
+    pub(super) fn nonsense(&mut self, why: String) {
+        self.nonsense += 1;
+        self.why = Some(why);
+    }
+
+    pub(super) fn event(&mut self, message: &Value) {
+        self.event_count += 1;
+        let said = message.get("event").unwrap_or(message);
+        let words = decode::alarm(said);
+        let text = if words.is_empty() { said.to_string() } else { words };
+        if self.events.len() >= EVENTS_KEPT {
+            self.events.remove(0);
+        }
+        self.events.push(text.chars().take(200).collect());
+    }
+
+    pub(super) fn block(&mut self, block: &Block) {
+        if self.channels.len() >= CHANNELS_MAX && !self.channels.contains_key(&block.channel) {
+            return self.nonsense(format!("more than {CHANNELS_MAX} sample channels"));
+        }
+        self.channels.entry(block.channel.clone()).or_default().block(block);
+    }
+}
+
+impl ChannelTrack {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive count; milliseconds since 1970 fit a double"
+    )]
+    fn block(&mut self, block: &Block) {
+        let begin_ms = block.begin_ms as f64;
+        if let Some(expected_ms) = self.expected_ms {
+            // Half an interval is the rounding of the device's own milliseconds.
+            let gap = (begin_ms - expected_ms) / block.interval_ms;
+            if gap > 0.5 {
+                self.missing += gap.round() as u64;
+            } else if gap < -0.5 {
+                self.overlapping += 1;
+            }
+        }
+        self.messages += 1;
+        self.instants += u64::try_from(block.instants).unwrap_or(u64::MAX);
+        self.expected_ms = Some(begin_ms + block.duration_ms());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn block(begin_ms: i64, instants: usize) -> Block {
+        Block { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants, columns: Vec::new() }
+    }
+
+    #[test]
+    fn a_missing_millisecond_is_counted() {
+        let mut track = Track::default();
+        for (begin_ms, instants) in [(0, 200), (200, 200), (401, 200), (801, 200), (900, 10)] {
+            track.block(&block(begin_ms, instants));
+        }
+        let (_, channel) = track.channels().next().expect("one");
+        assert_eq!((channel.messages, channel.instants, channel.missing, channel.overlapping), (5, 810, 201, 1));
+    }
+
+    #[test]
+    fn events_are_kept_as_words_and_bounded() {
+        let mut track = Track::default();
+        (0..100).for_each(|number| track.event(&json!({"event": {"number": number, "text": "x"}})));
+        assert_eq!((track.event_count(), track.events().len()), (100, EVENTS_KEPT));
+        assert_eq!(track.events().last().map(String::as_str), Some("99 x"));
+    }
+}

@@ -1,0 +1,75 @@
+//! `cnc-gateway serve`: the simulated machine over a real protocol, for other people's clients and for trying the box without
+//! a machine.
+
+mod nclink;
+
+use super::{CannotRun, CommandResult, Outcome};
+use crate::signals::{Request, Signals};
+use adapters::Address;
+use adapters::address::{Speed, Target};
+use adapters::clock::{Clock, ScaledClock};
+use adapters::simulated::{Simulated, SimulatedSettings};
+use clap::{Args, Subcommand};
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+/// What is served.
+#[derive(Debug, Subcommand)]
+pub(super) enum Served {
+    /// An NC-Link device (GB/T 41970) at an MQTT broker, laid out like a Huazhong controller.
+    Nclink(nclink::NclinkArguments),
+}
+
+/// What every partner has in common.
+#[derive(Debug, Args)]
+struct Common {
+    /// Address and port to listen on; port 0 takes a free one.
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: Option<SocketAddr>,
+    /// The machine: lathe, mill, or a whole address such as simulated://lathe?seed=7&speed=10.
+    #[arg(long, value_name = "lathe|mill", default_value = "lathe")]
+    machine: String,
+}
+
+/// A running machine and the clock that it lives by.
+struct Running {
+    machine: Simulated,
+    clock: Arc<dyn Clock>,
+}
+
+impl Common {
+    /// Starts the machine.
+    fn machine(&self) -> Result<Running, CannotRun> {
+        let whole = self.machine.contains(':');
+        let text = if whole { self.machine.clone() } else { format!("simulated://{}", self.machine) };
+        let address: Address = text.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
+        let Target::Simulated(target) = address.target() else {
+            return Err(CannotRun::new(format!("{text} is no simulated machine"), "give lathe or mill"));
+        };
+        let Speed::Times(speed) = target.speed else {
+            return Err(CannotRun::new("a served machine lives by the clock", "give a factor, for example speed=10"));
+        };
+        let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
+        let machine = Simulated::new(address.text(), SimulatedSettings::of(target), clock.now_ns());
+        Ok(Running { machine, clock })
+    }
+}
+
+/// Serves until told to stop.
+pub(super) fn run(what: &Served) -> CommandResult {
+    match what {
+        Served::Nclink(arguments) => nclink::serve(arguments),
+    }
+}
+
+/// Returns when a signal says stop.
+fn until_stopped() -> CommandResult {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
+    runtime.block_on(async {
+        let mut signals =
+            Signals::listen().map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
+        while signals.next().await != Request::Stop {}
+        Ok(Outcome::Fine)
+    })
+}

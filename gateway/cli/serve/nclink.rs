@@ -1,0 +1,67 @@
+//! `cnc-gateway serve nclink`: the simulated machine as an NC-Link device. A device does not listen; it dials a broker.
+
+use super::{Common, Running, until_stopped};
+use crate::cli::{CannotRun, CommandResult, print};
+use adapters::mqtt::Options;
+use adapters::nclink::device::{Device, MAILBOX, Said};
+use clap::Args;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Arguments of `serve nclink`.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct NclinkArguments {
+    #[command(flatten)]
+    common: Common,
+    /// The MQTT broker that device and clients meet at, for example mosquitto on this computer.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:1883")]
+    broker: String,
+    /// Serial number: the last part of every topic of the device.
+    #[arg(long, value_name = "SERIAL", default_value = "SIM0001", value_parser = serial)]
+    serial: String,
+}
+
+fn serial(text: &str) -> Result<String, String> {
+    match text.is_empty() || text.contains(['/', '+', '#', '?']) {
+        true => Err("give letters and digits without / + # ?".to_owned()),
+        false => Ok(text.to_owned()),
+    }
+}
+
+/// Serves until told to stop.
+pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
+    if arguments.common.listen.is_some() {
+        return Err(CannotRun::new(
+            "an NC-Link device does not listen, it dials a broker",
+            "give --broker HOST:PORT in place of --listen",
+        ));
+    }
+    let options = broker(&arguments.broker)?;
+    let Running { machine, clock } = arguments.common.machine()?;
+    let mut device = Device::new(&arguments.serial, &machine, clock);
+    let stop = Arc::new(AtomicBool::new(false));
+    let (stopping, name) = (stop.clone(), format!("nclink://{}/{}", arguments.broker, arguments.serial));
+    let run = move || device.run(&options, &stopping, |said| print(&line(&name, &said)));
+    let thread = std::thread::Builder::new().name("device".to_owned()).spawn(run);
+    let thread = thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))?;
+    let outcome = until_stopped();
+    stop.store(true, Ordering::SeqCst);
+    // A device that panicked has said so on standard error.
+    let _ended = thread.join();
+    outcome
+}
+
+fn broker(text: &str) -> Result<Options, CannotRun> {
+    let wrong = || CannotRun::new(format!("--broker {text}: this is no HOST:PORT"), "write it like 127.0.0.1:1883");
+    let (host, port) = text.rsplit_once(':').ok_or_else(wrong)?;
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    let port = port.parse().ok().filter(|port| *port > 0 && !host.is_empty()).ok_or_else(wrong)?;
+    Ok(Options::new(host, port, "cnc-gateway-device"))
+}
+
+fn line(name: &str, said: &Said) -> String {
+    match said {
+        Said::Connected => format!("serving {name} (mailbox for the feed override: {MAILBOX})\n"),
+        Said::Failed(error) => format!("not served: {error}; dialling again every second\n"),
+    }
+}
