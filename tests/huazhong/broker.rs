@@ -1,7 +1,7 @@
 //! A real mosquitto on a free port of this computer; killed when dropped.
 
 use std::net::{TcpListener, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -31,13 +31,14 @@ fn free_port() -> u16 {
 impl Broker {
     /// An open broker; `None` when mosquitto is not installed.
     pub(crate) fn start() -> Option<Self> {
-        Self::with("allow_anonymous true\n")
+        Self::with("allow_anonymous true\n", |_| {})
     }
 
-    /// A broker with these further lines in its configuration; `{dir}` is a directory of its own.
-    pub(crate) fn with(lines: &str) -> Option<Self> {
+    /// A broker with these further lines in its configuration; `{dir}` is a directory of its own, which is prepared first.
+    pub(crate) fn with(lines: &str, prepare: impl FnOnce(&Path)) -> Option<Self> {
         program("mosquitto")?;
         let directory = tempfile::tempdir().expect("a directory");
+        prepare(directory.path());
         let mut broker = Self { child: None, directory, port: free_port() };
         let own = broker.directory.path().display().to_string();
         let text = format!(
@@ -48,11 +49,6 @@ impl Broker {
         std::fs::write(broker.directory.path().join("conf"), text).expect("writable");
         broker.run();
         Some(broker)
-    }
-
-    /// Puts a file into the broker's directory, readable by the user that mosquitto becomes.
-    pub(crate) fn directory(&self) -> &std::path::Path {
-        self.directory.path()
     }
 
     /// Starts it, again after [`Broker::kill`].

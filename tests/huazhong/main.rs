@@ -3,11 +3,13 @@
 //! The broker is mosquitto, started and killed by the tests. Where it is not installed they say that they skip; with
 //! `CNC_GATEWAY_CI` set they fail.
 
-#[path = "../support/command.rs"]
-mod command;
+#[path = "../box/process.rs"]
+#[expect(dead_code, reason = "the tests of the box use the rest of it")]
+mod process;
 
 mod broker;
 mod dialects;
 mod nclink;
 mod sampling;
 mod stand;
+mod whole_box;

@@ -86,7 +86,7 @@ impl Stand {
         let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
         let origin_ns = clock.now_ns() - ON_FOR_S * 1_000_000_000;
         let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
-        machine.moment(clock.now_ns());
+        let _at_work = machine.moment(clock.now_ns());
         let device = Served::start(broker.port, &machine, &clock);
         Some(Self { device, machine, clock, broker })
     }

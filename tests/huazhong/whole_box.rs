@@ -1,0 +1,42 @@
+//! The programs as an integrator starts them: one serves the simulated machine as an NC-Link device, the other reads it.
+
+use crate::broker::Broker;
+use crate::process::{Gateway, get, program, run, stderr, wait_for};
+use std::time::Duration;
+
+#[test]
+fn the_gateway_reads_a_served_machine_through_a_broker() {
+    let Some(mut broker) = Broker::start() else { return };
+    let at = format!("127.0.0.1:{}", broker.port);
+    let mut device = program();
+    device.args(["serve", "nclink", "--machine", "mill", "--serial", "A7", "--broker", &at]);
+    let mut device = Gateway::spawn(device);
+    device.wait_said("serving nclink://");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("gateway.toml");
+    let text = format!("[[source]]\nname = \"cnc\"\naddress = \"nclink://{at}/A7\"\n");
+    std::fs::write(&file, text).expect("writable");
+    let config = file.to_str().expect("a path");
+    let mut gateway = Gateway::start(&directory.path().join("data"), &["--config", config]);
+    let page = gateway.address();
+    let live = |name: &str| get(&page, "/api/v1/live").json()["channels"][name]["value"].clone();
+    let program_of = || wait_for("a program", Duration::from_secs(30), || live("program").as_str().map(str::to_owned));
+    assert!(program_of().starts_with('O'));
+    let source = || get(&page, "/api/v1/status").json()["sources"][0].clone();
+    assert_eq!(source()["state"], "reading", "{}", source());
+    // The broker dies: the box says so, and reads again when it is back.
+    broker.kill();
+    wait_for("the failed line", Duration::from_secs(30), || (source()["state"] == "failing").then_some(()));
+    assert!(source()["error"].as_str().is_some_and(|error| error.contains("broker")), "{}", source());
+    broker.run();
+    wait_for("reading again", Duration::from_secs(60), || (source()["state"] == "reading").then_some(()));
+    gateway.stop();
+    device.stop();
+}
+
+#[test]
+fn a_device_does_not_listen() {
+    let refused = run(&["serve", "nclink", "--listen", "127.0.0.1:1883"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("--broker"), "{}", stderr(&refused));
+}
