@@ -15,7 +15,6 @@
 //! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
 //! | `track` | what sample channels and events have brought, and whether a millisecond is missing |
 //! | `mailbox` | the registers through which the ladder is asked for an override |
-//! | `actuator` | the [`Actuator`](crate::Actuator): a register mailbox that the ladder reads |
 //! | `device` | the other role: the simulated machine as an NC-Link device |
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for

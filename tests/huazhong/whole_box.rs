@@ -19,10 +19,14 @@ fn the_gateway_reads_a_served_machine_through_a_broker() {
     let config = file.to_str().expect("a path");
     let mut gateway = Gateway::start(&directory.path().join("data"), &["--config", config]);
     let page = gateway.address();
-    let live = |name: &str| get(&page, "/api/v1/live").json()["channels"][name]["value"].clone();
-    let program_of = || wait_for("a program", Duration::from_secs(30), || live("program").as_str().map(str::to_owned));
-    assert!(program_of().starts_with('O'));
-    let source = || get(&page, "/api/v1/status").json()["sources"][0].clone();
+    let status = || get(&page, "/api/v1/status").json();
+    let tool = || {
+        let status = status();
+        let channels = status["channels"].as_array()?;
+        channels.iter().find(|channel| channel["name"] == "tool")?["value"].as_str().map(str::to_owned)
+    };
+    assert!(wait_for("a tool", Duration::from_secs(60), tool).starts_with('T'));
+    let source = || status()["sources"][0].clone();
     assert_eq!(source()["state"], "reading", "{}", source());
     // The broker dies: the box says so, and reads again when it is back.
     broker.kill();
