@@ -6,7 +6,6 @@ use crate::clock::Clock;
 use crate::driver::Actuator;
 use crate::nclink::mailbox::{Letter, Mailbox, Register};
 use crate::simulated::{Moment, Simulated, SimulatedOverride};
-use crate::units::OverridePct;
 use std::collections::BTreeMap;
 
 /// First F and G word of channel 0, configuration HNC-30.
@@ -75,7 +74,7 @@ impl Registers {
         // A machine that is off takes no letters; the client sees it by the override in force.
         let _taken = match Letter::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
             Some(Letter::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),
-            Some(Letter::Release) | None => self.ladder.write_feed_override(clock, OverridePct::FULL),
+            Some(Letter::Release) | None => self.ladder.release(clock),
         };
     }
 }
