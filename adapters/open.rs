@@ -86,8 +86,13 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
     match address.target() {
         Target::Simulated(target) => Ok(simulated(address, target, now_ns)),
         Target::Replay(target) => replay(address, target, now_ns),
-        Target::Fanuc { at, path, backend: FanucBackend::Native, options } => {
-            let opened = crate::fanuc::open::native(address.text(), at, *path, options);
+        Target::Fanuc { at, path, backend, options } => {
+            let opened = match backend {
+                FanucBackend::Native => crate::fanuc::open::native(address.text(), at, *path, options),
+                FanucBackend::Vendor(library) => {
+                    crate::fanuc::open::vendor(address.text(), library, at, *path, options)
+                }
+            };
             let refused = Refused::default();
             Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
         }
@@ -128,7 +133,7 @@ fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Ope
 }
 
 /// When the machine's day began.
-fn begun(target: &SimulatedTarget, now_ns: TimeNs) -> TimeNs {
+pub fn begun(target: &SimulatedTarget, now_ns: TimeNs) -> TimeNs {
     #[expect(clippy::cast_possible_truncation, reason = "at most a day")]
     let begun_ns = (target.begun_s * 1e9) as i64;
     now_ns.saturating_sub(begun_ns)
@@ -177,7 +182,7 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
 #[must_use]
 pub fn missing_driver(address: &Address) -> Option<OpenError> {
     match address.target() {
-        Target::Simulated(_) | Target::Replay(_) | Target::Fanuc { backend: FanucBackend::Native, .. } => None,
+        Target::Simulated(_) | Target::Replay(_) | Target::Fanuc { .. } => None,
         Target::NcLink(target) if !target.tls => None,
         other => Some(not_built(address, other)),
     }
@@ -186,7 +191,7 @@ pub fn missing_driver(address: &Address) -> Option<OpenError> {
 fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",
-        Target::Fanuc { .. } => "the FANUC driver through the vendor's library",
+        Target::Fanuc { .. } => "another pace than that of the clock for a real controller",
         Target::NcLink(target) if target.tls => "TLS to the broker",
         Target::NcLink(_) => "another pace than that of the clock for a real controller",
         Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",

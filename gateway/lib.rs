@@ -5,6 +5,7 @@ pub mod check;
 pub mod cli;
 pub mod config;
 pub mod control;
+pub mod doctor;
 pub mod gate;
 pub mod history;
 pub mod http;

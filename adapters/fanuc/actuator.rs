@@ -165,4 +165,26 @@ impl Actuator for FanucActuator {
             _ => Err(self.decode("another kind of answer")),
         }
     }
+
+    /// The mailbox says that nobody asks, the second override's byte that there is no wish; the others get 100 %.
+    fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        let write = match self.method {
+            WriteMethod::Mailbox { area, at } => {
+                self.heartbeat = self.heartbeat.wrapping_add(1);
+                let values = vec![0, i32::from(OverridePct::FULL.percent()), i32::from(self.heartbeat)];
+                Write::Pmc { stretch: Stretch::bytes(area, at, 3), values }
+            }
+            WriteMethod::SecondOverride { area, at } => {
+                Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
+            }
+            _ => return self.write_feed_override(clock, OverridePct::FULL),
+        };
+        self.line.write(clock, &write)?;
+        self.written = None;
+        Ok(())
+    }
+
+    fn settles_within(&self) -> Duration {
+        Duration::from_nanos(self.settle_ns.unsigned_abs()).max(Duration::from_secs(1))
+    }
 }

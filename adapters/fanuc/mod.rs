@@ -18,6 +18,7 @@
 //! | `code` | every return code as cause and next step |
 //! | `focas` | the one narrow trait over what the adapter needs |
 //! | `native` | FOCAS2/Ethernet spoken by ourselves |
+//! | `vendor` | the vendor's library in a child process |
 //! | `statistics` | what the round trips cost |
 //! | `line` | the one connection that everything shares: opening, loss, power-off, duty cycle, allowed writes |
 //! | `poll`, `source` | what is asked for at which pace; the groups as sources |
@@ -55,10 +56,13 @@ pub mod server;
 pub mod source;
 pub mod states;
 pub mod statistics;
+pub mod vendor;
 pub mod wire;
 pub mod work_offset;
 
 #[cfg(test)]
 mod captures;
+#[cfg(test)]
+mod line_tests;
 #[cfg(test)]
 mod tests;

@@ -6,8 +6,10 @@ use super::line::{Connect, Line};
 use super::native::{Native, NativeSettings};
 use super::readings::Manner;
 use super::source::FanucSource;
+use super::vendor::{Vendor, VendorSettings};
 use crate::address::{Endpoint, FanucOptions, WriteMethod};
 use crate::driver::{Actuator, Source};
+use std::path::Path;
 
 /// What an address opens.
 pub struct OpenedFanuc {
@@ -24,6 +26,22 @@ pub struct OpenedFanuc {
 pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let settings = NativeSettings { at: at.clone(), path: u16::from(path), timeout: options.timeout };
     let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
+    opened(name, connect, path, options)
+}
+
+/// Opens a controller through the vendor's library, in a child process. Nothing is loaded before the first poll.
+#[must_use]
+pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
+    let settings = VendorSettings {
+        library: library.to_owned(),
+        at: at.clone(),
+        path: u16::from(path),
+        timeout: options.timeout,
+        deadline: None,
+        program: None,
+        environment: Vec::new(),
+    };
+    let connect: Connect = Box::new(move || Ok(Box::new(Vendor::connect(settings.clone())?)));
     opened(name, connect, path, options)
 }
 

@@ -1,6 +1,6 @@
 //! The groups of a controller as sources.
 
-use super::line::Line;
+use super::line::{Facts, Line};
 use super::poll;
 use super::readings::{self, Manner};
 use crate::address::FanucOptions;
@@ -8,6 +8,7 @@ use crate::channel::ChannelId;
 use crate::clock::Clock;
 use crate::driver::{Source, SourceError};
 use crate::reading::Reading;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Which group.
@@ -26,6 +27,7 @@ pub struct FanucSource {
     items: Vec<super::item::Item>,
     channels: Vec<ChannelId>,
     period: Duration,
+    facts: Option<Arc<Facts>>,
 }
 
 impl FanucSource {
@@ -54,7 +56,7 @@ impl FanucSource {
         channels: Vec<ChannelId>,
         period: Duration,
     ) -> Self {
-        Self { name, line, group, manner, items, channels, period }
+        Self { name, line, group, manner, items, channels, period, facts: None }
     }
 }
 
@@ -71,8 +73,13 @@ impl Source for FanucSource {
         self.period
     }
 
+    fn identity(&self) -> Vec<(&'static str, String)> {
+        self.facts.as_ref().filter(|_| self.group == Group::Fast).map_or_else(Vec::new, |facts| identity(facts))
+    }
+
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let asked = self.line.ask(clock, &self.items)?;
+        self.facts = Some(asked.facts.clone());
         if self.group == Group::Slow {
             readings::slow(&self.channels, &asked, out);
             return Ok(());
@@ -82,4 +89,20 @@ impl Source for FanucSource {
         readings::fast(&self.channels, &asked, alarms.as_ref(), self.manner, out);
         Ok(())
     }
+}
+
+fn identity(facts: &Facts) -> Vec<(&'static str, String)> {
+    let opening = &facts.opening;
+    let mut known = vec![("make", "FANUC".to_owned())];
+    if let Some(system) = &facts.system {
+        known.push(("control", format!("{}-{}", system.kind, system.machine)));
+        known.push(("series", system.series.clone()));
+        known.push(("version", system.version.clone()));
+    }
+    known.push(("generation", opening.generation.version().to_string()));
+    known.push(("paths", opening.paths.to_string()));
+    known.push(("axes", facts.axes.join(" ")));
+    known.push(("spindles", opening.spindles.to_string()));
+    known.push(("unit", if facts.inch { "inch" } else { "mm" }.to_owned()));
+    known
 }

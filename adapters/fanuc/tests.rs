@@ -61,8 +61,11 @@ fn the_ladder_takes_what_comes_through_the_mailbox() {
     assert_eq!(write(actuator.as_mut(), 90), Ok(pct(90)));
     assert_eq!(write(actuator.as_mut(), 80), Ok(pct(80)));
     assert_eq!(write(actuator.as_mut(), 20), Ok(pct(50)), "the ladder has limits of its own");
-    let g12 = server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
-    assert_eq!(g12, Some(super::feed_override::encode(pct(50))));
+    let g12 = || server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
+    assert_eq!(g12(), Some(super::feed_override::encode(pct(50))));
+    actuator.release(&SystemClock::new()).expect("given back");
+    std::thread::sleep(std::time::Duration::from_millis(30));
+    assert_eq!(g12(), Some(super::feed_override::encode(OverridePct::FULL)));
 }
 
 #[test]
@@ -73,6 +76,8 @@ fn the_second_override_has_a_byte_of_its_own() {
     let g12 = server.with(|control| control.map(|control| control.memory.byte(Area::G, 12)));
     assert_eq!(g12, Some(0x9B), "the operator's dial is untouched");
     assert!(matches!(write(actuator.as_mut(), 0), Err(SourceError::Refused { .. })));
+    actuator.release(&SystemClock::new()).expect("given back");
+    assert_eq!(actuator.read_feed_override(&SystemClock::new()), Ok(OverridePct::FULL));
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod audit;
 mod bench;
 mod check;
 mod diagnose;
+mod doctor;
 mod effects;
 mod history;
 mod identify;
@@ -15,6 +16,7 @@ mod rules;
 mod run;
 mod serve;
 mod simulate;
+mod vendor_child;
 
 use crate::config::Log;
 use crate::log::{self, LogFormat};
@@ -119,9 +121,14 @@ enum Command {
     Identify(identify::IdentifyArguments),
     /// What scripts can see, call and set.
     Rules(rules::RulesArguments),
+    /// Try one address: who is there, what it answers, what is wrong and what to do next.
+    Doctor(doctor::DoctorArguments),
     /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
     #[command(subcommand)]
     Serve(serve::Served),
+    /// The child process around a vendor's library; started by the gateway itself.
+    #[command(hide = true)]
+    VendorChild(vendor_child::VendorChildArguments),
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -157,7 +164,9 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Effects(effects) => effects::effects(effects),
         Command::Identify(identify) => identify::identify(&identify),
         Command::Rules(rules) => rules::run(&rules),
+        Command::Doctor(doctor) => doctor::doctor(&doctor),
         Command::Serve(served) => serve::run(&served),
+        Command::VendorChild(child) => vendor_child::run(&child),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `cnc-gateway serve`: the simulated machine over a real protocol, for other people's clients and for trying the box without
 //! a machine.
 
+mod fanuc;
 mod nclink;
 
 use super::{CannotRun, CommandResult, Outcome};
@@ -16,6 +17,8 @@ use std::sync::Arc;
 /// What is served.
 #[derive(Debug, Subcommand)]
 pub(super) enum Served {
+    /// A FANUC control that answers FOCAS2/Ethernet, with a ladder that owns the feed override.
+    Fanuc(fanuc::FanucArguments),
     /// An NC-Link device (GB/T 41970) at an MQTT broker, laid out like a Huazhong controller.
     Nclink(nclink::NclinkArguments),
 }
@@ -38,6 +41,11 @@ struct Running {
 }
 
 impl Common {
+    /// Where to listen; `port` unless given.
+    fn listen(&self, port: u16) -> SocketAddr {
+        self.listen.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], port)))
+    }
+
     /// Starts the machine.
     fn machine(&self) -> Result<Running, CannotRun> {
         let whole = self.machine.contains(':');
@@ -50,7 +58,8 @@ impl Common {
             return Err(CannotRun::new("a served machine lives by the clock", "give a factor, for example speed=10"));
         };
         let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
-        let machine = Simulated::new(address.text(), SimulatedSettings::of(target), clock.now_ns());
+        let begun_ns = adapters::open::begun(target, clock.now_ns());
+        let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun_ns);
         Ok(Running { machine, clock })
     }
 }
@@ -58,6 +67,7 @@ impl Common {
 /// Serves until told to stop.
 pub(super) fn run(what: &Served) -> CommandResult {
     match what {
+        Served::Fanuc(arguments) => fanuc::serve(arguments),
         Served::Nclink(arguments) => nclink::serve(arguments),
     }
 }

@@ -1,0 +1,152 @@
+//! The line with a controller that is a list of answers, on a clock that stands still.
+
+use super::allow::AllowList;
+use super::answer::{Answer, ItemError, ItemResult, Refusal};
+use super::code::ReturnCode;
+use super::focas::{Focas, FocasError};
+use super::item::{Item, Stretch, Write};
+use super::line::{Connect, Line};
+use super::opening::{Generation, Opening};
+use crate::clock::{Clock, SECOND_NS, TimeNs};
+use crate::driver::SourceError;
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// What the mock has been told to do, and what it was asked.
+#[derive(Default)]
+struct Told {
+    now_ns: AtomicI64,
+    takes_ns: AtomicI64,
+    asked: AtomicU64,
+    connect: Mutex<Option<FocasError>>,
+    fail: Mutex<Option<FocasError>>,
+    results: Mutex<HashMap<Item, ItemResult>>,
+}
+
+struct Mock(Arc<Told>, Opening);
+
+impl Focas for Mock {
+    fn opening(&self) -> &Opening {
+        &self.1
+    }
+
+    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+        self.0.now_ns.fetch_add(self.0.takes_ns.load(Ordering::SeqCst), Ordering::SeqCst);
+        self.0.asked.fetch_add(items.len() as u64, Ordering::SeqCst);
+        if let Some(error) = self.0.fail.lock().expect("sound").take() {
+            return Err(error);
+        }
+        let results = self.0.results.lock().expect("sound");
+        out.extend(items.iter().map(|item| results.get(item).cloned().unwrap_or(Ok(Answer::Whole(1)))));
+        Ok(())
+    }
+
+    fn write(&mut self, _: &Write) -> Result<(), FocasError> {
+        Ok(())
+    }
+}
+
+/// Sleeping moves it.
+struct Standing(Arc<Told>);
+
+impl Clock for Standing {
+    fn now_ns(&self) -> TimeNs {
+        self.0.now_ns.load(Ordering::SeqCst)
+    }
+
+    fn sleep_until(&self, until_ns: TimeNs) {
+        self.0.now_ns.fetch_max(until_ns, Ordering::SeqCst);
+    }
+}
+
+fn line(duty_pct: u8) -> (Line, Arc<Told>, Standing) {
+    let told = Arc::new(Told::default());
+    let own = told.clone();
+    let opening = Opening {
+        generation: Generation::of(4),
+        family: 5,
+        axes_max: 32,
+        spindles_max: 8,
+        paths: 1,
+        axes: 2,
+        spindles: 1,
+    };
+    let connect: Connect = Box::new(move || match own.connect.lock().expect("sound").clone() {
+        Some(error) => Err(error),
+        None => Ok(Box::new(Mock(own.clone(), opening))),
+    });
+    (Line::new("fanuc://mock", connect, AllowList::default(), duty_pct), told.clone(), Standing(told))
+}
+
+fn refused(code: i16) -> ItemResult {
+    Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail: 0 }))
+}
+
+#[test]
+fn the_controller_has_its_share_of_the_time_for_itself() {
+    let (line, told, clock) = line(25);
+    told.takes_ns.store(20_000_000, Ordering::SeqCst);
+    line.ask(&clock, &[Item::Feed]).expect("well");
+    let first = line.ask(&clock, &[Item::Feed]).expect("well");
+    let second = line.ask(&clock, &[Item::Feed]).expect("well");
+    assert_eq!(second.began_ns - first.ended_ns, 60_000_000, "busy 20 ms of every 80 ms");
+}
+
+#[test]
+fn what_is_missing_is_asked_once_per_connection() {
+    let (line, told, clock) = line(100);
+    told.results.lock().expect("sound").insert(Item::Feed, refused(6));
+    let items = [Item::Sequence, Item::Feed, Item::BlockCount];
+    let asked = line.ask(&clock, &items).expect("well");
+    assert_eq!(asked.of(Item::Feed), Some(&refused(6)));
+    assert_eq!(line.unsupported(), [Item::Feed]);
+    let before = told.asked.load(Ordering::SeqCst);
+    let asked = line.ask(&clock, &items).expect("well");
+    assert_eq!(told.asked.load(Ordering::SeqCst) - before, 2);
+    assert_eq!(asked.of(Item::Feed), Some(&Err(ItemError::NotOffered)));
+    assert_eq!(asked.of(Item::BlockCount), Some(&Ok(Answer::Whole(1))), "the answers stay with their questions");
+    *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
+    assert!(line.ask(&clock, &items).is_err());
+    told.results.lock().expect("sound").clear();
+    let asked = line.ask(&clock, &items).expect("a new connection");
+    assert_eq!(asked.of(Item::Feed), Some(&Ok(Answer::Whole(1))), "the control may have got the option");
+}
+
+#[test]
+fn a_code_that_says_the_connection_is_dead_ends_it() {
+    let (line, told, clock) = line(100);
+    line.ask(&clock, &[Item::Feed]).expect("well");
+    told.results.lock().expect("sound").insert(Item::Feed, refused(-16));
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    told.results.lock().expect("sound").clear();
+    line.ask(&clock, &[Item::Feed]).expect("well again");
+    assert_eq!((line.counts().connections, line.counts().broken), (2, 1));
+}
+
+#[test]
+fn off_is_what_was_on_before() {
+    let (line, told, clock) = line(100);
+    let nobody = || Some(FocasError::NobodyThere("refused".into()));
+    *told.connect.lock().expect("sound") = nobody();
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })), "it may be the wrong address");
+    *told.connect.lock().expect("sound") = None;
+    line.ask(&clock, &[Item::Feed]).expect("on");
+    *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    *told.connect.lock().expect("sound") = nobody();
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Off { .. })), "starting, or off");
+    told.now_ns.fetch_add(200 * SECOND_NS, Ordering::SeqCst);
+    let error = line.ask(&clock, &[Item::Feed]).expect_err("too long for a start");
+    assert!(matches!(error, SourceError::Line { .. }), "the host lives and nobody listens: {error}");
+    *told.connect.lock().expect("sound") = Some(FocasError::Unreachable("no route".into()));
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Off { .. })), "however long");
+}
+
+#[test]
+fn nothing_is_written_that_is_not_allowed() {
+    let (line, _, clock) = line(100);
+    let write = Write::Pmc { stretch: Stretch::bytes(super::item::Area::G, 12, 1), values: vec![0] };
+    assert!(matches!(line.write(&clock, &write), Err(SourceError::Refused { .. })));
+    assert_eq!(line.counts().connections, 0, "not even a connection was opened for it");
+}

@@ -1,0 +1,172 @@
+//! The parent's side: the library through its child.
+
+use super::KIND;
+use super::message::{Ask, Tell};
+use crate::address::Endpoint;
+use crate::child::{ChildCounts, ChildError, ChildSettings, Supervised};
+use crate::fanuc::answer::{ItemError, ItemResult, Refusal};
+use crate::fanuc::code::{Consequence, ReturnCode};
+use crate::fanuc::focas::{Focas, FocasError};
+use crate::fanuc::item::{Item, Write};
+use crate::fanuc::opening::Opening;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// An item in which the child ended this often is not asked for any more.
+const DEATHS_MAX: u32 = 2;
+
+/// What the child may take longer than the library's own patience, which is about a second more than it is told.
+const GRACE: Duration = Duration::from_millis(1500);
+
+/// How the library is used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VendorSettings {
+    /// The library's file.
+    pub library: PathBuf,
+    /// Where the controller is.
+    pub at: Endpoint,
+    /// Path from 1.
+    pub path: u16,
+    /// The library's patience with the controller; whole seconds, at least one.
+    pub timeout: Duration,
+    /// Longest wait for the child; `None` follows from `timeout`.
+    pub deadline: Option<Duration>,
+    /// The program that runs as the child; `None` is this one.
+    pub program: Option<PathBuf>,
+    /// Environment variables for the child.
+    pub environment: Vec<(String, String)>,
+}
+
+/// A controller through the vendor's library.
+pub struct Vendor {
+    child: Supervised,
+    settings: VendorSettings,
+    opening: Opening,
+    /// The start of the child in which the connection is open.
+    open_in: u64,
+    deaths: HashMap<Item, u32>,
+}
+
+impl Vendor {
+    /// Starts a child, loads the library and connects.
+    ///
+    /// # Errors
+    /// See [`FocasError`].
+    pub fn connect(settings: VendorSettings) -> Result<Self, FocasError> {
+        let patience = Duration::from_secs(u64::from(seconds(settings.timeout).unsigned_abs()));
+        let mut child = ChildSettings::new(KIND, &[], settings.deadline.unwrap_or(patience + GRACE));
+        child.program.clone_from(&settings.program);
+        child.environment.clone_from(&settings.environment);
+        child.pause_min = Duration::ZERO;
+        let mut child = Supervised::new(child);
+        let opening = open(&mut child, &settings)?;
+        let open_in = child.generation();
+        Ok(Self { child, settings, opening, open_in, deaths: HashMap::new() })
+    }
+
+    /// How the child has been doing.
+    #[must_use]
+    pub fn counts(&self) -> ChildCounts {
+        self.child.counts()
+    }
+
+    /// Process number of the child.
+    #[must_use]
+    pub fn process_id(&self) -> Option<u32> {
+        self.child.process_id()
+    }
+
+    /// Asks a child in which the connection is open; opens it in a new child.
+    fn request(&mut self, ask: &Ask) -> Result<Result<Tell, ChildError>, FocasError> {
+        if self.child.process_id().is_none() {
+            self.opening = open(&mut self.child, &self.settings)?;
+            self.open_in = self.child.generation();
+        }
+        Ok(told(&mut self.child, ask))
+    }
+
+    fn read(&mut self, item: Item) -> Result<ItemResult, FocasError> {
+        if self.deaths.get(&item).is_some_and(|deaths| *deaths >= DEATHS_MAX) {
+            return Ok(Err(ItemError::NotOffered));
+        }
+        Ok(match self.request(&Ask::Read(item))? {
+            Ok(Tell::Read(result)) => {
+                self.suspect(item, &result);
+                result
+            }
+            Ok(other) => Err(ItemError::Malformed(format!("{other:?}"))),
+            Err(error) => {
+                *self.deaths.entry(item).or_default() += 1;
+                Err(ItemError::Malformed(format!("the library failed in {item:?}: {error}")))
+            }
+        })
+    }
+
+    /// A library that wrote beyond its structures has hurt nothing outside its margin, but is not trusted any further.
+    fn suspect(&mut self, item: Item, result: &ItemResult) {
+        if matches!(result, Err(ItemError::Malformed(_))) {
+            *self.deaths.entry(item).or_default() += 1;
+            self.child.end();
+        }
+    }
+}
+
+/// Whole seconds, at least one: zero would mean for ever.
+fn seconds(timeout: Duration) -> i32 {
+    i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
+}
+
+fn told(child: &mut Supervised, ask: &Ask) -> Result<Tell, ChildError> {
+    let bytes = serde_json::to_vec(ask).map_err(|error| ChildError::NoAnswer(error.to_string()))?;
+    let answer = child.request(&bytes)?;
+    serde_json::from_slice(&answer).map_err(|error| ChildError::NoAnswer(error.to_string()))
+}
+
+fn open(child: &mut Supervised, settings: &VendorSettings) -> Result<Opening, FocasError> {
+    let ask = Ask::Open {
+        library: settings.library.clone(),
+        host: settings.at.host.clone(),
+        port: settings.at.port,
+        path: settings.path,
+        timeout_s: seconds(settings.timeout),
+    };
+    let opened = match told(child, &ask).map_err(|error| FocasError::Library(error.to_string()))? {
+        Tell::Opened(opening) => return Ok(opening),
+        Tell::Code(ReturnCode(-16)) => FocasError::Unreachable(ReturnCode::SOCKET.to_string()),
+        Tell::Code(ReturnCode(-17)) => FocasError::NoSession,
+        Tell::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
+        Tell::Unloadable(what) => FocasError::Library(format!("{}: {what}", settings.library.display())),
+        other => FocasError::Library(format!("{other:?}")),
+    };
+    child.end();
+    Err(opened)
+}
+
+impl Focas for Vendor {
+    fn opening(&self) -> &Opening {
+        &self.opening
+    }
+
+    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+        let before = out.len();
+        for item in items {
+            let result = self.read(*item).inspect_err(|_| out.truncate(before))?;
+            out.push(result);
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, write: &Write) -> Result<(), FocasError> {
+        match self.request(&Ask::Write(write.clone()))? {
+            Ok(Tell::Written) => Ok(()),
+            Ok(Tell::Code(code)) if code.consequence() == Consequence::Reconnect => {
+                Err(FocasError::Broken(code.to_string()))
+            }
+            Ok(Tell::Code(code)) => Err(FocasError::Refused(Refusal { code, detail: 0 })),
+            Ok(Tell::Confused(_)) => Err(FocasError::Refused(Refusal { code: ReturnCode::FUNC, detail: 0 })),
+            Ok(other) => Err(FocasError::Library(format!("{other:?}"))),
+            Err(error) => Err(FocasError::Library(error.to_string())),
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What parent and child say, as JSON: small, and legible in a debugger.
+
+use crate::fanuc::answer::ItemResult;
+use crate::fanuc::code::ReturnCode;
+use crate::fanuc::item::{Item, Write};
+use crate::fanuc::opening::Opening;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// From the parent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Ask {
+    /// Load the library and connect.
+    Open {
+        /// The library's file.
+        library: PathBuf,
+        /// The controller.
+        host: String,
+        /// Its port.
+        port: u16,
+        /// Path from 1.
+        path: u16,
+        /// The library's own patience, s.
+        timeout_s: i32,
+    },
+    /// Read one item.
+    Read(Item),
+    /// Write.
+    Write(Write),
+}
+
+/// From the child.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Tell {
+    /// Connected.
+    Opened(Opening),
+    /// The library could not be loaded, or lacks what nothing works without.
+    Unloadable(String),
+    /// A return code of opening or writing.
+    Code(ReturnCode),
+    /// Written.
+    Written,
+    /// One item.
+    Read(ItemResult),
+    /// The request made no sense, or there is no connection.
+    Confused(String),
+}

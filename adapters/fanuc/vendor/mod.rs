@@ -1,0 +1,32 @@
+//! The vendor's library, in a child process.
+//!
+//! The library aborts when its log cannot be written, hangs on a silent line, writes far beyond its structures when an
+//! answer is malformed, leaves garbage behind on errors, and binds its handle to a thread. So it is loaded only in a
+//! [child process](crate::child) whose one thread owns the handle. Every item is one request to the child: when the
+//! child dies or hangs in it, that item is told as failed, a fresh child goes on with the next item of the same poll,
+//! and an item that has killed the child twice is left alone until the next connection.
+//!
+//! | file | what |
+//! |---|---|
+//! | `message` | what parent and child say |
+//! | `client` | the parent's side: [`Focas`](super::focas::Focas) through the child |
+//! | `child` | the child's side: items to calls, structures to answers |
+//! | `layout` | the structures as the library lays them out, with their sizes asserted |
+//! | `structure` | a structure that was filled in, read field by field |
+//! | `ffi` | loading, symbols and calls: the only `unsafe` |
+//!
+//! A symbol that the library does not have makes its items *not offered*; nothing else suffers. Layouts were measured
+//! against version 1.0.5 for Linux, in which `long` has 32 bits whatever the header says.
+
+mod child;
+mod client;
+mod ffi;
+mod layout;
+mod message;
+mod structure;
+
+pub use child::child;
+pub use client::{Vendor, VendorSettings};
+
+/// What the hidden subcommand calls this child.
+pub const KIND: &str = "fanuc";

@@ -1,0 +1,62 @@
+//! A structure that the library filled in, read field by field.
+
+use super::ffi::Missing;
+use super::layout::LoadElm;
+use crate::child::Guarded;
+use crate::fanuc::answer::{ItemError, Refusal};
+use crate::fanuc::code::ReturnCode;
+use std::mem::offset_of;
+
+/// Why a call has no structure.
+fn missing(_: Missing) -> ItemError {
+    ItemError::NotOffered
+}
+
+pub(super) fn checked(code: Result<i16, Missing>) -> Result<(), ItemError> {
+    match code.map_err(missing)? {
+        0 => Ok(()),
+        code => Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail: 0 })),
+    }
+}
+
+/// A structure that a call fills in; on any code but 0 nothing of it is looked at.
+pub(super) fn filled(
+    length: usize,
+    call: impl FnOnce(&mut Guarded) -> Result<i16, Missing>,
+) -> Result<Bytes, ItemError> {
+    let mut buffer = Guarded::new(length);
+    checked(call(&mut buffer))?;
+    buffer.bytes().map(Bytes).map_err(|overrun| ItemError::Malformed(overrun.to_string()))
+}
+
+/// The bytes of a structure, read little-endian by offset; what lies beyond the end is zero.
+pub(super) struct Bytes(Vec<u8>);
+
+impl Bytes {
+    pub(super) fn array<const N: usize>(&self, at: usize) -> [u8; N] {
+        self.0.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
+    }
+
+    pub(super) fn i16(&self, at: usize) -> i16 {
+        i16::from_le_bytes(self.array(at))
+    }
+
+    pub(super) fn i32(&self, at: usize) -> i32 {
+        i32::from_le_bytes(self.array(at))
+    }
+
+    pub(super) fn text(&self, at: usize, length: usize) -> String {
+        let bytes = self.0.get(at..(at + length).min(self.0.len())).unwrap_or_default();
+        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+        String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+    }
+
+    /// A number with its decimals.
+    pub(super) fn element(&self, at: usize) -> Option<f64> {
+        decimal(self.i32(at), self.i16(at + offset_of!(LoadElm, dec)))
+    }
+}
+
+pub(super) fn decimal(data: i32, places: i16) -> Option<f64> {
+    (0..=9).contains(&places).then(|| f64::from(data) / 10f64.powi(i32::from(places)))
+}

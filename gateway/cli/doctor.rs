@@ -1,0 +1,70 @@
+//! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
+
+use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::doctor::{self, Difference, Report};
+use clap::Args;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Arguments of `doctor`.
+#[derive(Debug, Args)]
+pub(super) struct DoctorArguments {
+    /// The address, as in the configuration, for example fanuc://10.0.0.5:8193.
+    address: String,
+    /// Read a FANUC controller through this library of the vendor's too, and list where the two differ.
+    #[arg(long, value_name = "LIBRARY")]
+    compare: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the report. Exit code 0 reachable without problems, 1 with problems, 2 unusable address.
+pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
+    let unusable = |text| CannotRun::new(text, "");
+    let Some(library) = &arguments.compare else {
+        let report = doctor::examine(&arguments.address).map_err(unusable)?;
+        if arguments.json {
+            print_json(&report.json())
+        } else {
+            print(&text(&report))
+        }
+        return Ok(outcome(report.problems.is_empty()));
+    };
+    let (ours, theirs, differences) = doctor::compare(&arguments.address, library).map_err(unusable)?;
+    if arguments.json {
+        let mut document = ours.json();
+        document["vendor"] = theirs.json();
+        document["differences"] = differences.iter().map(Difference::json).collect();
+        print_json(&document);
+    } else {
+        print(&format!("{}{}", text(&ours), text(&theirs)));
+        differences.iter().for_each(|one| print(&format!("  differs: {:#}\n", one.json())));
+    }
+    Ok(outcome(ours.problems.is_empty() && theirs.problems.is_empty() && differences.is_empty()))
+}
+
+fn outcome(well: bool) -> Outcome {
+    if well { Outcome::Fine } else { Outcome::No }
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!("{}\n", report.address);
+    let mut line = |what: std::fmt::Arguments<'_>| {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{what}");
+    };
+    line(format_args!("  {}", if report.reachable { "answers" } else { "does not answer" }));
+    report.identity.iter().for_each(|(key, value)| line(format_args!("  {key}: {value}")));
+    line(format_args!("  opened and read in {:.1} ms, read again in {:.1} ms", report.open_ms, report.read_ms));
+    for (channel, value) in &report.readings {
+        match value {
+            Ok(value) => line(format_args!("    {:<26} {value}", channel.name())),
+            Err(missing) => line(format_args!("    {:<26} - ({missing})", channel.name())),
+        }
+    }
+    for problem in &report.problems {
+        line(format_args!("  problem: {}\n    next: {}", problem.what, problem.next));
+    }
+    text
+}

@@ -1,0 +1,79 @@
+//! `cnc-gateway serve fanuc`: the simulated machine behind a control that answers FOCAS2/Ethernet.
+
+use super::{Common, Running, until_stopped};
+use crate::cli::{CannotRun, CommandResult, print};
+use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
+use clap::{Args, ValueEnum};
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The ladder runs on when nobody asks.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Arguments of `serve fanuc`.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct FanucArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Generation of the control, which decides the encodings.
+    #[arg(long, value_enum, default_value_t = Generation::Series30i)]
+    generation: Generation,
+    /// Connections at a time; the vendor's library takes two for one client.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
+    connections: u16,
+}
+
+/// Generations of controls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Generation {
+    /// 30i, 31i, 32i, 35i and later (version word 4).
+    #[value(name = "30i")]
+    Series30i,
+    /// 0i-D, 0i-F (version word 3).
+    #[value(name = "0i-f")]
+    Series0iF,
+    /// 16i, 18i, 21i, 0i-C and before (version word 2).
+    #[value(name = "16i")]
+    Series16i,
+}
+
+impl Generation {
+    fn version(self) -> u16 {
+        match self {
+            Self::Series30i => 4,
+            Self::Series0iF => 3,
+            Self::Series16i => 2,
+        }
+    }
+}
+
+/// Serves until told to stop.
+pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
+    let at = arguments.common.listen(8193);
+    let next = "stop the other program, or choose another port with --listen";
+    let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
+    let Running { machine, clock } = arguments.common.machine()?;
+    let control = SimulatedControl::new(machine, clock, arguments.generation.version());
+    let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
+    let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
+    let server = Server::start(listener, Box::new(control), settings).map_err(no_threads)?;
+    print(&format!(
+        "fanuc://{} answers; the ladder's mailbox is at R900, its second override at R910\n",
+        server.address()
+    ));
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopping = stop.clone();
+    let ladder = std::thread::spawn(move || {
+        while !stopping.load(Ordering::SeqCst) {
+            server.with(|_| ());
+            std::thread::sleep(LOOK);
+        }
+    });
+    let outcome = until_stopped();
+    stop.store(true, Ordering::SeqCst);
+    // A ladder that panicked has said so on standard error.
+    let _ended = ladder.join();
+    outcome
+}

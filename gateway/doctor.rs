@@ -1,0 +1,238 @@
+//! One address examined: opened, named, read twice, timed, and everything that is wrong told with what to do next.
+//! Contract: sources of the project, section on `doctor`.
+
+use adapters::clock::{Clock, SystemClock};
+use adapters::open::open;
+use adapters::{Absence, Address, ChannelId, Reading, Source, SourceError, Value};
+use serde_json::{Map, json};
+use std::fmt;
+use std::time::Instant;
+
+/// Something that is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Trouble {
+    /// What happened, and where.
+    pub what: String,
+    /// What to do next.
+    pub next: String,
+}
+
+/// A value with its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown(ChannelId, Value);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.1 {
+            Value::Number(number) => write!(f, "{number} {}", self.0.channel().unit),
+            Value::Text(text) => write!(f, "{text:?}"),
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// As given.
+    pub address: String,
+    /// Did anything answer?
+    pub reachable: bool,
+    /// Who answered.
+    pub identity: Vec<(&'static str, String)>,
+    /// What the channels say, in the order of the sources.
+    pub readings: Vec<(ChannelId, Result<Shown, Absence>)>,
+    /// From nothing to the first values.
+    pub open_ms: f64,
+    /// Reading everything once on the open connection.
+    pub read_ms: f64,
+    /// What is wrong.
+    pub problems: Vec<Trouble>,
+}
+
+/// Examines an address. Takes as long as its sources' own deadlines at most.
+///
+/// # Errors
+/// The text is no usable address, in words.
+pub fn examine(text: &str) -> Result<Report, String> {
+    let address: Address = text.parse().map_err(|error| format!("{error}"))?;
+    let clock = SystemClock::new();
+    let began = Instant::now();
+    let mut opened = open(&address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let mut report = Report {
+        address: address.text().to_owned(),
+        reachable: false,
+        identity: Vec::new(),
+        readings: Vec::new(),
+        open_ms: 0.0,
+        read_ms: 0.0,
+        problems: Vec::new(),
+    };
+    let working: Vec<bool> = opened.sources.iter_mut().map(|source| report.first(source.as_mut(), &clock)).collect();
+    report.open_ms = milliseconds(began);
+    let began = Instant::now();
+    for (source, _) in opened.sources.iter_mut().zip(working).filter(|(_, works)| *works) {
+        report.again(source.as_mut(), &clock);
+    }
+    report.read_ms = milliseconds(began);
+    report.judge();
+    Ok(report)
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    (since.elapsed().as_secs_f64() * 1e4).round() / 10.0
+}
+
+impl Report {
+    /// The first look at a source: does it work at all?
+    fn first(&mut self, source: &mut dyn Source, clock: &dyn Clock) -> bool {
+        let mut readings = Vec::new();
+        match source.read(clock, &mut readings) {
+            Ok(()) => {
+                self.reachable = true;
+                self.identity.extend(source.identity());
+                true
+            }
+            Err(error) => {
+                self.failed(&error);
+                false
+            }
+        }
+    }
+
+    /// The second look, whose values are shown.
+    fn again(&mut self, source: &mut dyn Source, clock: &dyn Clock) {
+        let mut readings = Vec::new();
+        if let Err(error) = source.read(clock, &mut readings) {
+            self.failed(&error);
+        }
+        self.readings.extend(readings.into_iter().map(shown));
+    }
+
+    fn failed(&mut self, error: &SourceError) {
+        // A machine that refuses or answers nonsense is there all the same.
+        self.reachable |= matches!(error, SourceError::Refused { .. } | SourceError::Decode { .. });
+        let trouble = trouble(error);
+        if !self.problems.contains(&trouble) {
+            self.problems.push(trouble);
+        }
+    }
+
+    fn judge(&mut self) {
+        for (channel, value) in &self.readings {
+            let Err(absence @ (Absence::OutOfRange | Absence::Refused | Absence::Timeout)) = value else { continue };
+            self.problems.push(Trouble { what: format!("{channel} has no value: {absence}"), next: next(*absence) });
+        }
+    }
+
+    /// The report as the contract lays it out.
+    #[must_use]
+    pub fn json(&self) -> serde_json::Value {
+        let identity: Map<String, serde_json::Value> =
+            self.identity.iter().map(|(key, value)| ((*key).to_owned(), json!(value))).collect();
+        let reading = |(channel, value): &(ChannelId, Result<Shown, Absence>)| match value {
+            Ok(Shown(_, Value::Number(number))) => {
+                json!({"channel": channel.name(), "value": number, "unit": channel.channel().unit})
+            }
+            Ok(Shown(_, Value::Text(text))) => json!({"channel": channel.name(), "value": &**text, "unit": ""}),
+            Err(absence) => json!({"channel": channel.name(), "missing": absence.word()}),
+        };
+        json!({
+            "address": self.address,
+            "reachable": self.reachable,
+            "identity": identity,
+            "readings": self.readings.iter().map(reading).collect::<Vec<_>>(),
+            "timing": {"open_ms": self.open_ms, "read_ms": self.read_ms},
+            "problems": self.problems.iter().map(|one| json!({"what": one.what, "next": one.next})).collect::<Vec<_>>(),
+        })
+    }
+}
+
+fn shown(reading: Reading) -> (ChannelId, Result<Shown, Absence>) {
+    (reading.channel, reading.value.map(|value| Shown(reading.channel, value)))
+}
+
+fn next(absence: Absence) -> String {
+    let next = match absence {
+        Absence::OutOfRange => {
+            "Compare with the machine's own screen; if that is right, report the address and both values"
+        }
+        Absence::Refused => "Try again; if it lasts, look what the state of the machine forbids",
+        _ => "Try again; if it lasts, look at cable and switch",
+    };
+    next.to_owned()
+}
+
+fn trouble(error: &SourceError) -> Trouble {
+    let (what, next) = match error {
+        SourceError::Line { what, next, .. } => (what.clone(), next.clone()),
+        SourceError::Timeout { request, deadline_ms, next, .. } => {
+            (format!("no answer to {request} within {deadline_ms} ms"), next.clone())
+        }
+        SourceError::Refused { request, what, next, .. } => (format!("{request} refused: {what}"), next.clone()),
+        SourceError::Decode { request, what, .. } => {
+            (format!("the answer to {request} makes no sense: {what}"), "Is this the right device and port?".to_owned())
+        }
+        SourceError::Off { .. } => ("the machine is off".to_owned(), "Switch it on".to_owned()),
+        SourceError::End { .. } => ("the recording is over".to_owned(), "Give a longer one".to_owned()),
+    };
+    Trouble { what, next }
+}
+
+/// A channel on which two ways of talking to the same machine do not agree.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Which channel.
+    pub channel: ChannelId,
+    /// What we read by ourselves.
+    pub native: Value,
+    /// What the vendor's library reads.
+    pub vendor: Value,
+}
+
+/// Numbers of a running machine that are this close agree: two percent, or one of the unit.
+fn agree(native: &Value, vendor: &Value) -> bool {
+    match (native, vendor) {
+        (Value::Number(a), Value::Number(b)) => (a - b).abs() <= (0.02 * a.abs().max(b.abs())).max(1.0),
+        (a, b) => a == b,
+    }
+}
+
+/// Reads a FANUC controller by ourselves and through the vendor's library, one after the other, and lists the channels
+/// on which they differ. A channel that only one of them has is no difference.
+///
+/// # Errors
+/// The address is no FANUC controller that we talk to by ourselves, in words.
+pub fn compare(text: &str, library: &std::path::Path) -> Result<(Report, Report, Vec<Difference>), String> {
+    let address: Address = text.parse().map_err(|error| format!("{error}"))?;
+    let native = matches!(
+        address.target(),
+        adapters::address::Target::Fanuc { backend: adapters::address::FanucBackend::Native, .. }
+    );
+    if !native {
+        return Err(format!("{text}: give a fanuc:// address without backend= to compare with a library"));
+    }
+    let joint = if text.contains('?') { '&' } else { '?' };
+    let escaped = library.display().to_string().replace('%', "%25").replace('&', "%26").replace('?', "%3F");
+    let ours = examine(text)?;
+    let theirs = examine(&format!("{text}{joint}backend=vendor&library={escaped}"))?;
+    let differences = ours.readings.iter().filter_map(|(channel, native)| {
+        let native = native.as_ref().ok()?;
+        let vendor = theirs.readings.iter().find(|(other, _)| other == channel)?.1.as_ref().ok()?;
+        let difference = Difference { channel: *channel, native: native.1.clone(), vendor: vendor.1.clone() };
+        (!agree(&native.1, &vendor.1)).then_some(difference)
+    });
+    let differences = differences.collect();
+    Ok((ours, theirs, differences))
+}
+
+impl Difference {
+    /// For `doctor --json`.
+    #[must_use]
+    pub fn json(&self) -> serde_json::Value {
+        let value = |value: &Value| match value {
+            Value::Number(number) => json!(number),
+            Value::Text(text) => json!(&**text),
+        };
+        json!({"channel": self.channel.name(), "native": value(&self.native), "vendor": value(&self.vendor)})
+    }
+}
