@@ -83,6 +83,39 @@ impl SourceError {
     }
 }
 
+/// What a source knows of itself besides its readings: which device answers, how often it refreshes, how long the wire
+/// takes. Shown beside the source; never an input of anything.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fact {
+    /// What it is; a number's name ends in its unit.
+    pub name: String,
+    /// What is known.
+    pub value: FactValue,
+}
+
+/// What a [`Fact`] says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FactValue {
+    /// Finite, in the unit of the name.
+    Number(f64),
+    /// A name or a sentence.
+    Text(String),
+}
+
+impl Fact {
+    /// A number; its name ends in the unit.
+    #[must_use]
+    pub fn number(name: impl Into<String>, number: f64) -> Self {
+        Self { name: name.into(), value: FactValue::Number(number) }
+    }
+
+    /// A name or a sentence.
+    #[must_use]
+    pub fn text(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { name: name.into(), value: FactValue::Text(text.into()) }
+    }
+}
+
 /// Something that can be read.
 pub trait Source: Send {
     /// The address, as in the configuration.
@@ -106,6 +139,11 @@ pub trait Source: Send {
     /// # Errors
     /// See [`SourceError`].
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError>;
+
+    /// What it has found out about itself so far. Asked for about once a second; does not talk to the device.
+    fn facts(&self) -> Vec<Fact> {
+        Vec::new()
+    }
 }
 
 /// A source that brings its own time: a recording or the simulated machine, read as fast as the pipeline takes it.

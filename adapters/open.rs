@@ -3,6 +3,7 @@
 use crate::address::{Address, FanucBackend, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
 use crate::clock::TimeNs;
 use crate::driver::{Actuator, Pull, Source};
+use crate::modbus::ModbusMeter;
 use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
@@ -28,6 +29,14 @@ pub enum OpenError {
         /// The file named in the address.
         file: String,
         /// What the system said.
+        what: String,
+    },
+    /// What the address says does not go together, or names something that is not there.
+    #[error("{address}: {what}")]
+    Refused {
+        /// The address.
+        address: String,
+        /// Why, and what to do.
         what: String,
     },
     /// The address needs another way of running.
@@ -97,8 +106,17 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
             Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
         }
         Target::NcLink(target) => crate::nclink::open(address, target),
+        Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::tcp(address, at, meter)),
+        Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::rtu(address, line, meter)),
         other => Err(not_built(address, other)),
     }
+}
+
+/// A device that is read and never written.
+fn read_only<S: Source + 'static>(address: &Address, source: Result<S, String>) -> Result<Opened, OpenError> {
+    let refused = |what| OpenError::Refused { address: address.text().to_owned(), what };
+    let sources: Vec<Box<dyn Source>> = vec![Box::new(source.map_err(refused)?)];
+    Ok(Opened { sources, actuator: None, simulated: None, refused: Refused::default() })
 }
 
 /// Opens an address for a run as fast as possible, where a recording without dates and the built-in machine begin at
@@ -182,7 +200,11 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
 #[must_use]
 pub fn missing_driver(address: &Address) -> Option<OpenError> {
     match address.target() {
-        Target::Simulated(_) | Target::Replay(_) | Target::Fanuc { .. } => None,
+        Target::Simulated(_)
+        | Target::Replay(_)
+        | Target::ModbusTcp { .. }
+        | Target::ModbusRtu { .. }
+        | Target::Fanuc { .. } => None,
         Target::NcLink(target) if !target.tls => None,
         other => Some(not_built(address, other)),
     }
@@ -192,10 +214,10 @@ fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",
         Target::Fanuc { .. } => "another pace than that of the clock for a real controller",
+        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "another pace than that of the clock for a real meter",
         Target::NcLink(target) if target.tls => "TLS to the broker",
         Target::NcLink(_) => "another pace than that of the clock for a real controller",
         Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",
-        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "the Modbus meter driver",
         Target::Eda9033a { .. } => "the EDA9033A meter driver",
         Target::Waveform { .. } => "the waveform receiver",
     };

@@ -121,6 +121,15 @@ pub struct GateStatus {
     pub recent: Vec<DecisionStatus>,
 }
 
+/// What a source knows of itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FactStatus {
+    /// What it is; a number's name ends in its unit.
+    pub name: String,
+    /// What is known.
+    pub value: Shown,
+}
+
 /// A source and how it keeps its pace.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SourceStatus {
@@ -150,6 +159,9 @@ pub struct SourceStatus {
     pub missed: u64,
     /// Readings and polls dropped: too late, by a stepping clock, unannounced, or nobody took them.
     pub dropped: u64,
+    /// Device, register map, effective refresh, load of the wire and the like.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub facts: Vec<FactStatus>,
 }
 
 /// A script and whether its newest text is in charge.

@@ -6,8 +6,8 @@ mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use target::{
-    Endpoint, FanucBackend, NcLinkTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine,
-    SimulatedTarget, Speed, Target,
+    Circuit, Endpoint, FanucBackend, MeterTarget, NcLinkTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice,
+    SimulatedMachine, SimulatedTarget, Speed, Target,
 };
 
 use keys::Keys;

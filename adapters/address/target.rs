@@ -6,6 +6,7 @@ use super::keys::Keys;
 use crate::channel::nearest;
 use crate::driver::LadderRule;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// How fast a replay or a simulated machine runs against the clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -143,6 +144,34 @@ pub struct NcLinkTarget {
     pub spindle_axis: Option<u32>,
 }
 
+/// What a power meter sits in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Circuit {
+    /// The supply of the whole machine: `total_power_w`.
+    Machine,
+    /// The supply of the spindle drive: `spindle_power_w`, `spindle_current_a`.
+    Spindle,
+}
+
+/// A Modbus meter on its line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeterTarget {
+    /// Unit identifier.
+    pub unit: u8,
+    /// Name of the register profile.
+    pub profile: String,
+    /// Directory of the user's own profiles.
+    pub profiles: Option<PathBuf>,
+    /// What it measures.
+    pub circuit: Circuit,
+    /// Ratio of the current transformers, where the meter does not count it in.
+    pub ct: f64,
+    /// Ratio of the voltage transformers, where the meter does not count it in.
+    pub pt: f64,
+    /// How long a request may take.
+    pub timeout: Duration,
+}
+
 /// What an address means.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
@@ -174,19 +203,15 @@ pub enum Target {
     ModbusTcp {
         /// Where.
         at: Endpoint,
-        /// Unit identifier.
-        unit: u8,
-        /// Name of the register profile.
-        profile: String,
+        /// Which meter, and what it measures.
+        meter: MeterTarget,
     },
     /// A Modbus device on a serial line.
     ModbusRtu {
         /// Where.
         line: SerialTarget,
-        /// Unit identifier.
-        unit: u8,
-        /// Name of the register profile.
-        profile: String,
+        /// Which meter, and what it measures.
+        meter: MeterTarget,
     },
     /// An EDA9033A meter in its native protocol.
     Eda9033a {
@@ -216,12 +241,12 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
             Ok(Target::HncNet { at: endpoint(body, Some(10001))?, library: library? })
         }
         "modbus-tcp" => {
-            let (unit, profile) = (keys.number("unit", 1, 0, 247), profile(keys));
-            Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, unit, profile: profile? })
+            let meter = meter(keys, 0);
+            Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
         }
         "modbus-rtu" => {
-            let (line, unit, profile) = (serial(body, keys), keys.number("unit", 1, 1, 247), profile(keys));
-            Ok(Target::ModbusRtu { line: line?, unit, profile: profile? })
+            let (line, meter) = (serial(body, keys), meter(keys, 1));
+            Ok(Target::ModbusRtu { line: line?, meter: meter? })
         }
         "eda9033a" => {
             let (line, address) = (serial(body, keys), keys.number("address", 1, 0, 255));
@@ -316,8 +341,19 @@ fn library(keys: &mut Keys) -> Result<PathBuf, String> {
     keys.text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
 }
 
-fn profile(keys: &mut Keys) -> Result<String, String> {
-    keys.text("profile").ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())
+fn meter(keys: &mut Keys, least_unit: u8) -> Result<MeterTarget, String> {
+    let unit = keys.number("unit", 1, least_unit, 247);
+    let profile = keys.text("profile");
+    let profiles = keys.text("profiles").map(PathBuf::from);
+    let circuit = keys.choice("circuit", &[("machine", Circuit::Machine), ("spindle", Circuit::Spindle)]);
+    let (ct, pt) = (keys.number("ct", 1.0, 0.001, 100_000.0), keys.number("pt", 1.0, 0.001, 100_000.0));
+    let timeout = timeout(keys);
+    let profile = profile.ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())?;
+    Ok(MeterTarget { unit, profile, profiles, circuit, ct, pt, timeout })
+}
+
+fn timeout(keys: &mut Keys) -> Duration {
+    Duration::from_millis(keys.number("timeout_ms", 500, 10, 60_000))
 }
 
 fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {

@@ -41,6 +41,8 @@ pub struct WorkerSettings {
     pub off_pause: Duration,
     /// A poll that has not returned after this time is shown as stuck.
     pub deadline: Duration,
+    /// Time between two polls; `None`: the source's own pace.
+    pub period: Option<Duration>,
 }
 
 impl Default for WorkerSettings {
@@ -51,6 +53,7 @@ impl Default for WorkerSettings {
             backoff_max: Duration::from_secs(30),
             off_pause: Duration::from_secs(2),
             deadline: Duration::from_secs(10),
+            period: None,
         }
     }
 }
@@ -90,13 +93,15 @@ impl Worker {
         settings: WorkerSettings,
     ) -> Result<Self, std::io::Error> {
         let name = source.name().to_owned();
-        let ledger = Ledger::new(source.period(), settings.deadline, clock.now_ns());
+        let period = settings.period.unwrap_or_else(|| source.period());
+        let ledger = Ledger::new(period, settings.deadline, clock.now_ns());
         let shared = Arc::new(Shared {
             stop: AtomicBool::new(false),
             queue: Mutex::new(Queue::new(settings.queue_polls)),
             ledger: Mutex::new(ledger),
         });
-        let mut poller = Poller { source, clock, settings, shared: shared.clone(), failures: 0 };
+        let asked_ns = TimeNs::MIN;
+        let mut poller = Poller { source, clock, settings, period, shared: shared.clone(), failures: 0, asked_ns };
         let thread = std::thread::Builder::new().name("source".to_owned()).spawn(move || poller.run())?;
         Ok(Self { name, shared, thread: Some(thread) })
     }
@@ -174,8 +179,11 @@ struct Poller {
     source: Box<dyn Source>,
     clock: Arc<dyn Clock>,
     settings: WorkerSettings,
+    period: Duration,
     shared: Arc<Shared>,
     failures: u32,
+    /// When the source was last asked for its facts.
+    asked_ns: TimeNs,
 }
 
 impl Poller {
@@ -188,6 +196,7 @@ impl Poller {
             let error = poll.error.clone();
             locked(&self.shared.queue).put(poll);
             locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
+            self.take_facts(ended_ns);
             if matches!(error, Some(SourceError::End { .. })) {
                 return;
             }
@@ -195,6 +204,15 @@ impl Poller {
             self.sleep_until(due_ns);
         }
         locked(&self.shared.ledger).stopped(self.clock.now_ns());
+    }
+
+    fn take_facts(&mut self, now_ns: TimeNs) {
+        if now_ns.saturating_sub(self.asked_ns) < SECOND_NS {
+            return;
+        }
+        self.asked_ns = now_ns;
+        let facts = self.source.facts();
+        locked(&self.shared.ledger).facts(facts);
     }
 
     fn stopping(&self) -> bool {
@@ -211,7 +229,7 @@ impl Poller {
 
     /// The next beat after `ended_ns`, or the end of the pause after a failure.
     fn next_due(&mut self, due_ns: TimeNs, ended_ns: TimeNs, error: Option<&SourceError>) -> TimeNs {
-        let period_ns = nanoseconds(self.source.period()).max(1);
+        let period_ns = nanoseconds(self.period).max(1);
         self.failures = if error.is_some() { self.failures.saturating_add(1) } else { 0 };
         match error {
             Some(SourceError::Off { .. }) => return ended_ns + nanoseconds(self.settings.off_pause).max(period_ns),

@@ -1,7 +1,7 @@
 //! How a source has been doing: pace, lateness, round trip, failures.
 
 use crate::clock::TimeNs;
-use crate::driver::SourceError;
+use crate::driver::{Fact, SourceError};
 use std::time::Duration;
 
 /// Percentiles are over at most this many polls.
@@ -84,6 +84,8 @@ pub struct WorkerStats {
     pub last_error: Option<SourceError>,
     /// Since when every poll has failed with it, or had until it passed.
     pub last_error_since_ns: Option<TimeNs>,
+    /// What the source knows of itself, at most about a second old.
+    pub facts: Vec<Fact>,
 }
 
 /// The last durations, in nanoseconds.
@@ -131,6 +133,7 @@ pub(super) struct Ledger {
     missed: u64,
     last_error: Option<SourceError>,
     last_error_since_ns: Option<TimeNs>,
+    facts: Vec<Fact>,
     pace: Duration,
     new_pace: Option<Duration>,
 }
@@ -152,6 +155,7 @@ impl Ledger {
             missed: 0,
             last_error: None,
             last_error_since_ns: None,
+            facts: Vec::new(),
             pace: period,
             new_pace: None,
         }
@@ -218,6 +222,10 @@ impl Ledger {
         self.new_pace.take()
     }
 
+    pub(super) fn facts(&mut self, facts: Vec<Fact>) {
+        self.facts = facts;
+    }
+
     pub(super) fn missed(&mut self, beats: u64) {
         self.missed += beats;
     }
@@ -242,6 +250,7 @@ impl Ledger {
             dropped,
             last_error: self.last_error.clone(),
             last_error_since_ns: self.last_error_since_ns,
+            facts: self.facts.clone(),
         }
     }
 }

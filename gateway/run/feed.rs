@@ -1,10 +1,10 @@
 //! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
 
-use crate::status::SourceStatus;
+use crate::status::{FactStatus, Shown, SourceStatus};
 use adapters::clock::TimeNs;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
 use adapters::worker::{Worker, WorkerState, WorkerStats};
-use adapters::{Sample, SourceError};
+use adapters::{Fact, FactValue, Sample, SourceError};
 use std::time::Duration;
 
 /// See the [module](self).
@@ -92,7 +92,16 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         failures: stats.failures,
         missed: stats.missed,
         dropped: dropped(counts) + stats.dropped,
+        facts: stats.facts.iter().map(shown).collect(),
     }
+}
+
+fn shown(fact: &Fact) -> FactStatus {
+    let value = match &fact.value {
+        FactValue::Number(number) => Shown::Number(*number),
+        FactValue::Text(text) => Shown::Text(text.clone()),
+    };
+    FactStatus { name: fact.name.clone(), value }
 }
 
 fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: MergeCounts) -> SourceStatus {
@@ -116,5 +125,6 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         failures: counts.failures,
         missed: 0,
         dropped: dropped(counts),
+        facts: Vec::new(),
     }
 }

@@ -80,7 +80,8 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     for source in &config.sources {
         match open(&source.address, clock.now_ns()) {
             Ok(opened) => {
-                let settings = WorkerSettings { deadline: source.deadline, ..WorkerSettings::default() };
+                let (deadline, period) = (source.deadline, source.period);
+                let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
                 found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
                 actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
                 machines.extend(opened.simulated);
@@ -97,7 +98,11 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
 }
 
 fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Clock>) -> std::io::Result<Feed> {
-    let plans: Vec<SourcePlan> = sources.iter().map(|(source, _)| SourcePlan::of(source.as_ref())).collect();
+    let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
+        let plan = SourcePlan::of(source.as_ref());
+        SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
+    };
+    let plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
     let merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
     Ok(Feed::Threads { workers: sources.into_iter().map(start).collect::<Result<_, _>>()?, merge })

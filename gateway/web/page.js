@@ -112,7 +112,9 @@ function showCards() {
     if (source.jitter_p99_ms !== null) figures.push(`${text("jitter")} ${number(source.jitter_p99_ms)} ms`);
     if (source.round_trip_p50_ms !== null) figures.push(`${text("trip")} ${number(source.round_trip_p50_ms)} ms`);
     if (source.failures) figures.push(`${source.failures} ${text("failures")}`);
-    return row(source.name, `${text("period")} ${number(source.period_s)} s`, source.error ?? figures.join(" · "), { dot: source.error ? "bad" : "good", bad: Boolean(source.error) });
+    const line = row(source.name, `${text("period")} ${number(source.period_s)} s`, source.error ?? figures.join(" · "), { dot: source.error ? "bad" : "good", bad: Boolean(source.error) });
+    line.title = (source.facts ?? []).map((fact) => `${fact.name}: ${typeof fact.value === "number" ? number(fact.value) : fact.value}`).join("\n");
+    return line;
   }), text("none"));
   filled("scripts", status.scripts.map((script) => {
     const line = row(script.file, script.version, text(script.condition), { dot: CONDITIONS[script.condition] ?? "warn", bad: CONDITIONS[script.condition] === "bad" });

@@ -2,6 +2,7 @@
 //! a machine.
 
 mod fanuc;
+mod modbus;
 mod nclink;
 
 use super::{CannotRun, CommandResult, Outcome};
@@ -21,6 +22,8 @@ pub(super) enum Served {
     Fanuc(fanuc::FanucArguments),
     /// An NC-Link device (GB/T 41970) at an MQTT broker, laid out like a Huazhong controller.
     Nclink(nclink::NclinkArguments),
+    /// A Modbus TCP meter: unit 1 in the machine's supply, unit 2 in that of the spindle drive.
+    Modbus(modbus::ModbusArguments),
 }
 
 /// What every partner has in common.
@@ -69,6 +72,7 @@ pub(super) fn run(what: &Served) -> CommandResult {
     match what {
         Served::Fanuc(arguments) => fanuc::serve(arguments),
         Served::Nclink(arguments) => nclink::serve(arguments),
+        Served::Modbus(arguments) => modbus::serve(arguments),
     }
 }
 

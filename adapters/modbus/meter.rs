@@ -1,0 +1,300 @@
+//! A Modbus meter as a source.
+
+use super::line::{Fault, Line};
+use super::pdu::{Block, NoRegisters};
+use super::plan::Plan;
+use super::profile::{Profile, Quantity, Register, find};
+use super::refresh::Refresh;
+use super::rtu::RtuLine;
+use super::tcp::TcpLine;
+use crate::address::{Address, Circuit, Endpoint, MeterTarget, SerialTarget};
+use crate::channel::ChannelId;
+use crate::clock::Clock;
+use crate::driver::{Fact, Source, SourceError};
+use crate::reading::{Absence, Reading, Stamp};
+use crate::serial::Bus;
+use std::time::Duration;
+
+/// How the registers of an output are put together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Law {
+    Sum,
+    Mean,
+    /// Mean of the phases against neutral, times the square root of three.
+    BetweenPhases,
+}
+
+/// A channel and the registers that it comes from.
+#[derive(Debug, Clone, PartialEq)]
+struct Output {
+    channel: ChannelId,
+    law: Law,
+    /// Positions in the profile's list.
+    registers: Vec<usize>,
+}
+
+/// A meter that is polled over Modbus.
+pub struct ModbusMeter {
+    name: String,
+    line: Box<dyn Line>,
+    unit: u8,
+    profile: Profile,
+    plan: Plan,
+    factors: Vec<f64>,
+    outputs: Vec<Output>,
+    channels: Vec<ChannelId>,
+    period: Duration,
+    serial: Option<SerialTarget>,
+    refresh: Refresh,
+    registers: Vec<Result<Vec<u16>, u8>>,
+    stamps: Vec<Stamp>,
+}
+
+impl ModbusMeter {
+    /// A meter on the network.
+    ///
+    /// # Errors
+    /// In words: an unusable profile.
+    pub fn tcp(address: &Address, at: &Endpoint, meter: &MeterTarget) -> Result<Self, String> {
+        let line = TcpLine::new(at.clone(), meter.timeout);
+        Self::new(address, Box::new(line), meter, None)
+    }
+
+    /// A meter on a serial line.
+    ///
+    /// # Errors
+    /// In words: an unusable profile; a line that another address uses at another speed.
+    pub fn rtu(address: &Address, target: &SerialTarget, meter: &MeterTarget) -> Result<Self, String> {
+        let line = RtuLine::new(Bus::of(target)?, meter.timeout);
+        Self::new(address, Box::new(line), meter, Some(target.clone()))
+    }
+
+    fn new(
+        address: &Address,
+        line: Box<dyn Line>,
+        meter: &MeterTarget,
+        serial: Option<SerialTarget>,
+    ) -> Result<Self, String> {
+        let profile = find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
+        let plan = Plan::of(&profile)?;
+        let factors = factors(&profile, meter)?;
+        let outputs = outputs(&profile, meter.circuit)?;
+        let busy = serial.as_ref().map(|line| plan.wire_time(line) * 5 / 4).unwrap_or_default();
+        Ok(Self {
+            name: address.text().to_owned(),
+            line,
+            unit: meter.unit,
+            period: profile.period.max(busy),
+            channels: outputs.iter().map(|output| output.channel).collect(),
+            plan,
+            profile,
+            factors,
+            outputs,
+            serial,
+            refresh: Refresh::default(),
+            registers: Vec::new(),
+            stamps: Vec::new(),
+        })
+    }
+
+    /// The map that is read.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// Reads every block; a block that is refused is kept as refused, anything else ends the poll.
+    fn poll(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.registers.clear();
+        self.stamps.clear();
+        for block in &self.plan.blocks {
+            let asked = ask(self.line.as_mut(), clock, self.unit, block);
+            let (registers, stamp) = match asked {
+                Ok((registers, stamp)) => (Ok(registers), stamp),
+                Err(Fault::Refused(code)) if self.plan.blocks.len() > 1 => (Err(code), Stamp::exact(clock.now_ns())),
+                Err(fault) => return Err(fault.of_source(&self.name, block.told(), self.line.deadline())),
+            };
+            self.registers.push(registers);
+            self.stamps.push(stamp);
+        }
+        match self
+            .registers
+            .iter()
+            .zip(&self.plan.blocks)
+            .find_map(|(found, block)| Some((found.as_ref().err()?, block)))
+        {
+            Some((code, block)) if self.registers.iter().all(Result::is_err) => {
+                Err(Fault::Refused(*code).of_source(&self.name, block.told(), self.line.deadline()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn reading(&self, output: &Output) -> Reading {
+        let mut stamp = self.stamps[0];
+        let mut numbers = Vec::with_capacity(3);
+        for index in &output.registers {
+            match self.number(*index) {
+                Ok((number, at)) => {
+                    stamp = at;
+                    numbers.push(number);
+                }
+                Err((reason, at)) => return Reading::absent(output.channel, at, reason),
+            }
+        }
+        Reading::number(output.channel, stamp, output.law.of(&numbers))
+    }
+
+    fn number(&self, index: usize) -> Result<(f64, Stamp), (Absence, Stamp)> {
+        let register = &self.profile.registers[index];
+        let holds = |block: &Block| {
+            register.address >= block.start
+                && register.address - block.start + register.format.registers() <= block.count
+        };
+        let Some(at) = self.plan.blocks.iter().position(holds) else {
+            return Err((Absence::NotSupported, self.stamps[0]));
+        };
+        let (stamp, offset) = (self.stamps[at], usize::from(register.address - self.plan.blocks[at].start));
+        let registers = self.registers[at].as_ref().map_err(|_| (Absence::Refused, stamp))?;
+        let decoded = register.format.decode(&registers[offset..], self.profile.word_order);
+        // What a meter does not measure it gives as an IEEE number that is none.
+        let number = decoded.ok_or((Absence::NotSupported, stamp))?;
+        Ok((number * self.factors[index], stamp))
+    }
+
+    fn look_at_refresh(&mut self) {
+        let all: Vec<u16> = self.registers.iter().flatten().flatten().copied().collect();
+        if let Some(stamp) = self.stamps.first() {
+            self.refresh.push(&all, stamp.mid_ns);
+        }
+    }
+}
+
+fn ask(line: &mut dyn Line, clock: &dyn Clock, unit: u8, block: &Block) -> Result<(Vec<u16>, Stamp), Fault> {
+    let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
+    match block.registers(&answer.pdu) {
+        Ok(registers) => Ok((registers, answer.stamp)),
+        Err(NoRegisters::Refused(code)) => Err(Fault::Refused(code)),
+        Err(NoRegisters::Other(bytes)) => Err(Fault::Garbled(format!("{bytes} bytes that answer another question"))),
+    }
+}
+
+impl Law {
+    fn of(self, numbers: &[f64]) -> f64 {
+        let sum: f64 = numbers.iter().sum();
+        let count = f64::from(u32::try_from(numbers.len()).unwrap_or(1)).max(1.0);
+        match self {
+            Self::Sum => sum,
+            Self::Mean => sum / count,
+            Self::BetweenPhases => 3.0_f64.sqrt() * sum / count,
+        }
+    }
+}
+
+/// Register to channel unit, with the transformers where the meter does not count them in.
+fn factors(profile: &Profile, meter: &MeterTarget) -> Result<Vec<f64>, String> {
+    let given = (meter.ct - 1.0).abs() > 1e-12 || (meter.pt - 1.0).abs() > 1e-12;
+    if given && !profile.secondary {
+        return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
+    }
+    let ratio = |quantity| match quantity {
+        Quantity::Power | Quantity::PhasePower(_) => meter.ct * meter.pt,
+        Quantity::Current(_) => meter.ct,
+        Quantity::Voltage(_) | Quantity::LineVoltage => meter.pt,
+        Quantity::Channel(_) => 1.0,
+    };
+    Ok(profile.registers.iter().map(|register| register.factor * ratio(register.quantity)).collect())
+}
+
+fn outputs(profile: &Profile, circuit: Circuit) -> Result<Vec<Output>, String> {
+    let where_is = |wanted: &dyn Fn(Quantity) -> bool| -> Vec<usize> {
+        let each = profile.registers.iter().enumerate();
+        each.filter(|(_, register)| wanted(register.quantity)).map(|(index, _)| index).collect()
+    };
+    let total = where_is(&|quantity| quantity == Quantity::Power);
+    let phases = where_is(&|quantity| matches!(quantity, Quantity::PhasePower(_)));
+    let currents = where_is(&|quantity| matches!(quantity, Quantity::Current(_)));
+    let line = where_is(&|quantity| quantity == Quantity::LineVoltage);
+    let voltages = where_is(&|quantity| matches!(quantity, Quantity::Voltage(_)));
+    let power = if circuit == Circuit::Spindle { "spindle_power_w" } else { "total_power_w" };
+    let mut outputs = Vec::new();
+    let mut add = |name: &str, law, registers: Vec<usize>| {
+        if let Some(channel) = ChannelId::of(name).filter(|_| !registers.is_empty()) {
+            outputs.push(Output { channel, law, registers });
+        }
+    };
+    add(power, Law::Sum, if total.is_empty() { phases } else { total });
+    if circuit == Circuit::Spindle {
+        add("spindle_current_a", Law::Mean, currents);
+    }
+    let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
+    add("supply_voltage_v", law, voltages);
+    for (index, register) in profile.registers.iter().enumerate() {
+        if let Quantity::Channel(channel) = register.quantity {
+            outputs.push(Output { channel, law: Law::Sum, registers: vec![index] });
+        }
+    }
+    let mut seen = Vec::new();
+    for output in &outputs {
+        if seen.contains(&output.channel) {
+            return Err(format!("profile {} gives {} twice", profile.name, output.channel));
+        }
+        seen.push(output.channel);
+    }
+    if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
+}
+
+fn point_name(register: &Register) -> Option<Fact> {
+    let Quantity::Channel(channel) = register.quantity else { return None };
+    register.name.as_ref().map(|name| Fact::text(channel.name(), name.clone()))
+}
+
+impl Source for ModbusMeter {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        if let Err(error) = self.poll(clock) {
+            self.refresh.interrupt();
+            return Err(error);
+        }
+        self.look_at_refresh();
+        out.extend(self.outputs.iter().map(|output| self.reading(output)));
+        Ok(())
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let mut facts = vec![Fact::text("meter", self.profile.meter.clone())];
+        if !self.profile.confirmed {
+            facts.push(Fact::text("register_map", format!("to be confirmed: {}", self.profile.source)));
+        }
+        if let Some(line) = &self.serial {
+            let wire = self.plan.wire_time(line);
+            facts.push(Fact::number("wire_time_ms", wire.as_secs_f64() * 1e3));
+            facts.push(Fact::number("wire_share_pct", 100.0 * wire.as_secs_f64() / self.period.as_secs_f64()));
+        }
+        match self.refresh.effective() {
+            Some(found) if found.at_least_as_fast => {
+                facts.push(Fact::text("effective_refresh", "at least as fast as it is polled"));
+            }
+            Some(found) => {
+                facts.push(Fact::number("effective_refresh_s", found.refresh_s));
+                facts.push(Fact::number("effective_refresh_uncertainty_s", found.uncertainty_s));
+            }
+            None => facts.push(Fact::text("effective_refresh", "not known yet")),
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a count of late answers stays far below 2^53")]
+        facts.push(Fact::number("late_answers", self.line.late_answers() as f64));
+        facts.extend(self.profile.registers.iter().filter_map(point_name));
+        facts
+    }
+}

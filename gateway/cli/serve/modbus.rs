@@ -1,0 +1,43 @@
+//! `cnc-gateway serve modbus`: the simulated machine's meters.
+
+use super::{CannotRun, CommandResult, Common, until_stopped};
+use crate::cli::print;
+use adapters::modbus::profile;
+use adapters::modbus::server::ModbusServer;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `serve modbus`.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct ModbusArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Which meter to be.
+    #[arg(long, value_name = "NAME", default_value = "sdm630")]
+    profile: String,
+    /// Directory of profiles of your own.
+    #[arg(long, value_name = "DIR")]
+    profiles: Option<PathBuf>,
+}
+
+/// Serves until told to stop.
+pub(super) fn serve(arguments: &ModbusArguments) -> CommandResult {
+    let profile = profile::find(&arguments.profile, arguments.profiles.as_deref());
+    let profile = profile.map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let running = arguments.common.machine()?;
+    let listen = arguments.common.listen(5020);
+    let (meter, name) = (profile.meter.clone(), profile.name.clone());
+    let server = ModbusServer::start(listen, &running.machine, running.clock.clone(), profile).map_err(|error| {
+        CannotRun::new(
+            format!("cannot listen on {listen}: {error}"),
+            "choose another port with --listen 127.0.0.1:5021",
+        )
+    })?;
+    let at = server.at();
+    print(&format!(
+        "serving {meter} over Modbus TCP on {at}\n  \
+         the machine:       modbus-tcp://{at}?unit=1&profile={name}\n  \
+         its spindle drive: modbus-tcp://{at}?unit=2&profile={name}&circuit=spindle\n"
+    ));
+    until_stopped()
+}
