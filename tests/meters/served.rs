@@ -41,10 +41,10 @@ fn machine_and_spindle_are_two_units() {
         let total_w = number(&poll(total.as_mut()).expect("answers"), "total_power_w");
         let readings = poll(spindle.as_mut()).expect("answers");
         let spindle_w = number(&readings, "spindle_power_w");
-        if spindle_w > 200.0 {
-            assert!(total_w > 0.0 && number(&readings, "spindle_current_a") > 0.0);
-            let volts = number(&readings, "supply_voltage_v");
-            assert!((300.0..480.0).contains(&volts), "{volts}");
+        let volts = number(&readings, "supply_voltage_v");
+        assert!((300.0..480.0).contains(&volts), "{volts}");
+        // The simulated meter has pulses; what is asked for comes together soon.
+        if spindle_w > 200.0 && total_w > 200.0 && number(&readings, "spindle_current_a") > 0.5 {
             return;
         }
         assert!(Instant::now() < until, "the spindle never turned");
