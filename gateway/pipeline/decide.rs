@@ -3,7 +3,7 @@
 use crate::gate::Verdict;
 use crate::history::{Alarm, AlarmClear, Decision as DecisionRow, Event, Record};
 use adapters::clock::TimeNs;
-use rules::script::{AlarmChange, Decision, OverrideRequest, SCRIPT_STOPPED};
+use rules::script::{AlarmChange, Axis, Decision, OffsetProposal, OverrideRequest, Stop, StopRequest};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -40,6 +40,9 @@ pub struct Change {
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
     asked: Option<Asked>,
+    stops: Vec<(Stop, Arc<str>)>,
+    /// Whole micrometres: finer changes are not recorded one by one.
+    offsets: Vec<(Axis, i64)>,
     recent: VecDeque<Change>,
 }
 
@@ -60,10 +63,41 @@ impl Decisions {
         for problem in &decision.problems {
             keep(event("script_failed", &problem.file, &problem.to_string(), decision.at_ns));
         }
+        self.stops(decision, &mut keep);
+        self.offsets(decision, &mut keep);
         let asked = decision.request.as_ref().map(|request| Asked::of(request, verdict));
         if asked != self.asked {
             keep(self.change(decision, verdict, asked).into());
         }
+    }
+
+    /// A request to hold or to change the tool is recorded when it begins.
+    fn stops(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
+        for request in &decision.stops {
+            if !self.stops.iter().any(|(stop, script)| *stop == request.stop && *script == request.script) {
+                keep(stop_row(request, decision.at_ns).into());
+                let text = format!("{} asked for ({})", request.stop.word(), request.reason);
+                self.recent.push_front(Change { at_ns: decision.at_ns, text });
+                self.recent.truncate(RECENT);
+            }
+        }
+        self.stops.clear();
+        self.stops.extend(decision.stops.iter().map(|request| (request.stop, request.script.clone())));
+    }
+
+    /// A proposed offset is recorded when it has changed by a micrometre.
+    fn offsets(&mut self, decision: &Decision, keep: &mut impl FnMut(Record)) {
+        for proposal in &decision.offsets {
+            #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
+            let whole_um = proposal.offset_um.round() as i64;
+            match self.offsets.iter_mut().find(|(axis, _)| *axis == proposal.axis) {
+                Some((_, known)) if *known == whole_um => continue,
+                Some((_, known)) => *known = whole_um,
+                None => self.offsets.push((proposal.axis, whole_um)),
+            }
+            keep(offset_row(proposal, decision.at_ns).into());
+        }
+        self.offsets.retain(|(axis, _)| decision.offsets.iter().any(|proposal| proposal.axis == *axis));
     }
 
     fn change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<Asked>) -> DecisionRow {
@@ -102,14 +136,42 @@ fn row_of(request: &OverrideRequest, at_ns: TimeNs) -> DecisionRow {
     }
 }
 
+/// What became of it is the gate's to say.
+const ASKED: &str = "asked";
+
+fn stop_row(request: &StopRequest, at_ns: TimeNs) -> DecisionRow {
+    DecisionRow {
+        at_ns,
+        script: request.script.to_string(),
+        script_version: format!("{:016x}", request.version),
+        wanted: request.stop.word().to_owned(),
+        reason: request.reason.to_string(),
+        outcome: ASKED.to_owned(),
+        ..DecisionRow::default()
+    }
+}
+
+fn offset_row(proposal: &OffsetProposal, at_ns: TimeNs) -> DecisionRow {
+    DecisionRow {
+        at_ns,
+        script: proposal.script.to_string(),
+        script_version: format!("{:016x}", proposal.version),
+        wanted: format!("{}_offset_um", proposal.axis.word()),
+        value: proposal.offset_um.is_finite().then_some(proposal.offset_um),
+        unit: "um".to_owned(),
+        reason: proposal.reason.to_string(),
+        outcome: ASKED.to_owned(),
+        outcome_reason: String::new(),
+    }
+}
+
 fn alarm(change: &AlarmChange, at_ns: TimeNs) -> Record {
     let (code, source) = (change.name.to_string(), change.script.to_string());
     if !change.raised {
         return AlarmClear { at_ns, code, source }.into();
     }
-    let severity = if &*change.name == SCRIPT_STOPPED { "critical" } else { "warning" };
-    let text = change.text.to_string();
-    Alarm { at_ns, code, source, severity: severity.to_owned(), en: text.clone(), zh: text }.into()
+    let severity = change.level.word().to_owned();
+    Alarm { at_ns, code, source, severity, en: change.en.to_string(), zh: change.zh.to_string() }.into()
 }
 
 fn event(kind: &str, source: &str, text: &str, at_ns: TimeNs) -> Record {

@@ -10,7 +10,7 @@ use crate::pipeline::{Pipeline, Store};
 use crate::status::{HistoryStatus, Problem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -21,6 +21,9 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 const SAVE_EVERY: Duration = Duration::from_secs(60);
 /// One day of machine time.
 const DAY_NS: i64 = 86_400 * SECOND_NS;
+
+/// What the scripts remember, beside what the estimators have learned.
+pub(super) const SCRIPTS_MEMORY: &str = "scripts.json";
 
 /// See the [module](self).
 pub struct Health {
@@ -147,17 +150,15 @@ impl Health {
         }
     }
 
-    /// Saves what the estimators have learned: a new file in the place of the old one.
+    /// Saves what the estimators have learned and what the scripts remember: new files in the place of the old ones.
     fn save(&mut self, pipeline: &Pipeline) {
         self.saved = Instant::now();
-        let text = pipeline.estimators().snapshot().to_string();
-        let fresh = self.memory.with_extension("new");
-        let directory = self.memory.parent().map_or(Ok(()), std::fs::create_dir_all);
-        let saved =
-            directory.and_then(|()| std::fs::write(&fresh, text)).and_then(|()| std::fs::rename(&fresh, &self.memory));
-        if let Err(error) = saved {
-            let text = format!("what was learned could not be saved in {}: {error}", self.memory.display());
-            tracing::warn!("{text}");
+        let scripts = self.memory.with_file_name(SCRIPTS_MEMORY);
+        let both = [(&self.memory, pipeline.estimators().snapshot()), (&scripts, pipeline.scripts().snapshot())];
+        for (path, snapshot) in both {
+            if let Err(error) = replace(path, &snapshot.to_string()) {
+                tracing::warn!("what was learned could not be saved in {}: {error}", path.display());
+            }
         }
     }
 
@@ -207,6 +208,14 @@ impl Health {
 }
 
 /// A length of time in words.
+/// A whole file in one step.
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+    let fresh = path.with_extension("new");
+    std::fs::write(&fresh, text)?;
+    std::fs::rename(&fresh, path)
+}
+
 fn span(ns: i64) -> String {
     let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
     match seconds {

@@ -9,7 +9,6 @@ use crate::status::{
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Sample, Slot, Value};
 use rules::estimators::{Estimated, Estimates};
-use rules::script::SCRIPT_STOPPED;
 
 /// Half the 95 % interval of a normal distribution, in standard deviations.
 const HALF_INTERVAL: f64 = 1.96;
@@ -85,8 +84,8 @@ pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
     });
     let scripts = pipeline.scripts().alarms().iter().map(|alarm| AlarmStatus {
         code: format!("{} ({})", alarm.name, alarm.script),
-        severity: if &*alarm.name == SCRIPT_STOPPED { "critical" } else { "warning" }.to_owned(),
-        text: alarm.text.to_string(),
+        severity: alarm.level.word().to_owned(),
+        text: alarm.en.to_string(),
         since_ms: milliseconds(alarm.since_ns),
     });
     controller.into_iter().chain(scripts).collect()

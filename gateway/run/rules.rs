@@ -1,6 +1,6 @@
 //! The scripts of a running box: delivered at the first start, loaded, watched, reloaded.
 
-use super::health::Health;
+use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::Wishes;
 use crate::config::Config;
 use crate::log::{Notice, Severity};
@@ -21,6 +21,9 @@ pub fn load(config: &Config) -> (Host, Watched) {
         told.push(Notice::new(Severity::Warning, "scripts_not_written", text));
     }
     let mut host = Host::new();
+    if let Some(remembered) = remembered(config) {
+        host.restore(&remembered);
+    }
     if directory.is_dir() {
         if let Err(problems) = load_now(directory, &mut host) {
             let consequence = match load_rest(directory, &problems, &mut host) {
@@ -43,6 +46,12 @@ pub fn load(config: &Config) -> (Host, Watched) {
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
     (host, Watched { reloader: reloader.ok(), told })
+}
+
+/// What the scripts remembered when the box last saved it.
+fn remembered(config: &Config) -> Option<serde_json::Value> {
+    let text = std::fs::read_to_string(config.gateway.data_dir.join(SCRIPTS_MEMORY)).ok()?;
+    serde_json::from_str(&text).ok()
 }
 
 fn refused(problems: &[Problem], consequence: &str) -> Notice {

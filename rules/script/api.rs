@@ -2,7 +2,7 @@
 
 use super::functions::{Method, SUBJECTS, Subject};
 use super::vocabulary::vocabulary;
-use super::{FUNCTIONS, words};
+use super::{FUNCTIONS, HANDLERS, RECORDS, words};
 use crate::estimators::SETTINGS;
 use serde_json::{Value, json};
 
@@ -49,6 +49,9 @@ pub fn api_json() -> Value {
         "schema": "rules-api/1",
         "methods": SUBJECTS.iter().flat_map(|subject| subject_json(subject)).collect::<Vec<Value>>(),
         "functions": functions.collect::<Vec<Value>>(),
+        "handlers": HANDLERS.iter().map(|it| json!({ "signature": it.signature, "en": it.en, "zh": it.zh })).collect::<Vec<_>>(),
+        "records": RECORDS.iter().map(|it| json!({ "name": it.name, "example": it.example, "en": it.en, "zh": it.zh }))
+            .collect::<Vec<_>>(),
         "variables": words.collect::<Vec<Value>>(),
         "settings": settings.collect::<Vec<Value>>(),
     })

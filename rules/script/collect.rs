@@ -1,46 +1,29 @@
-//! What a script leaves behind in one run, and what its timers remember between runs.
+//! What a script leaves behind in one run.
 
-use adapters::clock::{SECOND_NS, TimeNs};
+use super::decision::{Axis, Stop};
+use super::timers::{AlarmText, NAMES_MAX, Timers};
+use adapters::clock::TimeNs;
 use rhai::{Dynamic, EvalAltResult, ImmutableString};
-use std::collections::BTreeMap;
 
-/// At most this many names of one kind (timers, alarms, remembered values) per script.
-const NAMES_MAX: usize = 64;
 /// At most this many notes in one run.
 const NOTES_MAX: usize = 8;
 
 pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
-/// What the built-in functions of one script remember between runs.
-#[derive(Debug, Default)]
-pub(super) struct Timers {
-    held_since: BTreeMap<ImmutableString, TimeNs>,
-    alarms: BTreeMap<ImmutableString, AlarmTimer>,
-    last: BTreeMap<ImmutableString, Dynamic>,
-}
-
-#[derive(Debug, Default, Clone, Copy)]
-struct AlarmTimer {
-    active: bool,
-    turning_since: Option<TimeNs>,
-}
-
-impl Timers {
-    /// After a pause nothing is known of what happened in it: whatever was being timed begins anew.
-    pub(super) fn restart(&mut self) {
-        self.held_since.clear();
-        self.alarms.values_mut().for_each(|timer| timer.turning_since = None);
-    }
-}
+/// A number asked for, and why.
+pub(super) type Asked = (f64, ImmutableString);
 
 /// What one run of one script leaves behind.
 #[derive(Debug, Default)]
 pub(super) struct Collected {
     pub(super) now_ns: TimeNs,
     pub(super) timers: Timers,
-    pub(super) request: Option<(f64, ImmutableString)>,
-    pub(super) alarms: Vec<(ImmutableString, ImmutableString)>,
+    pub(super) request: Option<Asked>,
+    pub(super) stops: Vec<(Stop, ImmutableString)>,
+    pub(super) offsets: Vec<(Axis, Asked)>,
+    pub(super) alarms: Vec<(ImmutableString, AlarmText)>,
     pub(super) notes: Vec<ImmutableString>,
+    pub(super) published: Vec<(ImmutableString, Option<f64>)>,
     refusals: Vec<(&'static str, String)>,
 }
 
@@ -49,8 +32,11 @@ impl Collected {
     pub(super) fn begin(&mut self, now_ns: TimeNs) {
         self.now_ns = now_ns;
         self.request = None;
+        self.stops.clear();
+        self.offsets.clear();
         self.alarms.clear();
         self.notes.clear();
+        self.published.clear();
         self.refusals.clear();
     }
 
@@ -71,13 +57,13 @@ impl Collected {
         self.refusals.iter().map(|(method, reason)| format!("{method} has no value ({reason})"))
     }
 
-    pub(super) fn alarm(&mut self, name: ImmutableString, text: ImmutableString) -> Outcome<()> {
+    pub(super) fn alarm(&mut self, name: ImmutableString, text: AlarmText) -> Outcome<()> {
         if let Some(known) = self.alarms.iter_mut().find(|(known, _)| *known == name) {
             known.1 = text;
         } else if self.alarms.len() < NAMES_MAX {
             self.alarms.push((name, text));
         } else {
-            return Err(too_many("alarms"));
+            return Err(format!("more than {NAMES_MAX} alarms in one script").into());
         }
         Ok(())
     }
@@ -94,87 +80,27 @@ impl Collected {
         name: ImmutableString,
         wanted: Option<bool>,
         hold_s: f64,
-        text: ImmutableString,
+        text: AlarmText,
     ) -> Outcome<()> {
-        let now_ns = self.now_ns;
-        let timer = entry(&mut self.timers.alarms, &name, "alarms")?;
-        match wanted {
-            Some(wanted) if wanted != timer.active => {
-                let since = *timer.turning_since.get_or_insert(now_ns);
-                if seconds(now_ns - since) >= hold_s {
-                    *timer = AlarmTimer { active: wanted, turning_since: None };
-                }
-            }
-            Some(_) | None => timer.turning_since = None,
-        }
-        if timer.active { self.alarm(name, text) } else { Ok(()) }
+        let stands = self.timers.alarm_turning(&name, wanted, hold_s, self.now_ns)?;
+        if stands { self.alarm(name, text) } else { Ok(()) }
     }
 
-    /// Is the alarm of this name standing?
-    pub(super) fn alarm_active(&self, name: &str) -> bool {
-        self.timers.alarms.get(name).is_some_and(|timer| timer.active)
+    /// The last reason given for each kind counts.
+    pub(super) fn stop(&mut self, stop: Stop, reason: ImmutableString) {
+        self.stops.retain(|(known, _)| *known != stop);
+        self.stops.push((stop, reason));
     }
 
-    /// Seconds for which the condition has been true.
-    pub(super) fn held_s(&mut self, name: &ImmutableString, condition: bool) -> Outcome<f64> {
-        if !condition {
-            self.timers.held_since.remove(name.as_str());
-            return Ok(0.0);
-        }
-        let now_ns = self.now_ns;
-        if let Some(since) = self.timers.held_since.get(name.as_str()) {
-            return Ok(seconds(now_ns - since));
-        }
-        *entry(&mut self.timers.held_since, name, "timers")? = now_ns;
-        Ok(0.0)
+    /// The last offset proposed for each axis counts.
+    pub(super) fn offset(&mut self, axis: Axis, asked: Asked) {
+        self.offsets.retain(|(known, _)| *known != axis);
+        self.offsets.push((axis, asked));
     }
 
-    /// Is `value` another one than the last? No value changes nothing.
-    pub(super) fn changed(&mut self, name: &ImmutableString, value: Dynamic) -> Outcome<bool> {
-        if value.is_unit() {
-            return Ok(false);
-        }
-        let last = entry(&mut self.timers.last, name, "remembered values")?;
-        if same(last, &value) {
-            return Ok(false);
-        }
-        let first = last.is_unit();
-        *last = value;
-        Ok(!first)
+    /// The last value of each channel counts.
+    pub(super) fn publish(&mut self, name: ImmutableString, value: Option<f64>) {
+        self.published.retain(|(known, _)| *known != name);
+        self.published.push((name, value));
     }
-}
-
-fn same(a: &Dynamic, b: &Dynamic) -> bool {
-    match (a.as_float(), b.as_float()) {
-        (Ok(a), Ok(b)) => return a == b,
-        (Ok(_), Err(_)) | (Err(_), Ok(_)) => return false,
-        _ => {}
-    }
-    match (a.read_lock::<ImmutableString>(), b.read_lock::<ImmutableString>()) {
-        (Some(a), Some(b)) => *a == *b,
-        _ => a.as_int().ok() == b.as_int().ok() && a.as_bool().ok() == b.as_bool().ok() && a.is_unit() == b.is_unit(),
-    }
-}
-
-fn entry<'a, T: Default>(
-    map: &'a mut BTreeMap<ImmutableString, T>,
-    name: &ImmutableString,
-    what: &str,
-) -> Outcome<&'a mut T> {
-    if !map.contains_key(name.as_str()) {
-        if map.len() >= NAMES_MAX {
-            return Err(too_many(what));
-        }
-        map.insert(name.clone(), T::default());
-    }
-    map.get_mut(name.as_str()).ok_or_else(|| too_many(what))
-}
-
-fn too_many(what: &str) -> Box<EvalAltResult> {
-    format!("more than {NAMES_MAX} {what} in one script; use the same name each time instead of building new ones")
-        .into()
-}
-
-fn seconds(ns: i64) -> f64 {
-    ns as f64 / SECOND_NS as f64
 }

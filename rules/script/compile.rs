@@ -1,13 +1,16 @@
 //! From texts to a set of scripts that can run, or everything that is wrong with them.
 
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
-use super::examine::examine;
+use super::events::Event;
+use super::examine::{Findings, Place, Walk};
+use super::fields::Field;
+use super::handlers::{Handling, functions_but, handlers};
 use super::problem::{self, Problem};
 use super::settings::{Choice, merge, read_choices};
 use super::vocabulary::Word;
 use crate::estimators::Settings;
 use adapters::clock::SECOND_NS;
-use rhai::{AST, CallFnOptions, Engine, Map, Position, Scope};
+use rhai::{AST, CallFnOptions, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -29,12 +32,25 @@ pub(super) struct Script {
     pub(super) version: u64,
     pub(super) ast: AST,
     pub(super) reads: Vec<&'static Word>,
+    pub(super) fields: Vec<Field>,
+    /// Channels of its own: name and unit.
+    pub(super) channels: Vec<(ImmutableString, ImmutableString)>,
+    pub(super) handlers: Vec<Handling>,
+    /// Constants that are written as plain values: what handlers see of the body.
+    pub(super) constants: Vec<(String, Dynamic)>,
     /// 0: at every tick.
     pub(super) every_ns: i64,
     /// Nothing to run: the file only has settings.
     pub(super) passive: bool,
     pub(super) choices: Vec<Choice>,
     pub(super) thresholds: Vec<(String, String)>,
+}
+
+impl Script {
+    /// Has it a handler for this?
+    pub(super) fn hears(&self, event: &Event) -> bool {
+        self.handlers.iter().any(|handler| handler.kind == event.kind())
+    }
 }
 
 /// Scripts that belong together; all of them compile and their settings agree.
@@ -84,7 +100,21 @@ pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
     }
     let scripts: Vec<_> = scripts.into_values().collect();
     let settings = merge(&scripts, &mut problems);
+    one_publisher(&scripts, &mut problems);
     if problems.is_empty() { Ok(ScriptSet { scripts, settings }) } else { Err(problems) }
+}
+
+/// A channel has one publisher.
+fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<Problem>) {
+    let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
+    for script in scripts {
+        for (name, _) in &script.channels {
+            if let Some(other) = taken.insert(name, &script.file) {
+                let what = format!("the channel {name} is also published in {other}");
+                problems.push(Problem::new(&script.file, Position::NONE, what, "keep one of the two"));
+            }
+        }
+    }
 }
 
 struct Compiler {
@@ -109,7 +139,11 @@ impl Compiler {
         }
         let parse = |engine: &Engine| engine.compile(&file.text).map_err(|error| vec![problem::of_parse(name, &error)]);
         let plain = parse(&self.checking)?;
-        let mut found = examine(name, &plain, &self.callable);
+        let constants = constants(&plain);
+        let mut problems = Vec::new();
+        let handlers = handlers(file, &plain, &self.checking, &self.running, &mut problems);
+        let mut found = self.examine(name, &plain, &handlers, &constants);
+        found.problems.append(&mut problems);
         let every_ns = every_ns(file, &plain).unwrap_or_else(|problem| {
             found.problems.push(problem);
             0
@@ -124,10 +158,28 @@ impl Compiler {
             every_ns,
             passive: plain.statements().is_empty(),
             choices: self.choices(file, &ast)?,
-            thresholds: thresholds(&plain),
+            thresholds: constants.iter().map(|(name, value)| (name.clone(), value.to_string())).collect(),
             reads: found.reads,
+            fields: found.fields,
+            channels: found.channels,
+            handlers,
+            constants,
             ast,
         })
+    }
+
+    fn examine(&self, file: &str, plain: &AST, handlers: &[Handling], constants: &[(String, Dynamic)]) -> Findings {
+        let mut walk = Walk::new(file, plain, &self.callable);
+        let mut body = plain.clone();
+        body.clear_functions();
+        walk.read(&body, Place::Body);
+        walk.read(&functions_but(plain, handlers), Place::Function);
+        for handler in handlers {
+            let constants = constants.iter().map(|(name, _)| ImmutableString::from(name.as_str()));
+            let seen: Vec<ImmutableString> = handler.parameters.iter().cloned().chain(constants).collect();
+            walk.read(&handler.plain, Place::Handler(&seen));
+        }
+        walk.finish()
     }
 
     /// Calls `fn settings()` once.
@@ -158,9 +210,9 @@ fn every_ns(file: &ScriptFile, ast: &AST) -> Result<i64, Problem> {
     Err(Problem::new(&file.name, position_of(&file.text, "EVERY_S"), what, next))
 }
 
-/// The constants at the top of the script, as text: what a page shows as thresholds.
-fn thresholds(ast: &AST) -> Vec<(String, String)> {
-    ast.iter_literal_variables(true, false).map(|(name, _, value)| (name.to_owned(), value.to_string())).collect()
+/// The constants at the top of the script that are plain values: what a page shows as thresholds.
+fn constants(ast: &AST) -> Vec<(String, Dynamic)> {
+    ast.iter_literal_variables(true, false).map(|(name, _, value)| (name.to_owned(), value)).collect()
 }
 
 /// Where `word` first stands in `text` as a word of its own.

@@ -4,13 +4,18 @@ use super::problem::Problem;
 use adapters::clock::TimeNs;
 use std::sync::Arc;
 
-/// What the scripts want. Alarms and notes are changes: an unchanged tick has none.
+/// What the scripts want. Alarms and notes are changes: an unchanged tick has none. Requests and proposals are what is
+/// wanted now: they are repeated at every tick for as long as the script asks.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Decision {
     /// The tick.
     pub at_ns: TimeNs,
     /// The feed override asked for; `None` means the programmed feed, 100 %.
     pub request: Option<OverrideRequest>,
+    /// Feed holds and tool changes asked for, at most one of each kind: the first script's that asks.
+    pub stops: Vec<StopRequest>,
+    /// Thermal offsets proposed, at most one per axis: the first script's that proposes.
+    pub offsets: Vec<OffsetProposal>,
     /// Alarms raised or cleared at this tick.
     pub alarms: Vec<AlarmChange>,
     /// Lines for the history.
@@ -32,6 +37,132 @@ pub struct OverrideRequest {
     pub version: u64,
 }
 
+/// What a script can ask the operator's machine to do besides another feed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stop {
+    /// Hold the feed.
+    FeedHold,
+    /// Change the tool, at the next occasion that the ladder allows.
+    ToolChange,
+}
+
+impl Stop {
+    /// The word in the history and in JSON.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::FeedHold => "feed_hold",
+            Self::ToolChange => "tool_change",
+        }
+    }
+}
+
+/// A request to hold the feed or to change the tool. Whether it is passed on, latched and only once, is the gate's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StopRequest {
+    /// What.
+    pub stop: Stop,
+    /// Why, in the script's words.
+    pub reason: Arc<str>,
+    /// Which script.
+    pub script: Arc<str>,
+    /// Which version of it.
+    pub version: u64,
+}
+
+/// An axis whose offset a script can propose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Axis {
+    /// X.
+    X,
+    /// Y.
+    Y,
+    /// Z.
+    Z,
+}
+
+impl Axis {
+    /// Every axis.
+    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+
+    /// The letter, in lower case.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+
+    /// The axis of this letter, upper or lower case.
+    #[must_use]
+    pub fn of(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|axis| axis.word().eq_ignore_ascii_case(word))
+    }
+}
+
+/// An offset that would compensate the thermal error of an axis. Nothing has been checked: the number may be anything,
+/// NaN included.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetProposal {
+    /// Which axis.
+    pub axis: Axis,
+    /// The whole offset, not an increment, um.
+    pub offset_um: f64,
+    /// Why, in the script's words.
+    pub reason: Arc<str>,
+    /// Which script.
+    pub script: Arc<str>,
+    /// Which version of it.
+    pub version: u64,
+}
+
+/// A channel of a script's own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Published<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Unit symbol; `1` for pure numbers.
+    pub unit: &'a str,
+    /// Which script.
+    pub script: &'a Arc<str>,
+    /// The newest value, finite, while the script publishes one.
+    pub value: Option<f64>,
+}
+
+/// How grave an alarm is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// To know.
+    Info,
+    /// To look at.
+    Warning,
+    /// To act on at once.
+    Critical,
+}
+
+impl Level {
+    /// Every level.
+    pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Critical];
+
+    /// The word in scripts, in the history and in JSON.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warning => "warning",
+            Self::Critical => "critical",
+        }
+    }
+
+    /// The level of this word.
+    #[must_use]
+    pub fn of(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|level| level.word() == word)
+    }
+}
+
 /// An alarm that began or ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AlarmChange {
@@ -39,8 +170,12 @@ pub struct AlarmChange {
     pub name: Arc<str>,
     /// Which script.
     pub script: Arc<str>,
-    /// What the operator reads.
-    pub text: Arc<str>,
+    /// How grave.
+    pub level: Level,
+    /// What the operator reads, English.
+    pub en: Arc<str>,
+    /// What the operator reads, Chinese; the same as `en` where the script gives one text.
+    pub zh: Arc<str>,
     /// Began, or ended.
     pub raised: bool,
 }
@@ -55,10 +190,23 @@ pub struct Alarm {
     pub name: Arc<str>,
     /// Which script.
     pub script: Arc<str>,
-    /// What the operator reads.
-    pub text: Arc<str>,
+    /// How grave.
+    pub level: Level,
+    /// What the operator reads, English.
+    pub en: Arc<str>,
+    /// What the operator reads, Chinese.
+    pub zh: Arc<str>,
     /// Since when.
     pub since_ns: TimeNs,
+}
+
+impl Alarm {
+    /// The change that begins it, or ends it.
+    #[must_use]
+    pub(super) fn change(&self, raised: bool) -> AlarmChange {
+        let Self { name, script, level, en, zh, .. } = self.clone();
+        AlarmChange { name, script, level, en, zh, raised }
+    }
 }
 
 /// A line for the history.

@@ -2,12 +2,12 @@
 
 use super::collect::{Collected, Outcome};
 use super::functions;
-use super::problem::spoken;
+use super::outcomes;
 use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage, BasicMathPackage,
     BasicStringPackage, LanguageCorePackage, LogicPackage, MoreStringPackage, Package,
 };
-use rhai::{Dynamic, Engine, EvalAltResult, ImmutableString, OptimizationLevel};
+use rhai::{Engine, OptimizationLevel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Operations in one run; a shipped script takes about a hundred. An endless loop is stopped after a millisecond; one that
@@ -50,7 +50,8 @@ pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
         engine.disable_symbol(word);
     }
     engine.set_optimization_level(if optimize { OptimizationLevel::Simple } else { OptimizationLevel::None });
-    host_functions(&mut engine, shared);
+    outcomes::register(&mut engine, shared);
+    functions::register(&mut engine, shared);
     // Registered functions go before those of the language.
     let asleep = || -> Outcome<()> { Err("a script may not sleep".into()) };
     engine.register_fn("sleep", move |_: i64| asleep());
@@ -80,81 +81,6 @@ fn limits(engine: &mut Engine) {
     engine.set_max_map_size(ENTRIES_MAX);
     engine.set_max_variables(VARIABLES_MAX);
     engine.set_max_functions(FUNCTIONS_MAX);
-}
-
-fn host_functions(engine: &mut Engine, shared: &Shared) {
-    engine.register_fn("has", |value: Dynamic| !value.is_unit());
-    engine.register_fn("clamp", |value: Dynamic, least: Dynamic, greatest: Dynamic| -> Outcome<f64> {
-        let (least, greatest) = (number("clamp", &least)?, number("clamp", &greatest)?);
-        Ok(number("clamp", &value)?.max(least).min(greatest))
-    });
-    let to = shared.clone();
-    engine.register_fn("note", move |text: ImmutableString| to.lock().note(text));
-    let to = shared.clone();
-    engine.register_fn("held_s", move |name: ImmutableString, condition: bool| to.lock().held_s(&name, condition));
-    let to = shared.clone();
-    engine.register_fn("changed", move |name: ImmutableString, value: Dynamic| to.lock().changed(&name, value));
-    let to = shared.clone();
-    engine.register_fn("request_feed_override", move |pct: Dynamic, reason: ImmutableString| -> Outcome<()> {
-        let pct = number("request_feed_override", &pct)?;
-        to.lock().request = Some((pct, reason));
-        Ok(())
-    });
-    alarms(engine, shared);
-    functions::register(engine, shared);
-}
-
-fn alarms(engine: &mut Engine, shared: &Shared) {
-    let to = shared.clone();
-    engine.register_fn("alarm", move |name: ImmutableString, text: ImmutableString| to.lock().alarm(name, text));
-    let to = shared.clone();
-    engine.register_fn(
-        "alarm_when",
-        move |name: ImmutableString, condition: bool, hold_s: Dynamic, text: ImmutableString| -> Outcome<()> {
-            let hold_s = number("alarm_when", &hold_s)?;
-            to.lock().alarm_turning(name, Some(condition), hold_s, text)
-        },
-    );
-    threshold(engine, shared, "alarm_above", 1.0);
-    threshold(engine, shared, "alarm_below", -1.0);
-}
-
-/// `alarm_above` with sign 1, `alarm_below` with sign -1.
-fn threshold(engine: &mut Engine, shared: &Shared, function: &'static str, sign: f64) {
-    let to = shared.clone();
-    let run = move |name: ImmutableString,
-                    value: Dynamic,
-                    on: Dynamic,
-                    off: Dynamic,
-                    hold_s: Dynamic,
-                    text: ImmutableString|
-          -> Outcome<()> {
-        let (on, off, hold_s) = (number(function, &on)?, number(function, &off)?, number(function, &hold_s)?);
-        if sign * off > sign * on {
-            return Err(
-                format!("{function}: `off` = {off} lies beyond `on` = {on}; the alarm would never be quiet").into()
-            );
-        }
-        let mut collected = to.lock();
-        let beyond = if collected.alarm_active(&name) { off } else { on };
-        let wanted = if value.is_unit() { None } else { Some(sign * number(function, &value)? > sign * beyond) };
-        collected.alarm_turning(name, wanted, hold_s, text)
-    };
-    engine.register_fn(function, run);
-}
-
-/// A number; the absence of one is told apart from a wrong type.
-fn number(function: &str, value: &Dynamic) -> Outcome<f64> {
-    if let Ok(number) = value.as_float() {
-        return Ok(number);
-    }
-    if let Ok(whole) = value.as_int() {
-        return Ok(whole as f64);
-    }
-    if value.is_unit() {
-        return Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::UNIT, rhai::Position::NONE)));
-    }
-    Err(format!("{function} needs a number, not {}", spoken(value)).into())
 }
 
 /// Every function that can be called, by name and number of arguments.

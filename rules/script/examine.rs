@@ -2,49 +2,80 @@
 //!
 //! A misspelt function in a branch that is taken once a month is found here, not in that night.
 
+use super::fields::{self, Field, Record};
 use super::problem::Problem;
 use super::vocabulary::{Word, find, words};
 use adapters::channel::nearest;
-use rhai::{AST, ASTNode, Expr, FnCallExpr, Position, Stmt};
+use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position, Stmt};
+
+/// Longest name of a channel of a script's own.
+const CHANNEL_NAME_MAX: usize = 48;
+/// What lasts for one run of the body and would end at once in a handler.
+const OF_THE_BODY: [&str; 6] =
+    ["request_feed_override", "propose_offset_um", "alarm", "alarm_when", "alarm_above", "alarm_below"];
 
 /// What is known of a script before it runs.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     /// The words it looks at.
     pub(super) reads: Vec<&'static Word>,
+    /// The fields of records it looks at.
+    pub(super) fields: Vec<Field>,
+    /// The channels of its own: name and unit.
+    pub(super) channels: Vec<(ImmutableString, ImmutableString)>,
     /// Everything that is wrong.
     pub(super) problems: Vec<Problem>,
 }
 
-/// Walks an AST that was compiled without optimization. `callable` is sorted.
-pub(super) fn examine(file: &str, ast: &AST, callable: &[(String, usize)]) -> Findings {
-    let own = ast.iter_functions().map(|it| (it.name.to_owned(), it.params.len()));
-    let mut walk = Walk { file, callable, own: own.collect(), found: Findings::default() };
-    let mut body = ast.clone();
-    body.clear_functions();
-    body.walk(&mut |path| walk.node(path, false));
-    ast.clone_functions_only().walk(&mut |path| walk.node(path, true));
-    walk.found.problems.sort_by_key(|problem| (problem.line, problem.column));
-    walk.found.problems.dedup();
-    walk.found
+/// Where a piece of a script stands, which decides what it sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place<'a> {
+    /// The body: variables of the vocabulary, and its own.
+    Body,
+    /// A handler: variables of the vocabulary, its parameters, the constants of the script.
+    Handler(&'a [ImmutableString]),
+    /// Another function: nothing but what is handed over.
+    Function,
 }
 
-struct Walk<'a> {
+/// Reads the pieces of one file. `callable` is sorted; ASTs are compiled without optimization.
+pub(super) struct Walk<'a> {
     file: &'a str,
     callable: &'a [(String, usize)],
     own: Vec<(String, usize)>,
-    found: Findings,
+    pub(super) found: Findings,
 }
 
-impl Walk<'_> {
-    fn node(&mut self, path: &[ASTNode<'_>], in_function: bool) -> bool {
+impl<'a> Walk<'a> {
+    /// `whole` is the whole file.
+    pub(super) fn new(file: &'a str, whole: &AST, callable: &'a [(String, usize)]) -> Self {
+        let own = whole.iter_functions().map(|it| (it.name.to_owned(), it.params.len())).collect();
+        Self { file, callable, own, found: Findings::default() }
+    }
+
+    /// Looks through everything that stands in this place.
+    pub(super) fn read(&mut self, ast: &AST, place: Place<'_>) {
+        ast.walk(&mut |path| self.node(path, place));
+    }
+
+    /// Everything that was found, in the order of the text.
+    pub(super) fn finish(mut self) -> Findings {
+        self.found.problems.sort_by_key(|problem| (problem.line, problem.column));
+        self.found.problems.dedup();
+        self.found
+    }
+
+    fn node(&mut self, path: &[ASTNode<'_>], place: Place<'_>) -> bool {
         match path.last() {
             Some(ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at))) => {
-                self.call(call, call.args.len(), *at);
+                self.call(call, call.args.len(), *at, place);
             }
-            Some(ASTNode::Expr(Expr::MethodCall(call, at))) => self.call(call, call.args.len() + 1, *at),
+            Some(ASTNode::Expr(Expr::MethodCall(call, at))) => self.call(call, call.args.len() + 1, *at, place),
             Some(ASTNode::Expr(Expr::Variable(name, short, at))) if name.0.is_none() && short.is_none() => {
-                self.global(&name.1, *at, in_function);
+                match fields::record(&name.1).filter(|_| !self.is_own(&name.1)) {
+                    Some(record) => self.record(record, path, *at, place),
+                    None => self.global(&name.1, *at, place),
+                }
             }
             Some(ASTNode::Stmt(Stmt::Assignment(assignment))) => self.assigned(&assignment.1.lhs),
             _ => {}
@@ -52,12 +83,23 @@ impl Walk<'_> {
         true
     }
 
+    fn is_own(&self, name: &str) -> bool {
+        self.own.iter().any(|(own, _)| own == name)
+    }
+
     fn problem(&mut self, at: Position, what: String, next: impl Into<String>) {
         self.found.problems.push(Problem::new(self.file, at, what, next));
     }
 
-    fn call(&mut self, call: &FnCallExpr, arguments: usize, at: Position) {
+    fn call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: Place<'_>) {
         let name = call.name.as_str();
+        if name == "publish" && call.args.len() == 3 {
+            self.publishes(&call.args[0], &call.args[2], at);
+        }
+        if matches!(place, Place::Handler(_)) && OF_THE_BODY.contains(&name) {
+            let next = "raise_alarm and clear_alarm work here; or set memory.x here and ask for it in the body";
+            self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
+        }
         let known = |(known, count): &(String, usize)| known == name && *count == arguments;
         if call.op_token.is_some() || self.callable.iter().chain(&self.own).any(known) {
             return;
@@ -78,23 +120,80 @@ impl Walk<'_> {
         self.problem(at, format!("there is no function `{name}`"), next);
     }
 
-    fn global(&mut self, name: &str, at: Position, in_function: bool) {
-        if self.own.iter().any(|(own, _)| own == name) {
+    fn global(&mut self, name: &str, at: Position, place: Place<'_>) {
+        let known = matches!(place, Place::Handler(names) if names.iter().any(|known| *known == *name));
+        if known || self.is_own(name) {
             return;
         }
-        match find(name) {
-            Some(_) if in_function => self.problem(
+        match (find(name), place) {
+            (Some(_), Place::Function) => self.problem(
                 at,
                 format!("`{name}` is not visible inside a function"),
                 format!("hand it over: fn f({name}) {{ ... }} and call f({name})"),
             ),
-            Some(word) => self.reads(word),
-            None => {
-                let near = nearest(name, words().iter().map(|word| word.name)).filter(|_| !in_function);
-                let inside = "a function sees its own arguments and variables only; hand over what it needs";
-                let next = if in_function { inside.to_owned() } else { suggestion(near) };
+            (Some(word), _) => self.reads(word),
+            (None, Place::Function) => {
+                let next = "a function sees its own arguments and variables only; hand over what it needs";
                 self.problem(at, format!("there is no variable `{name}`"), next);
             }
+            (None, _) => {
+                let next = suggestion(nearest(name, words().iter().map(|word| word.name)));
+                self.problem(at, format!("there is no variable `{name}`"), next);
+            }
+        }
+    }
+
+    /// `sample.x`: the record is the left side of a dot, and the right side is a field of it.
+    fn record(&mut self, record: &'static Record, path: &[ASTNode<'_>], at: Position, place: Place<'_>) {
+        let name = record.name;
+        let dot = path.len().checked_sub(2).and_then(|parent| path.get(parent));
+        let property = match dot {
+            Some(ASTNode::Expr(Expr::Dot(pair, ..))) if pair.lhs.position() == at => property(pair),
+            _ => None,
+        };
+        let Some((field, at_field)) = property else {
+            let next = format!("write {}, with the channel that is meant", record.example);
+            return self.problem(at, format!("`{name}` is used as a whole"), next);
+        };
+        if place == Place::Function {
+            let what = format!("`{name}` is not visible inside a function");
+            return self.problem(at, what, format!("hand the value over: f({name}.{field})"));
+        }
+        match record.field(field) {
+            Ok(found) => {
+                let same = |it: &Field| it.record.name == name && it.word.name == found.word.name;
+                if !self.found.fields.iter().any(same) {
+                    self.found.fields.push(found);
+                }
+            }
+            Err(next) => self.problem(at_field, format!("there is no `{name}.{field}`"), next),
+        }
+    }
+
+    /// A channel of the script's own is known before it runs.
+    fn publishes(&mut self, name: &Expr, unit: &Expr, at: Position) {
+        let (Expr::StringConstant(name, at_name), Expr::StringConstant(unit, _)) = (name, unit) else {
+            let next = "write publish(\"my_channel_w\", x, \"W\")";
+            return self.problem(at, "name and unit of a channel are written as texts".to_owned(), next);
+        };
+        let letters = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+        let begins = name.starts_with(|c: char| c.is_ascii_lowercase());
+        if !letters || !begins || name.len() > CHANNEL_NAME_MAX {
+            let what = format!("\"{name}\" cannot be the name of a channel");
+            let next = format!("use a to z, 0 to 9 and _, beginning with a letter, at most {CHANNEL_NAME_MAX} of them");
+            return self.problem(*at_name, what, next);
+        }
+        if find(name).is_some() {
+            let next = format!("choose another name, such as my_{name}");
+            return self.problem(*at_name, format!("`{name}` is a channel or an estimate already"), next);
+        }
+        match self.found.channels.iter().find(|(known, _)| known == name) {
+            None => self.found.channels.push((name.clone(), unit.clone())),
+            Some((_, other)) if other != unit => {
+                let what = format!("`{name}` is published in {other} and in {unit}");
+                self.problem(*at_name, what, "a channel has one unit");
+            }
+            Some(_) => {}
         }
     }
 
@@ -114,6 +213,18 @@ impl Walk<'_> {
     }
 }
 
+/// The name right of the dot, also where more follows it.
+fn property(dot: &BinaryExpr) -> Option<(&str, Position)> {
+    match &dot.rhs {
+        Expr::Property(property, at) => Some((property.2.as_str(), *at)),
+        Expr::Dot(pair, ..) | Expr::Index(pair, ..) => match &pair.lhs {
+            Expr::Property(property, at) => Some((property.2.as_str(), *at)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 fn suggestion(near: Option<&str>) -> String {
     match near {
         Some(near) => format!("did you mean `{near}`?"),
@@ -122,7 +233,7 @@ fn suggestion(near: Option<&str>) -> String {
 }
 
 fn usage(name: &str) -> String {
-    let own = super::vocabulary::FUNCTIONS.iter().find(|it| it.signature.split('(').next() == Some(name));
+    let own = super::callable::FUNCTIONS.iter().find(|it| it.signature.split('(').next() == Some(name));
     let method = || super::functions::methods().find(|it| it.name == name).map(|it| it.signature());
     let signature = own.map(|it| it.signature.to_owned()).or_else(method);
     signature.map(|signature| format!("write {signature}")).unwrap_or_default()

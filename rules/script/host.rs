@@ -1,17 +1,23 @@
 //! Runs the scripts, one tick at a time.
 
 use super::compile::{ScriptFile, ScriptSet, compile};
-use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest};
+use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
 use super::engine::{Shared, engine};
+use super::events::Happenings;
 use super::problem::Problem;
 use super::settings::merge;
-use super::slot::{Outputs, Slot};
+use super::slot::{Moment, Outputs, Slot};
 use super::status::{ScriptStatus, Status};
 use crate::estimators::{Estimates, Settings};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use rhai::Engine;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// Scripts that are not there at the moment and whose memory is kept for them.
+const ABSENT_MAX: usize = 64;
 
 /// The scripts in charge. Needs no clock: the time is that of the sample.
 ///
@@ -27,6 +33,9 @@ pub struct Host {
     refused: Vec<Problem>,
     settings: Settings,
     generation: u64,
+    happenings: Happenings,
+    /// What scripts remembered in an earlier process, until they come into charge.
+    remembered: BTreeMap<String, Value>,
 }
 
 impl Default for Host {
@@ -50,6 +59,8 @@ impl Host {
             refused: Vec::new(),
             settings: Settings::default(),
             generation: 0,
+            happenings: Happenings::default(),
+            remembered: BTreeMap::new(),
         }
     }
 
@@ -70,14 +81,15 @@ impl Host {
         }
     }
 
-    /// Puts a compiled set in charge. A script whose text has not changed goes on with its memory and timers; a changed
-    /// one begins anew, and the version before it stays ready until the new one has run well for a minute.
+    /// Puts a compiled set in charge. Every script goes on with its memory and timers, also one whose text has changed; the
+    /// version before it stays ready, with what it remembered, until the new one has run well for a minute.
     pub fn install(&mut self, set: ScriptSet) {
         self.refused.clear();
         let mut old = std::mem::take(&mut self.slots);
         for script in set.scripts {
             let before = old.iter().position(|slot| slot.file() == &*script.file).map(|at| old.swap_remove(at));
-            self.slots.push(Slot::install(script, before));
+            let remembered = self.remembered.remove(&*script.file);
+            self.slots.push(Slot::install(script, before, remembered.as_ref()));
         }
         self.settings = set.settings;
         self.generation += 1;
@@ -94,8 +106,7 @@ impl Host {
         let slots = &self.slots;
         let stays = |alarm: &Alarm| slots.iter().any(|slot| slot.file() == &*alarm.script && slot.keeps(&alarm.name));
         for alarm in self.alarms.iter().filter(|alarm| !stays(alarm)) {
-            let (name, script, text) = (alarm.name.clone(), alarm.script.clone(), alarm.text.clone());
-            self.pending.push(AlarmChange { name, script, text, raised: false });
+            self.pending.push(alarm.change(false));
         }
         self.alarms.retain(stays);
     }
@@ -122,15 +133,37 @@ impl Host {
         decision.problems.clear();
         decision.alarms.append(&mut self.pending);
         let mut outputs = Outputs { alarms: &mut self.alarms, decision };
+        let events = self.happenings.step(sample, estimates);
+        let moment = Moment { sample, estimates, events };
         let mut replaced = false;
         for slot in &mut self.slots {
-            replaced |= slot.tick(&self.engine, &self.shared, sample, estimates, &mut outputs);
+            replaced |= slot.tick(&self.engine, &self.shared, &moment, &mut outputs);
         }
-        self.decision.request = least(self.slots.iter().filter_map(Slot::request)).cloned();
+        self.gather();
         if replaced {
             self.replaced();
         }
         &self.decision
+    }
+
+    /// What the scripts ask for now.
+    fn gather(&mut self) {
+        let Decision { request, stops, offsets, .. } = &mut self.decision;
+        *request = least(self.slots.iter().filter_map(Slot::request)).cloned();
+        stops.clear();
+        offsets.clear();
+        for slot in &self.slots {
+            for request in slot.stops() {
+                if !stops.iter().any(|known| known.stop == request.stop) {
+                    stops.push(request.clone());
+                }
+            }
+            for proposal in slot.offsets() {
+                if !offsets.iter().any(|known| known.axis == proposal.axis) {
+                    offsets.push(proposal.clone());
+                }
+            }
+        }
     }
 
     /// An older version has come into charge: its settings count again.
@@ -155,6 +188,26 @@ impl Host {
     pub fn status(&self) -> Status {
         let scripts: Vec<ScriptStatus> = self.slots.iter().map(Slot::status).collect();
         Status { scripts, refused: self.refused.clone() }
+    }
+
+    /// The channels of the scripts' own, each with its newest value.
+    pub fn published(&self) -> impl Iterator<Item = Published<'_>> {
+        self.slots.iter().flat_map(Slot::published)
+    }
+
+    /// What the scripts remember and would have to learn again: `scripts/1`.
+    #[must_use]
+    pub fn snapshot(&self) -> Value {
+        let present = self.slots.iter().map(|slot| (slot.file().to_owned(), slot.snapshot()));
+        let absent = self.remembered.iter().take(ABSENT_MAX).map(|(file, kept)| (file.clone(), kept.clone()));
+        json!({ "schema": "scripts/1", "scripts": absent.chain(present).collect::<Map<_, _>>() })
+    }
+
+    /// Takes what [`Host::snapshot`] gave in an earlier process: each script gets its own when it next comes into charge for
+    /// the first time. Whatever cannot be read is left out.
+    pub fn restore(&mut self, snapshot: &Value) {
+        let scripts = snapshot["scripts"].as_object().into_iter().flatten().take(ABSENT_MAX);
+        self.remembered = scripts.map(|(file, kept)| (file.clone(), kept.clone())).collect();
     }
 
     /// The decision of the last tick.

@@ -3,49 +3,68 @@
 //! [`Host::tick`] takes a sample and the estimates and yields a [`Decision`]: alarms, notes, and a request to the gate.
 //! A script can only ask; whether anything is written is decided elsewhere, by compiled code.
 //!
-//! - A script is a text that runs from top to bottom at every tick, or every `const EVERY_S = 1.0;` seconds.
+//! - A script is a text that runs from top to bottom at every tick, or every `const EVERY_S = 1.0;` seconds. Functions with
+//!   the names of [`HANDLERS`] run before it when a state, part, program, tool or alarm of the controller has changed.
 //! - It sees the words of [`words`] as variables: channels, estimates, `state`, `now_s`, `dt_s`, and `memory`, which is
-//!   its own. A word without a value is `()`: `has(x)` asks, `x ?? 0.0` replaces, a comparison is false. A script that
-//!   computes with a value that is not there waits: it asks for nothing and runs again when it is due.
+//!   its own; the same as fields of [`RECORDS`], with age and reason of absence. A word without a value is `()`: `has(x)`
+//!   asks, `x ?? 0.0` replaces, a comparison is false. A script that computes with a value that is not there waits: it asks
+//!   for nothing and runs again when it is due.
 //! - `fn settings() { #{ c1: 0.15 } }` is called once when the script is loaded and sets the estimators.
+//! - What it remembers outlives a changed text and the process ([`Host::snapshot`]).
 //! - Everything is bounded: operations, depth, sizes, names, notes. A script that fails is replaced by its last good
 //!   version or suspended.
 //! - The same samples give the same decisions: there is no clock, no random number, no file and no network in reach.
 //!
 //! | file | what |
 //! |---|---|
-//! | `vocabulary` | what a script sees and can call |
+//! | `vocabulary`, `fields`, `events`, `callable` | what a script sees, handles and can call |
 //! | `engine` | the interpreter and its limits |
+//! | `outcomes` | the functions through which a script leaves its effects |
 //! | `functions` | the methods that scripts call by name, one table per subject |
 //! | `api` | everything of it as a document |
-//! | `compile`, `examine`, `settings` | from text to a script, and everything that is wrong with it |
-//! | `host`, `slot`, `running`, `collect`, `notes` | running |
+//! | `compile`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
+//! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
+//! | `timers`, `kept` | what a script remembers |
 //! | `decision`, `status`, `problem` | what comes out |
 //! | `shipped` | the scripts that come with the gateway |
 
 mod api;
+mod callable;
 mod collect;
 mod compile;
 mod decision;
 mod engine;
+mod events;
 mod examine;
+mod fields;
 pub mod functions;
+mod handlers;
 mod host;
+mod kept;
 mod notes;
+mod outcomes;
 mod problem;
 mod running;
 mod settings;
 mod shipped;
 mod slot;
 mod status;
+mod timers;
+mod variables;
 mod vocabulary;
 
 pub use api::{api, api_json};
+pub use callable::{FUNCTIONS, Function};
 pub use compile::{ScriptFile, ScriptSet, compile};
-pub use decision::{Alarm, AlarmChange, Decision, Note, OverrideRequest, SCRIPT_STOPPED};
+pub use decision::{
+    Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
+    StopRequest,
+};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};
+pub use events::{HANDLERS, Handler};
+pub use fields::{RECORDS, Record};
 pub use host::Host;
 pub use problem::Problem;
 pub use shipped::shipped;
 pub use status::{Condition, ScriptStatus, Status};
-pub use vocabulary::{FUNCTIONS, Function, Word, WordKind, vocabulary, words};
+pub use vocabulary::{Word, WordKind, vocabulary, words};

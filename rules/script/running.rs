@@ -1,4 +1,4 @@
-//! One run of a compiled script, with what the interpreter may keep between two runs.
+//! Runs of a compiled script, with what the interpreter may keep between two of them.
 
 use super::collect::Outcome;
 use rhai::{AST, Caches, Engine, GlobalRuntimeState, Scope};
@@ -14,10 +14,15 @@ impl Running {
         Self { kept: None }
     }
 
-    /// Runs the script from top to bottom. After an error nothing is kept.
+    /// Operations are counted from here on. `ast` holds the functions of the script.
+    pub(super) fn begin(&mut self, engine: &Engine, ast: &AST) {
+        let (global, _) = self.kept.get_or_insert_with(|| begin(engine, ast));
+        global.num_operations = 0;
+    }
+
+    /// Runs statements from top to bottom. After an error nothing is kept.
     pub(super) fn run(&mut self, engine: &Engine, scope: &mut Scope<'_>, ast: &AST) -> Outcome<()> {
         let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| begin(engine, ast));
-        global.num_operations = 0;
         #[expect(
             deprecated,
             reason = "the only call that takes caches; rhai offers no other before its next major version"

@@ -1,18 +1,25 @@
 //! One script in charge: its variables, its timers, its last good version.
 
-use super::collect::{Collected, Timers};
+use super::collect::{Collected, Outcome};
 use super::compile::Script;
-use super::decision::{Alarm, AlarmChange, Decision, Note, OverrideRequest, SCRIPT_STOPPED};
+use super::decision::{
+    Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
+};
 use super::engine::{OPERATIONS_MAX, Shared};
+use super::events::Event;
+use super::kept::Kept;
 use super::notes::NoteLimit;
 use super::problem;
 use super::running::Running;
 use super::status::{Condition, ScriptStatus};
-use super::vocabulary::{Seen, View};
+use super::timers::{AlarmText, Timers};
+use super::variables::{fill, has_absent, scope_of, why_absent};
+use super::vocabulary::View;
 use crate::estimators::Estimates;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rhai::{Dynamic, Engine, EvalAltResult, ImmutableString, Map, Scope};
+use rhai::{Engine, EvalAltResult, ImmutableString, Scope};
+use serde_json::Value;
 use std::sync::Arc;
 
 /// A new version that has run well for this long needs no older one behind it.
@@ -20,22 +27,42 @@ const PROBATION_NS: i64 = 60 * SECOND_NS;
 /// A longer time between two runs is a pause: `dt_s` is 0 after it and timers begin anew.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 
+/// What a tick is about.
+pub(super) struct Moment<'a> {
+    pub(super) sample: &'a Sample,
+    pub(super) estimates: &'a Estimates,
+    pub(super) events: &'a [Event],
+}
+
 /// Where a run leaves its effects.
 pub(super) struct Outputs<'a> {
     pub(super) alarms: &'a mut Vec<Alarm>,
     pub(super) decision: &'a mut Decision,
 }
 
+/// The version before, with what it remembered when it was replaced.
+struct Previous {
+    script: Arc<Script>,
+    kept: Kept,
+}
+
 /// One script in charge.
 pub(super) struct Slot {
     script: Arc<Script>,
-    previous: Option<Arc<Script>>,
+    previous: Option<Previous>,
     scope: Scope<'static>,
+    base: usize,
     running: Running,
     timers: Timers,
     condition: Condition,
     request: Option<OverrideRequest>,
     reason: (ImmutableString, Arc<str>),
+    stops: Vec<StopRequest>,
+    offsets: Vec<OffsetProposal>,
+    /// Alarms that the body named in its last run.
+    named: Vec<(ImmutableString, AlarmText)>,
+    /// Newest values of the channels of its own.
+    values: Vec<Option<f64>>,
     notes: NoteLimit,
     runs: u64,
     good_since_ns: Option<TimeNs>,
@@ -43,34 +70,52 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// `before` is what stood under this file name until now.
-    pub(super) fn install(script: Arc<Script>, before: Option<Self>) -> Self {
+    /// `before` is what stood under this file name until now, `remembered` what the file had in an earlier process.
+    pub(super) fn install(script: Arc<Script>, before: Option<Self>, remembered: Option<&Value>) -> Self {
         match before {
             Some(before) if before.script.version == script.version && before.condition.in_charge() => before,
             Some(before) => {
+                let kept = before.kept();
                 let proven = before.good_since_ns.is_some() && !before.condition.suspended();
-                let previous = if proven { Some(before.script) } else { before.previous };
-                Self::fresh(script.clone(), previous.filter(|previous| previous.version != script.version))
+                let standing = Previous { script: before.script, kept: kept.clone() };
+                let previous = if proven { Some(standing) } else { before.previous };
+                let previous = previous.filter(|previous| previous.script.version != script.version);
+                Self::fresh(script, previous, kept)
             }
-            None => Self::fresh(script, None),
+            None => Self::fresh(script, None, remembered.map(Kept::restore).unwrap_or_default()),
         }
     }
 
-    fn fresh(script: Arc<Script>, previous: Option<Arc<Script>>) -> Self {
+    fn fresh(script: Arc<Script>, previous: Option<Previous>, kept: Kept) -> Self {
+        let scope = scope_of(&script, kept.memory);
         Self {
-            scope: scope_of(&script),
+            base: scope.len(),
+            scope,
             running: Running::new(),
+            values: vec![None; script.channels.len()],
             script,
             previous,
-            timers: Timers::default(),
+            timers: kept.timers,
             condition: Condition::Running,
             request: None,
             reason: (ImmutableString::new(), Arc::from("")),
+            stops: Vec::new(),
+            offsets: Vec::new(),
+            named: Vec::new(),
             notes: NoteLimit::default(),
             runs: 0,
             good_since_ns: None,
             ran_ns: None,
         }
+    }
+
+    fn kept(&self) -> Kept {
+        Kept { memory: self.scope.get_value("memory").unwrap_or_default(), timers: self.timers.clone() }
+    }
+
+    /// What outlives the process.
+    pub(super) fn snapshot(&self) -> Value {
+        self.kept().snapshot()
     }
 
     pub(super) fn file(&self) -> &str {
@@ -85,8 +130,25 @@ impl Slot {
         self.request.as_ref()
     }
 
+    pub(super) fn stops(&self) -> &[StopRequest] {
+        &self.stops
+    }
+
+    pub(super) fn offsets(&self) -> &[OffsetProposal] {
+        &self.offsets
+    }
+
+    /// The channels of its own, each with its newest value.
+    pub(super) fn published(&self) -> impl Iterator<Item = Published<'_>> {
+        let rows = self.script.channels.iter().zip(&self.values);
+        rows.map(|((name, unit), value)| Published { name, unit, script: &self.script.file, value: *value })
+    }
+
+    /// Nothing is asked for any more.
     pub(super) fn withdraw(&mut self) {
         self.request = None;
+        self.stops.clear();
+        self.offsets.clear();
     }
 
     /// May an alarm of this name stand on after a set was installed?
@@ -94,35 +156,58 @@ impl Slot {
         name != SCRIPT_STOPPED || !matches!(self.condition, Condition::Running | Condition::Waiting(_))
     }
 
-    /// Runs the script when it is due. True when an older version has come into charge.
+    /// Runs the handlers of what has happened, and the script when it is due. True when an older version has come into
+    /// charge.
     pub(super) fn tick(
         &mut self,
         engine: &Engine,
         shared: &Shared,
-        sample: &Sample,
-        estimates: &Estimates,
+        moment: &Moment<'_>,
         outputs: &mut Outputs<'_>,
     ) -> bool {
-        if self.script.passive || self.condition.suspended() || !self.due(sample.at_ns) {
+        let at_ns = moment.sample.at_ns;
+        let due = !self.script.passive && self.due(at_ns);
+        let heard = moment.events.iter().any(|event| self.script.hears(event));
+        if self.condition.suspended() || !(due || heard) {
             return false;
         }
-        let view = View { sample, estimates, dt_s: self.elapsed_s(sample.at_ns) };
-        self.ran_ns = Some(sample.at_ns);
-        self.fill(&view);
-        self.exchange(shared, sample.at_ns);
-        let outcome = self.running.run(engine, &mut self.scope, &self.script.ast).and_then(|()| self.bounded(engine));
-        self.scope.rewind(1 + self.script.reads.len());
+        let dt_s = if due { self.elapsed_s(at_ns) } else { 0.0 };
+        let view = View { sample: moment.sample, estimates: moment.estimates, dt_s };
+        fill(&mut self.scope, &self.script, &view);
+        self.exchange(shared, at_ns);
+        let outcome = self.run(engine, moment.events, due);
+        self.scope.rewind(self.base);
         let mut collected = shared.lock();
         std::mem::swap(&mut collected.timers, &mut self.timers);
-        self.runs += 1;
         match outcome {
-            Ok(()) => self.succeed(&mut collected, outputs),
+            Ok(()) => self.succeed(&mut collected, due, outputs),
             Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
                 self.wait(&error, &view, &collected);
             }
             Err(error) => return self.fail(&error, outputs),
         }
         false
+    }
+
+    /// All of it within the operations of one run.
+    fn run(&mut self, engine: &Engine, events: &[Event], due: bool) -> Outcome<()> {
+        let script = Arc::clone(&self.script);
+        self.running.begin(engine, &script.ast);
+        for event in events {
+            for handler in script.handlers.iter().filter(|handler| handler.kind == event.kind()) {
+                for (name, value) in handler.parameters.iter().zip(event.values()) {
+                    self.scope.push_dynamic(name.clone(), value);
+                }
+                self.running.run(engine, &mut self.scope, &handler.ast)?;
+                self.scope.rewind(self.base);
+            }
+        }
+        if due {
+            self.runs += 1;
+            self.running.run(engine, &mut self.scope, &script.ast)?;
+        }
+        // `memory` lives on, so its size is checked after every run.
+        self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
     }
 
     fn due(&self, at_ns: TimeNs) -> bool {
@@ -133,23 +218,12 @@ impl Slot {
 
     /// Seconds since the last run; 0 after a pause, and whatever was being timed begins anew then.
     fn elapsed_s(&mut self, at_ns: TimeNs) -> f64 {
-        let elapsed_ns = self.ran_ns.map_or(0, |ran_ns| at_ns - ran_ns);
+        let elapsed_ns = self.ran_ns.replace(at_ns).map_or(0, |ran_ns| at_ns - ran_ns);
         if elapsed_ns < 0 || elapsed_ns > PAUSE_NS.max(3 * self.script.every_ns) {
             self.timers.restart();
             return 0.0;
         }
         elapsed_ns as f64 / SECOND_NS as f64
-    }
-
-    fn fill(&mut self, view: &View<'_>) {
-        for word in self.script.reads.iter().filter(|word| !word.writable()) {
-            let Some(place) = self.scope.get_mut(word.name) else { continue };
-            match word.see(view) {
-                Seen::Number(number) => *place = Dynamic::from_float(number),
-                Seen::Absent => *place = Dynamic::UNIT,
-                Seen::Text(text) => set_text(place, text),
-            }
-        }
     }
 
     fn exchange(&mut self, shared: &Shared, at_ns: TimeNs) {
@@ -158,18 +232,11 @@ impl Slot {
         std::mem::swap(&mut collected.timers, &mut self.timers);
     }
 
-    /// `memory` lives on, so its size is checked after every run.
-    fn bounded(&self, engine: &Engine) -> Result<(), Box<EvalAltResult>> {
-        self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
-    }
-
     fn any_absent(&self, collected: &Collected) -> bool {
-        let absent = |name| self.scope.get(name).is_some_and(Dynamic::is_unit);
-        collected.refusals().next().is_some()
-            || self.script.reads.iter().any(|word| !word.writable() && absent(word.name))
+        collected.refusals().next().is_some() || has_absent(&self.scope, &self.script)
     }
 
-    fn succeed(&mut self, collected: &mut Collected, outputs: &mut Outputs<'_>) {
+    fn succeed(&mut self, collected: &mut Collected, due: bool, outputs: &mut Outputs<'_>) {
         if matches!(self.condition, Condition::Waiting(_)) {
             self.condition = Condition::Running;
         }
@@ -177,9 +244,14 @@ impl Slot {
         if self.previous.is_some() && collected.now_ns - good_since_ns > PROBATION_NS {
             self.previous = None;
         }
-        self.ask(collected);
-        self.raise(collected, outputs);
-        self.clear(collected, outputs);
+        if due {
+            self.ask(collected);
+            self.named.clear();
+            self.named.append(&mut collected.alarms);
+        }
+        self.ask_to_stop(collected, due);
+        self.alarms(collected.now_ns, outputs);
+        self.publish(collected);
         for text in collected.notes.drain(..) {
             if let Some(text) = self.notes.admit(&text, collected.now_ns) {
                 outputs.decision.notes.push(Note { script: self.script.file.clone(), text });
@@ -188,6 +260,7 @@ impl Slot {
     }
 
     fn ask(&mut self, collected: &mut Collected) {
+        self.propose(collected);
         let Some((pct, reason)) = collected.request.take() else {
             self.request = None;
             return;
@@ -199,65 +272,99 @@ impl Slot {
         self.request = Some(OverrideRequest { pct, reason, script, version: self.script.version });
     }
 
-    fn raise(&self, collected: &Collected, outputs: &mut Outputs<'_>) {
-        for (name, text) in &collected.alarms {
-            let standing = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name == **name;
-            if !outputs.alarms.iter().any(standing) {
-                self.begin_alarm(Arc::from(name.as_str()), Arc::from(text.as_str()), collected.now_ns, outputs);
+    fn propose(&mut self, collected: &mut Collected) {
+        let Script { file, version, .. } = &*self.script;
+        self.offsets.clear();
+        self.offsets.extend(collected.offsets.drain(..).map(|(axis, (offset_um, reason))| OffsetProposal {
+            axis,
+            offset_um,
+            reason: Arc::from(reason.as_str()),
+            script: file.clone(),
+            version: *version,
+        }));
+    }
+
+    /// A handler asks for one tick, the body for as long as it goes on asking.
+    fn ask_to_stop(&mut self, collected: &mut Collected, due: bool) {
+        let Script { file, version, .. } = &*self.script;
+        if due {
+            self.stops.clear();
+        }
+        for (stop, reason) in collected.stops.drain(..) {
+            self.stops.retain(|known| known.stop != stop);
+            let reason = Arc::from(reason.as_str());
+            self.stops.push(StopRequest { stop, reason, script: file.clone(), version: *version });
+        }
+    }
+
+    fn publish(&mut self, collected: &mut Collected) {
+        for (name, value) in collected.published.drain(..) {
+            if let Some(at) = self.script.channels.iter().position(|(known, _)| **known == *name) {
+                self.values[at] = value;
             }
         }
     }
 
-    fn begin_alarm(&self, name: Arc<str>, text: Arc<str>, since_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        let script = self.script.file.clone();
-        let alarm = Alarm { name: name.clone(), script: script.clone(), text: text.clone(), since_ns };
-        outputs.alarms.push(alarm);
-        outputs.decision.alarms.push(AlarmChange { name, script, text, raised: true });
-    }
-
-    fn clear(&self, collected: &Collected, outputs: &mut Outputs<'_>) {
+    /// Begins and ends alarms: those that the body named and those that stand until they are cleared.
+    fn alarms(&self, now_ns: TimeNs, outputs: &mut Outputs<'_>) {
+        for (name, text) in self.named.iter().map(|(name, text)| (name, text)).chain(self.timers.latched()) {
+            let standing = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name == **name;
+            if !outputs.alarms.iter().any(standing) {
+                self.begin_alarm(name, text, now_ns, outputs);
+            }
+        }
         let own = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name != *SCRIPT_STOPPED;
-        let asked = |alarm: &Alarm| collected.alarms.iter().any(|(name, _)| **name == *alarm.name);
-        if !outputs.alarms.iter().any(|alarm| own(alarm) && !asked(alarm)) {
-            return;
-        }
-        for alarm in outputs.alarms.iter().filter(|alarm| own(alarm) && !asked(alarm)) {
-            let (name, script, text) = (alarm.name.clone(), alarm.script.clone(), alarm.text.clone());
-            outputs.decision.alarms.push(AlarmChange { name, script, text, raised: false });
-        }
-        outputs.alarms.retain(|alarm| !own(alarm) || asked(alarm));
+        let asked = |alarm: &Alarm| {
+            let named = self.named.iter().any(|(name, _)| **name == *alarm.name);
+            named || self.timers.latched().contains_key(&*alarm.name)
+        };
+        let over = |alarm: &Alarm| own(alarm) && !asked(alarm);
+        let ended = outputs.alarms.iter().filter(|alarm| over(alarm)).map(|alarm| alarm.change(false));
+        outputs.decision.alarms.extend(ended);
+        outputs.alarms.retain(|alarm| !over(alarm));
     }
 
-    /// The script worked on a value that is not there: it asks for nothing and tries again; alarms stay as they are.
+    fn begin_alarm(&self, name: &str, text: &AlarmText, since_ns: TimeNs, outputs: &mut Outputs<'_>) {
+        let (en, zh) = (Arc::from(text.en.as_str()), Arc::from(text.zh.as_str()));
+        let script = self.script.file.clone();
+        let alarm = Alarm { name: Arc::from(name), script, level: text.level, en, zh, since_ns };
+        outputs.decision.alarms.push(alarm.change(true));
+        outputs.alarms.push(alarm);
+    }
+
+    /// The script worked on a value that is not there: it asks for nothing, publishes nothing and tries again; alarms stay
+    /// as they are.
     fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected) {
-        self.request = None;
+        self.withdraw();
+        self.values.fill(None);
         if self.condition != Condition::Running {
             return;
         }
         let mut problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
-        let absent = self.script.reads.iter().filter_map(|word| Some((word.name, word.why_absent(view)?)));
-        let absent = absent.map(|(name, why)| format!("{name} has no value ({why})"));
-        let absent: Vec<String> = absent.chain(collected.refusals()).collect();
+        let absent: Vec<String> = why_absent(&self.script, view).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
     }
 
     /// The script failed. True when an older version has come into charge.
     fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
-        self.request = None;
+        self.withdraw();
+        self.values.fill(None);
         let problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
         let at_ns = outputs.decision.at_ns;
         let previous = self.previous.take();
         let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
-        let text = format!("{problem}; {next} until the file is changed");
+        let en = format!("{problem}; {next} until the file is changed");
+        let zh = format!("脚本已停止：{problem}");
         let replaced = previous.is_some();
-        if let Some(previous) = previous {
-            *self = Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(previous, None) };
+        if let Some(Previous { script, kept }) = previous {
+            *self = Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, kept) };
         } else {
             self.condition = Condition::Suspended(Some(problem.clone()));
         }
         outputs.alarms.retain(|alarm| *alarm.script != *self.script.file || *alarm.name != *SCRIPT_STOPPED);
-        self.begin_alarm(Arc::from(SCRIPT_STOPPED), Arc::from(text), at_ns, outputs);
+        let text = AlarmText { level: Level::Critical, en: en.into(), zh: zh.into() };
+        self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
         outputs.decision.problems.push(problem);
         replaced
     }
@@ -272,22 +379,5 @@ impl Slot {
             reads: self.script.reads.iter().map(|word| word.name).collect(),
             thresholds: self.script.thresholds.clone(),
         }
-    }
-}
-
-/// Only what the script reads; a variable that nobody looks at costs nothing.
-fn scope_of(script: &Script) -> Scope<'static> {
-    let mut scope = Scope::with_capacity(1 + script.reads.len());
-    scope.push("memory", Map::new());
-    for word in script.reads.iter().filter(|word| !word.writable()) {
-        scope.push_dynamic(word.name, Dynamic::UNIT);
-    }
-    scope
-}
-
-/// Keeps the string that is there when it says the same.
-fn set_text(place: &mut Dynamic, text: &str) {
-    if place.read_lock::<ImmutableString>().is_none_or(|old| old.as_str() != text) {
-        *place = Dynamic::from(ImmutableString::from(text));
     }
 }

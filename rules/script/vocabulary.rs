@@ -1,5 +1,8 @@
 //! What a script sees: one table, made from the table of channels and from the estimates.
 
+use super::callable::FUNCTIONS;
+use super::events::HANDLERS;
+use super::fields::RECORDS;
 use crate::estimators::{Estimated, Estimates, SETTINGS};
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample};
@@ -29,11 +32,12 @@ pub struct Word {
     pub en: &'static str,
     /// What it is, in Chinese.
     pub zh: &'static str,
-    source: Source,
+    pub(super) source: Source,
 }
 
+/// Where the value of a word comes from.
 #[derive(Debug, Clone, Copy)]
-enum Source {
+pub(super) enum Source {
     Channel(ChannelId),
     Quantity(fn(&Estimates) -> Estimated),
     Deviation(fn(&Estimates) -> Estimated),
@@ -195,7 +199,7 @@ const OWN: [Word; 7] = [
         "",
         WordKind::Map,
         (
-            "What this script remembers between runs: memory.count = 1; empty after the file was changed",
+            "What this script remembers between runs, also when the file is changed or the box starts again: memory.count = 1",
             "脚本自身的存储",
         ),
         Source::Memory,
@@ -232,73 +236,6 @@ pub(super) fn find(name: &str) -> Option<&'static Word> {
     WORDS.iter().find(|word| word.name == name)
 }
 
-/// A function a script can call, besides those of the language.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Function {
-    /// How it is written.
-    pub signature: &'static str,
-    /// What it does, in English.
-    pub en: &'static str,
-    /// What it does, in Chinese.
-    pub zh: &'static str,
-}
-
-const fn function(signature: &'static str, en: &'static str, zh: &'static str) -> Function {
-    Function { signature, en, zh }
-}
-
-/// The functions of the host.
-pub const FUNCTIONS: &[Function] = &[
-    function("has(x)", "true when x has a value in this run", "x 当前有值"),
-    function("x ?? y", "x, or y where x has no value", "x 无值时取 y"),
-    function(
-        "alarm(name, text)",
-        "The alarm stands for as long as this line is reached at every run",
-        "每次运行到此行时报警有效",
-    ),
-    function(
-        "alarm_when(name, condition, hold_s, text)",
-        "Alarm after the condition has held for hold_s, cleared after it has been false for hold_s",
-        "条件持续 hold_s 秒后报警或解除",
-    ),
-    function(
-        "alarm_above(name, x, on, off, hold_s, text)",
-        "Alarm after x has been above `on` for hold_s, cleared after it has been below `off` for hold_s; without a value it stays",
-        "x 高于 on 报警，低于 off 解除",
-    ),
-    function(
-        "alarm_below(name, x, on, off, hold_s, text)",
-        "Alarm after x has been below `on` for hold_s, cleared after it has been above `off` for hold_s; without a value it stays",
-        "x 低于 on 报警，高于 off 解除",
-    ),
-    function(
-        "note(text)",
-        "A line in the history; the same text not twice in a minute, at most 20 a minute",
-        "写入历史记录",
-    ),
-    function(
-        "request_feed_override(pct, reason)",
-        "Ask the gate for a feed override in percent; without a request it is 100 %; of several requests the least counts",
-        "请求进给倍率（由闸门决定）",
-    ),
-    function(
-        "held_s(name, condition)",
-        "For how many seconds the condition has been true without interruption",
-        "条件持续为真的秒数",
-    ),
-    function(
-        "changed(name, x)",
-        "true when x has another value than the one remembered under this name; the first value is no change",
-        "x 的值是否改变",
-    ),
-    function("clamp(x, least, greatest)", "x, but not outside the two limits", "限幅"),
-    function(
-        "why(method)",
-        "Why the method of this name had no answer in this run, as text; no value when it had one",
-        "该方法无值的原因",
-    ),
-];
-
 /// The whole vocabulary as Markdown, in English or Chinese: what `check --vocabulary` prints.
 #[must_use]
 pub fn vocabulary(chinese: bool) -> String {
@@ -306,6 +243,15 @@ pub fn vocabulary(chinese: bool) -> String {
     let mut text = String::from("## Variables\n\n| name | unit | what |\n|---|---|---|\n");
     for word in words() {
         text += &format!("| `{}` | {} | {} |\n", word.name, word.unit, pick(word.en, word.zh));
+    }
+    text += "\n## Records\n\n| name | what |\n|---|---|\n";
+    for record in RECORDS {
+        text += &format!("| `{}` | {} |\n", record.example, pick(record.en, record.zh));
+    }
+    text += "\n## Handlers\n\nFunctions that are called when something happens; they see constants, variables and `memory`.\n\n";
+    text += "| function | when |\n|---|---|\n";
+    for handler in HANDLERS {
+        text += &format!("| `fn {}` | {} |\n", handler.signature, pick(handler.en, handler.zh));
     }
     text += "\n## Functions\n\n| function | what |\n|---|---|\n";
     for function in FUNCTIONS {

@@ -6,6 +6,7 @@ mod mad;
 mod methods;
 mod reload;
 mod shipped;
+mod vocabulary;
 mod wear;
 
 use adapters::clock::SECOND_NS;

@@ -1,0 +1,183 @@
+//! The records that a script reads by field: `sample.spindle_power_w`, `estimates.cutting_power_w`, `age_s.tool`,
+//! `missing.spindle_power_w`.
+//!
+//! A record holds only the fields that the script names, which are known before it runs: so a misspelt one is told when
+//! the file is loaded, and one that nobody reads costs nothing.
+
+use super::vocabulary::{Seen, Source, View, Word, find, words};
+use adapters::channel::nearest;
+use adapters::clock::SECOND_NS;
+
+/// What a record tells of its fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tells {
+    Channel,
+    Estimate,
+    Age,
+    Absence,
+}
+
+/// A record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Record {
+    /// Its name in scripts.
+    pub name: &'static str,
+    /// One of its fields.
+    pub example: &'static str,
+    /// What it is, in English.
+    pub en: &'static str,
+    /// What it is, in Chinese.
+    pub zh: &'static str,
+    tells: Tells,
+}
+
+/// Every record.
+pub const RECORDS: [Record; 4] = [
+    Record {
+        name: "sample",
+        example: "sample.spindle_power_w",
+        en: "A channel; the same as its plain name",
+        zh: "测量通道（与直接写通道名相同）",
+        tells: Tells::Channel,
+    },
+    Record {
+        name: "estimates",
+        example: "estimates.cutting_power_w",
+        en: "An estimate or its standard deviation; the same as its plain name",
+        zh: "估计量（与直接写名称相同）",
+        tells: Tells::Estimate,
+    },
+    Record {
+        name: "age_s",
+        example: "age_s.spindle_power_w",
+        en: "How old the value of a channel is, s; 0 between two readings; no value when the channel has none",
+        zh: "通道数据的时间（秒）",
+        tells: Tells::Age,
+    },
+    Record {
+        name: "missing",
+        example: "missing.spindle_power_w",
+        en: "Why a channel or an estimate has no value, as one word (timeout, stale, not_learned, ...); no value when it has one",
+        zh: "通道或估计量无值的原因",
+        tells: Tells::Absence,
+    },
+];
+
+/// The record of this name.
+pub(super) fn record(name: &str) -> Option<&'static Record> {
+    RECORDS.iter().find(|record| record.name == name)
+}
+
+/// One field of a record.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Field {
+    pub(super) record: &'static Record,
+    pub(super) word: &'static Word,
+}
+
+impl Field {
+    /// The value in this run.
+    pub(super) fn see<'a>(&self, view: &View<'a>) -> Seen<'a> {
+        match self.record.tells {
+            Tells::Channel | Tells::Estimate => self.word.see(view),
+            Tells::Age => age(self.word, view),
+            Tells::Absence => absence(self.word, view),
+        }
+    }
+}
+
+fn age<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
+    let Source::Channel(id) = word.source else { return Seen::Absent };
+    let slot = view.sample.slot(id);
+    if slot.value.is_ok() { Seen::Number(slot.age_ns as f64 / SECOND_NS as f64) } else { Seen::Absent }
+}
+
+fn absence<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
+    let reason = match word.source {
+        Source::Channel(id) => view.sample.slot(id).value.as_ref().err().map(|absence| absence.word()),
+        Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|reason| reason.word()),
+        _ => None,
+    };
+    reason.map_or(Seen::Absent, Seen::Text)
+}
+
+impl Record {
+    fn holds(&self, word: &Word) -> bool {
+        let channel = matches!(word.source, Source::Channel(_));
+        let quantity = matches!(word.source, Source::Quantity(_) | Source::Deviation(_));
+        match self.tells {
+            Tells::Channel | Tells::Age => channel,
+            Tells::Estimate => !channel && !["memory", "now_s", "dt_s"].contains(&word.name),
+            Tells::Absence => channel || quantity,
+        }
+    }
+
+    /// The field of this name, or what to write instead.
+    pub(super) fn field(&'static self, name: &str) -> Result<Field, String> {
+        let names = || words().iter().filter(|word| self.holds(word)).map(|word| word.name);
+        match find(name) {
+            Some(word) if self.holds(word) => Ok(Field { record: self, word }),
+            Some(word) => {
+                let other = RECORDS.iter().find(|other| other.holds(word));
+                let there = other.map_or_else(|| name.to_owned(), |other| format!("{}.{name}", other.name));
+                Err(format!("write `{there}`"))
+            }
+            None => match nearest(name, names()) {
+                Some(near) => Err(format!("did you mean `{}.{near}`?", self.name)),
+                None => Err("`cnc-gateway rules api` lists every channel and estimate".to_owned()),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimators::Estimates;
+    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+
+    fn field(record_name: &str, name: &str) -> Result<Field, String> {
+        record(record_name).expect("a record").field(name)
+    }
+
+    #[test]
+    fn every_channel_and_estimate_is_a_field() {
+        for id in ChannelId::all() {
+            for record in ["sample", "age_s", "missing"] {
+                assert!(field(record, id.name()).is_ok(), "{record}.{id}");
+            }
+        }
+        for (name, _) in Estimates::none(0).quantities() {
+            assert!(field("estimates", name).is_ok() && field("missing", name).is_ok(), "{name}");
+        }
+        assert!(field("estimates", "state").is_ok());
+    }
+
+    #[test]
+    fn what_to_write_instead() {
+        let told = |record, name| field(record, name).expect_err("no field");
+        assert_eq!(told("sample", "spindel_power_w"), "did you mean `sample.spindle_power_w`?");
+        assert_eq!(told("sample", "cutting_power_w"), "write `estimates.cutting_power_w`");
+        assert_eq!(told("estimates", "spindle_power_w"), "write `sample.spindle_power_w`");
+        assert!(told("age_s", "now_s").contains("now_s"));
+    }
+
+    #[test]
+    fn age_and_reason() {
+        let id = ChannelId::of("spindle_power_w").expect("a channel");
+        let (mut sample, estimates) = (Sample::empty(0), Estimates::none(0));
+        let see = |sample: &Sample, record: &str| {
+            let view = View { sample, estimates: &estimates, dt_s: 0.0 };
+            let seen = field(record, "spindle_power_w").expect("a field").see(&view);
+            format!("{seen:?}")
+        };
+        sample.set(id, Slot { value: Ok(Value::Number(7.0)), age_ns: SECOND_NS / 2 });
+        assert_eq!(
+            [see(&sample, "sample"), see(&sample, "age_s"), see(&sample, "missing")],
+            ["Number(7.0)", "Number(0.5)", "Absent"]
+        );
+        sample.set(id, Slot::absent(Absence::Timeout));
+        assert_eq!([see(&sample, "sample"), see(&sample, "age_s")], ["Absent", "Absent"]);
+        assert!(see(&sample, "missing").contains("timeout"));
+    }
+}
