@@ -98,8 +98,11 @@ fn check_scripts(config: &Config, report: &mut Report) {
         report.read.push(format!("{shown}: not there yet; the first start writes the shipped scripts into it"));
         Ok(script::shipped())
     };
-    match files.and_then(|files| script::compile(&files)) {
-        Ok(set) => report.read.push(format!("{shown}: {} scripts", set.len())),
+    match files.and_then(|files| script::prepare(&files)) {
+        Ok(set) => {
+            let trials = script::trials(&set).len();
+            report.read.push(format!("{shown}: {} scripts, {trials} trials passed", set.len()));
+        }
         Err(problems) => report.problems.extend(problems.into_iter().map(|problem| below(directory, problem))),
     }
 }

@@ -1,11 +1,11 @@
-//! The scripts on disk: written there on the first start, watched, compiled beside the tick, swapped only when all of
-//! them compile.
+//! The scripts on disk: written there on the first start, watched, compiled and tried beside the tick, swapped only when all
+//! of them compile and all their trials pass.
 //!
 //! [`Reloader`] looks at the directory once a second on a thread of its own, so that a slow disk never delays a tick. A
 //! change is taken when it has stood still for one look, so that a file is not read while an editor is writing it.
 
 use adapters::channel::nearest;
-use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, compile, shipped};
+use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, shipped};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -258,7 +258,7 @@ fn watch(mut watch: Watch, poll: bool, asks: &Receiver<()>, send: &SyncSender<Lo
         }
         let found = watch.look(asked).cloned();
         if let Some(found) = found
-            && send.send(found.and_then(|files| compile(&files))).is_err()
+            && send.send(found.and_then(|files| prepare(&files))).is_err()
         {
             return;
         }
@@ -270,7 +270,7 @@ fn watch(mut watch: Watch, poll: bool, asks: &Receiver<()>, send: &SyncSender<Lo
 /// # Errors
 /// Everything that is wrong; the host says so too, and whatever was in charge stays.
 pub fn load_now(directory: &Path, host: &mut Host) -> Result<usize, Vec<Problem>> {
-    put_in_charge(read_directory(directory).and_then(|files| compile(&files)), host)
+    put_in_charge(read_directory(directory).and_then(|files| prepare(&files)), host)
 }
 
 /// What is in charge after a start at which something was wrong.
@@ -288,7 +288,7 @@ pub fn load_rest(directory: &Path, problems: &[Problem], host: &mut Host) -> Fal
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
     let files: Vec<ScriptFile> = read_directory(directory).unwrap_or_default();
     let good: Vec<ScriptFile> = files.into_iter().filter(|file| !bad(file)).collect();
-    let fallback = match compile(&good) {
+    let fallback = match prepare(&good) {
         Ok(set) if !set.is_empty() => {
             let count = set.len();
             host.install(set);

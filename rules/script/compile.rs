@@ -4,9 +4,10 @@ use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
 use super::events::Event;
 use super::examine::{Findings, Place, Walk};
 use super::fields::Field;
-use super::handlers::{Handling, functions_but, handlers};
+use super::handlers::{Called, Handling, called};
 use super::problem::{self, Problem};
 use super::settings::{Choice, merge, read_choices};
+use super::trials::{Trial, prove};
 use super::vocabulary::Word;
 use crate::estimators::Settings;
 use adapters::clock::SECOND_NS;
@@ -36,6 +37,7 @@ pub(super) struct Script {
     /// Channels of its own: name and unit.
     pub(super) channels: Vec<(ImmutableString, ImmutableString)>,
     pub(super) handlers: Vec<Handling>,
+    pub(super) trials: Vec<Trial>,
     /// Constants that are written as plain values: what handlers see of the body.
     pub(super) constants: Vec<(String, Dynamic)>,
     /// 0: at every tick.
@@ -58,6 +60,7 @@ impl Script {
 pub struct ScriptSet {
     pub(super) scripts: Vec<Arc<Script>>,
     pub(super) settings: Settings,
+    pub(super) files: Arc<[ScriptFile]>,
 }
 
 impl ScriptSet {
@@ -65,6 +68,12 @@ impl ScriptSet {
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// The texts that it was made from.
+    #[must_use]
+    pub fn files(&self) -> &[ScriptFile] {
+        &self.files
     }
 
     /// How many scripts there are.
@@ -101,7 +110,15 @@ pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
     let scripts: Vec<_> = scripts.into_values().collect();
     let settings = merge(&scripts, &mut problems);
     one_publisher(&scripts, &mut problems);
-    if problems.is_empty() { Ok(ScriptSet { scripts, settings }) } else { Err(problems) }
+    if problems.is_empty() { Ok(ScriptSet { scripts, settings, files: files.into() }) } else { Err(problems) }
+}
+
+/// Compiles all files and runs their trials: what has to be well before scripts come into charge.
+///
+/// # Errors
+/// Everything that is wrong in any of the files, or else everything that their trials found.
+pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
+    compile(files).and_then(prove)
 }
 
 /// A channel has one publisher.
@@ -141,8 +158,8 @@ impl Compiler {
         let plain = parse(&self.checking)?;
         let constants = constants(&plain);
         let mut problems = Vec::new();
-        let handlers = handlers(file, &plain, &self.checking, &self.running, &mut problems);
-        let mut found = self.examine(name, &plain, &handlers, &constants);
+        let called = called(file, &plain, (&self.checking, &self.running), &mut problems);
+        let mut found = self.examine(name, &plain, &called, &constants);
         found.problems.append(&mut problems);
         let every_ns = every_ns(file, &plain).unwrap_or_else(|problem| {
             found.problems.push(problem);
@@ -162,22 +179,26 @@ impl Compiler {
             reads: found.reads,
             fields: found.fields,
             channels: found.channels,
-            handlers,
+            handlers: called.handlers,
+            trials: called.trials,
             constants,
             ast,
         })
     }
 
-    fn examine(&self, file: &str, plain: &AST, handlers: &[Handling], constants: &[(String, Dynamic)]) -> Findings {
+    fn examine(&self, file: &str, plain: &AST, called: &Called, constants: &[(String, Dynamic)]) -> Findings {
         let mut walk = Walk::new(file, plain, &self.callable);
         let mut body = plain.clone();
         body.clear_functions();
         walk.read(&body, Place::Body);
-        walk.read(&functions_but(plain, handlers), Place::Function);
-        for handler in handlers {
-            let constants = constants.iter().map(|(name, _)| ImmutableString::from(name.as_str()));
-            let seen: Vec<ImmutableString> = handler.parameters.iter().cloned().chain(constants).collect();
+        walk.read(&called.others(plain), Place::Function);
+        let constants: Vec<ImmutableString> = constants.iter().map(|(name, _)| name.as_str().into()).collect();
+        for handler in &called.handlers {
+            let seen: Vec<ImmutableString> = handler.parameters.iter().chain(&constants).cloned().collect();
             walk.read(&handler.plain, Place::Handler(&seen));
+        }
+        for trial in &called.trials {
+            walk.read(&trial.plain, Place::Trial(&constants));
         }
         walk.finish()
     }

@@ -4,6 +4,7 @@
 
 use super::fields::{self, Field, Record};
 use super::problem::Problem;
+use super::trials::{TRIAL_FUNCTIONS, TrialFunction};
 use super::vocabulary::{Word, find, words};
 use adapters::channel::nearest;
 use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position, Stmt};
@@ -34,6 +35,8 @@ pub(super) enum Place<'a> {
     Body,
     /// A handler: variables of the vocabulary, its parameters, the constants of the script.
     Handler(&'a [ImmutableString]),
+    /// A trial: the constants of the script, and the functions of trials.
+    Trial(&'a [ImmutableString]),
     /// Another function: nothing but what is handed over.
     Function,
 }
@@ -101,6 +104,9 @@ impl<'a> Walk<'a> {
             self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
         }
         let known = |(known, count): &(String, usize)| known == name && *count == arguments;
+        if let Some(function) = of_trials(name) {
+            return self.trial_call(function, arguments, at, place);
+        }
         if call.op_token.is_some() || self.callable.iter().chain(&self.own).any(known) {
             return;
         }
@@ -114,14 +120,32 @@ impl<'a> Walk<'a> {
             let next = "it runs at every tick; held_s(name, condition) tells how long something has lasted";
             return self.problem(at, "a script may not sleep".to_owned(), next);
         }
-        let names = self.callable.iter().chain(&self.own).map(|it| it.0.as_str());
+        let trials = TRIAL_FUNCTIONS.iter().filter_map(|it| it.signature.split('(').next());
+        let trials = trials.filter(|_| matches!(place, Place::Trial(_)));
+        let names = self.callable.iter().chain(&self.own).map(|it| it.0.as_str()).chain(trials);
         let names = names.filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
         let next = suggestion(nearest(name, names));
         self.problem(at, format!("there is no function `{name}`"), next);
     }
 
+    fn trial_call(&mut self, function: &TrialFunction, arguments: usize, at: Position, place: Place<'_>) {
+        let wanted = parameters(function.signature);
+        let name = function.signature.split('(').next().unwrap_or_default();
+        if !matches!(place, Place::Trial(_)) {
+            let next = "write it into a function whose name begins with trial_";
+            self.problem(at, format!("only a trial can call `{name}`"), next);
+        } else if arguments != wanted {
+            let what = format!("`{name}` takes {wanted} arguments, not {arguments}");
+            self.problem(at, what, format!("write {}", function.signature));
+        }
+    }
+
     fn global(&mut self, name: &str, at: Position, place: Place<'_>) {
-        let known = matches!(place, Place::Handler(names) if names.iter().any(|known| *known == *name));
+        let names = match place {
+            Place::Handler(names) | Place::Trial(names) => names,
+            Place::Body | Place::Function => &[],
+        };
+        let known = names.iter().any(|known| *known == *name);
         if known || self.is_own(name) {
             return;
         }
@@ -130,6 +154,11 @@ impl<'a> Walk<'a> {
                 at,
                 format!("`{name}` is not visible inside a function"),
                 format!("hand it over: fn f({name}) {{ ... }} and call f({name})"),
+            ),
+            (Some(_), Place::Trial(_)) => self.problem(
+                at,
+                format!("a trial does not see `{name}`"),
+                format!("it sets what the script sees: given(#{{ {name}: ... }})"),
             ),
             (Some(word), _) => self.reads(word),
             (None, Place::Function) => {
@@ -155,7 +184,7 @@ impl<'a> Walk<'a> {
             let next = format!("write {}, with the channel that is meant", record.example);
             return self.problem(at, format!("`{name}` is used as a whole"), next);
         };
-        if place == Place::Function {
+        if matches!(place, Place::Function | Place::Trial(_)) {
             let what = format!("`{name}` is not visible inside a function");
             return self.problem(at, what, format!("hand the value over: f({name}.{field})"));
         }
@@ -211,6 +240,16 @@ impl<'a> Walk<'a> {
             self.problem(*at, format!("`{}` is measured and cannot be set", word.name), next);
         }
     }
+}
+
+fn of_trials(name: &str) -> Option<&'static TrialFunction> {
+    TRIAL_FUNCTIONS.iter().find(|function| function.signature.split('(').next() == Some(name))
+}
+
+/// How many parameters a signature has.
+fn parameters(signature: &str) -> usize {
+    let inside = signature.split_once('(').map_or("", |(_, rest)| rest.trim_end_matches(')'));
+    if inside.is_empty() { 0 } else { inside.matches(',').count() + 1 }
 }
 
 /// The name right of the dot, also where more follows it.

@@ -1,4 +1,5 @@
-//! Handlers: functions whose body runs as a piece of the script, so that it sees the same variables and `memory`.
+//! Handlers and trials: functions that the host calls, whose body runs as a piece of the script, so that a handler sees the
+//! same variables and `memory`.
 //!
 //! A function of the language sees nothing but its arguments. So the body of a handler is compiled by itself: the text of the
 //! file with everything else blanked out, which keeps line and column of every message.
@@ -6,7 +7,8 @@
 use super::compile::ScriptFile;
 use super::events::{EventKind, handled};
 use super::problem::{self, Problem};
-use rhai::{AST, Engine, ImmutableString, Position};
+use super::trials::{self, Trial};
+use rhai::{AST, Engine, ImmutableString, Position, ScriptFuncDef};
 
 /// A handler, ready to run.
 pub(super) struct Handling {
@@ -18,44 +20,69 @@ pub(super) struct Handling {
     pub(super) ast: AST,
 }
 
-/// Every handler of a file; `whole` is the file, compiled without optimization.
-pub(super) fn handlers(
-    file: &ScriptFile,
-    whole: &AST,
-    checking: &Engine,
-    running: &Engine,
-    problems: &mut Vec<Problem>,
-) -> Vec<Handling> {
-    let mut found = Vec::new();
-    for function in whole.iter_fn_def() {
-        let (begin, end) = (function.body.start_position(), function.body.end_position());
-        let kind = match handled(&file.name, &function.name, function.params.len(), begin) {
-            Ok(Some(kind)) => kind,
-            Ok(None) => continue,
-            Err(problem) => {
-                problems.push(problem);
-                continue;
-            }
-        };
-        let text = only(&file.text, begin, end);
-        let compiled = checking.compile(&text).and_then(|plain| Ok((plain, running.compile(&text)?)));
-        match compiled {
-            Ok((plain, ast)) => {
-                let (name, parameters) = (function.name.clone(), function.params.to_vec());
-                found.push(Handling { kind, name, parameters, plain, ast });
-            }
-            Err(error) => problems.push(problem::of_parse(&file.name, &error)),
-        }
-    }
-    found.sort_by_key(|handler| handler.kind);
-    found
+/// The functions of a file that the host calls.
+#[derive(Default)]
+pub(super) struct Called {
+    pub(super) handlers: Vec<Handling>,
+    pub(super) trials: Vec<Trial>,
 }
 
-/// The functions of a file that are no handlers.
-pub(super) fn functions_but(whole: &AST, handlers: &[Handling]) -> AST {
-    let mut functions = whole.clone_functions_only();
-    functions.retain_functions(|_, _, name, _| !handlers.iter().any(|handler| handler.name == name));
-    functions
+/// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
+pub(super) fn called(
+    file: &ScriptFile,
+    whole: &AST,
+    (checking, running): (&Engine, &Engine),
+    problems: &mut Vec<Problem>,
+) -> Called {
+    let mut called = Called::default();
+    for function in whole.iter_fn_def() {
+        if let Err(problem) = called.add(file, function, (checking, running)) {
+            problems.push(problem);
+        }
+    }
+    called.handlers.sort_by_key(|handler| handler.kind);
+    called
+}
+
+impl Called {
+    fn add(
+        &mut self,
+        file: &ScriptFile,
+        function: &ScriptFuncDef,
+        (checking, running): (&Engine, &Engine),
+    ) -> Result<(), Problem> {
+        let (begin, end) = (function.body.start_position(), function.body.end_position());
+        let (name, parameters) = (function.name.clone(), function.params.to_vec());
+        let trial = name.starts_with(trials::PREFIX);
+        let kind = handled(&file.name, &name, parameters.len(), begin)?;
+        if !trial && kind.is_none() {
+            return Ok(());
+        }
+        if trial && !parameters.is_empty() {
+            let next = format!("write fn {name}() {{ ... }}");
+            return Err(Problem::new(&file.name, begin, format!("the trial `{name}` has parameters"), next));
+        }
+        let text = only(&file.text, begin, end);
+        let parse = |engine: &Engine| engine.compile(&text).map_err(|error| problem::of_parse(&file.name, &error));
+        let plain = parse(checking)?;
+        match kind {
+            Some(kind) => self.handlers.push(Handling { kind, name, parameters, plain, ast: parse(running)? }),
+            // Compiled as written, so that an error is told at its very place.
+            None => self.trials.push(Trial { name: name.to_string(), at: begin, ast: plain.clone(), plain }),
+        }
+        Ok(())
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.handlers.iter().any(|handler| handler.name == name) || self.trials.iter().any(|trial| trial.name == name)
+    }
+
+    /// The functions of the file that are the script's own.
+    pub(super) fn others(&self, whole: &AST) -> AST {
+        let mut functions = whole.clone_functions_only();
+        functions.retain_functions(|_, _, name, _| !self.has(name));
+        functions
+    }
 }
 
 /// The text between two positions, everything else blank; lines and columns stay.

@@ -25,6 +25,7 @@
 //! | `compile`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
 //! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
 //! | `timers`, `kept` | what a script remembers |
+//! | `trials` | given and expected, written in the script file itself |
 //! | `decision`, `status`, `problem` | what comes out |
 //! | `shipped` | the scripts that come with the gateway |
 
@@ -50,12 +51,13 @@ mod shipped;
 mod slot;
 mod status;
 mod timers;
+mod trials;
 mod variables;
 mod vocabulary;
 
 pub use api::{api, api_json};
 pub use callable::{FUNCTIONS, Function};
-pub use compile::{ScriptFile, ScriptSet, compile};
+pub use compile::{ScriptFile, ScriptSet, compile, prepare};
 pub use decision::{
     Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
     StopRequest,
@@ -67,4 +69,5 @@ pub use host::Host;
 pub use problem::Problem;
 pub use shipped::shipped;
 pub use status::{Condition, ScriptStatus, Status};
+pub use trials::{TRIAL_FUNCTIONS, TrialFunction, TrialResult, prove, trials};
 pub use vocabulary::{Word, WordKind, vocabulary, words};

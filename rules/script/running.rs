@@ -14,6 +14,18 @@ impl Running {
         Self { kept: None }
     }
 
+    /// Runs statements with the functions of another AST.
+    pub(super) fn run_within(
+        &mut self,
+        engine: &Engine,
+        scope: &mut Scope<'_>,
+        ast: &AST,
+        functions: &AST,
+    ) -> Outcome<()> {
+        self.begin(engine, functions);
+        self.run(engine, scope, ast)
+    }
+
     /// Operations are counted from here on. `ast` holds the functions of the script.
     pub(super) fn begin(&mut self, engine: &Engine, ast: &AST) {
         let (global, _) = self.kept.get_or_insert_with(|| begin(engine, ast));

@@ -3,6 +3,7 @@
 use super::callable::FUNCTIONS;
 use super::events::HANDLERS;
 use super::fields::RECORDS;
+use super::trials::TRIAL_FUNCTIONS;
 use crate::estimators::{Estimated, Estimates, SETTINGS};
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample};
@@ -255,6 +256,11 @@ pub fn vocabulary(chinese: bool) -> String {
     }
     text += "\n## Functions\n\n| function | what |\n|---|---|\n";
     for function in FUNCTIONS {
+        text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
+    }
+    text += "\n## Trials\n\nFunctions named `trial_...` in the file of the script; `cnc-gateway rules test` runs them. They call:\n\n";
+    text += "| function | what |\n|---|---|\n";
+    for function in TRIAL_FUNCTIONS {
         text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
     }
     text += "\n`cnc-gateway rules api` lists the methods besides: power separation, curves, compensation, wear.\n";

@@ -6,6 +6,7 @@ mod mad;
 mod methods;
 mod reload;
 mod shipped;
+mod trials;
 mod vocabulary;
 mod wear;
 

@@ -1,0 +1,250 @@
+//! What a trial is played on: one script, what it sees, and a clock of its own.
+
+use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
+use crate::script::compile::{Script, ScriptSet};
+use crate::script::decision::{Alarm, Axis, Decision, Stop};
+use crate::script::problem::Problem;
+use crate::script::status::Condition;
+use crate::script::vocabulary::words;
+use crate::script::{Host, WordKind};
+use adapters::channel::nearest;
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{Absence, ChannelId, Sample, Slot, Value};
+use rhai::{Dynamic, ImmutableString};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// When every trial begins.
+const BEGIN_NS: TimeNs = 1_800_000_000 * SECOND_NS;
+/// 10 Hz, as the box ticks unless configured.
+const STEP_NS: i64 = SECOND_NS / 10;
+/// Most ticks of one trial.
+const TICKS_MAX: u64 = 100_000;
+/// Standard deviation of an estimate that a trial gives without one.
+const SD_SHARE: f64 = 0.02;
+
+/// Where the functions of a trial find the stage.
+#[derive(Clone, Default)]
+pub(super) struct Theatre(Arc<Mutex<Stage>>);
+
+impl Theatre {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Stage> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn open(&self, stage: Stage) {
+        *self.lock() = stage;
+    }
+
+    pub(super) fn close(&self) -> Stage {
+        std::mem::take(&mut *self.lock())
+    }
+}
+
+/// See the [module](self).
+pub(super) struct Stage {
+    host: Host,
+    sample: Sample,
+    estimates: Estimates,
+    now_ns: TimeNs,
+    step_ns: i64,
+    ticks: u64,
+    /// Stops asked for since time last began to pass.
+    stops: Vec<Stop>,
+    notes: Vec<Arc<str>>,
+    /// Expectations met.
+    pub(super) met: usize,
+    /// The script failed; where and why.
+    pub(super) failure: Option<Problem>,
+}
+
+impl Default for Stage {
+    fn default() -> Self {
+        Self {
+            host: Host::new(),
+            sample: Sample::empty(BEGIN_NS),
+            estimates: Estimates::none(BEGIN_NS),
+            now_ns: BEGIN_NS,
+            step_ns: STEP_NS,
+            ticks: 0,
+            stops: Vec::new(),
+            notes: Vec::new(),
+            met: 0,
+            failure: None,
+        }
+    }
+}
+
+impl Stage {
+    /// The script alone, with empty memory.
+    pub(super) fn new(script: &Arc<Script>) -> Self {
+        let mut stage = Self::default();
+        stage.host.install(ScriptSet { scripts: vec![script.clone()], ..ScriptSet::default() });
+        stage
+    }
+
+    /// Time since the beginning.
+    pub(super) fn passed_s(&self) -> f64 {
+        (self.now_ns - BEGIN_NS) as f64 / SECOND_NS as f64
+    }
+
+    /// From now on the script sees this.
+    pub(super) fn give(&mut self, name: &str, value: &Dynamic) -> Result<(), String> {
+        if name == "state" {
+            return self.give_state(value);
+        }
+        if let Some(id) = ChannelId::of(name) {
+            return self.give_channel(id, value);
+        }
+        let deviation = name.strip_suffix("_sd_w").map(|stem| format!("{stem}_w"));
+        let deviation = deviation.or_else(|| name.strip_suffix("_sd_mm").map(|stem| format!("{stem}_mm")));
+        match deviation {
+            Some(quantity) => {
+                let sd =
+                    number(value).filter(|sd| *sd >= 0.0).ok_or_else(|| format!("{name} needs a number from 0 on"))?;
+                let place = quantity_of(&mut self.estimates, &quantity).ok_or_else(|| unknown(name))?;
+                if let Ok(estimate) = place {
+                    estimate.sd = sd;
+                }
+            }
+            None => {
+                let place = quantity_of(&mut self.estimates, name).ok_or_else(|| unknown(name))?;
+                *place = match number(value) {
+                    Some(value) => Ok(Estimate { value, sd: SD_SHARE * value.abs() }),
+                    None if value.is_unit() => Err(NoEstimate::NotSettled),
+                    None => return Err(format!("{name} needs a number, or () for no value")),
+                };
+            }
+        }
+        Ok(())
+    }
+
+    fn give_state(&mut self, value: &Dynamic) -> Result<(), String> {
+        let word = value.clone().into_immutable_string().unwrap_or_default();
+        let Some(state) = State::ALL.into_iter().find(|state| state.word() == word.as_str()) else {
+            let words = State::ALL.map(State::word);
+            let near = nearest(&word, words).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
+            return Err(format!("there is no state \"{word}\": it is one of {}{near}", words.join(", ")));
+        };
+        if state != self.estimates.state {
+            (self.estimates.state, self.estimates.since_ns) = (state, self.now_ns);
+        }
+        self.estimates.unknown_because = (state == State::Unknown).then_some(NoEstimate::NotYet);
+        Ok(())
+    }
+
+    fn give_channel(&mut self, id: ChannelId, value: &Dynamic) -> Result<(), String> {
+        let channel = id.channel();
+        let text = value.read_lock::<ImmutableString>().map(|text| text.to_string());
+        let value = match (number(value), text, channel.kind == adapters::channel::Kind::Text) {
+            _ if value.is_unit() => Err(Absence::Timeout),
+            (Some(number), _, false) if channel.holds(number) => Ok(Value::Number(number)),
+            (Some(number), _, false) => {
+                let (least, greatest) = channel.range;
+                return Err(format!("{id} = {number} is outside {least} to {greatest} {}", channel.unit));
+            }
+            (_, Some(text), true) => Ok(Value::Text(text.into())),
+            (_, _, true) => return Err(format!("{id} needs a text, or () for no value")),
+            (_, _, false) => return Err(format!("{id} needs a number, or () for no value")),
+        };
+        self.sample.set(id, Slot { value, age_ns: 0 });
+        Ok(())
+    }
+
+    /// Ticks come this far apart from now on.
+    pub(super) fn pace(&mut self, seconds: f64) -> Result<(), String> {
+        self.step_ns = span(seconds).filter(|step_ns| *step_ns > 0).ok_or("pace_s needs seconds from 0.001 to 3600")?;
+        Ok(())
+    }
+
+    /// Lets time pass, tick by tick.
+    pub(super) fn pass(&mut self, seconds: f64) -> Result<(), String> {
+        let span_ns = span(seconds).ok_or("after_s needs seconds, from 0.001 on")?;
+        let end_ns = self.now_ns.saturating_add(span_ns);
+        self.stops.clear();
+        while self.now_ns < end_ns {
+            self.ticks += 1;
+            if self.ticks > TICKS_MAX {
+                return Err(format!("more than {TICKS_MAX} ticks in one trial; pace_s(1.0) makes them longer"));
+            }
+            self.tick()?;
+            self.now_ns += self.step_ns;
+        }
+        Ok(())
+    }
+
+    fn tick(&mut self) -> Result<(), String> {
+        (self.sample.at_ns, self.estimates.at_ns) = (self.now_ns, self.now_ns);
+        let decision = self.host.tick(&self.sample, &self.estimates);
+        self.stops.extend(decision.stops.iter().map(|request| request.stop));
+        self.notes.extend(decision.notes.iter().map(|note| note.text.clone()));
+        self.failure = decision.problems.first().cloned();
+        if self.failure.is_some() { Err("the script failed".to_owned()) } else { Ok(()) }
+    }
+
+    /// What the script wants now.
+    pub(super) fn decision(&self) -> &Decision {
+        self.host.decision()
+    }
+
+    /// The alarms that stand.
+    pub(super) fn alarms(&self) -> &[Alarm] {
+        self.host.alarms()
+    }
+
+    /// Was this asked for since time last began to pass?
+    pub(super) fn stopped(&self, stop: Stop) -> bool {
+        self.stops.contains(&stop)
+    }
+
+    /// The offset proposed for an axis.
+    pub(super) fn offset_um(&self, axis: Axis) -> Option<f64> {
+        self.decision().offsets.iter().find(|proposal| proposal.axis == axis).map(|proposal| proposal.offset_um)
+    }
+
+    /// The newest value of a channel of the script's own; `Err` where it has none of this name.
+    pub(super) fn published(&self, name: &str) -> Result<Option<f64>, String> {
+        let found = self.host.published().find(|it| it.name == name).map(|it| it.value);
+        let names = || self.host.published().map(|it| it.name.to_owned()).collect::<Vec<_>>().join(", ");
+        found.ok_or_else(|| format!("the script publishes no `{name}`; it publishes: {}", names()))
+    }
+
+    /// Everything noted since the beginning.
+    pub(super) fn notes(&self) -> &[Arc<str>] {
+        &self.notes
+    }
+
+    /// Why the script asks for nothing, where it waits for a value.
+    pub(super) fn waiting(&self) -> String {
+        let status = self.host.status();
+        match status.scripts.first().map(|script| &script.condition) {
+            Some(Condition::Waiting(problem)) => format!("; the script waits: {}", problem.what),
+            _ => String::new(),
+        }
+    }
+}
+
+fn number(value: &Dynamic) -> Option<f64> {
+    value.as_float().ok().or_else(|| value.as_int().ok().map(|whole| whole as f64))
+}
+
+/// At most 10 days at once.
+fn span(seconds: f64) -> Option<i64> {
+    (0.001..=864_000.0).contains(&seconds).then_some((seconds * SECOND_NS as f64).round() as i64)
+}
+
+fn quantity_of<'a>(estimates: &'a mut Estimates, name: &str) -> Option<&'a mut Estimated> {
+    match name {
+        "filtered_power_w" => Some(&mut estimates.filtered_power_w),
+        "no_load_power_w" => Some(&mut estimates.no_load_power_w),
+        "cutting_power_w" => Some(&mut estimates.cutting_power_w),
+        "load_loss_w" => Some(&mut estimates.load_loss_w),
+        "visible_cutting_power_w" => Some(&mut estimates.visible_cutting_power_w),
+        _ => None,
+    }
+}
+
+fn unknown(name: &str) -> String {
+    let given = words().iter().filter(|word| word.kind != WordKind::Map).map(|word| word.name);
+    let near = nearest(name, given).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+    format!("`{name}` is nothing that a trial can give{near}")
+}
