@@ -6,7 +6,7 @@
 use crate::config;
 use crate::gate::Gate;
 use crate::history::{Options, WhenFull, Writer};
-use crate::pipeline::{NoStore, Pipeline, Store, stored_series};
+use crate::pipeline::{NoStore, Pipeline, Store};
 use crate::usage;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::{Delay, Merge, SourceId, SourcePlan};
@@ -216,7 +216,7 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Fig
     });
     let mut whole = pipeline()?;
     bench.run("gate and records", |sample| whole.step(sample, &mut NoStore));
-    let options = Options { when_full: WhenFull::Wait, extras: stored_series(), ..Options::default() };
+    let options = Options { when_full: WhenFull::Wait, extras: pipeline()?.series(), ..Options::default() };
     let path = directory.join("bench.db");
     let (mut whole, mut store) = (pipeline()?, Stored(Writer::open(&path, options)?));
     bench.run("history", |sample| whole.step(sample, &mut store));

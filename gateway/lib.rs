@@ -1,5 +1,6 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
 
+pub mod backtest;
 pub mod bench;
 pub mod check;
 pub mod cli;
@@ -9,6 +10,7 @@ pub mod doctor;
 pub mod gate;
 pub mod history;
 pub mod http;
+pub mod in_charge;
 pub mod log;
 pub mod moment;
 pub mod operations;

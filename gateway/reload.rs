@@ -98,6 +98,14 @@ pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<Problem>>
     if problems.is_empty() { Ok(files) } else { Err(problems) }
 }
 
+/// One script file.
+///
+/// # Errors
+/// It cannot be read.
+pub fn read_file(path: &Path) -> Result<ScriptFile, Problem> {
+    read_script(path).map_err(|error| unreadable(path, &error))
+}
+
 fn paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(directory)? {
@@ -276,15 +284,23 @@ pub fn load_now(directory: &Path, host: &mut Host) -> Result<usize, Vec<Problem>
 /// What is in charge after a start at which something was wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Fallback {
+    /// The scripts that were in charge before the box was stopped, so many.
+    Last(usize),
     /// All files but those with problems, so many.
     Others(usize),
     /// The shipped scripts, from memory.
     Shipped,
 }
 
-/// At the start there is no last good set: puts in charge every file that is right by itself, or the shipped scripts
-/// where none can be used, so that the box is never without its alarms. The host goes on saying what is wrong.
-pub fn load_rest(directory: &Path, problems: &[Problem], host: &mut Host) -> Fallback {
+/// At the start: puts in charge the set that was in charge before, where there is one; or every file that is right by itself;
+/// or the shipped scripts, so that the box is never without its alarms. The host goes on saying what is wrong.
+pub fn load_rest(directory: &Path, last: Option<ScriptSet>, problems: &[Problem], host: &mut Host) -> Fallback {
+    if let Some(set) = last.filter(|set| !set.is_empty()) {
+        let count = set.len();
+        host.install(set);
+        host.refuse(problems.to_vec());
+        return Fallback::Last(count);
+    }
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
     let files: Vec<ScriptFile> = read_directory(directory).unwrap_or_default();
     let good: Vec<ScriptFile> = files.into_iter().filter(|file| !bad(file)).collect();

@@ -1,9 +1,17 @@
-//! `cnc-gateway rules`: what scripts can see, call and set.
+//! `cnc-gateway rules`: what scripts can see, call and set; their trials; edited ones over stored history.
 
 use super::effects::Lang;
-use super::{CommandResult, Outcome, print, print_json};
-use ::rules::script;
+use super::{CannotRun, CommandResult, Outcome, print, print_json, refused};
+use crate::backtest::{Plan, backtest};
+use crate::config::{self, Config};
+use crate::history::Reader;
+use crate::in_charge;
+use crate::moment;
+use crate::reload::{read_directory, read_file};
+use ::rules::script::{self, Problem, ScriptFile, ScriptSet, TrialResult};
 use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 
 /// Arguments of `rules`.
 #[derive(Debug, Args)]
@@ -14,7 +22,7 @@ pub(super) struct RulesArguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Every method, variable, function and setting of scripts, with units.
+    /// Every method, variable, handler, function, trial function and setting of scripts, with units.
     Api {
         /// Language of the texts.
         #[arg(long, value_enum, default_value_t = Lang::En)]
@@ -23,13 +31,219 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Run the trials that are written in script files; exit code 1 when one fails.
+    Test(TestArguments),
+    /// Run edited scripts over stored history beside the running ones: alarms lost and gained, requests, states. Exit code 1
+    /// when an alarm or a stop is lost or an edited script fails.
+    Backtest(BacktestArguments),
 }
 
-/// Prints.
+#[derive(Debug, Args)]
+struct TestArguments {
+    /// Script files or directories of them; without any, the scripts of the configuration.
+    #[arg(value_name = "FILES")]
+    files: Vec<PathBuf>,
+    /// Configuration file; without one the built-in configuration.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print JSON (trials/1).
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct BacktestArguments {
+    /// Beginning: so long before the newest sample (24h, 7d, 90m), or 2026-01-31T08:15:00Z.
+    #[arg(long, allow_hyphen_values = true, value_name = "TIME", default_value = "24h")]
+    since: String,
+    /// End (excluded), in the same notation; without it the newest sample.
+    #[arg(long, allow_hyphen_values = true, value_name = "TIME")]
+    until: Option<String>,
+    /// Directory of the edited scripts; without it that of the configuration, as it is on disk.
+    #[arg(long, value_name = "DIR")]
+    scripts: Option<PathBuf>,
+    /// Directory of the scripts to compare with; without it those that were last in charge on this box, or those that come
+    /// with the gateway.
+    #[arg(long, value_name = "DIR")]
+    running: Option<PathBuf>,
+    /// Configuration file; without one the built-in configuration.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// History database; without it that of the configuration.
+    #[arg(long, value_name = "DB")]
+    history: Option<PathBuf>,
+    /// Least time between two samples, s: leaves samples out, which is faster and coarser. 0 takes every sample.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    every: f64,
+    /// Print JSON (backtest/1).
+    #[arg(long)]
+    json: bool,
+}
+
+/// Does what was asked.
 pub(super) fn run(arguments: &RulesArguments) -> CommandResult {
-    match arguments.what {
+    match &arguments.what {
         What::Api { json: true, .. } => print_json(&script::api_json()),
-        What::Api { lang, .. } => print(&script::api(lang == Lang::Zh)),
+        What::Api { lang, .. } => print(&script::api(*lang == Lang::Zh)),
+        What::Test(arguments) => return test(arguments),
+        What::Backtest(arguments) => return compare(arguments),
     }
     Ok(Outcome::Fine)
+}
+
+fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    config::load(file, environment).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })
+}
+
+/// The scripts of the configuration, or those that come with the gateway where the directory is not there yet.
+fn configured(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> {
+    let directory = &config.scripts.directory;
+    if directory.is_dir() { read_directory(directory).map_err(refused) } else { Ok(script::shipped()) }
+}
+
+fn named(files: &[PathBuf]) -> Result<Vec<ScriptFile>, CannotRun> {
+    let mut found = Vec::new();
+    for path in files {
+        if path.is_dir() {
+            found.extend(read_directory(path).map_err(refused)?);
+        } else {
+            found.push(read_file(path).map_err(|problem| refused(vec![problem]))?);
+        }
+    }
+    Ok(found)
+}
+
+fn test(arguments: &TestArguments) -> CommandResult {
+    let files = if arguments.files.is_empty() {
+        configured(&configuration(arguments.config.as_deref())?)?
+    } else {
+        named(&arguments.files)?
+    };
+    let (results, problems) = tried(&files);
+    let fine = problems.is_empty() && results.iter().all(|result| result.problem.is_none());
+    if arguments.json {
+        print_json(&json!({
+            "schema": "trials/1",
+            "fine": fine,
+            "trials": results.iter().map(trial).collect::<Vec<_>>(),
+            "problems": problems.iter().map(problem).collect::<Vec<_>>(),
+        }));
+    } else {
+        print(&told(&files, &results, &problems));
+    }
+    Ok(if fine { Outcome::Fine } else { Outcome::No })
+}
+
+/// Each file by itself, so that one that does not compile leaves the others their trials; then all of them together.
+fn tried(files: &[ScriptFile]) -> (Vec<TrialResult>, Vec<Problem>) {
+    let (mut results, mut problems) = (Vec::new(), Vec::new());
+    for file in files {
+        match script::compile(std::slice::from_ref(file)) {
+            Ok(set) => results.extend(script::trials(&set)),
+            Err(found) => problems.extend(found),
+        }
+    }
+    if problems.is_empty() {
+        problems.extend(script::compile(files).err().into_iter().flatten());
+    }
+    (results, problems)
+}
+
+fn told(files: &[ScriptFile], results: &[TrialResult], problems: &[Problem]) -> String {
+    let mut text = String::new();
+    for result in results {
+        let (file, line, name) = (&result.file, result.line, &result.name);
+        match &result.problem {
+            None => text += &format!("ok      {file}:{line} {name} ({} met, {:.1} s)\n", result.met, result.passed_s),
+            Some(problem) => text += &format!("FAILED  {problem}\n"),
+        }
+    }
+    for problem in problems {
+        text += &format!("{problem}\n");
+    }
+    let without = files.iter().filter(|file| !results.iter().any(|result| *result.file == *file.name));
+    for file in without.filter(|file| !problems.iter().any(|problem| problem.file == file.name)) {
+        text += &format!(
+            "none    {}: write fn trial_...() {{ given(#{{ ... }}); after_s(1.0); expect_...; }}\n",
+            file.name
+        );
+    }
+    let failed = results.iter().filter(|result| result.problem.is_some()).count();
+    text += &format!("{} trials, {failed} failed, {} other problems\n", results.len(), problems.len());
+    text
+}
+
+fn trial(result: &TrialResult) -> Value {
+    json!({
+        "file": &*result.file, "line": result.line, "name": result.name, "passed": result.problem.is_none(),
+        "met": result.met, "seconds": result.passed_s, "problem": result.problem.as_ref().map(problem),
+    })
+}
+
+fn problem(problem: &Problem) -> Value {
+    let Problem { file, line, column, what, next } = problem;
+    json!({ "file": file, "line": line, "column": column, "what": what, "next": next })
+}
+
+fn compare(arguments: &BacktestArguments) -> CommandResult {
+    let config = configuration(arguments.config.as_deref())?;
+    let history = arguments.history.clone().unwrap_or_else(|| config.history.path.clone());
+    let newest_ns = newest(&history)?;
+    if !(0.0..=3600.0).contains(&arguments.every) {
+        return Err(CannotRun::new(format!("--every {} is outside 0 to 3600 s", arguments.every), ""));
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "at most an hour")]
+    let every_ns = (arguments.every * 1e9) as i64;
+    let report = backtest(Plan {
+        from_ns: instant(&arguments.since, newest_ns)?,
+        to_ns: arguments.until.as_deref().map(|until| instant(until, newest_ns)).transpose()?,
+        history,
+        every_ns,
+        running: running(arguments, &config)?,
+        edited: edited(arguments, &config)?,
+    });
+    let report = report.map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    if arguments.json {
+        print_json(&report.json());
+    } else {
+        print(&report.to_string());
+    }
+    Ok(if report.worse() { Outcome::No } else { Outcome::Fine })
+}
+
+fn newest(history: &Path) -> Result<i64, CannotRun> {
+    let span = Reader::open(history).and_then(|reader| reader.span());
+    let span = span.map_err(|error| CannotRun::new(error.to_string(), "--history names the database"))?;
+    span.map(|(_, newest_ns)| newest_ns).ok_or_else(|| {
+        CannotRun::new(format!("{} holds no samples yet", history.display()), "let the box run for a while first")
+    })
+}
+
+/// `24h` means as much before the newest sample.
+fn instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
+    let back = text.ends_with(['s', 'm', 'h', 'd']) && text.starts_with(|c: char| c.is_ascii_digit());
+    let text = if back { format!("-{text}") } else { text.to_owned() };
+    moment::parse(&text, newest_ns).map_err(|what| CannotRun::new(what, ""))
+}
+
+fn running(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
+    let files = match &arguments.running {
+        Some(directory) => read_directory(directory).map_err(refused)?,
+        None => in_charge::kept(&config.gateway.data_dir).unwrap_or_else(script::shipped),
+    };
+    script::compile(&files).map_err(refused)
+}
+
+/// Trials are not asked for: what a script does to the history is to be seen before they are rewritten.
+fn edited(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
+    let files = match &arguments.scripts {
+        Some(directory) => read_directory(directory).map_err(refused)?,
+        None => configured(config)?,
+    };
+    script::compile(&files).map_err(refused)
 }

@@ -8,6 +8,7 @@
 use super::channel;
 use adapters::words::execution;
 use adapters::{ChannelId, LadderRequest, Sample};
+use rules::script::{Stop, StopRequest};
 use std::sync::Arc;
 
 /// A request of a script.
@@ -21,6 +22,19 @@ pub struct Ask {
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
+}
+
+impl Ask {
+    /// What a script asks for, as the ladder knows it: a tool change is a stop after this part.
+    #[must_use]
+    pub fn of(wanted: &StopRequest) -> Self {
+        let StopRequest { stop, reason, script, version } = wanted.clone();
+        let request = match stop {
+            Stop::FeedHold => LadderRequest::FeedHold,
+            Stop::ToolChange => LadderRequest::Stop,
+        };
+        Self { request, reason, script, version }
+    }
 }
 
 /// What became of it.

@@ -79,7 +79,8 @@ fn quantities(page: &mut Page, status: &Status) {
         if let (Some(value), Some(uncertainty)) = (estimate.value, estimate.uncertainty) {
             let (name, factor) = base(estimate.name);
             page.gauge(&name, "Inferred, see /api/v1/channels", value * factor);
-            let (name, factor) = base(&format!("{}_uncertainty_w", estimate.name.trim_end_matches("_w")));
+            let (stem, unit) = estimate.name.rsplit_once('_').unwrap_or((estimate.name, "w"));
+            let (name, factor) = base(&format!("{stem}_uncertainty_{unit}"));
             page.gauge(&name, "Half the 95 % interval of the inferred value", uncertainty * factor);
         }
     }

@@ -7,16 +7,18 @@ use rules::estimators::State;
 use serde_json::{Map, Value, json};
 
 /// Quantities that are inferred: name, unit, English, Chinese.
-pub const ESTIMATES: [(&str, &str, &str, &str); 5] = [
+pub const ESTIMATES: [(&str, &str, &str, &str); 7] = [
     ("filtered_power_w", "W", "Spindle power, filtered", "滤波后的主轴功率"),
     ("no_load_power_w", "W", "No-load power at this speed", "空载功率"),
     ("cutting_power_w", "W", "Cutting power", "切削功率"),
     ("load_loss_w", "W", "Additional loss under load", "附加载荷损耗"),
     ("visible_cutting_power_w", "W", "Least visible cutting power", "最小可见切削功率"),
+    ("wear_limit_w", "W", "Limit of the cutting power for a worn edge", "磨损阈值功率"),
+    ("tool_wear_mm", "mm", "Flank wear of the edge", "后刀面磨损量"),
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 11] = [
+const NO_ESTIMATES: [(&str, &str, &str); 16] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -26,6 +28,11 @@ const NO_ESTIMATES: [(&str, &str, &str); 11] = [
     ("extrapolated", "too far from learned speeds", "超出已学习转速范围"),
     ("imbalance", "coefficients contradict the power", "系数与功率矛盾"),
     ("below_no_load", "below no-load power", "低于空载功率"),
+    ("no_model", "no wear model for this cut", "无此切削的磨损模型"),
+    ("cut_unknown", "depth or diameter not known", "切削参数未知"),
+    ("outside_model", "outside the cuts of the model", "超出模型范围"),
+    ("not_observable", "wear cannot be seen in this cut", "此切削中不可观测"),
+    ("not_cutting", "nothing is being cut", "未切削"),
     ("output_missing", "the measured value is missing", "缺少测量值"),
     ("warming_up", "the model has not seen enough yet", "模型数据尚不足"),
 ];

@@ -4,9 +4,10 @@
 
 use crate::history::{ExtraSeries, ExtraValue, STATE_SERIES};
 use rules::estimators::{Estimated, Estimates};
+use rules::script::Host;
 
 /// How many series there are.
-const COUNT: usize = 6;
+const COUNT: usize = 9;
 
 /// The series, in the order of [`values`].
 #[must_use]
@@ -19,7 +20,25 @@ pub fn series() -> Vec<ExtraSeries> {
         watts("cutting_power_w", "Cutting power", "切削功率"),
         watts("cutting_power_sd_w", "Standard deviation of the cutting power", "切削功率标准差"),
         watts("visible_cutting_power_w", "Least visible cutting power", "最小可见切削功率"),
+        watts("wear_limit_w", "Limit of the cutting power for a worn edge", "磨损阈值功率"),
+        ExtraSeries::number("tool_wear_mm", "mm", "Flank wear of the edge", "后刀面磨损量"),
+        ExtraSeries::number("tool_wear_sd_mm", "mm", "Standard deviation of the flank wear", "磨损量标准差"),
     ]
+}
+
+/// The channels of the scripts' own that are stored: those of the scripts in charge when the box started.
+#[must_use]
+pub(super) fn own(scripts: &Host) -> Vec<ExtraSeries> {
+    let taken = series();
+    let fresh = scripts.published().filter(|it| !taken.iter().any(|known| known.name == it.name));
+    fresh.map(|it| ExtraSeries::number(it.name, it.unit, &format!("Published by {}", it.script), "脚本发布")).collect()
+}
+
+/// The newest value of an own channel.
+#[must_use]
+pub(super) fn own_value(scripts: &Host, name: &str) -> ExtraValue<'static> {
+    let value = scripts.published().find(|it| it.name == name).and_then(|it| it.value);
+    value.map_or(ExtraValue::Missing("not_published"), ExtraValue::Number)
 }
 
 /// The values of one tick.
@@ -40,6 +59,9 @@ pub fn values(estimates: &Estimates) -> [ExtraValue<'static>; COUNT] {
         value(estimates.cutting_power_w),
         sd(estimates.cutting_power_w),
         value(estimates.visible_cutting_power_w),
+        value(estimates.wear_limit_w),
+        value(estimates.tool_wear_mm),
+        sd(estimates.tool_wear_mm),
     ]
 }
 

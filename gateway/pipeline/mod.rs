@@ -12,15 +12,16 @@ mod tally;
 
 pub use channels::Channels;
 pub use decide::{Change, Decisions};
+use extras::{own, own_value};
 pub use extras::{series as stored_series, values as stored_values};
 pub use journal::Journal;
 pub use parts::Parts;
 pub use tally::Tally;
 
 use crate::gate::{Gate, Verdict};
-use crate::history::{ExtraValue, Record};
+use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
-use rules::estimators::{self, Estimates};
+use rules::estimators::{self, Estimated, Estimates};
 use rules::script::Host;
 
 /// Where a tick leaves what is to be remembered.
@@ -46,7 +47,11 @@ impl Store for NoStore {
 pub struct Pipeline {
     channels: Channels,
     estimators: estimators::Pipeline,
+    estimates: Estimates,
     scripts: Host,
+    /// Channels of the scripts' own that are stored.
+    own: Vec<ExtraSeries>,
+    extras: Vec<ExtraValue<'static>>,
     generation: u64,
     gate: Gate,
     verdict: Option<Verdict>,
@@ -63,7 +68,10 @@ impl Pipeline {
         estimators.reconfigure(scripts.settings().clone());
         Self {
             channels: Channels::new(),
+            estimates: *estimators.estimates(),
             estimators,
+            own: own(&scripts),
+            extras: Vec::new(),
             generation: scripts.generation(),
             scripts,
             gate,
@@ -75,16 +83,42 @@ impl Pipeline {
         }
     }
 
+    /// What is stored beside the channels: estimates, then the channels of the scripts' own that were there at the start.
+    #[must_use]
+    pub fn series(&self) -> Vec<ExtraSeries> {
+        [stored_series(), self.own.clone()].concat()
+    }
+
     /// Takes one tick. Samples come in the order of time.
     pub fn step(&mut self, sample: &Sample, store: &mut dyn Store) {
+        self.infer(sample);
+        self.decide(sample, store);
+    }
+
+    /// The first half of a tick.
+    pub fn infer(&mut self, sample: &Sample) -> &Estimates {
         self.follow_settings();
-        let estimates = *self.estimators.infer(sample);
+        self.estimates = *self.estimators.infer(sample);
+        &self.estimates
+    }
+
+    /// Between the halves: what the library of wear models says of this cut, limit and wear.
+    pub fn inform(&mut self, (wear_limit_w, tool_wear_mm): (Estimated, Estimated)) {
+        (self.estimates.wear_limit_w, self.estimates.tool_wear_mm) = (wear_limit_w, tool_wear_mm);
+    }
+
+    /// The second half of a tick: decides, stores, records.
+    pub fn decide(&mut self, sample: &Sample, store: &mut dyn Store) {
+        let estimates = self.estimates;
         self.tally.step(sample.at_ns, estimates.state);
-        store.sample(sample, &stored_values(&estimates));
-        self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
         let decision = self.scripts.tick(sample, &estimates);
         let verdict = self.gate.decide(decision.request.as_ref(), sample, &estimates);
-        self.decisions.step(decision, &verdict, |record| store.record(record));
+        self.extras.clear();
+        self.extras.extend(stored_values(&estimates));
+        self.extras.extend(self.own.iter().map(|series| own_value(&self.scripts, &series.name)));
+        store.sample(sample, &self.extras);
+        self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
+        self.decisions.step(self.scripts.decision(), &verdict, |record| store.record(record));
         self.verdict = Some(verdict);
         if let Some(part) = self.parts.step(&self.channels, sample, estimates.state) {
             store.record(part.into());
@@ -136,7 +170,7 @@ impl Pipeline {
     /// The estimates of the last tick.
     #[must_use]
     pub fn estimates(&self) -> &Estimates {
-        self.estimators.estimates()
+        &self.estimates
     }
 
     /// The estimators, for what they have learned.

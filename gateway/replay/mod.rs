@@ -13,8 +13,8 @@ pub use summary::{FileSummary, Kept, Summary};
 use crate::cli::CannotRun;
 use crate::config;
 use crate::gate::Gate;
-use crate::history::{ExtraValue, Options, Record, WhenFull, Writer};
-use crate::pipeline::{Pipeline, Store, stored_series};
+use crate::history::{ExtraSeries, ExtraValue, Options, Record, WhenFull, Writer};
+use crate::pipeline::{Pipeline, Store};
 use adapters::clock::TimeNs;
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{ReadRecording, read_path};
@@ -129,7 +129,12 @@ impl OneFile<'_> {
     fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(Counts, TimeNs), CannotRun> {
         let origin = origin_of(file).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""))?;
         let before = self.before(&origin)?;
-        let writer = self.plan.history.as_ref().map(|path| open(path, &origin, before.rows() > 0)).transpose()?;
+        let writer = self
+            .plan
+            .history
+            .as_ref()
+            .map(|path| open(path, &origin, before.rows() > 0, self.pipeline.series()))
+            .transpose()?;
         let source = Replay::new(origin, &read.recording, before.origin_ns.unwrap_or(next_ns.max(before.free_ns)));
         let rows = source.rows() as u64;
         if let (Some(path), true) = (&self.plan.history, self.plan.talk) {
@@ -181,9 +186,9 @@ impl OneFile<'_> {
     }
 }
 
-fn open(path: &Path, origin: &str, goes_on: bool) -> Result<Writer, CannotRun> {
+fn open(path: &Path, origin: &str, goes_on: bool, extras: Vec<ExtraSeries>) -> Result<Writer, CannotRun> {
     let origin = origin.to_owned();
-    let options = Options { when_full: WhenFull::Wait, extras: stored_series(), origin, goes_on, ..Options::default() };
+    let options = Options { when_full: WhenFull::Wait, extras, origin, goes_on, ..Options::default() };
     Writer::open(path, options).map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 

@@ -6,7 +6,7 @@ use crate::history::{
     disk_room,
 };
 use crate::log::{Notice, Severity};
-use crate::pipeline::{Store, stored_series};
+use crate::pipeline::Store;
 use crate::status::HistoryStatus;
 use adapters::Sample;
 use adapters::clock::TimeNs;
@@ -43,7 +43,7 @@ pub struct Kept {
 
 impl Kept {
     /// Opens the history of the configuration, or goes on without it where the disk does not let it. `beside` is stored
-    /// beside what the pipeline gives.
+    /// beside the channels.
     ///
     /// # Errors
     /// A history that belongs to somebody else: another gateway, a newer version, another program.
@@ -223,7 +223,7 @@ fn options(config: &config::History, beside: Vec<ExtraSeries>) -> Options {
     )]
     let max_bytes = (config.max_gb * 1e9) as u64;
     let retention = Retention { raw_days: config.retention_days, max_bytes, ..Retention::default() };
-    Options { group_commit: config.commit, retention, extras: [stored_series(), beside].concat(), ..Options::default() }
+    Options { group_commit: config.commit, retention, extras: beside, ..Options::default() }
 }
 
 /// Bytes that may still be used.

@@ -116,7 +116,11 @@ fn ticker(
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
     let twin = Twin::of(config);
+    let memory = data_dir.join("estimators.json");
+    let (scripts, watched) = rules::load(config);
+    let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
+    let beside = [pipeline.series(), beside].concat();
     let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();
@@ -125,9 +129,6 @@ fn ticker(
     let Sources { feed, pace, simulated, actuators, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let commands = commands(plan, actuators, orders, &clock)?;
-    let memory = data_dir.join("estimators.json");
-    let (scripts, watched) = rules::load(config);
-    let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,

@@ -52,7 +52,7 @@ fn estimate(name: &'static str, estimated: Estimated) -> EstimateStatus {
         name,
         value: value.map(|estimate| estimate.value),
         uncertainty: value.map(|estimate| HALF_INTERVAL * estimate.sd),
-        unit: "W",
+        unit: if name.ends_with("_mm") { "mm" } else { "W" },
         missing: missing.map(rules::estimators::NoEstimate::word),
         why: missing.map(|reason| reason.to_string()),
     }

@@ -3,11 +3,13 @@
 use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::Wishes;
 use crate::config::Config;
+use crate::in_charge;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
 use adapters::clock::TimeNs;
 use rules::script::{Host, Problem, shipped};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 /// Writes the shipped scripts where there are none, loads what is there, and watches it. Whatever is wrong is told, and
@@ -26,7 +28,9 @@ pub fn load(config: &Config) -> (Host, Watched) {
     }
     if directory.is_dir() {
         if let Err(problems) = load_now(directory, &mut host) {
-            let consequence = match load_rest(directory, &problems, &mut host) {
+            let last = in_charge::last(&config.gateway.data_dir).and_then(Result::ok);
+            let consequence = match load_rest(directory, last, &problems, &mut host) {
+                Fallback::Last(count) => format!("the {count} that were in charge before are in charge again"),
                 Fallback::Others(1) => "the other script is in charge".to_owned(),
                 Fallback::Others(count) => format!("the other {count} are in charge"),
                 Fallback::Shipped => "the shipped scripts are in charge as delivered".to_owned(),
@@ -45,7 +49,9 @@ pub fn load(config: &Config) -> (Host, Watched) {
         let text = format!("changed scripts will not be noticed ({error}); start the box again after a change");
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
-    (host, Watched { reloader: reloader.ok(), told })
+    let watched = Watched { reloader: reloader.ok(), data_dir: config.gateway.data_dir.clone(), told };
+    watched.keep(&host);
+    (host, watched)
 }
 
 /// What the scripts remembered when the box last saved it.
@@ -63,10 +69,19 @@ fn refused(problems: &[Problem], consequence: &str) -> Notice {
 /// Keeps the scripts of the pipeline as they are on disk.
 pub struct Watched {
     reloader: Option<Reloader>,
+    data_dir: PathBuf,
     told: Vec<Notice>,
 }
 
 impl Watched {
+    /// Remembers the texts in charge, for a start at which the directory holds something broken and for backtests.
+    fn keep(&self, host: &Host) {
+        let kept = host.status().refused.is_empty().then(|| in_charge::keep(&self.data_dir, host.files()));
+        if let Some(Err(error)) = kept {
+            tracing::warn!("the scripts in charge could not be kept in {}: {error}", self.data_dir.display());
+        }
+    }
+
     /// Takes what has been found on disk since the last tick. Costs nothing when there is nothing.
     pub fn step(&mut self, pipeline: &mut Pipeline, health: &mut Health, wishes: &Wishes, now_ns: TimeNs) {
         for notice in self.told.drain(..) {
@@ -79,6 +94,7 @@ impl Watched {
         let notice = match reloader.step(pipeline.scripts_mut()) {
             None => return,
             Some(Ok(count)) => {
+                self.keep(pipeline.scripts());
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }

@@ -8,6 +8,7 @@ use super::report;
 use super::rules::Watched;
 use super::twin::Twin;
 use super::wear::Wear;
+use crate::gate::Ask;
 use crate::http::Published;
 use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
@@ -92,9 +93,11 @@ impl Ticker {
             self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
-            self.pipeline.step(&sample, &mut self.health);
-            self.commands.step(&mut self.pipeline, &[], &sample, now_ns, &mut self.health);
-            self.wear.step(&sample, self.pipeline.estimates(), &mut self.health);
+            let inferred = *self.pipeline.infer(&sample);
+            self.pipeline.inform(self.wear.step(&sample, &inferred, &mut self.health));
+            self.pipeline.decide(&sample, &mut self.health);
+            let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
+            self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }

@@ -17,7 +17,7 @@ use rules::estimators::wear::{
     AlarmRule, Change, Conditions, Key, Observability, Threshold, WearAlarm, WearEstimate, WearRecord,
     cutting_speed_m_min, estimate_wear, threshold,
 };
-use rules::estimators::{Estimates, State};
+use rules::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -95,8 +95,9 @@ impl Wear {
         }
     }
 
-    /// Takes one tick, after the pipeline has. Without models in the library it costs a look at an empty queue.
-    pub fn step(&mut self, sample: &Sample, estimates: &Estimates, health: &mut Health) {
+    /// Takes one tick, between inferring and deciding: limit and wear of this cut, for the scripts and the history. Without
+    /// models in the library it costs a look at an empty queue.
+    pub fn step(&mut self, sample: &Sample, estimates: &Estimates, health: &mut Health) -> (Estimated, Estimated) {
         if let Some(notice) = self.told.take() {
             health.event(sample.at_ns, SOURCE, &notice);
         }
@@ -104,22 +105,29 @@ impl Wear {
         if let Some(problem) = self.model_library.problem() {
             health.event(sample.at_ns, SOURCE, &problem);
         }
+        let none = |reason| (Err(reason), Err(reason));
         if self.model_library.is_empty() {
-            return;
+            return none(NoEstimate::NoModel);
         }
         self.follow(sample, fresh);
-        let Some(model) = self.model.clone() else { return };
+        let Some(model) = self.model.clone() else { return none(NoEstimate::NoModel) };
+        if estimates.state != State::Cutting {
+            return none(NoEstimate::NotCutting);
+        }
+        let power = match estimates.cutting_power_w {
+            Ok(power) => power,
+            Err(reason) => return none(reason),
+        };
         let soon = self.judged_ns.is_some_and(|then_ns| (0..EVERY_NS).contains(&(sample.at_ns - then_ns)));
-        if estimates.state != State::Cutting || soon {
-            return;
+        if !soon {
+            self.judged_ns = Some(sample.at_ns);
+            let judged = self.judge(&model, sample, (power.value, power.sd)).map_err(|refusal| refusal.to_string());
+            if let Ok(judged) = &judged {
+                self.alarm_of(judged, power.value, sample.at_ns, health);
+            }
+            self.last = Some(judged);
         }
-        let Ok(power) = estimates.cutting_power_w else { return };
-        self.judged_ns = Some(sample.at_ns);
-        let judged = self.judge(&model, sample, (power.value, power.sd)).map_err(|refusal| refusal.to_string());
-        if let Ok(judged) = &judged {
-            self.alarm_of(judged, power.value, sample.at_ns, health);
-        }
-        self.last = Some(judged);
+        self.last.as_ref().map_or(none(NoEstimate::NotYet), estimates_of)
     }
 
     /// Another tool, material or operation may have another model.
@@ -219,6 +227,24 @@ impl Wear {
             why,
         })
     }
+}
+
+/// Limit and wear as estimates, where they can be stood behind.
+fn estimates_of(judged: &Result<Judged, String>) -> (Estimated, Estimated) {
+    let Ok(Judged { threshold, wear }) = judged else {
+        return (Err(NoEstimate::CutUnknown), Err(NoEstimate::CutUnknown));
+    };
+    let reason = match (threshold.extrapolated.is_empty(), threshold.observability) {
+        (false, _) => Some(NoEstimate::OutsideModel),
+        (true, Observability::NotObservableHere) => Some(NoEstimate::NotObservable),
+        (true, _) => None,
+    };
+    if let Some(reason) = reason {
+        return (Err(reason), Err(reason));
+    }
+    let found = wear.as_ref().map(|wear| Estimate { value: wear.flank_wear_mm, sd: wear.sd_mm });
+    let limit = Estimate { value: threshold.power_w, sd: threshold.sd_w };
+    (Ok(limit), found.map_err(|_| NoEstimate::NotObservable))
 }
 
 /// The tool's own past; of too many tools, those without an alarm are forgotten.

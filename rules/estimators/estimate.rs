@@ -49,6 +49,16 @@ pub enum NoEstimate {
     },
     /// The load-loss coefficients contradict the measured power (negative discriminant).
     Imbalance,
+    /// No wear model is known for the tool, the material and the operation of this cut.
+    NoModel,
+    /// Speed, feed, depth or diameter of the cut are not known.
+    CutUnknown,
+    /// The cut lies outside those that the model was fitted on.
+    OutsideModel,
+    /// The wear cannot be seen in the power of this cut.
+    NotObservable,
+    /// Nothing is being cut.
+    NotCutting,
     /// The power lies below the no-load power by more than the uncertainty: braking, or the no-load power is outdated.
     BelowNoLoad,
 }
@@ -68,6 +78,11 @@ impl NoEstimate {
             Self::NotLearned => "not_learned",
             Self::Extrapolated { .. } => "extrapolated",
             Self::Imbalance => "imbalance",
+            Self::NoModel => "no_model",
+            Self::CutUnknown => "cut_unknown",
+            Self::OutsideModel => "outside_model",
+            Self::NotObservable => "not_observable",
+            Self::NotCutting => "not_cutting",
             Self::BelowNoLoad => "below_no_load",
         }
     }
@@ -93,6 +108,15 @@ impl fmt::Display for NoEstimate {
                 "this speed is too far from those learned (noise gain {noise_gain:.1}); let the spindle run here without feed"
             ),
             Self::Imbalance => f.write_str("load-loss coefficients contradict the power; identify them again"),
+            Self::NoModel => {
+                f.write_str("no wear model for this tool, material and operation; identify tool-wear makes one")
+            }
+            Self::CutUnknown => {
+                f.write_str("depth, diameter, feed or speed of the cut are not known; the operations recipe gives them")
+            }
+            Self::OutsideModel => f.write_str("the cut lies outside those that the model was fitted on"),
+            Self::NotObservable => f.write_str("the wear cannot be seen in the power of this cut"),
+            Self::NotCutting => f.write_str("nothing is being cut"),
             Self::BelowNoLoad => f.write_str("power is below no-load power: braking, or no-load power is outdated"),
         }
     }
@@ -179,6 +203,10 @@ pub struct Estimates {
     pub load_loss_w: Estimated,
     /// Least cutting power that stands out of no-load power and noise, W.
     pub visible_cutting_power_w: Estimated,
+    /// Cutting power `[Pc]` at which the edge in use would be worn in this cut, W; from the library of wear models.
+    pub wear_limit_w: Estimated,
+    /// Flank wear that the cutting power means, mm; from the library of wear models.
+    pub tool_wear_mm: Estimated,
     /// Where the no-load power comes from.
     pub no_load_origin: NoLoadOrigin,
     /// By how much the interpolation amplifies the noise of the learned powers; 0 where there is no no-load power.
@@ -204,6 +232,8 @@ impl Estimates {
             cutting_power_w: Err(NoEstimate::NotYet),
             load_loss_w: Err(NoEstimate::NotYet),
             visible_cutting_power_w: Err(NoEstimate::NotYet),
+            wear_limit_w: Err(NoEstimate::NoModel),
+            tool_wear_mm: Err(NoEstimate::NoModel),
             no_load_origin: NoLoadOrigin::None,
             noise_gain: 0.0,
             visibility: Visibility::NotAsked,
@@ -212,13 +242,15 @@ impl Estimates {
     }
 
     /// Every quantity with its name (which ends in the unit), for scripts, storage and HTTP.
-    pub fn quantities(&self) -> [(&'static str, Estimated); 5] {
+    pub fn quantities(&self) -> [(&'static str, Estimated); 7] {
         [
             ("filtered_power_w", self.filtered_power_w),
             ("no_load_power_w", self.no_load_power_w),
             ("cutting_power_w", self.cutting_power_w),
             ("load_loss_w", self.load_loss_w),
             ("visible_cutting_power_w", self.visible_cutting_power_w),
+            ("wear_limit_w", self.wear_limit_w),
+            ("tool_wear_mm", self.tool_wear_mm),
         ]
     }
 

@@ -237,6 +237,8 @@ impl Pipeline {
             cutting_power_w,
             load_loss_w,
             visible_cutting_power_w: self.least_visible(reference.and(no_load)),
+            wear_limit_w: Err(NoEstimate::NoModel),
+            tool_wear_mm: Err(NoEstimate::NoModel),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
             visibility: self.visibility(inputs, no_load, verdict),

@@ -87,6 +87,7 @@ pub const FUNCTIONS: &[Function] = &[
         "按名称保存数值（最多 2048 个）",
     ),
     function("recall(name)", "The number put away under this name, or no value", "取出已保存的数值"),
+    function("remembered()", "How many numbers are put away, of at most 2048", "已保存数值的个数"),
     function("forget(beginning)", "Forgets every number whose name begins so", "删除以此开头的已保存数值"),
     function(
         "held_s(name, condition)",

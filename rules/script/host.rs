@@ -32,6 +32,7 @@ pub struct Host {
     pending: Vec<AlarmChange>,
     refused: Vec<Problem>,
     settings: Settings,
+    files: Arc<[ScriptFile]>,
     generation: u64,
     happenings: Happenings,
     /// What scripts remembered in an earlier process, until they come into charge.
@@ -58,6 +59,7 @@ impl Host {
             pending: Vec::new(),
             refused: Vec::new(),
             settings: Settings::default(),
+            files: Arc::default(),
             generation: 0,
             happenings: Happenings::default(),
             remembered: BTreeMap::new(),
@@ -92,6 +94,7 @@ impl Host {
             self.slots.push(Slot::install(script, before, remembered.as_ref()));
         }
         self.settings = set.settings;
+        self.files = set.files;
         self.generation += 1;
         self.drop_alarms();
     }
@@ -116,6 +119,12 @@ impl Host {
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// The texts of the set that was put in charge last.
+    #[must_use]
+    pub fn files(&self) -> &[ScriptFile] {
+        &self.files
     }
 
     /// Grows whenever other scripts come into charge.

@@ -43,6 +43,8 @@ fn memory(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
     engine.register_fn("recall", move |name: Text| to.lock().timers.recall(&name));
     let to = shared.clone();
+    engine.register_fn("remembered", move || to.lock().timers.remembered());
+    let to = shared.clone();
     engine.register_fn("forget", move |beginning: Text| to.lock().timers.forget(&beginning));
 }
 

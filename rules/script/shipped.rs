@@ -2,11 +2,13 @@
 
 use super::compile::ScriptFile;
 
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 7] = [
     ("alarms.rhai", include_str!("../scripts/alarms.rhai")),
     ("constant_load.rhai", include_str!("../scripts/constant_load.rhai")),
     ("energy.rhai", include_str!("../scripts/energy.rhai")),
     ("state.rhai", include_str!("../scripts/state.rhai")),
+    ("teach.rhai", include_str!("../scripts/teach.rhai")),
+    ("thermal.rhai", include_str!("../scripts/thermal.rhai")),
     ("tool_wear.rhai", include_str!("../scripts/tool_wear.rhai")),
 ];
 

@@ -147,6 +147,11 @@ impl Timers {
         self.kept.get(name).map_or(Dynamic::UNIT, |value| Dynamic::from_float(*value))
     }
 
+    /// How many numbers are put away.
+    pub(super) fn remembered(&self) -> i64 {
+        i64::try_from(self.kept.len()).unwrap_or(i64::MAX)
+    }
+
     /// Forgets every number whose name begins so.
     pub(super) fn forget(&mut self, beginning: &str) {
         self.kept.retain(|name, _| !name.starts_with(beginning));

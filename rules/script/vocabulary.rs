@@ -100,7 +100,7 @@ fn channel(sample: &Sample, id: ChannelId) -> Seen<'_> {
 type Quantity = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
 
 /// The estimated quantities: name, name of the standard deviation, unit, texts, value.
-const QUANTITIES: [Quantity; 5] = [
+const QUANTITIES: [Quantity; 7] = [
     (
         "filtered_power_w",
         "filtered_power_sd_w",
@@ -135,6 +135,22 @@ const QUANTITIES: [Quantity; 5] = [
         "Least cutting power that stands out of no-load power and noise",
         "可分辨的最小切削功率",
         |it| it.visible_cutting_power_w,
+    ),
+    (
+        "wear_limit_w",
+        "wear_limit_sd_w",
+        "W",
+        "Cutting power at which the edge in use would be worn in this cut, from the library of wear models",
+        "当前切削参数下的磨损阈值功率",
+        |it| it.wear_limit_w,
+    ),
+    (
+        "tool_wear_mm",
+        "tool_wear_sd_mm",
+        "mm",
+        "Flank wear that the cutting power means, from the library of wear models",
+        "由切削功率推算的后刀面磨损量",
+        |it| it.tool_wear_mm,
     ),
 ];
 

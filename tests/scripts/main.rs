@@ -1,5 +1,6 @@
 //! The script host: what scripts can do, what they cannot, and what happens when they fail.
 
+mod backtest;
 mod deciding;
 mod failing;
 mod mad;

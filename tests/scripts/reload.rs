@@ -133,14 +133,18 @@ fn a_start_with_a_broken_file_puts_the_others_in_charge_and_with_none_left_the_s
     write(directory.path(), "b.rhai", "request_feed_override(70, ");
     let mut host = Host::new();
     let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
-    assert_eq!(load_rest(directory.path(), &problems, &mut host), Fallback::Others(1));
+    assert_eq!(load_rest(directory.path(), None, &problems, &mut host), Fallback::Others(1));
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
     assert_eq!(host.status().refused, problems, "and this is said");
+
+    let last = compile(&[file("a.rhai", "request_feed_override(95, \"before\");")]).expect("it compiles");
+    assert_eq!(load_rest(directory.path(), Some(last), &problems, &mut host), Fallback::Last(1));
+    assert_eq!(request(&mut host, 0.1, &[]), Some(95.0), "what was in charge before goes first");
 
     fs::remove_file(directory.path().join("a.rhai")).expect("removed");
     let mut host = Host::new();
     let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
-    assert_eq!(load_rest(directory.path(), &problems, &mut host), Fallback::Shipped);
+    assert_eq!(load_rest(directory.path(), None, &problems, &mut host), Fallback::Shipped);
     assert_eq!(host.status().scripts.len(), shipped().len());
     assert!(!host.status().well());
 }

@@ -62,7 +62,7 @@ pub struct TrialResult {
 /// Every trial of every script, in the order of files and lines.
 #[must_use]
 pub fn trials(set: &ScriptSet) -> Vec<TrialResult> {
-    set.scripts.iter().flat_map(|script| of_script(script)).collect()
+    set.scripts.iter().flat_map(of_script).collect()
 }
 
 /// May these scripts come into charge?

@@ -239,6 +239,8 @@ fn quantity_of<'a>(estimates: &'a mut Estimates, name: &str) -> Option<&'a mut E
         "cutting_power_w" => Some(&mut estimates.cutting_power_w),
         "load_loss_w" => Some(&mut estimates.load_loss_w),
         "visible_cutting_power_w" => Some(&mut estimates.visible_cutting_power_w),
+        "wear_limit_w" => Some(&mut estimates.wear_limit_w),
+        "tool_wear_mm" => Some(&mut estimates.tool_wear_mm),
         _ => None,
     }
 }

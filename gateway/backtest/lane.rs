@@ -1,0 +1,238 @@
+//! One set of scripts on its way through the history, and what it did.
+
+use super::compare::{Kind, Spell};
+use super::seconds;
+use crate::pipeline::Tally;
+use adapters::Sample;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::estimators;
+use rules::script::{Decision, Host, Problem, ScriptSet};
+use std::sync::Arc;
+
+/// A longer step between two samples is a gap.
+pub(super) const STEP_MAX_NS: i64 = 10 * SECOND_NS;
+/// At most so many alarms and stops are listed; further ones are counted.
+const SPELLS_MAX: usize = 100_000;
+/// Requests nearer to each other than this are the same, %.
+const SAME_PCT: f64 = 0.5;
+/// Problems kept.
+const PROBLEMS_MAX: usize = 20;
+
+/// What was asked for in all.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Asked {
+    /// For how long, ns.
+    asked_ns: i64,
+    /// Least request, %.
+    pub least_pct: Option<f64>,
+    /// Greatest request, %.
+    pub greatest_pct: Option<f64>,
+    integral: f64,
+    /// How often a request began.
+    pub times: u64,
+}
+
+impl Asked {
+    fn add(&mut self, pct: Option<f64>, before: Option<f64>, step_ns: i64) {
+        let Some(pct) = pct.filter(|pct| pct.is_finite()) else { return };
+        self.times += u64::from(before.is_none());
+        self.asked_ns += step_ns;
+        self.integral += pct * seconds(step_ns);
+        self.least_pct = Some(self.least_pct.map_or(pct, |least| least.min(pct)));
+        self.greatest_pct = Some(self.greatest_pct.map_or(pct, |greatest| greatest.max(pct)));
+    }
+
+    /// For how long, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        seconds(self.asked_ns)
+    }
+
+    /// Mean over that time, %.
+    #[must_use]
+    pub fn mean_pct(&self) -> Option<f64> {
+        (self.asked_ns > 0).then(|| self.integral / self.seconds())
+    }
+}
+
+/// See the [module](self).
+pub struct Lane {
+    from_ns: TimeNs,
+    estimators: estimators::Pipeline,
+    host: Host,
+    generation: u64,
+    tally: Tally,
+    spells: Vec<Spell>,
+    /// Spells that have begun, by place in `spells`.
+    open: Vec<usize>,
+    left_out: u64,
+    asked: Asked,
+    pct: Option<f64>,
+    notes: u64,
+    problems: Vec<Problem>,
+}
+
+impl Lane {
+    /// Compared from `from_ns` on; what happens before counts for nothing.
+    pub(super) fn new(set: ScriptSet, from_ns: TimeNs) -> Self {
+        let mut host = Host::new();
+        host.install(set);
+        Self {
+            from_ns,
+            estimators: estimators::Pipeline::new(host.settings().clone()),
+            generation: host.generation(),
+            host,
+            tally: Tally::default(),
+            spells: Vec::new(),
+            open: Vec::new(),
+            left_out: 0,
+            asked: Asked::default(),
+            pct: None,
+            notes: 0,
+            problems: Vec::new(),
+        }
+    }
+
+    pub(super) fn step(&mut self, sample: &Sample, step_ns: i64) {
+        if self.generation != self.host.generation() {
+            self.generation = self.host.generation();
+            self.estimators.reconfigure(self.host.settings().clone());
+        }
+        let estimates = *self.estimators.infer(sample);
+        // Empty at almost every tick, so that it costs nothing to copy.
+        let decision = self.host.tick(sample, &estimates).clone();
+        self.take(&decision);
+        let before = std::mem::replace(&mut self.pct, decision.request.as_ref().map(|request| request.pct));
+        if sample.at_ns >= self.from_ns {
+            self.tally.step(sample.at_ns, estimates.state);
+            self.asked.add(self.pct, before, step_ns);
+        }
+    }
+
+    fn take(&mut self, decision: &Decision) {
+        let at_ns = decision.at_ns;
+        for change in &decision.alarms {
+            let named = |spell: &Spell| {
+                spell.kind == Kind::Alarm && *spell.name == *change.name && *spell.script == *change.script
+            };
+            if change.raised {
+                let (script, name, text) = (change.script.clone(), change.name.clone(), change.en.clone());
+                self.begin(Spell {
+                    kind: Kind::Alarm,
+                    script,
+                    name,
+                    text,
+                    level: change.level.word(),
+                    from_ns: at_ns,
+                    to_ns: None,
+                });
+            } else {
+                self.finish(at_ns, named);
+            }
+        }
+        self.stops(decision);
+        if at_ns >= self.from_ns {
+            self.notes += decision.notes.len() as u64;
+        }
+        let room = PROBLEMS_MAX.saturating_sub(self.problems.len());
+        self.problems.extend(decision.problems.iter().take(room).cloned());
+    }
+
+    /// A stop lasts for as long as it is asked for.
+    fn stops(&mut self, decision: &Decision) {
+        let over = |spell: &Spell| {
+            let same = |stop: rules::script::Stop| *spell.name == *stop.word();
+            spell.kind == Kind::Stop && !decision.stops.iter().any(|request| same(request.stop))
+        };
+        self.finish(decision.at_ns, over);
+        for request in &decision.stops {
+            let word = request.stop.word();
+            let standing = |at: &&usize| self.spells[**at].kind == Kind::Stop && *self.spells[**at].name == *word;
+            if self.open.iter().find(standing).is_none() {
+                let (script, text) = (request.script.clone(), request.reason.clone());
+                let (name, from_ns) = (Arc::from(word), decision.at_ns);
+                self.begin(Spell { kind: Kind::Stop, script, name, text, level: "", from_ns, to_ns: None });
+            }
+        }
+    }
+
+    fn begin(&mut self, spell: Spell) {
+        if self.spells.len() >= SPELLS_MAX {
+            self.left_out += 1;
+            return;
+        }
+        self.open.push(self.spells.len());
+        self.spells.push(spell);
+    }
+
+    fn finish(&mut self, at_ns: TimeNs, which: impl Fn(&Spell) -> bool) {
+        let spells = &mut self.spells;
+        self.open.retain(|at| {
+            let over = which(&spells[*at]);
+            if over {
+                spells[*at].to_ns = Some(at_ns);
+            }
+            !over
+        });
+    }
+
+    /// The stretch is over; what ended before it began is forgotten.
+    pub(super) fn end(&mut self, _at_ns: TimeNs) {
+        let from_ns = self.from_ns;
+        self.spells.retain(|spell| spell.to_ns.is_none_or(|to_ns| to_ns >= from_ns));
+        self.spells.iter_mut().for_each(|spell| spell.from_ns = spell.from_ns.max(from_ns));
+        self.open.clear();
+    }
+
+    pub(super) fn pct(&self) -> Option<f64> {
+        self.pct
+    }
+
+    /// Alarms and stops, in the order in which they began.
+    #[must_use]
+    pub fn spells(&self) -> &[Spell] {
+        &self.spells
+    }
+
+    /// What was asked for.
+    #[must_use]
+    pub fn asked(&self) -> &Asked {
+        &self.asked
+    }
+
+    /// Every state with its seconds.
+    #[must_use]
+    pub fn seconds_per_state(&self) -> Vec<(&'static str, f64)> {
+        self.tally.seconds_per_state()
+    }
+
+    /// Notes written.
+    #[must_use]
+    pub fn notes(&self) -> u64 {
+        self.notes
+    }
+
+    /// Scripts that failed on the way.
+    #[must_use]
+    pub fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+
+    /// How many scripts there are.
+    #[must_use]
+    pub fn scripts(&self) -> usize {
+        self.host.status().scripts.len()
+    }
+
+    /// Alarms and stops beyond those that are listed.
+    #[must_use]
+    pub fn left_out(&self) -> u64 {
+        self.left_out
+    }
+}
+
+/// Is it another request? No request is the programmed feed.
+pub(super) fn differ(a: Option<f64>, b: Option<f64>) -> bool {
+    let (a, b) = (a.unwrap_or(100.0), b.unwrap_or(100.0));
+    (a - b).abs() > SAME_PCT || a.is_finite() != b.is_finite()
+}

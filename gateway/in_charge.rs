@@ -1,0 +1,62 @@
+//! The scripts that were last in charge, kept beside everything else that the box writes: what a backtest compares with, and
+//! what comes into charge again after a start at which the directory holds something broken.
+
+use rules::script::{Problem, ScriptFile, ScriptSet, prepare};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// Name of the file in the data directory.
+const FILE: &str = "scripts_in_charge.json";
+
+/// Where they are kept.
+#[must_use]
+pub fn path(data_dir: &Path) -> PathBuf {
+    data_dir.join(FILE)
+}
+
+/// Keeps the texts of this set, in one step.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn keep(data_dir: &Path, files: &[ScriptFile]) -> std::io::Result<()> {
+    let scripts: Map<String, Value> = files.iter().map(|file| (file.name.clone(), json!(file.text))).collect();
+    let text = json!({ "schema": "scripts_in_charge/1", "scripts": scripts }).to_string();
+    std::fs::create_dir_all(data_dir)?;
+    let (path, fresh) = (path(data_dir), path(data_dir).with_extension("new"));
+    std::fs::write(&fresh, text)?;
+    std::fs::rename(fresh, path)
+}
+
+/// The texts that were kept; `None` where there are none.
+#[must_use]
+pub fn kept(data_dir: &Path) -> Option<Vec<ScriptFile>> {
+    let text = std::fs::read_to_string(path(data_dir)).ok()?;
+    let document: Value = serde_json::from_str(&text).ok()?;
+    let file =
+        |(name, text): (&String, &Value)| Some(ScriptFile { name: name.clone(), text: text.as_str()?.to_owned() });
+    document["scripts"].as_object()?.iter().map(file).collect()
+}
+
+/// The set that was kept, compiled and tried; `None` where there is none.
+///
+/// # Errors
+/// A newer program may find something wrong with it.
+pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<Problem>>> {
+    kept(data_dir).map(|files| prepare(&files))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_kept_comes_back() {
+        let directory = tempfile::tempdir().expect("a directory");
+        assert_eq!(kept(directory.path()), None);
+        let files = vec![ScriptFile { name: "a.rhai".to_owned(), text: "note(\"报警\");\n".to_owned() }];
+        keep(directory.path(), &files).expect("written");
+        assert_eq!(kept(directory.path()), Some(files));
+        std::fs::write(path(directory.path()), "{").expect("written");
+        assert!(last(directory.path()).is_none(), "half a file is none");
+    }
+}
