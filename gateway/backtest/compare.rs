@@ -116,10 +116,12 @@ fn of_running(spell: &Spell, edited: &[&Spell]) -> Option<Difference> {
     }
 }
 
-/// The first of the others that stands at the same time.
+/// Of the others that stand at the same time, the one that does so for longest.
 fn meeting<'a>(spell: &Spell, others: &[&'a Spell]) -> Option<&'a Spell> {
     let first = others.partition_point(|other| other.end_ns().saturating_add(SAME_NS) < spell.from_ns);
-    others.get(first).copied().filter(|other| other.from_ns <= spell.end_ns().saturating_add(SAME_NS))
+    let meets = |other: &&&Spell| other.from_ns <= spell.end_ns().saturating_add(SAME_NS);
+    let common_ns = |other: &Spell| other.end_ns().min(spell.end_ns()).saturating_sub(other.from_ns.max(spell.from_ns));
+    others[first..].iter().take_while(meets).max_by_key(|other| common_ns(other)).copied()
 }
 
 #[cfg(test)]
@@ -156,6 +158,8 @@ mod tests {
     fn a_second_is_the_same_moment() {
         let (a, b) = ([spell("a", 10, Some(20))], [spell("a", 11, Some(19))]);
         assert!(differences(&a, &b).is_empty());
+        let both = [spell("a", 0, Some(10)), spell("a", 11, Some(30))];
+        assert!(differences(&both, &both).is_empty(), "the one before is near, but this one is the same");
         let (a, b) = ([spell("a", 10, Some(20))], [spell("a", 23, Some(25))]);
         assert_eq!(differences(&a, &b).len(), 2);
     }

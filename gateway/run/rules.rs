@@ -76,8 +76,7 @@ pub struct Watched {
 impl Watched {
     /// Remembers the texts in charge, for a start at which the directory holds something broken and for backtests.
     fn keep(&self, host: &Host) {
-        let kept = host.status().refused.is_empty().then(|| in_charge::keep(&self.data_dir, host.files()));
-        if let Some(Err(error)) = kept {
+        if let Err(error) = in_charge::keep(&self.data_dir, host.files()) {
             tracing::warn!("the scripts in charge could not be kept in {}: {error}", self.data_dir.display());
         }
     }

@@ -27,11 +27,11 @@ fn the_shipped_scripts_compile_and_run_with_and_without_values() {
 fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
     let mut host = Host::new();
     host.load(&shipped()).expect("they compile");
-    let heavy: Vec<Option<f64>> =
-        (10..110).map(|tick| request(&mut host, f64::from(tick) / 10.0, &[("spindle_load_pct", 95.0)])).collect();
+    let cut = [("spindle_load_pct", 95.0), ("feed_mm_min", 200.0), ("feed_programmed_mm_min", 200.0)];
+    let heavy: Vec<Option<f64>> = (10..110).map(|tick| request(&mut host, f64::from(tick) / 10.0, &cut)).collect();
     let last = heavy.last().copied().flatten().expect("a heavy cut is slowed down");
     assert!(last < 90.0, "{last}");
-    assert_eq!(request(&mut host, 11.1, &[]), None, "without the load nothing is asked for");
+    assert_eq!(request(&mut host, 11.1, &cut[1..]), None, "without the load nothing is asked for");
 }
 
 #[test]
@@ -92,6 +92,8 @@ fn the_same_samples_give_the_same_decisions() {
                 ("spindle_load_pct", 150.0 * slow + 10.0 * random),
                 ("total_power_w", 3000.0 * random),
                 ("part_count", f64::from(tick / 500)),
+                ("feed_mm_min", 200.0),
+                ("feed_programmed_mm_min", 200.0),
             ];
             let provided = if seed.is_multiple_of(7) { &values[1..] } else { &values[..] };
             text += &format!("{:?}\n", host.tick(&sample(at_s, provided), &cutting(at_s, 900.0 * random)));

@@ -45,6 +45,7 @@ pub const TRIAL_FUNCTIONS: &[TrialFunction] = &[
         "The channel of the script's own is in this range",
         "期望自定义通道在此范围",
     ),
+    row("expect_setting(name, least, greatest)", "A setting of the estimators is in this range", "期望设定值在此范围"),
     row("expect_note(part)", "A note with these words was written", "期望写入包含此文字的记录"),
 ];
 
@@ -58,6 +59,7 @@ pub(super) fn register(engine: &mut Engine, theatre: &Theatre) {
     alarms(engine, theatre);
     stops(engine, theatre);
     numbers(engine, theatre);
+    settings(engine, theatre);
     let on = theatre.clone();
     engine.register_fn("expect_note", move |part: Text| {
         expect(&on, |stage| {
@@ -172,6 +174,14 @@ fn numbers(engine: &mut Engine, theatre: &Theatre) {
     let on = theatre.clone();
     engine.register_fn("expect_published", move |name: Text, least: Dynamic, greatest: Dynamic| {
         expect(&on, |stage| within(&name, stage.published(&name)?, (&least, &greatest), stage))
+    });
+}
+
+fn settings(engine: &mut Engine, theatre: &Theatre) {
+    let on = theatre.clone();
+    engine.register_fn("expect_setting", move |name: Text, least: Dynamic, greatest: Dynamic| {
+        let what = format!("the setting {name}");
+        expect(&on, |stage| within(&what, stage.setting(&name), (&least, &greatest), stage))
     });
 }
 

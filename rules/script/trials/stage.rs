@@ -4,6 +4,7 @@ use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use crate::script::compile::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
 use crate::script::problem::Problem;
+use crate::script::settings::merge;
 use crate::script::status::Condition;
 use crate::script::vocabulary::words;
 use crate::script::{Host, WordKind};
@@ -78,7 +79,9 @@ impl Stage {
     /// The script alone, with empty memory.
     pub(super) fn new(script: &Arc<Script>) -> Self {
         let mut stage = Self::default();
-        stage.host.install(ScriptSet { scripts: vec![script.clone()], ..ScriptSet::default() });
+        let scripts = vec![script.clone()];
+        let settings = merge(&scripts, &mut Vec::new());
+        stage.host.install(ScriptSet { scripts, settings, ..ScriptSet::default() });
         stage
     }
 
@@ -206,6 +209,11 @@ impl Stage {
         let found = self.host.published().find(|it| it.name == name).map(|it| it.value);
         let names = || self.host.published().map(|it| it.name.to_owned()).collect::<Vec<_>>().join(", ");
         found.ok_or_else(|| format!("the script publishes no `{name}`; it publishes: {}", names()))
+    }
+
+    /// A setting of the estimators, as this script alone leaves it.
+    pub(super) fn setting(&self, name: &str) -> Option<f64> {
+        self.host.settings().get(name)
     }
 
     /// Everything noted since the beginning.
