@@ -1,12 +1,15 @@
 //! What a script leaves behind in one run.
 
 use super::decision::{Axis, Stop};
-use super::timers::{AlarmText, NAMES_MAX, Timers};
+use super::timers::{AlarmText, NAMES_MAX, Timers, too_many};
 use adapters::clock::TimeNs;
 use rhai::{Dynamic, EvalAltResult, ImmutableString};
 
 /// At most this many notes in one run.
 const NOTES_MAX: usize = 8;
+
+/// At most so many calls of `forget` in one run.
+const FORGET_MAX: usize = 16;
 
 pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
@@ -25,6 +28,7 @@ pub(super) struct Collected {
     pub(super) notes: Vec<ImmutableString>,
     pub(super) published: Vec<(ImmutableString, Option<f64>)>,
     refusals: Vec<(&'static str, String)>,
+    forgotten: usize,
 }
 
 impl Collected {
@@ -38,6 +42,17 @@ impl Collected {
         self.notes.clear();
         self.published.clear();
         self.refusals.clear();
+        self.forgotten = 0;
+    }
+
+    /// Looks through everything that was put away, which a loop could make long.
+    pub(super) fn forget(&mut self, beginning: &str) -> Outcome<()> {
+        self.forgotten += 1;
+        if self.forgotten > FORGET_MAX {
+            return Err(format!("forget was called more than {FORGET_MAX} times in one run").into());
+        }
+        self.timers.forget(beginning);
+        Ok(())
     }
 
     /// A method had no answer in this run; the last reason of each counts.
@@ -63,7 +78,7 @@ impl Collected {
         } else if self.alarms.len() < NAMES_MAX {
             self.alarms.push((name, text));
         } else {
-            return Err(format!("more than {NAMES_MAX} alarms in one script").into());
+            return Err(too_many("alarms", NAMES_MAX));
         }
         Ok(())
     }

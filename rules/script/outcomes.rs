@@ -45,7 +45,7 @@ fn memory(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
     engine.register_fn("remembered", move || to.lock().timers.remembered());
     let to = shared.clone();
-    engine.register_fn("forget", move |beginning: Text| to.lock().timers.forget(&beginning));
+    engine.register_fn("forget", move |beginning: Text| to.lock().forget(&beginning));
 }
 
 fn requests(engine: &mut Engine, shared: &Shared) {

@@ -223,7 +223,7 @@ fn entry<'a, T: Default>(
     map.get_mut(name.as_str()).ok_or_else(|| too_many(what, most))
 }
 
-fn too_many(what: &str, most: usize) -> Box<rhai::EvalAltResult> {
+pub(super) fn too_many(what: &str, most: usize) -> Box<rhai::EvalAltResult> {
     format!("more than {most} {what} in one script; use the same name each time instead of building new ones").into()
 }
 

@@ -27,7 +27,7 @@ fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// A machine that has run for so long with [`WATCH`]; the scripts that come with the gateway are deleted.
+/// A machine that has run for so long with [`WATCH`]; those that come with the gateway are emptied.
 fn machine(directory: &Path, seconds: u32, tick_hz: f64) {
     let config = format!(
         "[gateway]\nname = \"Lathe\"\ndata_dir = \"data\"\ntick_hz = {tick_hz:?}\n[http]\nenabled = false\n\
@@ -35,6 +35,9 @@ fn machine(directory: &Path, seconds: u32, tick_hz: f64) {
     );
     fs::write(directory.join("cnc-gateway.toml"), config).expect("written");
     fs::create_dir_all(directory.join("data/scripts")).expect("created");
+    for file in rules::script::shipped() {
+        fs::write(directory.join("data/scripts").join(file.name), "// not here\n").expect("written");
+    }
     fs::write(directory.join("data/scripts/watch.rhai"), WATCH).expect("written");
     let seconds = seconds.to_string();
     let output = program(&["run", "--config", "cnc-gateway.toml", "--speed", "max", "--for", &seconds], directory);

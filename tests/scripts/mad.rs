@@ -5,7 +5,7 @@ use rules::script::TEXT_MAX;
 use std::time::{Duration, Instant};
 
 /// Scripts that want everything: time, memory, depth.
-const MAD: [(&str, &str); 19] = [
+const MAD: [(&str, &str); 27] = [
     ("endless loop", "loop {}"),
     ("endless while", "while true { let x = 1; }"),
     ("recursion", "fn f(x) { f(x + 1) } f(0);"),
@@ -22,8 +22,22 @@ const MAD: [(&str, &str); 19] = [
     ("sorting for ever", "let a = []; for i in 0..120 { a.push(120 - i); } loop { let b = a; b.sort(); }"),
     ("searching for ever", "let s = \"\"; s.pad(1000, 'x'); loop { s.index_of(\"y\"); }"),
     ("copying for ever", "let a = []; a.pad(120, 1.5); loop { let b = a; }"),
-    ("copying maps for ever", "let m = #{}; for i in 0..250 { m[`k${i}`] = i; } loop { let b = m; }"),
+    ("copying maps for ever", "let m = #{}; for i in 0..120 { m[`k${i}`] = i; } loop { let b = m; }"),
     ("alarms without end", "let i = 0; loop { alarm(`a${i}`, \"\"); i += 1; }"),
+    ("forgetting without end", "for i in 0..900 { remember(`k${i}`, i); } loop { forget(\"x\"); }"),
+    ("remembering without end", "let i = 0; loop { remember(`a${i}`, i); i += 1; }"),
+    ("latched alarms without end", "let i = 0; loop { raise_alarm(`a${i}`, \"\"); i += 1; }"),
+    ("deep maps for ever", "let m = #{}; for i in 0..60 { m[`k${i}`] = [i]; } loop { let b = m; let c = b; }"),
+    ("comparing for ever", "let a = []; a.pad(120, 1.5); let b = a; loop { let c = a == b; }"),
+    ("copying text for ever", "let s = \"\"; s.pad(1000, 'x'); loop { let b = s + \"y\"; }"),
+    (
+        "methods for ever",
+        "const T = [20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0, 27.0, 28.0, 29.0]; loop { predicted_thermal_error_um(T, T, 1.0); }",
+    ),
+    (
+        "curves for ever",
+        "const C = [[0.4, 0.2, 3.0, 1.45, 0.29, 0.14, 0.03, 0.01], [1.2, 0.2, 3.0, 1.5, 0.872, 0.4277, 0.0944, 0.01]]; loop { feed_curve_depth_mm(C, 1.0, 2.4); }",
+    ),
     ("timers without end", "let i = 0; loop { held_s(`a${i}`, true); i += 1; }"),
 ];
 
@@ -43,9 +57,31 @@ fn a_mad_script_is_stopped_and_told_and_the_next_tick_runs() {
         );
         assert_eq!(decision.problems.len(), 1, "{what} was not stopped");
         assert_eq!(decision.request.map(|request| request.pct), Some(90.0), "{what}: its request ends");
+        // The bound is 50 ms; how long a loaded machine lets a thread wait is another matter.
         assert!(took < Duration::from_secs(2), "{what} took {took:?}");
         assert_eq!(request(&mut host, 0.1, &[]), Some(90.0));
     }
+}
+
+/// Least of several runs of each, which is the time it takes when nobody is in the way:
+/// `cargo test --release --test scripts mad_scripts_take -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement"]
+fn mad_scripts_take_less_than_fifty_milliseconds() {
+    let mut worst = Duration::ZERO;
+    for (what, text) in MAD {
+        let run = || {
+            let mut host = host(text);
+            let began = Instant::now();
+            host.tick(&sample(0.0, &[]), &Estimates::none(0));
+            began.elapsed()
+        };
+        let least = (0..7).map(|_| run()).min().unwrap_or_default();
+        println!("{what:28} {:7.3} ms", least.as_secs_f64() * 1e3);
+        worst = worst.max(least);
+    }
+    println!("worst {:.3} ms", worst.as_secs_f64() * 1e3);
+    assert!(worst < Duration::from_millis(50), "{worst:?}");
 }
 
 #[test]
