@@ -53,7 +53,7 @@ fn everything_that_is_wrong_is_told_at_once() {
         "model.toml:5: ",
         "run.csv:3: ",
         "missing.so: the vendor library is not there",
-        "the FANUC driver through the vendor's library is not built yet",
+        "the FANUC driver (FOCAS2) is not built yet",
         "6 problems",
     ] {
         assert!(text.contains(part), "{part}\n---\n{text}");
