@@ -16,6 +16,7 @@ pub mod child;
 pub mod clock;
 pub mod driver;
 pub mod fanuc;
+pub mod hnc;
 pub mod merge;
 pub mod modbus;
 pub mod mqtt;

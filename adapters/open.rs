@@ -106,6 +106,7 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
             Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
         }
         Target::NcLink(target) => crate::nclink::open(address, target),
+        Target::HncNet(target) => Ok(crate::hnc::open(address, target)),
         Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::tcp(address, at, meter)),
         Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::rtu(address, line, meter)),
         other => Err(not_built(address, other)),
@@ -206,6 +207,7 @@ pub fn missing_driver(address: &Address) -> Option<OpenError> {
         | Target::ModbusRtu { .. }
         | Target::Fanuc { .. } => None,
         Target::NcLink(target) if !target.tls => None,
+        Target::HncNet(_) => None,
         other => Some(not_built(address, other)),
     }
 }
@@ -216,8 +218,7 @@ fn not_built(address: &Address, target: &Target) -> OpenError {
         Target::Fanuc { .. } => "another pace than that of the clock for a real controller",
         Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "another pace than that of the clock for a real meter",
         Target::NcLink(target) if target.tls => "TLS to the broker",
-        Target::NcLink(_) => "another pace than that of the clock for a real controller",
-        Target::HncNet { .. } => "the Huazhong driver (HncNetDll)",
+        Target::NcLink(_) | Target::HncNet(_) => "another pace than that of the clock for a real controller",
         Target::Eda9033a { .. } => "the EDA9033A meter driver",
         Target::Waveform { .. } => "the waveform receiver",
     };

@@ -160,9 +160,8 @@ fn check_sources(name: &str, config: &Config, report: &mut Report) {
         }
         match source.address.target() {
             Target::Replay(replay) => check_recording(&replay.file, report),
-            Target::Fanuc { backend: FanucBackend::Vendor(library), .. } | Target::HncNet { library, .. } => {
-                check_library(library, report);
-            }
+            Target::Fanuc { backend: FanucBackend::Vendor(library), .. } => check_library(library, report),
+            Target::HncNet(target) => check_library(&target.library, report),
             _ => {}
         }
     }

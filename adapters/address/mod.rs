@@ -1,12 +1,14 @@
 //! Sources and sinks as addresses: the same notation in the configuration, on the command line and in messages.
 
 mod fanuc;
+mod huazhong;
 mod keys;
 mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
+pub use huazhong::{HncNetTarget, NcLinkTarget};
 pub use target::{
-    Circuit, Endpoint, FanucBackend, MeterTarget, NcLinkTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice,
+    Circuit, Endpoint, FanucBackend, MeterTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice,
     SimulatedMachine, SimulatedTarget, Speed, Target,
 };
 
@@ -114,6 +116,8 @@ mod tests {
             "nclink://broker/SN1?user=u&password_file=/etc/pw&period_ms=50&f_channel=6400&spindle_axis=3",
             "nclinks://broker:8883/SERIAL",
             "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
+            "hncnet://cnc?library=x.so&local_host=10.0.0.2&local_port=9090&long_bytes=4&period_ms=200&sample=yes",
+            "nclink://broker/SN1?write=mailbox&mailbox=R200",
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",
             "modbus-rtu:///dev/ttyUSB0?baud=9600&parity=none&unit=1&profile=eda9033a",
             "eda9033a:///dev/ttyUSB0?baud=9600&address=1&ct=20",

@@ -2,6 +2,7 @@
 
 use super::SCHEMES;
 use super::fanuc::FanucOptions;
+use super::huazhong::{HncNetTarget, NcLinkTarget, hncnet, nclink};
 use super::keys::Keys;
 use crate::channel::nearest;
 use crate::driver::LadderRule;
@@ -123,27 +124,6 @@ pub struct SerialTarget {
     pub parity: Parity,
 }
 
-/// A Huazhong controller behind a broker.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NcLinkTarget {
-    /// The broker.
-    pub at: Endpoint,
-    /// Serial number of the device.
-    pub serial: String,
-    /// Encrypted?
-    pub tls: bool,
-    /// User at the broker.
-    pub user: Option<String>,
-    /// File that holds the user's password.
-    pub password_file: Option<PathBuf>,
-    /// Pace of the queries, ms.
-    pub period_ms: u64,
-    /// Index of the channel's first F word: 2560 in configuration HNC-30, 6400 in HNC-80.
-    pub f_channel: u32,
-    /// Number of the spindle among the axes, where it is not 5.
-    pub spindle_axis: Option<u32>,
-}
-
 /// What a power meter sits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Circuit {
@@ -193,12 +173,7 @@ pub enum Target {
     /// A Huazhong controller by NC-Link over MQTT.
     NcLink(NcLinkTarget),
     /// A Huazhong controller through its vendor library.
-    HncNet {
-        /// Where.
-        at: Endpoint,
-        /// The vendor library.
-        library: PathBuf,
-    },
+    HncNet(HncNetTarget),
     /// A Modbus device on the network.
     ModbusTcp {
         /// Where.
@@ -236,10 +211,7 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "fanuc" => fanuc(body, keys),
         "nclink" => nclink(body, keys, false),
         "nclinks" => nclink(body, keys, true),
-        "hncnet" => {
-            let library = library(keys);
-            Ok(Target::HncNet { at: endpoint(body, Some(10001))?, library: library? })
-        }
+        "hncnet" => hncnet(body, keys),
         "modbus-tcp" => {
             let meter = meter(keys, 0);
             Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
@@ -322,22 +294,7 @@ fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
     Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 
-fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
-    let (user, password_file) = (keys.text("user"), keys.text("password_file").map(PathBuf::from));
-    let period_ms = keys.number("period_ms", 100, 10, 60_000);
-    let f_channel = keys.number("f_channel", 2560, 0, 65_535);
-    let spindle_axis = keys.optional("spindle_axis", 0, 63);
-    let rest = body.strip_prefix("//").unwrap_or(body);
-    let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
-    if serial.is_empty() || serial.contains(['+', '#']) {
-        return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
-    }
-    let at = endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
-    let serial = serial.to_owned();
-    Ok(Target::NcLink(NcLinkTarget { at, serial, tls, user, password_file, period_ms, f_channel, spindle_axis }))
-}
-
-fn library(keys: &mut Keys) -> Result<PathBuf, String> {
+pub(super) fn library(keys: &mut Keys) -> Result<PathBuf, String> {
     keys.text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
 }
 
@@ -366,7 +323,7 @@ fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
     Ok(SerialTarget { port: PathBuf::from(port), baud, parity })
 }
 
-fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
+pub(super) fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
     let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
     let (host, port) = split_port(text);
     let host = host.trim_start_matches('[').trim_end_matches(']');

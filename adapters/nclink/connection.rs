@@ -3,6 +3,7 @@
 use super::message::{self, Answer, Ask};
 use super::model::Model;
 use super::topic::Subject;
+use crate::address::NcLinkTarget;
 use crate::driver::SourceError;
 use crate::mqtt::{self, Client, Message, MqttError, Qos};
 use serde_json::{Value, json};
@@ -29,6 +30,21 @@ pub struct Link {
     pub login: Option<(String, String)>,
     /// Longest wait for an answer.
     pub deadline: Duration,
+}
+
+impl Link {
+    /// What an address of this name says.
+    #[must_use]
+    pub fn of(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
+        Self {
+            name: name.to_owned(),
+            host: target.at.host.clone(),
+            port: target.at.port,
+            serial: target.serial.clone(),
+            login,
+            deadline: DEADLINE,
+        }
+    }
 }
 
 /// A message that nobody asked for.

@@ -91,10 +91,15 @@ fn one_alarm(alarm: &Value) -> String {
     }
 }
 
+/// What stands behind the last `/` or `\\` of a path.
+pub(crate) fn last_part(path: &str) -> &str {
+    path.trim().rsplit(['/', '\\']).next().unwrap_or_default()
+}
+
 /// The name of a program without its directory: `../prog/O1234` is `O1234`.
 pub(super) fn program(value: &Value) -> Option<String> {
     let text = match value {
-        Value::String(text) => text.trim().rsplit(['/', '\\']).next().unwrap_or_default().to_owned(),
+        Value::String(text) => last_part(text).to_owned(),
         other => number(other).map(|number| format!("O{number}"))?,
     };
     Some(text)

@@ -13,6 +13,8 @@
 //!
 //! The heartbeat is written last, in the same request: a letter counts when it moves.
 
+use crate::driver::{LadderRequest, SourceError};
+use crate::reading::Absence;
 use crate::units::OverridePct;
 use std::fmt;
 use std::str::FromStr;
@@ -103,7 +105,7 @@ impl Mailbox {
     }
 
     /// A letter as registers with their values, in the order in which they are to be written.
-    pub fn post(&mut self, letter: Letter, request: u8) -> [(Register, i64); 4] {
+    pub fn post(&mut self, letter: Letter, request: Option<LadderRequest>) -> [(Register, i64); 4] {
         self.heartbeat = self.heartbeat % 100 + 1;
         let (percent, enable) = match letter {
             Letter::Override(wanted) => (wanted, 1),
@@ -111,11 +113,41 @@ impl Mailbox {
         };
         [
             (self.word(Self::OVERRIDE), i64::from(percent.percent())),
-            (self.word(Self::REQUEST), i64::from(request)),
+            (self.word(Self::REQUEST), request.map_or(0, request_word)),
             (self.word(Self::ENABLE), enable),
             (self.word(Self::HEARTBEAT), i64::from(self.heartbeat)),
         ]
     }
+}
+
+fn request_word(request: LadderRequest) -> i64 {
+    match request {
+        LadderRequest::FeedHold => 1,
+        LadderRequest::Stop => 2,
+    }
+}
+
+/// What the register +2 asks for.
+#[must_use]
+pub fn request_of(word: i64) -> Option<LadderRequest> {
+    LadderRequest::ALL.into_iter().find(|request| request_word(*request) == word)
+}
+
+/// The override in force as the controller shows it. A value that is not there is an error, not 0 %.
+///
+/// # Errors
+/// [`SourceError::Decode`] with the reason.
+pub fn in_force(name: &str, found: Result<f64, Absence>) -> Result<OverridePct, SourceError> {
+    let nonsense = |what: String| SourceError::Decode {
+        source_name: name.to_owned(),
+        request: "the feed override in force".to_owned(),
+        what,
+    };
+    let percent = found.map_err(|reason| nonsense(format!("there is no value ({reason})")))?;
+    let whole = (0.0..=254.0).contains(&percent).then(|| percent.round());
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 254")]
+    let known = whole.and_then(|percent| OverridePct::new(percent as u8));
+    known.ok_or_else(|| nonsense(format!("{percent} % is no override")))
 }
 
 #[cfg(test)]
@@ -141,7 +173,7 @@ mod tests {
         let wanted = OverridePct::new(80).expect("exists");
         let mut last = 0;
         for _ in 0..250 {
-            let words = mailbox.post(Letter::Override(wanted), 0);
+            let words = mailbox.post(Letter::Override(wanted), None);
             let (heartbeat, value) = words[3];
             assert_eq!(heartbeat, Register { kind: 'D', index: 103 });
             assert!(value != last && (1..=100).contains(&value));
@@ -158,5 +190,17 @@ mod tests {
         }
         assert_eq!(Letter::of(0, 80), Some(Letter::Release));
         assert_eq!((Letter::of(1, 255), Letter::of(1, -1), Letter::of(7, 80)), (None, None, None));
+    }
+
+    #[test]
+    fn the_override_in_force_is_never_guessed() {
+        assert_eq!(in_force("x", Ok(80.0)).map(OverridePct::percent), Ok(80));
+        for none in [Ok(255.0), Ok(-1.0), Err(Absence::NotYetRead)] {
+            assert!(in_force("x", none).is_err(), "{none:?}");
+        }
+        for request in LadderRequest::ALL {
+            assert_eq!(request_of(request_word(request)), Some(request));
+        }
+        assert_eq!((request_of(0), request_of(3)), (None, None));
     }
 }

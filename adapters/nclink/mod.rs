@@ -15,6 +15,7 @@
 //! | `source`, `open` | the [`Source`](crate::Source), and how an address becomes one |
 //! | `track` | what sample channels and events have brought, and whether a millisecond is missing |
 //! | `mailbox` | the registers through which the ladder is asked for an override |
+//! | `actuator` | the [`Actuator`](crate::Actuator): letters into the mailbox, the override in force read back |
 //! | `device` | the other role: the simulated machine as an NC-Link device |
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for
@@ -37,6 +38,7 @@
 //! taken from the channel's F word, whose bits are known), the unit of the load current (taken as A), and the register
 //! offsets of configurations other than HNC-30 (key `f_channel`).
 
+mod actuator;
 pub mod connection;
 mod decode;
 pub mod device;
@@ -51,6 +53,8 @@ mod source;
 pub mod topic;
 mod track;
 
+pub use actuator::NcLinkActuator;
+pub(crate) use decode::last_part;
 pub use message::{Answer, Ask, Params};
 pub use open::open;
 pub use source::{BlockSink, NcLinkSource};

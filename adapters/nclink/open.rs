@@ -1,7 +1,10 @@
 //! From an address to a source and, where a mailbox is named, an actuator.
 
+use super::actuator::NcLinkActuator;
+use super::connection::Link;
 use super::source::NcLinkSource;
 use crate::address::{Address, NcLinkTarget};
+use crate::driver::Actuator;
 use crate::open::{OpenError, Opened, Refused};
 
 /// Opens an NC-Link address; nothing is connected before the first poll.
@@ -14,8 +17,10 @@ pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenErro
         return Err(OpenError::Unsuitable { address: address.text().to_owned(), what });
     }
     let login = login(target)?;
+    let link = Link::of(address.text(), target, login.clone());
     let source = NcLinkSource::new(address.text(), target, login);
-    Ok(Opened { sources: vec![Box::new(source)], actuator: None, simulated: None, refused: Refused::default() })
+    let actuator = target.mailbox.map(|first| Box::new(NcLinkActuator::new(link, first)) as Box<dyn Actuator>);
+    Ok(Opened { sources: vec![Box::new(source)], actuator, simulated: None, refused: Refused::default() })
 }
 
 fn login(target: &NcLinkTarget) -> Result<Option<(String, String)>, OpenError> {

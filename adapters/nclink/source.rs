@@ -1,6 +1,6 @@
 //! An NC-Link device as a source.
 
-use super::connection::{Connection, DEADLINE, Link, Unasked};
+use super::connection::{Connection, Link, Unasked};
 use super::map::{self, Layout, Plan};
 use super::message::Answer;
 use super::model::Model;
@@ -45,14 +45,7 @@ impl NcLinkSource {
     /// A source of this name for what the address says.
     #[must_use]
     pub fn new(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
-        let link = Link {
-            name: name.to_owned(),
-            host: target.at.host.clone(),
-            port: target.at.port,
-            serial: target.serial.clone(),
-            login,
-            deadline: DEADLINE,
-        };
+        let link = Link::of(name, target, login);
         let layout = Layout { f_channel: target.f_channel, spindle_axis: target.spindle_axis };
         let period = Duration::from_millis(target.period_ms);
         Self { link, layout, period, channels: map::channels(), session: None, track: Track::default(), sink: None }

@@ -14,6 +14,7 @@ pub(super) struct VendorChildArguments {
 pub(super) fn run(arguments: &VendorChildArguments) -> CommandResult {
     let ended = match arguments.kind.as_str() {
         adapters::fanuc::vendor::KIND => adapters::fanuc::vendor::child(),
+        adapters::hnc::KIND => adapters::hnc::child(),
         other => return Err(CannotRun::new(format!("no library is served as {other}"), "")),
     };
     ended.map(|()| Outcome::Fine).map_err(|error| CannotRun::new(format!("the line to the gateway: {error}"), ""))

@@ -9,7 +9,9 @@ mod process;
 
 mod broker;
 mod dialects;
+mod hnc;
 mod nclink;
 mod sampling;
 mod stand;
 mod whole_box;
+mod writing;

@@ -4,7 +4,7 @@
 use super::values::channel_word;
 use crate::clock::Clock;
 use crate::driver::Actuator;
-use crate::nclink::mailbox::{Letter, Mailbox, Register};
+use crate::nclink::mailbox::{Letter, Mailbox, Register, request_of};
 use crate::simulated::{Moment, Simulated, SimulatedOverride};
 use std::collections::BTreeMap;
 
@@ -71,6 +71,9 @@ impl Registers {
             return;
         }
         self.heartbeat = Some(heartbeat);
+        if let Some(request) = request_of(word(Mailbox::REQUEST)) {
+            let _off = self.ladder.ask(clock, request);
+        }
         // A machine that is off takes no letters; the client sees it by the override in force.
         let _taken = match Letter::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
             Some(Letter::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),

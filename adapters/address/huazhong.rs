@@ -1,0 +1,120 @@
+//! Addresses of Huazhong controllers: `nclink://`, `nclinks://` and `hncnet://`.
+
+use super::keys::Keys;
+use super::target::{Endpoint, Target, endpoint, library};
+use crate::nclink::mailbox::{Mailbox, Register};
+use std::path::PathBuf;
+
+/// A Huazhong controller behind a broker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NcLinkTarget {
+    /// The broker.
+    pub at: Endpoint,
+    /// Serial number of the device.
+    pub serial: String,
+    /// Encrypted?
+    pub tls: bool,
+    /// User at the broker.
+    pub user: Option<String>,
+    /// File that holds the user's password.
+    pub password_file: Option<PathBuf>,
+    /// Pace of the queries, ms.
+    pub period_ms: u64,
+    /// Index of the channel's first F word: 2560 in configuration HNC-30, 6400 in HNC-80.
+    pub f_channel: u32,
+    /// Number of the spindle among the axes, where it is not 5.
+    pub spindle_axis: Option<u32>,
+    /// First register of the mailbox for the feed override; without one nothing is ever written.
+    pub mailbox: Option<Register>,
+}
+
+/// A Huazhong controller through its vendor's library.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HncNetTarget {
+    /// Where.
+    pub at: Endpoint,
+    /// The vendor's library.
+    pub library: PathBuf,
+    /// Number of this computer in the controller's network; found out when not given.
+    pub local_host: Option<String>,
+    /// Port of the library's own listener; the controller dials back to it.
+    pub local_port: u16,
+    /// Bytes of the header's `Bit32` in arrays: 8 where `long` has 64 bits, else 4.
+    pub long_bytes: usize,
+    /// Pace of the polls, ms.
+    pub period_ms: u64,
+    /// Run the controller's 1 ms sampling?
+    pub sample: bool,
+    /// First register of the mailbox for the feed override; without one nothing is ever written.
+    pub mailbox: Option<Register>,
+}
+
+pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
+    let (user, password_file) = (keys.text("user"), keys.text("password_file").map(PathBuf::from));
+    let period_ms = keys.number("period_ms", 100, 10, 60_000);
+    let f_channel = keys.number("f_channel", 2560, 0, 65_535);
+    let spindle_axis = keys.optional("spindle_axis", 0, 63);
+    let mailbox = mailbox(keys);
+    let rest = body.strip_prefix("//").unwrap_or(body);
+    let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
+    if serial.is_empty() || serial.contains(['+', '#']) {
+        return Err("no serial number; write nclink://BROKER:1883/SERIAL".to_owned());
+    }
+    let at = endpoint(broker, Some(if tls { 8883 } else { 1883 }))?;
+    let serial = serial.to_owned();
+    Ok(Target::NcLink(NcLinkTarget {
+        at,
+        serial,
+        tls,
+        user,
+        password_file,
+        period_ms,
+        f_channel,
+        spindle_axis,
+        mailbox,
+    }))
+}
+
+pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
+    let library = library(keys);
+    let (local_host, local_port) = (keys.text("local_host"), keys.number("local_port", 10001, 1, u16::MAX));
+    let long_bytes = match keys.text("long_bytes").as_deref() {
+        None => size_of::<std::ffi::c_long>(),
+        Some("4") => 4,
+        Some("8") => 8,
+        Some(other) => {
+            keys.problem(format!("long_bytes={other}: give 4 or 8"));
+            4
+        }
+    };
+    let period_ms = keys.number("period_ms", 100, 10, 60_000);
+    let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
+    let mailbox = mailbox(keys);
+    let (at, library) = (endpoint(body, Some(10001))?, library?);
+    Ok(Target::HncNet(HncNetTarget { at, library, local_host, local_port, long_bytes, period_ms, sample, mailbox }))
+}
+
+/// `write=mailbox`, and where it begins.
+fn mailbox(keys: &mut Keys) -> Option<Register> {
+    let wanted = keys.choice("write", &[("none", false), ("mailbox", true)]);
+    let text = keys.text("mailbox");
+    if !wanted {
+        if text.is_some() {
+            keys.problem("mailbox= counts only with write=mailbox".to_owned());
+        }
+        return None;
+    }
+    match text.as_deref().unwrap_or("D100").parse::<Register>() {
+        Ok(first) if Mailbox::may_begin(first) => Some(first),
+        Ok(first) => {
+            keys.problem(format!(
+                "mailbox={first}: name an R, W or D register; others are not free or keep their contents"
+            ));
+            None
+        }
+        Err(problem) => {
+            keys.problem(format!("mailbox={problem}"));
+            None
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! The feed override through four registers that the ladder reads, and the override in force read back.
+
+use super::decode::number;
+use super::item::{channel, flag};
+use super::line::Line;
+use crate::clock::Clock;
+use crate::driver::{Actuator, LadderRequest, SourceError};
+use crate::nclink::mailbox::{Letter, Mailbox, Register};
+use crate::units::OverridePct;
+
+/// Posts letters for the ladder; see [`mailbox`](crate::nclink::mailbox).
+pub struct HncActuator {
+    line: Line,
+    mailbox: Mailbox,
+    last: Letter,
+}
+
+impl HncActuator {
+    /// A mailbox that begins at this register.
+    #[must_use]
+    pub fn new(line: Line, first: Register) -> Self {
+        Self { line, mailbox: Mailbox::new(first), last: Letter::Release }
+    }
+}
+
+impl Actuator for HncActuator {
+    fn name(&self) -> &str {
+        self.line.name()
+    }
+
+    fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
+        self.last = Letter::Override(wanted);
+        self.line.write(&self.mailbox.post(self.last, None))
+    }
+
+    fn release(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
+        self.last = Letter::Release;
+        self.line.write(&self.mailbox.post(self.last, None))
+    }
+
+    fn ask(&mut self, _: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        self.line.write(&self.mailbox.post(self.last, Some(request)))
+    }
+
+    fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
+        let found = number(&self.line.read(flag(channel::FEED_OVERRIDE))?);
+        crate::nclink::mailbox::in_force(self.line.name(), found)
+    }
+}

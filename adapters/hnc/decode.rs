@@ -1,0 +1,151 @@
+//! Values to words and text.
+
+use super::answer::{Answer, ItemError, ItemResult};
+use super::item::{Item, channel, flag};
+use crate::reading::Absence;
+use crate::words::{execution, mode, operation};
+
+/// Text up to the first zero, out of GBK. What is no GBK becomes the replacement character.
+pub(super) fn text_of(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    encoding_rs::GBK.decode_without_bom_handling(&bytes[..end]).0.trim().to_owned()
+}
+
+/// The whole number of an answer.
+pub(super) fn whole(result: &ItemResult) -> Result<i32, Absence> {
+    match result {
+        Ok(Answer::Whole(number)) => Ok(*number),
+        Ok(_) => Err(Absence::OutOfRange),
+        Err(error) => Err(error.absence()),
+    }
+}
+
+/// The number of an answer.
+pub(super) fn number(result: &ItemResult) -> Result<f64, Absence> {
+    match result {
+        Ok(Answer::Real(number)) => Ok(*number),
+        other => whole(other).map(f64::from),
+    }
+}
+
+/// The text of an answer.
+pub(super) fn text(result: &ItemResult) -> Result<&str, Absence> {
+    match result {
+        Ok(Answer::Text(text)) => Ok(text),
+        Ok(_) => Err(Absence::OutOfRange),
+        Err(error) => Err(error.absence()),
+    }
+}
+
+/// The alarms as one text, empty without any.
+pub(super) fn alarms(result: &ItemResult) -> Result<String, Absence> {
+    match result {
+        Ok(Answer::Alarms(alarms)) => {
+            let each: Vec<String> = alarms.iter().map(|(number, text)| format!("{number} {text}")).collect();
+            Ok(each.join("; "))
+        }
+        Ok(_) => Err(Absence::OutOfRange),
+        Err(error) => Err(error.absence()),
+    }
+}
+
+/// Answers by item; what was not asked for is not offered.
+pub(super) trait Answers {
+    /// The answer to an item.
+    fn of(&self, item: Item) -> ItemResult;
+
+    /// A whole number of the channel.
+    fn flag(&self, kind: i32) -> Result<i32, Absence> {
+        whole(&self.of(flag(kind)))
+    }
+
+    /// Is a flag set? A flag that the controller does not have is not.
+    fn set(&self, kind: i32) -> Result<bool, Absence> {
+        match self.of(flag(kind)) {
+            Err(ItemError::NotOffered | ItemError::Refused(-2)) => Ok(false),
+            other => whole(&other).map(|flag| flag != 0),
+        }
+    }
+
+    /// The word of the channel `mode`.
+    fn mode(&self) -> Result<&'static str, Absence> {
+        Ok(match self.flag(channel::MODE)? {
+            _ if self.set(channel::IS_MDI)? => mode::MANUAL_DATA_INPUT,
+            1 => mode::AUTOMATIC,
+            7 => mode::SEMI_AUTOMATIC,
+            _ => mode::MANUAL,
+        })
+    }
+
+    /// The word of the channel `execution`.
+    fn execution(&self) -> Result<&'static str, Absence> {
+        let cycle = self.flag(channel::CYCLE)? != 0;
+        let hold = self.flag(channel::HOLD)? != 0;
+        Ok(match () {
+            () if self.set(channel::IS_ESTOP)? || self.set(channel::IS_RESETTING)? => execution::STOPPED,
+            () if hold => execution::FEED_HOLD,
+            () if cycle && self.set(channel::VERIFY)? => execution::READY,
+            () if cycle => execution::ACTIVE,
+            () => execution::READY,
+        })
+    }
+
+    /// Does the feed follow the spindle? The controller does not name operations otherwise.
+    fn operation(&self) -> Result<&'static str, Absence> {
+        if self.set(channel::IS_THREADING)? {
+            return Ok(operation::THREADING);
+        }
+        if self.set(channel::IS_RIGID)? { Ok(operation::TAPPING) } else { Err(Absence::NotSupported) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    impl Answers for HashMap<i32, i32> {
+        fn of(&self, item: Item) -> ItemResult {
+            let Item::Channel(kind, ..) = item else { return Err(ItemError::NotOffered) };
+            self.get(&kind).map(|value| Answer::Whole(*value)).ok_or(ItemError::NotOffered)
+        }
+    }
+
+    fn machine(flags: &[(i32, i32)]) -> HashMap<i32, i32> {
+        let base = [(channel::MODE, 1), (channel::CYCLE, 1), (channel::HOLD, 0)];
+        base.iter().chain(flags).copied().collect()
+    }
+
+    #[test]
+    fn flags_become_words() {
+        let words = |flags: &[(i32, i32)]| {
+            let machine = machine(flags);
+            (machine.mode().expect("known"), machine.execution().expect("known"))
+        };
+        assert_eq!(words(&[]), (mode::AUTOMATIC, execution::ACTIVE));
+        assert_eq!(words(&[(channel::HOLD, 1)]), (mode::AUTOMATIC, execution::FEED_HOLD));
+        assert_eq!(words(&[(channel::CYCLE, 0), (channel::MODE, 2)]), (mode::MANUAL, execution::READY));
+        assert_eq!(words(&[(channel::VERIFY, 1)]).1, execution::READY);
+        assert_eq!(words(&[(channel::IS_ESTOP, 1)]).1, execution::STOPPED);
+        assert_eq!(words(&[(channel::MODE, 7), (channel::IS_MDI, 1)]).0, mode::MANUAL_DATA_INPUT);
+        assert_eq!(words(&[(channel::MODE, 7)]).0, mode::SEMI_AUTOMATIC);
+        assert_eq!(machine(&[(channel::IS_RIGID, 1)]).operation(), Ok(operation::TAPPING));
+        assert_eq!(machine(&[]).operation(), Err(Absence::NotSupported));
+        assert_eq!(HashMap::new().mode(), Err(Absence::NotSupported));
+    }
+
+    #[test]
+    fn texts_come_out_of_gbk() {
+        assert_eq!(text_of(b"\xbb\xfa\xb4\xb2\xc5\xdc\xb7\xc9\xb3\xb5\0rest"), "机床跑飞车");
+        assert_eq!(text_of(b" O1234 "), "O1234");
+        assert!(text_of(&[0xff; 3]).chars().all(|c| c == char::REPLACEMENT_CHARACTER));
+    }
+
+    #[test]
+    fn not_yet_is_no_zero() {
+        assert_eq!(number(&Err(ItemError::NotYet)), Err(Absence::NotYetRead));
+        assert_eq!(number(&Err(ItemError::Refused(-1))), Err(Absence::Refused));
+        assert_eq!(number(&Ok(Answer::Real(2.5))), Ok(2.5));
+        assert_eq!(alarms(&Ok(Answer::Alarms(vec![(7, "a".into()), (8, "b".into())]))), Ok("7 a; 8 b".to_owned()));
+    }
+}

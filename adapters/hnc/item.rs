@@ -1,0 +1,128 @@
+//! What can be asked of the library: the numbers of the vendor's headers, each with the width of its value.
+
+use crate::nclink::mailbox::Register;
+use serde::{Deserialize, Serialize};
+
+/// How a value lies in the buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Width {
+    /// The low four bytes, signed, whatever `Bit32` is.
+    Whole,
+    /// `fBit64`.
+    Real,
+    /// Text up to the first zero, GBK.
+    Text,
+}
+
+/// One question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Item {
+    /// `HNC_SystemGetValue`.
+    System(i32, Width),
+    /// `HNC_ChannelGetValue` of channel 0: type, index.
+    Channel(i32, i32, Width),
+    /// `HNC_AxisGetValue`: type, logical axis.
+    Axis(i32, i32, Width),
+    /// `HNC_RegGetValue`: type, index.
+    Register(i32, i32),
+    /// `HNC_FprogGetFullName` of channel 0.
+    Program,
+    /// `HNC_AlarmGetNum` and `HNC_AlarmGetData`: errors of every kind.
+    Alarms,
+}
+
+/// Version of the controller.
+pub const NC_VERSION: Item = Item::System(24, Width::Text);
+/// Serial number.
+pub const SERIAL: Item = Item::System(25, Width::Text);
+/// Counts of a position per millimetre.
+pub const MOVE_UNIT: Item = Item::System(1, Width::Whole);
+
+/// A whole number of channel 0.
+#[must_use]
+pub const fn flag(kind: i32) -> Item {
+    Item::Channel(kind, 0, Width::Whole)
+}
+
+/// A real number of channel 0.
+#[must_use]
+pub const fn real(kind: i32) -> Item {
+    Item::Channel(kind, 0, Width::Real)
+}
+
+/// Numbers of `HncChannel`.
+pub mod channel {
+    /// Actual feed, f64.
+    pub const ACT_FEEDRATE: i32 = 7;
+    /// Programmed feed, f64.
+    pub const PROG_FEEDRATE: i32 = 8;
+    /// Feed override.
+    pub const FEED_OVERRIDE: i32 = 9;
+    /// Tool in use.
+    pub const TOOL_USE: i32 = 14;
+    /// 0 reset, 1 automatic, 2 jog, 3 step, 4 handwheel, 5 reference, 6 PLC, 7 single block or MDI.
+    pub const MODE: i32 = 16;
+    /// MDI?
+    pub const IS_MDI: i32 = 17;
+    /// A program runs? Setting it would start one; that is never done.
+    pub const CYCLE: i32 = 18;
+    /// Feed hold? Setting it would hold; that is never done.
+    pub const HOLD: i32 = 19;
+    /// A thread is cut?
+    pub const IS_THREADING: i32 = 22;
+    /// Rigid tapping?
+    pub const IS_RIGID: i32 = 23;
+    /// Emergency stop?
+    pub const IS_ESTOP: i32 = 25;
+    /// Resetting?
+    pub const IS_RESETTING: i32 = 26;
+    /// The program is only checked?
+    pub const VERIFY: i32 = 31;
+    /// Line that runs.
+    pub const RUN_ROW: i32 = 32;
+    /// Parts.
+    pub const PART_CNTR: i32 = 36;
+    /// Logical axis of the spindle.
+    pub const SPDL_LAX: i32 = 45;
+    /// Commanded spindle speed, f64.
+    pub const CMD_SPDL_SPEED: i32 = 47;
+    /// Actual spindle speed, f64.
+    pub const ACT_SPDL_SPEED: i32 = 48;
+    /// Spindle override.
+    pub const SPDL_OVERRIDE: i32 = 49;
+}
+
+/// Numbers of `HncAxis`.
+pub mod axis {
+    /// Name, text.
+    pub const NAME: i32 = 0;
+    /// Actual position, counts.
+    pub const ACT_POS: i32 = 6;
+    /// Actual speed, f64.
+    pub const ACT_VEL: i32 = 18;
+    /// Load current, f64.
+    pub const LOAD_CUR: i32 = 29;
+}
+
+/// Number of a register's kind (`HncRegType`), and the bytes that one register has.
+#[must_use]
+pub fn register_type(at: Register) -> Option<(i32, usize)> {
+    let kinds = [('X', 1), ('Y', 1), ('F', 2), ('G', 2), ('R', 1), ('W', 2), ('D', 4), ('B', 4), ('P', 4)];
+    let at = kinds.iter().position(|(kind, _)| *kind == at.kind)?;
+    Some((i32::try_from(at).ok()?, kinds[at].1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_have_the_numbers_of_the_header() {
+        let of = |kind| register_type(Register { kind, index: 0 });
+        assert_eq!(
+            (of('X'), of('G'), of('R'), of('D'), of('P')),
+            (Some((0, 1)), Some((3, 2)), Some((4, 1)), Some((6, 4)), Some((8, 4)))
+        );
+        assert_eq!(of('Q'), None);
+    }
+}

@@ -1,0 +1,300 @@
+//! The parent's side: the library through its child, shared by source and actuator.
+
+use super::KIND;
+use super::answer::{ItemError, ItemResult, ReturnCode};
+use super::item::{Item, register_type};
+use super::message::{Ask, Tell};
+use super::sampling::{Columns, SampledItem};
+use crate::address::Endpoint;
+use crate::child::{ChildCounts, ChildError, ChildSettings, Supervised};
+use crate::driver::SourceError;
+use crate::nclink::mailbox::Register;
+use std::collections::HashMap;
+use std::net::UdpSocket;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// An item in which the child ended this often is not asked for any more.
+const DEATHS_MAX: u32 = 2;
+/// A call that takes longer has met a dead link: the library waits for 3 s then.
+const DEAD_LINK: Duration = Duration::from_millis(2500);
+
+/// How the library is used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HncSettings {
+    /// The address, as in the configuration.
+    pub name: String,
+    /// The library's file.
+    pub library: PathBuf,
+    /// Where the controller is.
+    pub at: Endpoint,
+    /// Number of this computer in the controller's network; `None` is found out.
+    pub local_host: Option<String>,
+    /// Port of the library's own listener.
+    pub local_port: u16,
+    /// Bytes of `Bit32` in arrays.
+    pub long_bytes: usize,
+    /// Longest wait for the child: more than the library's own 3 s.
+    pub deadline: Duration,
+    /// The program that runs as the child; `None` is this one.
+    pub program: Option<PathBuf>,
+    /// Environment variables for the child.
+    pub environment: Vec<(String, String)>,
+}
+
+/// The state of the connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Alive {
+    /// Connections that events told of.
+    pub connected: u64,
+    /// Losses that events told of.
+    pub lost: u64,
+    /// Increases whenever the library was loaded anew.
+    pub generation: u64,
+}
+
+struct Inner {
+    child: Supervised,
+    settings: HncSettings,
+    deaths: HashMap<Item, u32>,
+}
+
+/// A handle on the child; clones are handles on the same one.
+#[derive(Clone)]
+pub struct Line {
+    inner: Arc<Mutex<Inner>>,
+    name: String,
+}
+
+impl Line {
+    /// Nothing is started before the first question.
+    #[must_use]
+    pub fn new(settings: HncSettings) -> Self {
+        let mut child = ChildSettings::new(KIND, &[], settings.deadline);
+        child.program.clone_from(&settings.program);
+        child.environment.clone_from(&settings.environment);
+        let name = settings.name.clone();
+        let inner = Inner { child: Supervised::new(child), settings, deaths: HashMap::new() };
+        Self { inner: Arc::new(Mutex::new(inner)), name }
+    }
+
+    /// The address.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How the child has been doing.
+    #[must_use]
+    pub fn counts(&self) -> ChildCounts {
+        self.locked().child.counts()
+    }
+
+    /// Loads and connects if need be, and tells whether the controller is there.
+    ///
+    /// # Errors
+    /// [`SourceError::Line`] while it is not, with what the library says.
+    pub fn alive(&self) -> Result<Alive, SourceError> {
+        let mut inner = self.locked();
+        match inner.ask(&Ask::Alive, "its connection")? {
+            Tell::Alive { code: 0, connected, lost } => {
+                Ok(Alive { connected, lost, generation: inner.child.generation() })
+            }
+            Tell::Alive { code, .. } => Err(inner.line_failed(
+                format!("the controller is not connected ({})", ReturnCode(code)),
+                "The library connects again by itself; check that the machine is on and the cable is in.",
+            )),
+            other => Err(inner.nonsense("its connection", &other)),
+        }
+    }
+
+    /// Reads one item. A child that dies of it costs this item only; one that has died of it twice is not asked again.
+    ///
+    /// # Errors
+    /// [`SourceError::Timeout`] on a dead link, [`SourceError::Line`] when the library cannot be loaded or connected.
+    pub fn read(&self, item: Item) -> Result<ItemResult, SourceError> {
+        let mut inner = self.locked();
+        if inner.deaths.get(&item).is_some_and(|deaths| *deaths >= DEATHS_MAX) {
+            return Ok(Err(ItemError::NotOffered));
+        }
+        inner.open()?;
+        let began = Instant::now();
+        match inner.told(&Ask::Read(item)) {
+            Ok(Tell::Read(_)) if began.elapsed() > DEAD_LINK => Err(inner.dead_link(began.elapsed())),
+            Ok(Tell::Read(result)) => {
+                // A library that wrote beyond its value is not trusted any further.
+                if matches!(&result, Err(ItemError::Malformed(_))) {
+                    *inner.deaths.entry(item).or_default() += 1;
+                    inner.child.end();
+                }
+                Ok(result)
+            }
+            Ok(other) => Err(inner.nonsense("an item", &other)),
+            Err(error) => {
+                *inner.deaths.entry(item).or_default() += 1;
+                inner.child.end();
+                Ok(Err(ItemError::Malformed(error.to_string())))
+            }
+        }
+    }
+
+    /// Writes registers one after the other.
+    ///
+    /// # Errors
+    /// The first that is refused, or the line.
+    pub fn write(&self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+        let mut inner = self.locked();
+        for (at, value) in words {
+            let request = format!("writing {at}");
+            let Some((kind, bytes)) = register_type(*at) else {
+                return Err(inner.refused(&request, "there is no such register".to_owned()));
+            };
+            let index = i32::try_from(at.index).unwrap_or(i32::MAX);
+            match inner.ask(&Ask::Write(kind, index, *value, bytes), &request)? {
+                Tell::Done => {}
+                Tell::Code(_, code) => return Err(inner.refused(&request, code.to_string())),
+                other => return Err(inner.nonsense(&request, &other)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Begins to sample.
+    ///
+    /// # Errors
+    /// Refused where the library or the controller cannot, or somebody else samples.
+    pub fn sample(&self, items: &[SampledItem]) -> Result<(), SourceError> {
+        let mut inner = self.locked();
+        match inner.ask(&Ask::Sample(items.to_vec()), "sampling")? {
+            Tell::Done => Ok(()),
+            Tell::Code(function, code) => Err(inner.refused("sampling", format!("{function}: {code}"))),
+            Tell::Confused(what) => Err(inner.refused("sampling", what)),
+            other => Err(inner.nonsense("sampling", &other)),
+        }
+    }
+
+    /// What has been sampled since the last time.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    pub fn sampled(&self) -> Result<Columns, SourceError> {
+        let mut inner = self.locked();
+        match inner.ask(&Ask::Sampled, "the samples")? {
+            Tell::Sampled(columns) => Ok(columns),
+            Tell::Code(function, code) => Err(inner.refused("the samples", format!("{function}: {code}"))),
+            other => Err(inner.nonsense("the samples", &other)),
+        }
+    }
+
+    /// Ends the child; the next question starts another one.
+    pub fn end(&self) {
+        self.locked().child.end();
+    }
+
+    fn locked(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Inner {
+    /// A question whose failure ends the poll.
+    fn ask(&mut self, ask: &Ask, request: &str) -> Result<Tell, SourceError> {
+        self.open()?;
+        let began = Instant::now();
+        let told = self.told(ask).map_err(|error| self.child_failed(&error, request))?;
+        if began.elapsed() > DEAD_LINK { Err(self.dead_link(began.elapsed())) } else { Ok(told) }
+    }
+
+    fn told(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
+        let bytes = serde_json::to_vec(ask).map_err(|error| ChildError::NoAnswer(error.to_string()))?;
+        let answer = self.child.request(&bytes)?;
+        serde_json::from_slice(&answer).map_err(|error| ChildError::NoAnswer(error.to_string()))
+    }
+
+    /// A child in which the connection is open.
+    fn open(&mut self) -> Result<(), SourceError> {
+        if self.child.process_id().is_some() {
+            return Ok(());
+        }
+        let settings = &self.settings;
+        let ask = Ask::Open {
+            library: settings.library.clone(),
+            local_host: settings.local_host.clone().unwrap_or_else(|| local_host(&settings.at)),
+            local_port: settings.local_port,
+            host: settings.at.host.clone(),
+            port: settings.at.port,
+            long_bytes: settings.long_bytes,
+        };
+        let told = self.told(&ask).map_err(|error| self.child_failed(&error, "opening"));
+        let failed = match told? {
+            Tell::Opened => return Ok(()),
+            Tell::Unloadable(what) => self.line_failed(
+                format!("the library {} cannot be used: {what}", self.settings.library.display()),
+                "Check library= in the address, and that the file is for this processor.",
+            ),
+            Tell::Code(function, code) if function == "HNC_NetInit" => self.line_failed(
+                format!("the library cannot listen at port {}: {code}", self.settings.local_port),
+                "Give another local_port= in the address, or end the other program.",
+            ),
+            Tell::Code(_, code) => self.line_failed(
+                format!("the controller does not answer: {code}"),
+                "Check that the machine is on, and its network number and port.",
+            ),
+            other => self.nonsense("opening", &other),
+        };
+        self.child.end();
+        Err(failed)
+    }
+
+    fn line_failed(&self, what: String, next: &str) -> SourceError {
+        SourceError::Line { source_name: self.settings.name.clone(), what, next: next.to_owned() }
+    }
+
+    fn child_failed(&mut self, error: &ChildError, request: &str) -> SourceError {
+        match error {
+            ChildError::Hung(deadline) => SourceError::Timeout {
+                source_name: self.settings.name.clone(),
+                request: request.to_owned(),
+                deadline_ms: u64::try_from(deadline.as_millis()).unwrap_or(u64::MAX),
+                next: "The library hung and was ended; it is started again.".to_owned(),
+            },
+            other => self.line_failed(other.to_string(), "The child with the library is started again by itself."),
+        }
+    }
+
+    fn dead_link(&self, took: Duration) -> SourceError {
+        SourceError::Timeout {
+            source_name: self.settings.name.clone(),
+            request: "one of its values".to_owned(),
+            deadline_ms: u64::try_from(took.as_millis()).unwrap_or(u64::MAX),
+            next: "The link to the controller is dead; the library connects again by itself.".to_owned(),
+        }
+    }
+
+    fn refused(&self, request: &str, what: String) -> SourceError {
+        SourceError::Refused {
+            source_name: self.settings.name.clone(),
+            request: request.to_owned(),
+            what,
+            next: "Look into the controller's manual whether it has this.".to_owned(),
+        }
+    }
+
+    fn nonsense(&self, request: &str, told: &Tell) -> SourceError {
+        let what = match told {
+            Tell::Confused(what) => what.clone(),
+            other => format!("{other:?}"),
+        };
+        SourceError::Decode { source_name: self.settings.name.clone(), request: request.to_owned(), what }
+    }
+}
+
+/// The number of this computer by which the controller is reached; nothing is sent to find out.
+fn local_host(at: &Endpoint) -> String {
+    let found = UdpSocket::bind("0.0.0.0:0").and_then(|socket| {
+        socket.connect((at.host.as_str(), at.port))?;
+        socket.local_addr()
+    });
+    found.map_or_else(|_| "0.0.0.0".to_owned(), |address| address.ip().to_string())
+}

@@ -1,0 +1,65 @@
+//! What parent and child say, as JSON.
+
+use super::answer::{ItemResult, ReturnCode};
+use super::item::Item;
+use super::sampling::{Columns, SampledItem};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// From the parent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Ask {
+    /// Load the library, listen, connect.
+    Open {
+        /// The library's file.
+        library: PathBuf,
+        /// Number of this computer in the controller's network.
+        local_host: String,
+        /// Port of the library's own listener.
+        local_port: u16,
+        /// The controller.
+        host: String,
+        /// Its port.
+        port: u16,
+        /// Bytes of `Bit32` in arrays.
+        long_bytes: usize,
+    },
+    /// Is the connection alive, and what has happened since?
+    Alive,
+    /// Read one item.
+    Read(Item),
+    /// Write one register: type, index, value, bytes.
+    Write(i32, i32, i64, usize),
+    /// Begin to sample.
+    Sample(Vec<SampledItem>),
+    /// What has been sampled since.
+    Sampled,
+}
+
+/// From the child.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Tell {
+    /// Connected.
+    Opened,
+    /// The library could not be loaded, or lacks what nothing works without.
+    Unloadable(String),
+    /// A return code of this function.
+    Code(String, ReturnCode),
+    /// `HNC_NetIsConnect`, and how often an event told of a connection and of a loss.
+    Alive {
+        /// 0 connected, otherwise a code.
+        code: i32,
+        /// Connections so far.
+        connected: u64,
+        /// Losses so far.
+        lost: u64,
+    },
+    /// One item.
+    Read(ItemResult),
+    /// Written, or sampling.
+    Done,
+    /// Samples.
+    Sampled(Columns),
+    /// The request made no sense, or there is no connection.
+    Confused(String),
+}

@@ -1,0 +1,338 @@
+//! The vendor's library: one with the same functions, compiled here and really loaded in the real child process.
+
+use crate::broker::program as find;
+use crate::stand::until;
+use adapters::address::Endpoint;
+use adapters::clock::{Clock, SystemClock};
+use adapters::driver::Actuator;
+use adapters::hnc::item::{Item, Width, axis, channel, flag};
+use adapters::hnc::line::{HncSettings, Line};
+use adapters::hnc::sampling::Sampled;
+use adapters::hnc::{HncActuator, HncSource};
+use adapters::nclink::mailbox::Register;
+use adapters::units::OverridePct;
+use adapters::{Absence, Reading, Source, SourceError};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// The library in a directory of its own, and the file that tells it which fault to have.
+struct Library {
+    _directory: tempfile::TempDir,
+    file: PathBuf,
+    fault: PathBuf,
+}
+
+impl Library {
+    fn build(flags: &[&str]) -> Self {
+        let directory = tempfile::tempdir().expect("a directory");
+        let (file, fault) = (directory.path().join("libfakehnc.so"), directory.path().join("fault"));
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/huazhong/fake_hnc.c");
+        let built = Command::new("cc").args(["-shared", "-fPIC", "-O1", "-w", "-pthread"]).args(flags);
+        assert!(built.arg("-o").arg(&file).arg(source).status().expect("a C compiler").success());
+        Self { _directory: directory, file, fault }
+    }
+
+    fn fault(&self, text: &str) {
+        std::fs::write(&self.fault, text).expect("written");
+    }
+
+    fn well(&self) {
+        let _was_well = std::fs::remove_file(&self.fault);
+    }
+
+    fn settings(&self) -> HncSettings {
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port").port();
+        HncSettings {
+            name: "hncnet://fake".to_owned(),
+            library: self.file.clone(),
+            at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
+            local_host: Some("127.0.0.1".to_owned()),
+            local_port: port,
+            long_bytes: size_of::<std::ffi::c_long>(),
+            deadline: Duration::from_millis(1500),
+            program: Some(PathBuf::from(env!("CARGO_BIN_EXE_cnc-gateway"))),
+            environment: vec![("FAKE_LIBRARY_FAULT".to_owned(), self.fault.display().to_string())],
+        }
+    }
+
+    fn line(&self) -> Line {
+        Line::new(self.settings())
+    }
+
+    fn source(&self) -> HncSource {
+        HncSource::new(self.line(), Duration::from_millis(100), false)
+    }
+}
+
+fn poll(source: &mut dyn Source) -> Result<Vec<Reading>, SourceError> {
+    let mut out = Vec::new();
+    source.read(&SystemClock::new(), &mut out).map(|()| out)
+}
+
+fn number(readings: &[Reading], channel: &str) -> Result<f64, Absence> {
+    let reading = readings.iter().find(|reading| reading.channel.name() == channel).expect(channel);
+    reading.value.clone().map(|value| value.as_number().expect("a number"))
+}
+
+fn text(readings: &[Reading], channel: &str) -> Result<String, Absence> {
+    let reading = readings.iter().find(|reading| reading.channel.name() == channel).expect(channel);
+    reading.value.clone().map(|value| value.as_text().expect("a text").to_owned())
+}
+
+fn cut(readings: &[Reading]) {
+    let numbers = [
+        ("feed_mm_min", 812.5),
+        ("feed_programmed_mm_min", 1000.0),
+        ("spindle_speed_rpm", 2987.25),
+        ("spindle_override_pct", 100.0),
+        ("part_count", 17.0),
+        ("x_axis_position_mm", -12.34567),
+        ("z_axis_position_mm", -37.03701),
+        ("y_axis_current_a", 2.25),
+        ("spindle_current_a", 6.25),
+    ];
+    for (channel, expected) in numbers {
+        assert_eq!(number(readings, channel), Ok(expected), "{channel}");
+    }
+    let words =
+        [("mode", "AUTOMATIC"), ("execution", "ACTIVE"), ("program", "O1234"), ("block", "N340"), ("tool", "T12")];
+    for (channel, expected) in words {
+        assert_eq!(text(readings, channel).as_deref(), Ok(expected), "{channel}");
+    }
+}
+
+#[test]
+fn the_library_is_loaded_and_gives_values_in_units() {
+    let library = Library::build(&[]);
+    let mut source = library.source();
+    let readings = poll(&mut source).expect("answers");
+    cut(&readings);
+    assert_eq!(text(&readings, "alarm").as_deref(), Ok("1010101 机床跑飞车"), "GBK");
+    assert_eq!(text(&readings, "operation"), Err(Absence::NotSupported));
+    assert_eq!(readings.len(), source.channels().len());
+}
+
+#[test]
+fn a_library_without_a_function_lacks_its_channels_only() {
+    let library = Library::build(&["-DWITHOUT_AXIS"]);
+    let readings = poll(&mut library.source()).expect("answers");
+    assert_eq!(number(&readings, "spindle_speed_rpm"), Ok(2987.25));
+    assert_eq!(number(&readings, "spindle_current_a"), Err(Absence::NotSupported));
+    assert_eq!(number(&readings, "x_axis_position_mm"), Err(Absence::NotSupported));
+}
+
+#[test]
+fn not_yet_and_refused_never_show_what_was_scribbled() {
+    let library = Library::build(&[]);
+    let mut source = library.source();
+    cut(&poll(&mut source).expect("well before"));
+    library.fault("later HNC_ChannelGetValue");
+    let readings = poll(&mut source).expect("the others flow");
+    assert_eq!(number(&readings, "spindle_speed_rpm"), Err(Absence::NotYetRead), "not yet is no zero");
+    assert_eq!(text(&readings, "mode"), Err(Absence::NotYetRead));
+    assert_eq!(number(&readings, "y_axis_current_a"), Ok(2.25));
+    for (code, expected) in [(-1, Absence::Refused), (-2, Absence::NotSupported), (77, Absence::Refused)] {
+        library.fault(&format!("code HNC_AxisGetValue {code}"));
+        let readings = poll(&mut source).expect("the others flow");
+        assert_eq!(number(&readings, "spindle_current_a"), Err(expected), "code {code}");
+        assert_eq!(number(&readings, "feed_mm_min"), Ok(812.5));
+    }
+    let line = library.line();
+    library.fault("later HNC_RegGetValue");
+    assert!(line.read(Item::Register(6, 5)).expect("alive").is_err());
+    library.well();
+    cut(&poll(&mut source).expect("well afterwards"));
+}
+
+/// A fault in one function: its channel has a reason, the others flow; afterwards all is well.
+fn survives(kind: &str) {
+    let library = Library::build(&[]);
+    let mut source = library.source();
+    cut(&poll(&mut source).expect("well before"));
+    library.fault(&format!("{kind} HNC_FprogGetFullName"));
+    let began = Instant::now();
+    let readings = poll(&mut source).expect("the others flow");
+    let took = began.elapsed();
+    assert_eq!(text(&readings, "program"), Err(Absence::OutOfRange), "{kind}");
+    assert_eq!(number(&readings, "spindle_speed_rpm"), Ok(2987.25));
+    println!("{kind}: one channel lost, {} others in the same poll, {} ms", readings.len() - 1, took.as_millis());
+    library.well();
+    until("well again", || poll(&mut source).ok().filter(|readings| text(readings, "program").is_ok()));
+}
+
+#[test]
+fn a_library_that_hangs_costs_one_channel() {
+    survives("hang");
+}
+
+#[test]
+fn a_library_that_aborts_costs_one_channel() {
+    survives("abort");
+}
+
+#[test]
+fn a_library_that_overruns_its_value_costs_one_channel() {
+    survives("overrun");
+}
+
+#[test]
+fn absurd_counts_are_bounded() {
+    let library = Library::build(&[]);
+    let mut source = HncSource::new(library.line(), Duration::from_millis(100), true);
+    poll(&mut source).expect("well before");
+    library.fault("lots HNC_AlarmGetNum 2000000000");
+    let readings = poll(&mut source).expect("answers");
+    assert_eq!(text(&readings, "alarm").map(|text| text.matches(';').count()), Ok(15));
+    library.fault("lots HNC_SamplGetData 2000000000");
+    let error = poll(&mut source).expect_err("points beyond what was asked for");
+    assert!(matches!(&error, SourceError::Decode { what, .. } if what.contains("2000000000")), "{error}");
+    library.well();
+    cut(&poll(&mut source).expect("well afterwards"));
+}
+
+#[test]
+fn a_dead_link_ends_the_poll_after_one_call() {
+    let library = Library::build(&[]);
+    let mut settings = library.settings();
+    settings.deadline = Duration::from_millis(4500);
+    let mut source = HncSource::new(Line::new(settings), Duration::from_millis(100), false);
+    cut(&poll(&mut source).expect("well before"));
+    library.fault("slow HNC_ChannelGetValue");
+    let began = Instant::now();
+    let error = poll(&mut source).expect_err("the link is dead");
+    assert!(matches!(error, SourceError::Timeout { .. }), "{error}");
+    assert!(began.elapsed() < Duration::from_secs(5), "one call of 3 s, not one for each channel");
+    library.fault("code HNC_NetIsConnect 7");
+    let error = poll(&mut source).expect_err("not connected");
+    assert!(error.to_string().contains("connects again by itself"), "{error}");
+    library.well();
+    cut(&poll(&mut source).expect("well afterwards"));
+}
+
+#[test]
+fn the_state_of_the_connection_comes_from_the_events() {
+    let library = Library::build(&[]);
+    let line = library.line();
+    let alive = line.alive().expect("connected");
+    assert_eq!((alive.connected, alive.lost, alive.generation), (1, 0, 1));
+    line.end();
+    assert_eq!(line.alive().expect("connected again").generation, 2);
+}
+
+#[test]
+fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
+    let library = Library::build(&[]);
+    let said = |settings: HncSettings| Line::new(settings).alive().expect_err("it cannot").to_string();
+    let text = said(HncSettings { library: "/does/not/exist.so".into(), ..library.settings() });
+    assert!(text.contains("/does/not/exist.so") && text.contains("library="), "{text}");
+    let first = library.settings();
+    let holder = Line::new(first.clone());
+    holder.alive().expect("it listens");
+    let text = said(first);
+    assert!(text.contains("1009") && text.contains("local_port="), "{text}");
+    library.fault("code HNC_NetConnect -1");
+    assert!(said(library.settings()).contains("does not answer"));
+    library.fault("abort HNC_NetConnect");
+    assert!(said(library.settings()).contains("signal"));
+    library.fault("hang HNC_NetConnect");
+    assert!(said(library.settings()).contains("hung"));
+}
+
+#[test]
+fn registers_are_written_and_the_override_in_force_is_read_back() {
+    let library = Library::build(&[]);
+    let line = library.line();
+    let mut actuator = HncActuator::new(line.clone(), Register { kind: 'D', index: 100 });
+    let clock = SystemClock::new();
+    assert_eq!(actuator.read_feed_override(&clock).map(OverridePct::percent), Ok(80));
+    let wanted = OverridePct::new(65).expect("exists");
+    actuator.write_feed_override(&clock, wanted).expect("written");
+    assert_eq!(actuator.read_feed_override(&clock), Ok(wanted));
+    let word = |index| line.read(Item::Register(6, index)).expect("alive").expect("a value");
+    let heartbeat = word(103);
+    actuator.write_feed_override(&clock, wanted).expect("written");
+    assert_ne!(word(103), heartbeat, "the heartbeat moves with every letter");
+    library.fault("code HNC_RegSetValue -4");
+    let error = actuator.write_feed_override(&clock, wanted).expect_err("refused");
+    assert!(matches!(&error, SourceError::Refused { what, .. } if what.contains("only be read")), "{error}");
+    library.fault("later HNC_ChannelGetValue");
+    actuator.read_feed_override(&clock).expect_err("not yet is no override of 0 %");
+}
+
+#[test]
+fn every_sampled_millisecond_comes_once() {
+    let library = Library::build(&[]);
+    let mut source = HncSource::new(library.line(), Duration::from_millis(100), true);
+    let (sender, blocks) = mpsc::channel();
+    source.on_block(Box::new(move |block, _| sender.send(block.clone()).expect("the test listens")));
+    let end = Instant::now() + Duration::from_secs(3);
+    while Instant::now() < end {
+        cut(&poll(&mut source).expect("answers"));
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let blocks: Vec<_> = blocks.try_iter().collect();
+    let Sampled { instants, missing, repeated } = source.sampled().expect("it samples");
+    assert_eq!((missing, repeated), (0, 0));
+    assert!(instants > 2000, "{instants} ms of 3 s");
+    for pair in blocks.windows(2) {
+        let ended_ms = pair[0].begin_ms + i64::try_from(pair[0].instants).expect("fits");
+        assert_eq!(pair[1].begin_ms, ended_ms);
+    }
+    let current = blocks[0].columns.iter().find(|column| column.path == "AXIS@5/MOTOR/CURRENT").expect("the spindle");
+    assert_eq!(current.values[0], Some(6005.0), "type 6 of axis 5, as the library was told");
+    println!(
+        "1 ms sampling through the library for 3 s: {instants} instants, {missing} missing, {} blocks",
+        blocks.len()
+    );
+}
+
+/// Files and children of this process.
+fn own() -> (usize, usize) {
+    let files = std::fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
+    let me = std::process::id().to_string();
+    let parent = |path: PathBuf| {
+        let text = std::fs::read_to_string(path.join("stat")).ok()?;
+        text.rsplit_once(')')?.1.split_whitespace().nth(1).map(str::to_owned)
+    };
+    let processes = std::fs::read_dir("/proc").expect("readable").flatten();
+    (files, processes.filter_map(|entry| parent(entry.path())).filter(|parent| *parent == me).count())
+}
+
+fn cycles(count: usize) {
+    let library = Library::build(&[]);
+    let (before, began) = (own(), Instant::now());
+    for cycle in 0..count {
+        library.fault(["abort HNC_NetConnect", "overrun HNC_FprogGetFullName", "code HNC_NetConnect -1"][cycle % 3]);
+        let mut source = library.source();
+        let _typed = poll(&mut source);
+    }
+    let after = own();
+    println!(
+        "{count} cycles with a dying library in {:.1} s: files and children {before:?} before, {after:?} after",
+        began.elapsed().as_secs_f64()
+    );
+    assert!(after.0 <= before.0 + 60 && after.1 <= before.1 + 12, "other tests run beside this one; a leak is more");
+}
+
+#[test]
+fn nothing_is_left_of_sixty_dying_children() {
+    cycles(60);
+}
+
+/// `cargo test --test huazhong thousand -- --ignored --nocapture`
+#[test]
+#[ignore = "a minute"]
+fn nothing_is_left_of_a_thousand_cycles() {
+    cycles(1000);
+}
+
+#[test]
+fn items_have_the_numbers_of_the_header() {
+    assert!(find("cc").is_some());
+    assert_eq!(flag(channel::MODE), Item::Channel(16, 0, Width::Whole));
+    assert_eq!(axis::LOAD_CUR, 29);
+    assert!(SystemClock::new().now_ns() > 0);
+}
