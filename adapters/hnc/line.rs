@@ -44,7 +44,7 @@ pub struct HncSettings {
 }
 
 /// The state of the connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Alive {
     /// Connections that events told of.
     pub connected: u64,

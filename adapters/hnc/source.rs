@@ -3,11 +3,11 @@
 use super::answer::{ItemError, ItemResult};
 use super::decode::{Answers, alarms, number, text, whole};
 use super::item::{self, Item, Width, axis, channel, flag, real};
-use super::line::Line;
+use super::line::{Alive, Line};
 use super::sampling::{Sampled, Sampling};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Source, SourceError};
+use crate::driver::{Fact, Source, SourceError};
 use crate::nclink::sample::Block;
 use crate::nclink::{BlockSink, last_part};
 use crate::reading::{Absence, Reading, Stamp};
@@ -76,6 +76,7 @@ pub struct HncSource {
     period: Duration,
     channels: Vec<ChannelId>,
     layout: Layout,
+    alive: Alive,
     sampling: Option<Sampling>,
     sink: Option<BlockSink>,
 }
@@ -85,7 +86,15 @@ impl HncSource {
     #[must_use]
     pub fn new(line: Line, period: Duration, sample: bool) -> Self {
         let sampling = sample.then(Sampling::default);
-        Self { line, period, channels: channels(), layout: Layout::default(), sampling, sink: None }
+        Self {
+            line,
+            period,
+            channels: channels(),
+            layout: Layout::default(),
+            alive: Alive::default(),
+            sampling,
+            sink: None,
+        }
     }
 
     /// Whole blocks of samples go there from now on.
@@ -234,9 +243,30 @@ impl Source for HncSource {
         self.period
     }
 
+    fn identity(&self) -> Vec<(&'static str, String)> {
+        let named = [("nc version", item::NC_VERSION), ("serial", item::SERIAL)];
+        let ask = |(name, item)| Some((name, text(&self.line.read(item).ok()?).ok()?.to_owned()));
+        named.into_iter().filter_map(ask).collect()
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts")]
+    fn facts(&self) -> Vec<Fact> {
+        let counts = self.line.counts();
+        let mut facts = vec![
+            Fact::number("library_starts", counts.starts as f64),
+            Fact::number("connections", self.alive.connected as f64),
+            Fact::number("lost_connections", self.alive.lost as f64),
+        ];
+        if let Some(sampled) = self.sampled() {
+            facts.push(Fact::number("sampled_instants", sampled.instants as f64));
+            facts.push(Fact::number("missing_instants", sampled.missing as f64));
+        }
+        facts
+    }
+
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        let alive = self.line.alive()?;
-        self.look(alive.generation)?;
+        self.alive = self.line.alive()?;
+        self.look(self.alive.generation)?;
         let began_ns = clock.now_ns();
         let mut answers = HashMap::new();
         for item in self.items() {

@@ -10,7 +10,7 @@ use super::track::Track;
 use crate::address::NcLinkTarget;
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Source, SourceError};
+use crate::driver::{Fact, Source, SourceError};
 use crate::reading::{Reading, Stamp};
 use std::time::{Duration, Instant};
 
@@ -160,7 +160,25 @@ impl Source for NcLinkSource {
         self.period
     }
 
+    fn identity(&self) -> Vec<(&'static str, String)> {
+        let Some(model) = self.model() else { return Vec::new() };
+        let sampled: Vec<String> =
+            model.samples.iter().map(|channel| format!("{} every {} ms", channel.id, channel.interval_ms)).collect();
+        vec![
+            ("name", model.name.clone()),
+            ("serial", self.link.serial.clone()),
+            ("data items", model.items.len().to_string()),
+            ("sample channels", sampled.join(", ")),
+        ]
+    }
+
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         self.poll(clock, out)
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        let mut facts = self.track.facts();
+        facts.extend(self.model().map(|model| Fact::text("device", &model.name)));
+        facts
     }
 }

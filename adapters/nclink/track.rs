@@ -2,6 +2,7 @@
 
 use super::decode;
 use super::sample::Block;
+use crate::driver::Fact;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -57,6 +58,20 @@ impl Track {
     #[must_use]
     pub fn unusable(&self) -> (u64, Option<&str>) {
         (self.lost + self.nonsense, self.why.as_deref())
+    }
+
+    /// The same as facts of the source: instants and missing instants of each sample channel, events, unusable messages.
+    #[expect(clippy::cast_precision_loss, reason = "counts")]
+    pub(super) fn facts(&self) -> Vec<Fact> {
+        let mut facts = Vec::new();
+        for (name, channel) in &self.channels {
+            facts.push(Fact::number(format!("{name}_instants"), channel.instants as f64));
+            facts.push(Fact::number(format!("{name}_missing_instants"), channel.missing as f64));
+        }
+        facts.push(Fact::number("events", self.event_count as f64));
+        facts.extend(self.events.last().map(|event| Fact::text("last_event", event)));
+        facts.push(Fact::number("unusable_messages", self.unusable().0 as f64));
+        facts
     }
 
     pub(super) fn lost_messages(&mut self, lost: u64) {
