@@ -2,8 +2,8 @@
 //! latches it, and the machine's builder decides what it does.
 //!
 //! The same request does not pass again before two things have happened: the script has withdrawn it, and the operator has
-//! seen to it at the machine (started again after a feed hold, changed the tool or the edge after a stop) or has
-//! acknowledged it on the box. A limit that chatters therefore stops the machine once and not fifty times.
+//! seen to it at the machine (started again after a feed hold, or after the program stood) or has acknowledged it on the
+//! box. A limit that chatters therefore stops the machine once and not fifty times.
 
 use super::channel;
 use adapters::words::execution;
@@ -73,20 +73,14 @@ struct Latch {
 pub(super) struct Asks {
     latches: [Latch; 2],
     execution: Option<ChannelId>,
-    tool: Option<ChannelId>,
+    /// The machine has been in feed hold, has stood, since it last ran.
     held: bool,
-    in_use: Option<Arc<str>>,
+    stood: bool,
 }
 
 impl Asks {
     pub(super) fn new() -> Self {
-        Self {
-            latches: Default::default(),
-            execution: channel("execution"),
-            tool: channel("tool"),
-            held: false,
-            in_use: None,
-        }
+        Self { latches: Default::default(), execution: channel("execution"), held: false, stood: false }
     }
 
     pub(super) fn judge(&mut self, asks: &[Ask], sample: &Sample, armed: bool) -> Vec<(Ask, AskOutcome)> {
@@ -111,16 +105,18 @@ impl Asks {
         self.latches.iter_mut().for_each(|latch| latch.latched = false);
     }
 
-    /// The operator has started again after a feed hold, or has changed the tool or its edge.
+    /// The operator has started again after a feed hold, or after the program stood.
     fn seen_to(&mut self, sample: &Sample) {
-        if let Some(word) = self.execution.and_then(|id| sample.text(id)) {
-            let held = word == execution::FEED_HOLD;
-            if std::mem::replace(&mut self.held, held) && word == execution::ACTIVE {
-                self.release(LadderRequest::FeedHold);
-            }
+        let Some(word) = self.execution.and_then(|id| sample.text(id)) else { return };
+        self.held |= word == execution::FEED_HOLD;
+        self.stood |= word == execution::STOPPED;
+        if word != execution::ACTIVE {
+            return;
         }
-        let Some(tool) = self.tool.and_then(|id| sample.text(id)) else { return };
-        if self.in_use.as_deref() != Some(tool) && self.in_use.replace(Arc::from(tool)).is_some() {
+        if std::mem::take(&mut self.held) {
+            self.release(LadderRequest::FeedHold);
+        }
+        if std::mem::take(&mut self.stood) {
             self.release(LadderRequest::Stop);
         }
     }
@@ -136,12 +132,10 @@ mod tests {
     use super::*;
     use adapters::{Slot, Value};
 
-    fn sample(word: &str, tool: &str) -> Sample {
+    fn sample(word: &str) -> Sample {
         let mut sample = Sample::empty(0);
-        for (name, text) in [("execution", word), ("tool", tool)] {
-            let slot = Slot { value: Ok(Value::Text(text.into())), age_ns: 0 };
-            sample.set(ChannelId::of(name).expect("a channel"), slot);
-        }
+        let slot = Slot { value: Ok(Value::Text(word.into())), age_ns: 0 };
+        sample.set(ChannelId::of("execution").expect("a channel"), slot);
         sample
     }
 
@@ -154,7 +148,7 @@ mod tests {
         let mut asks = Asks::new();
         let mut judge = |wanted: bool, word: &str| {
             let asked = if wanted { hold() } else { Vec::new() };
-            asks.judge(&asked, &sample(word, "T1"), true).first().map(|(_, outcome)| *outcome)
+            asks.judge(&asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
         };
         assert_eq!(judge(true, execution::ACTIVE), Some(AskOutcome::Sent));
         assert_eq!(judge(true, execution::FEED_HOLD), None);
@@ -167,16 +161,20 @@ mod tests {
     }
 
     #[test]
-    fn a_new_edge_or_an_acknowledgement_releases_a_stop() {
+    fn a_program_that_stood_or_an_acknowledgement_releases_a_stop() {
         let stop = vec![Ask { request: LadderRequest::Stop, ..hold().remove(0) }];
         let mut asks = Asks::new();
-        let mut judge = |wanted: bool, tool: &str| {
+        let mut judge = |wanted: bool, word: &str| {
             let asked: &[Ask] = if wanted { &stop } else { &[] };
-            asks.judge(asked, &sample(execution::ACTIVE, tool), true).first().map(|(_, outcome)| *outcome)
+            asks.judge(asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
         };
-        assert_eq!((judge(true, "T1"), judge(false, "T1")), (Some(AskOutcome::Sent), None));
-        assert_eq!((judge(true, "T1"), judge(false, "T1")), (Some(AskOutcome::Latched), None));
-        assert_eq!(judge(true, "T1-2"), Some(AskOutcome::Sent));
-        assert_eq!(asks.judge(&hold(), &sample(execution::ACTIVE, "T1-2"), false)[0].1, AskOutcome::Shadow);
+        let active = execution::ACTIVE;
+        assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Sent), None));
+        assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Latched), None));
+        assert_eq!((judge(false, execution::STOPPED), judge(false, execution::READY)), (None, None));
+        assert_eq!((judge(true, active), judge(false, active)), (Some(AskOutcome::Sent), None));
+        asks.acknowledge();
+        assert_eq!(asks.judge(&stop, &sample(active), true)[0].1, AskOutcome::Sent);
+        assert_eq!(asks.judge(&hold(), &sample(active), false)[0].1, AskOutcome::Shadow);
     }
 }

@@ -27,8 +27,19 @@ if kind == 11.0 { request_feed_override(value * 1e300 * 1e300, "too large"); }
 if kind == 12.0 { throw "gives up"; }
 if kind == 13.0 { loop { } }
 "#;
+/// Kinds that are numbers; the script goes on after them.
+const NUMBERS: [u64; 7] = [0, 1, 2, 3, 4, 5, 11];
 /// The last kind is slow by design: a loop that is stopped. It comes seldom.
 const KINDS: u64 = 13;
+
+/// Mostly numbers; one in forty is of any kind, one in four thousand a loop.
+fn kind(random: &mut Random) -> u64 {
+    match random.next() % 4000 {
+        0 => KINDS,
+        1..=100 => random.next() % KINDS,
+        _ => NUMBERS[(random.next() % 7) as usize],
+    }
+}
 
 /// Remembers every write with its time, and has it in force at once.
 struct Controller {
@@ -78,8 +89,8 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
         at_ns += TICK_NS / 2 + (random.next() % 100_000_000) as i64;
         clock.set(at_ns);
         let (mut sample, mut estimates) = cutting(at_ns);
-        let kind = if random.next().is_multiple_of(2000) { KINDS } else { random.next() % KINDS };
-        set_number(&mut sample, "temperature_1_c", if random.next().is_multiple_of(2) { 0.0 } else { kind as f64 });
+        let kind = if random.next().is_multiple_of(2) { 0 } else { kind(&mut random) };
+        set_number(&mut sample, "temperature_1_c", kind as f64);
         set_number(&mut sample, "temperature_2_c", (random.next() % 3600) as f64 / 10.0 - 60.0);
         if random.next().is_multiple_of(100) {
             cases[(random.next() % cases.len() as u64) as usize].1(&mut sample, &mut estimates);

@@ -5,7 +5,7 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
 use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::{Gate, Reaction};
+use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
 use gateway::pipeline::{NoStore, Pipeline};
 use gateway::run::hand::{Hand, Said};
 use rules::estimators;
@@ -58,7 +58,15 @@ impl Bench {
         limits: &config::Gate,
     ) -> Self {
         settings.ladder.rule = LadderRule::Product;
-        let machine = Simulated::experiment("simulated://lathe", settings, 0, steps);
+        Self::of(Simulated::experiment("simulated://lathe", settings, 0, steps), scripts, limits)
+    }
+
+    /// The day's work.
+    pub(crate) fn at_work(settings: SimulatedSettings, scripts: &[ScriptFile], limits: &config::Gate) -> Self {
+        Self::of(Simulated::new("simulated://lathe", settings, 0), scripts, limits)
+    }
+
+    fn of(machine: Simulated, scripts: &[ScriptFile], limits: &config::Gate) -> Self {
         let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
         let mut host = Host::new();
         host.load(scripts).expect("the scripts are accepted");
@@ -87,8 +95,12 @@ impl Bench {
         self.lockstep.sample_into(&mut self.sample, self.now_ns);
         self.pipeline.step(&self.sample, &mut NoStore);
         let verdict = *self.pipeline.verdict().expect("decided");
-        let (mut said, gate) = (Vec::new(), self.pipeline.gate_mut());
-        self.hand.step(&verdict, &[], self.now_ns, |it| said.push(it));
+        let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
+        let gate = self.pipeline.gate_mut();
+        let judged = gate.ask(&asks, &self.sample).into_iter();
+        let sent: Vec<Ask> = judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
+        let mut said = Vec::new();
+        self.hand.step(&verdict, &sent, self.now_ns, |it| said.push(it));
         for it in said {
             let fault = match it {
                 Said::Written(written) => written.fault,
@@ -97,7 +109,10 @@ impl Bench {
                     self.reactions.push(reaction);
                     None
                 }
-                Said::Asked(..) => None,
+                Said::Asked(_, failed) => {
+                    self.faults.extend(failed);
+                    None
+                }
             };
             if let Some(fault) = fault {
                 gate.disarm(fault.disarmed());

@@ -4,5 +4,6 @@
 mod bench;
 mod constant_load;
 mod steps;
+mod stops;
 mod thermal;
 mod wear;
