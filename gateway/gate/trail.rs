@@ -126,17 +126,12 @@ pub fn write(written: &Written) -> Option<Audit> {
     if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
         return None;
     }
-    let what = match written.occasion {
-        Occasion::Change => "the override was changed",
-        Occasion::SignOfLife => "the sign of life",
-        Occasion::Release => "the machine was given back to its dial",
-    };
     Some(Audit {
         outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
         before: written.before.map(percent),
         asked: Some(percent(written.asked)),
         after: written.after.map(percent),
-        reason: written.fault.as_ref().map_or(what.to_owned(), |fault| words(&fault.to_string())),
+        reason: written.fault.as_ref().map_or(written.occasion.words().to_owned(), |fault| words(&fault.to_string())),
         ..of("write", written.at_ns)
     })
 }

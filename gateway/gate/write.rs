@@ -25,6 +25,18 @@ pub enum Occasion {
     Release,
 }
 
+impl Occasion {
+    /// In the words of the history.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Change => "the override was changed",
+            Self::SignOfLife => "the sign of life",
+            Self::Release => "the machine was given back to its dial",
+        }
+    }
+}
+
 /// One write, for the history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {

@@ -32,7 +32,7 @@ pub struct Commands {
     alarm: Option<(TimeNs, String)>,
     written: Option<f64>,
     begun: bool,
-    where_: [Option<ChannelId>; 3],
+    place: [Option<ChannelId>; 3],
 }
 
 impl Commands {
@@ -49,7 +49,7 @@ impl Commands {
             alarm: None,
             written: None,
             begun: false,
-            where_: ["program", "block", "tool"].map(ChannelId::of),
+            place: ["program", "block", "tool"].map(ChannelId::of),
         }
     }
 
@@ -163,7 +163,7 @@ impl Commands {
             Said::Seen(reaction) => {
                 self.keep(trail::reaction(&reaction), gate, health);
                 let [program, block, tool] =
-                    self.where_.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
+                    self.place.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
                 health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
             }
             Said::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
@@ -187,7 +187,7 @@ impl Commands {
             after: written.after.map(percent),
             unit: "%".to_owned(),
             outcome: if written.fault.is_some() { "failed" } else { "done" }.to_owned(),
-            reason: written.fault.as_ref().map_or_else(|| format!("{:?}", written.occasion), ToString::to_string),
+            reason: written.fault.as_ref().map_or_else(|| written.occasion.words().to_owned(), ToString::to_string),
             ..Command::default()
         }
     }
