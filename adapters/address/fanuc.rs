@@ -43,6 +43,9 @@ pub struct FanucOptions {
     pub duty_pct: u8,
     /// Longest wait for connecting and for an answer.
     pub timeout: Duration,
+    /// Diagnosis number in which the control shows the power of the spindle drive in watts, where it does (4902 on
+    /// some 30i); without a meter, the only power there is.
+    pub power_diagnosis: Option<u16>,
     /// How the feed override is written.
     pub write: WriteMethod,
     /// An override is looked at again after this time: several scans of the ladder.
@@ -73,6 +76,7 @@ impl FanucOptions {
             duty_pct: keys.number("duty_pct", 50, 1, 100),
             timeout: ms(keys, "timeout_ms", 2000, 50, 30_000),
             settle: ms(keys, "settle_ms", 50, 0, 2000),
+            power_diagnosis: Some(keys.number("power_diagnosis", 0, 0, 9999)).filter(|number| *number > 0),
             write: write(keys),
             allow,
         }

@@ -49,7 +49,11 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
 #[must_use]
 pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let line = Line::new(name, connect, allowed(options), options.duty_pct);
-    let manner = Manner { path, second_override: matches!(options.write, WriteMethod::SecondOverride { .. }) };
+    let manner = Manner {
+        path,
+        second_override: matches!(options.write, WriteMethod::SecondOverride { .. }),
+        power_diagnosis: options.power_diagnosis,
+    };
     let sources: Vec<Box<dyn Source>> = vec![
         Box::new(FanucSource::fast(name, line.clone(), manner, options)),
         Box::new(FanucSource::slow(name, line.clone(), manner, options)),

@@ -65,6 +65,12 @@ pub const MOTOR_TEMPERATURE: Item = Item::Diagnosis(403, 1);
 /// Gear stages of the spindles.
 pub const GEAR: Item = Item::Spindles(Spindle::Gear);
 
+/// Power of the spindle drive, W, in this diagnosis number.
+#[must_use]
+pub fn power(diagnosis: u16) -> Item {
+    Item::Diagnosis(diagnosis, 1)
+}
+
 /// What changes slowly.
 #[must_use]
 pub fn slow() -> Vec<Item> {

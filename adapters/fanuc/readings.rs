@@ -42,6 +42,9 @@ pub const FAST: [&str; 25] = [
 /// The channel of threads: present only while one is cut, so that a recipe can name the operation otherwise.
 pub const OPERATION: &str = "operation";
 
+/// The power of the spindle drive, where the address names a diagnosis number for it.
+pub const POWER: &str = "spindle_power_w";
+
 /// Channels of the slow group, in the order of [`slow`].
 pub const SLOW: [&str; 3] = ["part_count", "motor_temperature_c", "gear_stage"];
 
@@ -179,6 +182,8 @@ pub struct Manner {
     pub path: u8,
     /// Is the second feed override in use on this machine?
     pub second_override: bool,
+    /// Diagnosis number of the power of the spindle drive.
+    pub power_diagnosis: Option<u16>,
 }
 
 /// The readings of the quick group. `alarms` are the results of asking for alarms, when they were.
@@ -215,7 +220,10 @@ pub fn fast(channels: &[ChannelId], asked: &Asked, alarms: Option<&Asked>, manne
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
     let operation = signals.operation().map(Arc::from).map(Value::Text).ok_or(Absence::NotSupported);
-    out.extend(channels.iter().zip(all.chain([operation])).map(|(channel, value)| reading(*channel, stamp, value)));
+    let power = number(manner.power_diagnosis.ok_or(Absence::NotSupported).and_then(|at| view.number(poll::power(at))));
+    out.extend(
+        channels.iter().zip(all.chain([operation, power])).map(|(channel, value)| reading(*channel, stamp, value)),
+    );
 }
 
 fn alarm_text(status: &Status, asked: &Asked, alarms: Option<&Asked>) -> String {

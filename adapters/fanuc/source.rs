@@ -35,8 +35,11 @@ impl FanucSource {
     /// alarm.
     #[must_use]
     pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
-        let channels = readings::ids(readings::FAST.into_iter().chain([readings::OPERATION]));
-        Self::of(name.to_owned(), line, Group::Fast, manner, poll::fast(manner.path), channels, options.period)
+        let power = manner.power_diagnosis;
+        let names = readings::FAST.into_iter().chain([readings::OPERATION]).chain(power.map(|_| readings::POWER));
+        let mut items = poll::fast(manner.path);
+        items.extend(power.map(poll::power));
+        Self::of(name.to_owned(), line, Group::Fast, manner, items, readings::ids(names), options.period)
     }
 
     /// What changes slowly: parts, temperature of the spindle motor, gear stage.

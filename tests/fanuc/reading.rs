@@ -62,6 +62,19 @@ fn what_one_control_does_not_have_does_not_disturb_the_rest() {
 }
 
 #[test]
+fn the_power_that_a_drive_shows_of_itself_is_read_where_the_address_says_so() {
+    let mut control = controller(4);
+    control.diagnosis(4902, 2, Number::decimal(2350, 0));
+    let server = serve(control, ServerSettings::default());
+    let readings = poll(opened(&server, "power_diagnosis=4902").sources[0].as_mut()).expect("answers");
+    assert_eq!(number(&readings, "spindle_power_w"), 2350.0);
+    let readings = poll(opened(&server, "power_diagnosis=4903").sources[0].as_mut()).expect("answers");
+    assert_eq!(value(&readings, "spindle_power_w"), Err(Absence::NotSupported));
+    let readings = poll(opened(&server, "").sources[0].as_mut()).expect("answers");
+    assert!(readings.iter().all(|reading| reading.channel.name() != "spindle_power_w"), "a meter is asked instead");
+}
+
+#[test]
 fn inches_become_millimetres_and_feed_per_turn_becomes_feed() {
     let mut control = controller(4);
     control.parameter(1001, 0, Number::decimal(1, 0));

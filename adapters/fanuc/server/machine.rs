@@ -97,6 +97,9 @@ fn show(control: &mut Controller, moment: &Moment) {
     let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
     control.parameters.insert(6711, Data { kind: 3, values: vec![Number::decimal(parts, 0)] });
     control.diagnosis(403, 1, whole(moment.electric.motor_temperature_c));
+    // What the drive shows of itself, in steps of ten watts.
+    let power = Number::decimal(whole(moment.truth.spindle_power_w / 10.0).mantissa.saturating_mul(10), 0);
+    control.diagnosis(4902, 2, power);
     alarms(control, panel);
     signals(control, panel);
 }

@@ -1,0 +1,107 @@
+//! The loop closed: a gateway reads a served FANUC machine, a script holds the spindle load, the gate lets it through, the
+//! ladder takes it from the mailbox. Two real processes.
+
+use crate::commands::Serving;
+use crate::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What the script aims at, percent of the spindle's rating: a little less than the roughing cuts of the plan take.
+const TARGET_PCT: f64 = 30.0;
+
+const SCRIPT: &str = "
+const TARGET = 30.0;
+let pct = memory.pct ?? 100.0;
+if has(spindle_load_pct) && has(rapid) && rapid == 0.0 && spindle_load_pct > 8.0 {
+    pct = clamp(pct + 0.8 * (TARGET - spindle_load_pct) * dt_s, 60.0, 118.0);
+    request_feed_override(pct, \"constant load\");
+} else {
+    pct = 100.0;
+}
+memory.pct = pct;
+";
+
+fn prepared(directory: &Path, address: &str) -> PathBuf {
+    let scripts = directory.join("data/scripts");
+    std::fs::create_dir_all(&scripts).expect("a directory");
+    std::fs::write(scripts.join("load.rhai"), SCRIPT).expect("a script");
+    let config = directory.join("cnc-gateway.toml");
+    let written = format!(
+        "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n\
+         [gate]\nmode = \"armed\"\nsource = \"lathe\"\n[http]\nlisten = \"127.0.0.1:0\"\n"
+    );
+    std::fs::write(&config, written).expect("a configuration");
+    config
+}
+
+fn started(config: &Path) -> (Gateway, String) {
+    let mut command = program();
+    command.args(["run", "--config", text(config), "--listen", "127.0.0.1:0"]);
+    let mut gateway = Gateway::spawn(command);
+    let address = gateway.address();
+    (gateway, address)
+}
+
+fn armed(config: &Path) {
+    let told = run(&["arm", "--for", "30m", "--by", "fitter", "--config", text(config)]);
+    assert!(told.status.success(), "{}{}", stdout(&told), stderr(&told));
+}
+
+struct Shown {
+    gate: Value,
+    override_pct: Option<f64>,
+    load_pct: Option<f64>,
+}
+
+fn shown(address: &str) -> Shown {
+    let status = get(address, "/api/v1/status").json();
+    let channels = status["channels"].as_array().cloned().unwrap_or_default();
+    let of = |name: &str| channels.iter().find(|row| row["name"] == name).and_then(|row| row["value"].as_f64());
+    Shown { gate: status["gate"].clone(), override_pct: of("feed_override_pct"), load_pct: of("spindle_load_pct") }
+}
+
+#[test]
+fn the_load_is_held_through_the_mailbox_of_a_served_machine() {
+    let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = prepared(directory.path(), &format!("{}?write=mailbox&power_diagnosis=4902", serving.address));
+    let (gateway, address) = started(&config);
+    wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
+    armed(&config);
+    let in_force = wait_for("an override other than 100 % in force", Duration::from_secs(150), || {
+        let now = shown(&address);
+        assert!(now.gate["disarmed"].is_null() || now.gate["disarmed"] == "not armed since the start", "{}", now.gate);
+        let asked = now.gate["written_pct"].as_f64()?;
+        let found = now.override_pct?;
+        ((asked - 100.0).abs() >= 3.0 && (found - asked).abs() <= 2.0).then_some((asked, found, now.load_pct))
+    });
+    let (asked, found, load) = in_force;
+    println!("asked {asked} %, the control shows {found} %, load {load:?} % towards {TARGET_PCT} %");
+    let held = wait_for("the load at its target", Duration::from_secs(100), || {
+        let now = shown(&address);
+        let (found, load) = (now.override_pct?, now.load_pct?);
+        (found <= 97.0 && (load - TARGET_PCT).abs() <= 1.0).then_some((found, load))
+    });
+    println!("at {} % of the feed the load is {} %", held.0, held.1);
+    gateway.stop();
+}
+
+#[test]
+fn a_direct_write_is_not_held_and_ends_the_arming() {
+    let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = prepared(directory.path(), &format!("{}?write=direct&power_diagnosis=4902", serving.address));
+    let (gateway, address) = started(&config);
+    wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
+    armed(&config);
+    let why = wait_for("the end of the arming", Duration::from_secs(150), || {
+        let disarmed = shown(&address).gate["disarmed"].as_str().map(str::to_owned)?;
+        (disarmed != "not armed since the start").then_some(disarmed)
+    });
+    println!("disarmed: {why}");
+    gateway.stop();
+    let database = directory.path().join("data/history.db");
+    let told = stdout(&run(&["history", "audit", "--json", "--history", text(&database)]));
+    assert!(told.contains("not held: 9") && told.contains("was written to G012"), "{told}");
+}
