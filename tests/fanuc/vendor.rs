@@ -235,7 +235,7 @@ fn cycles(count: u32) {
 
 #[test]
 fn nothing_is_left_of_dying_children() {
-    cycles(300);
+    cycles(150);
 }
 
 /// `cargo test --test fanuc thousand -- --ignored --nocapture`
