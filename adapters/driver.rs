@@ -127,12 +127,6 @@ pub trait Source: Send {
     /// The pace at which it wants to be read.
     fn period(&self) -> Duration;
 
-    /// Who answers, as far as it is known after a successful read: pairs of a word and a text, such as series and
-    /// version of a control.
-    fn identity(&self) -> Vec<(&'static str, String)> {
-        Vec::new()
-    }
-
     /// Reads everything once and appends it to `out`. Blocks no longer than the source's own deadline. A value that
     /// could not be had is a reading with a reason; an error means that the whole poll failed.
     ///

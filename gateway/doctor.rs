@@ -2,6 +2,7 @@
 //! Contract: sources of the project, section on `doctor`.
 
 use adapters::clock::{Clock, SystemClock};
+use adapters::driver::{Fact, FactValue};
 use adapters::open::open;
 use adapters::{Absence, Address, ChannelId, Reading, Source, SourceError, Value};
 use serde_json::{Map, json};
@@ -38,7 +39,7 @@ pub struct Report {
     /// Did anything answer?
     pub reachable: bool,
     /// Who answered.
-    pub identity: Vec<(&'static str, String)>,
+    pub identity: Vec<Fact>,
     /// What the channels say, in the order of the sources.
     pub readings: Vec<(ChannelId, Result<Shown, Absence>)>,
     /// From nothing to the first values.
@@ -89,7 +90,6 @@ impl Report {
         match source.read(clock, &mut readings) {
             Ok(()) => {
                 self.reachable = true;
-                self.identity.extend(source.identity());
                 true
             }
             Err(error) => {
@@ -105,6 +105,7 @@ impl Report {
         if let Err(error) = source.read(clock, &mut readings) {
             self.failed(&error);
         }
+        self.identity.extend(source.facts());
         self.readings.extend(readings.into_iter().map(shown));
     }
 
@@ -128,7 +129,7 @@ impl Report {
     #[must_use]
     pub fn json(&self) -> serde_json::Value {
         let identity: Map<String, serde_json::Value> =
-            self.identity.iter().map(|(key, value)| ((*key).to_owned(), json!(value))).collect();
+            self.identity.iter().map(|fact| (fact.name.clone(), fact_json(&fact.value))).collect();
         let reading = |(channel, value): &(ChannelId, Result<Shown, Absence>)| match value {
             Ok(Shown(_, Value::Number(number))) => {
                 json!({"channel": channel.name(), "value": number, "unit": channel.channel().unit})
@@ -144,6 +145,13 @@ impl Report {
             "timing": {"open_ms": self.open_ms, "read_ms": self.read_ms},
             "problems": self.problems.iter().map(|one| json!({"what": one.what, "next": one.next})).collect::<Vec<_>>(),
         })
+    }
+}
+
+fn fact_json(value: &FactValue) -> serde_json::Value {
+    match value {
+        FactValue::Number(number) => json!(number),
+        FactValue::Text(text) => json!(text),
     }
 }
 

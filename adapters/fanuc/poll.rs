@@ -53,6 +53,7 @@ pub fn fast(path: u8) -> Vec<Item> {
         MODAL_S,
         MODAL_T,
         FEED_UNIT,
+        MOTOR_TEMPERATURE,
         Item::Pmc(control_signals(path)),
         Item::Pmc(ladder_signals(path)),
     ]
@@ -74,5 +75,5 @@ pub fn power(diagnosis: u16) -> Item {
 /// What changes slowly.
 #[must_use]
 pub fn slow() -> Vec<Item> {
-    vec![PART_COUNT, MOTOR_TEMPERATURE, GEAR]
+    vec![PART_COUNT, GEAR]
 }

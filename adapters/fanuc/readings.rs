@@ -11,7 +11,7 @@ use crate::reading::{Absence, Reading, Stamp, Value};
 use std::sync::Arc;
 
 /// Channels of the quick group, in the order of [`fast`].
-pub const FAST: [&str; 25] = [
+pub const FAST: [&str; 26] = [
     "spindle_programmed_rpm",
     "feed_programmed_mm_min",
     "spindle_speed_rpm",
@@ -37,6 +37,7 @@ pub const FAST: [&str; 25] = [
     "tool",
     "alarm",
     "motion",
+    "motor_temperature_c",
 ];
 
 /// The channel of threads: present only while one is cut, so that a recipe can name the operation otherwise.
@@ -46,7 +47,8 @@ pub const OPERATION: &str = "operation";
 pub const POWER: &str = "spindle_power_w";
 
 /// Channels of the slow group, in the order of [`slow`].
-pub const SLOW: [&str; 3] = ["part_count", "motor_temperature_c", "gear_stage"];
+/// Only values that hold between readings: one that is interpolated would keep all the others waiting for it.
+pub const SLOW: [&str; 2] = ["part_count", "gear_stage"];
 
 const MM_PER_INCH: f64 = 25.4;
 
@@ -216,6 +218,7 @@ pub fn fast(channels: &[ChannelId], asked: &Asked, alarms: Option<&Asked>, manne
         text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
         text(status.map(|status| alarm_text(&status, asked, alarms))),
         word(status.map(|status| states::motion(&status))),
+        number(view.number(poll::MOTOR_TEMPERATURE)),
     ];
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
@@ -238,7 +241,7 @@ fn alarm_text(status: &Status, asked: &Asked, alarms: Option<&Asked>) -> String 
 /// The readings of the slow group.
 pub fn slow(channels: &[ChannelId], asked: &Asked, out: &mut Vec<Reading>) {
     let view = View { asked, path: 1 };
-    let values = [poll::PART_COUNT, poll::MOTOR_TEMPERATURE, poll::GEAR].map(|item| number(view.number(item)));
+    let values = [poll::PART_COUNT, poll::GEAR].map(|item| number(view.number(item)));
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     out.extend(channels.iter().zip(values).map(|(channel, value)| reading(*channel, stamp, value)));
 }

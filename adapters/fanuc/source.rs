@@ -6,7 +6,7 @@ use super::readings::{self, Manner};
 use crate::address::FanucOptions;
 use crate::channel::ChannelId;
 use crate::clock::Clock;
-use crate::driver::{Source, SourceError};
+use crate::driver::{Fact, Source, SourceError};
 use crate::reading::Reading;
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,7 +42,7 @@ impl FanucSource {
         Self::of(name.to_owned(), line, Group::Fast, manner, items, readings::ids(names), options.period)
     }
 
-    /// What changes slowly: parts, temperature of the spindle motor, gear stage.
+    /// What changes slowly and holds in between: parts, gear stage.
     #[must_use]
     pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
         let joint = if name.contains('?') { '&' } else { '?' };
@@ -76,10 +76,6 @@ impl Source for FanucSource {
         self.period
     }
 
-    fn identity(&self) -> Vec<(&'static str, String)> {
-        self.facts.as_ref().filter(|_| self.group == Group::Fast).map_or_else(Vec::new, |facts| identity(facts))
-    }
-
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let asked = self.line.ask(clock, &self.items)?;
         self.facts = Some(asked.facts.clone());
@@ -92,20 +88,39 @@ impl Source for FanucSource {
         readings::fast(&self.channels, &asked, alarms.as_ref(), self.manner, out);
         Ok(())
     }
+
+    fn facts(&self) -> Vec<Fact> {
+        match (&self.facts, self.group) {
+            (Some(facts), Group::Fast) => identity(facts).into_iter().chain(experience(&self.line)).collect(),
+            _ => Vec::new(),
+        }
+    }
 }
 
-fn identity(facts: &Facts) -> Vec<(&'static str, String)> {
+/// Who answers.
+fn identity(facts: &Facts) -> Vec<Fact> {
     let opening = &facts.opening;
-    let mut known = vec![("make", "FANUC".to_owned())];
+    let mut known = vec![Fact::text("make", "FANUC")];
     if let Some(system) = &facts.system {
-        known.push(("control", format!("{}-{}", system.kind, system.machine)));
-        known.push(("series", system.series.clone()));
-        known.push(("version", system.version.clone()));
+        known.push(Fact::text("control", format!("{}-{}", system.kind, system.machine)));
+        known.push(Fact::text("series", system.series.clone()));
+        known.push(Fact::text("version", system.version.clone()));
     }
-    known.push(("generation", opening.generation.version().to_string()));
-    known.push(("paths", opening.paths.to_string()));
-    known.push(("axes", facts.axes.join(" ")));
-    known.push(("spindles", opening.spindles.to_string()));
-    known.push(("unit", if facts.inch { "inch" } else { "mm" }.to_owned()));
+    known.push(Fact::text("generation", opening.generation.version().to_string()));
+    known.push(Fact::text("axes", facts.axes.join(" ")));
+    known.push(Fact::text("unit", if facts.inch { "inch" } else { "mm" }));
     known
+}
+
+/// How the line has been doing.
+fn experience(line: &Line) -> Vec<Fact> {
+    #[expect(clippy::cast_precision_loss, reason = "a count that is shown")]
+    let count = |name, count: u64| Fact::number(name, count as f64);
+    let (counts, unsupported) = (line.counts(), line.unsupported().len());
+    vec![
+        count("connections", counts.connections),
+        count("connections_broken", counts.broken),
+        count("connections_refused", counts.refused),
+        count("items_not_supported", u64::try_from(unsupported).unwrap_or(u64::MAX)),
+    ]
 }

@@ -77,6 +77,7 @@ fn the_second_override_has_a_byte_of_its_own() {
     assert_eq!(g12, Some(0x9B), "the operator's dial is untouched");
     assert!(matches!(write(actuator.as_mut(), 0), Err(SourceError::Refused { .. })));
     actuator.release(&SystemClock::new()).expect("given back");
+    std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(actuator.read_feed_override(&SystemClock::new()), Ok(OverridePct::FULL));
 }
 

@@ -21,7 +21,7 @@ mod properties;
 pub use counts::MergeCounts;
 pub use lockstep::Lockstep;
 
-use crate::channel::ChannelId;
+use crate::channel::{ChannelId, Kind};
 use crate::clock::TimeNs;
 use crate::driver::{Pull, Source, SourceError};
 use crate::reading::{Absence, Reading};
@@ -62,7 +62,7 @@ impl SourcePlan {
 /// How far back the merge looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delay {
-    /// One and a quarter periods of the slowest source, at most [`DELAY_MAX`].
+    /// One and a quarter periods of the slowest source with a channel that is interpolated, at most [`DELAY_MAX`].
     #[default]
     SlowestPeriod,
     /// Exactly this; zero means that the newest values are held and never interpolated.
@@ -268,7 +268,10 @@ fn explained(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
 }
 
 fn delay_of(plans: &[SourcePlan], delay: Delay) -> i64 {
-    let slowest = plans.iter().map(|plan| plan.period).max().unwrap_or_default();
+    // Only what is interpolated has to wait for the next reading of its source.
+    let waits = |plan: &&SourcePlan| plan.channels.iter().any(|id| id.channel().kind == Kind::Continuous);
+    let slowest = plans.iter().filter(waits).map(|plan| plan.period).max();
+    let slowest = slowest.or_else(|| plans.iter().map(|plan| plan.period).max()).unwrap_or_default();
     match delay {
         Delay::Fixed(delay) => nanoseconds(delay),
         Delay::SlowestPeriod => nanoseconds((slowest * 5 / 4).min(DELAY_MAX)),

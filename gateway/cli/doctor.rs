@@ -2,6 +2,7 @@
 
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
 use crate::doctor::{self, Difference, Report};
+use adapters::driver::FactValue;
 use clap::Args;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -55,7 +56,12 @@ fn text(report: &Report) -> String {
         let _ = writeln!(text, "{what}");
     };
     line(format_args!("  {}", if report.reachable { "answers" } else { "does not answer" }));
-    report.identity.iter().for_each(|(key, value)| line(format_args!("  {key}: {value}")));
+    for fact in &report.identity {
+        match &fact.value {
+            FactValue::Number(number) => line(format_args!("  {}: {number}", fact.name)),
+            FactValue::Text(text) => line(format_args!("  {}: {text}", fact.name)),
+        }
+    }
     line(format_args!("  opened and read in {:.1} ms, read again in {:.1} ms", report.open_ms, report.read_ms));
     for (channel, value) in &report.readings {
         match value {

@@ -39,7 +39,7 @@ fn every_channel_of_a_cut_in_all_generations() {
         assert_eq!(value(&readings, "y_axis_position_mm"), Err(Absence::NotSupported), "a lathe has no Y");
         let slow = poll(opened.sources[1].as_mut()).expect("answers");
         assert_eq!((number(&slow, "part_count"), number(&slow, "gear_stage")), (17.0, 2.0));
-        assert_eq!(number(&slow, "motor_temperature_c"), 48.0);
+        assert_eq!(number(&readings, "motor_temperature_c"), 48.0);
         assert_eq!((server.opened(), server.sessions()), (1, 1), "both groups share one connection");
         assert_eq!(server.frames(), 3, "the facts once, then one round trip per group");
     }
