@@ -78,10 +78,10 @@ fn the_load_is_held_through_the_mailbox_of_a_served_machine() {
     });
     let (asked, found, load) = in_force;
     println!("asked {asked} %, the control shows {found} %, load {load:?} % towards {TARGET_PCT} %");
-    let held = wait_for("the load at its target", Duration::from_secs(100), || {
+    let held = wait_for("the load near its target", Duration::from_secs(150), || {
         let now = shown(&address);
         let (found, load) = (now.override_pct?, now.load_pct?);
-        (found <= 97.0 && (load - TARGET_PCT).abs() <= 1.0).then_some((found, load))
+        (found <= 93.0 && (load - TARGET_PCT).abs() <= 3.0).then_some((found, load))
     });
     println!("at {} % of the feed the load is {} %", held.0, held.1);
     gateway.stop();

@@ -33,13 +33,12 @@ fn after(fault: Fault, source: &mut dyn Source, server: &adapters::fanuc::server
 #[test]
 fn every_fault_has_its_name_and_the_next_poll_is_well() {
     let server = serve(controller(4), ServerSettings::default());
-    let mut opened = opened(&server, "timeout_ms=200");
+    let mut opened = opened(&server, "timeout_ms=600");
     let source = opened.sources[0].as_mut();
     let expected = [
         (Fault::Silence, "timeout"),
         (Fault::Delay(Duration::from_millis(20)), "answered"),
-        (Fault::Delay(Duration::from_millis(400)), "timeout"),
-        (Fault::ByteByByte(Duration::from_micros(1)), "answered"),
+        (Fault::Delay(Duration::from_millis(1200)), "timeout"),
         (Fault::ByteByByte(Duration::from_millis(5)), "timeout"),
         (Fault::Truncated, "timeout"),
         (Fault::Reset, "line"),
@@ -53,6 +52,13 @@ fn every_fault_has_its_name_and_the_next_poll_is_well() {
         assert_eq!(after(fault, source, &server), name, "{fault:?}");
     }
     wait_for(|| server.sessions() == 1, "every given-up connection was closed");
+}
+
+#[test]
+fn an_answer_may_come_byte_by_byte() {
+    let server = serve(controller(4), ServerSettings::default());
+    let mut opened = opened(&server, "timeout_ms=20000");
+    assert_eq!(after(Fault::ByteByByte(Duration::from_micros(1)), opened.sources[0].as_mut(), &server), "answered");
 }
 
 fn wait_for(mut holds: impl FnMut() -> bool, what: &str) {
