@@ -127,6 +127,12 @@ pub trait Source: Send {
     /// The pace at which it wants to be read.
     fn period(&self) -> Duration;
 
+    /// Who answers, as far as it is known after a successful read: pairs of a word and a text. May ask the device; for
+    /// what is shown all the time there are [`Source::facts`].
+    fn identity(&self) -> Vec<(&'static str, String)> {
+        Vec::new()
+    }
+
     /// Reads everything once and appends it to `out`. Blocks no longer than the source's own deadline. A value that
     /// could not be had is a reading with a reason; an error means that the whole poll failed.
     ///

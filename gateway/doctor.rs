@@ -105,7 +105,10 @@ impl Report {
         if let Err(error) = source.read(clock, &mut readings) {
             self.failed(&error);
         }
-        self.identity.extend(source.facts());
+        let named = source.identity().into_iter().map(|(name, value)| Fact::text(name, value));
+        let new = |fact: &Fact| self.identity.iter().all(|known| known.name != fact.name);
+        let fresh: Vec<Fact> = named.chain(source.facts()).filter(new).collect();
+        self.identity.extend(fresh);
         self.readings.extend(readings.into_iter().map(shown));
     }
 
