@@ -77,6 +77,12 @@ impl Sampling {
         sampling
     }
 
+    /// The same after the library was loaded anew: what was counted stays, the counter begins where it stands.
+    #[must_use]
+    pub fn continuing(self, before: &Self) -> Self {
+        Self { counts: before.counts, ..self }
+    }
+
     fn add(&mut self, kind: i32, axis: i32, what: &str) {
         if self.items.len() < SAMPLED_MAX {
             self.items.push(SampledItem::OfAxis { kind, axis });

@@ -133,11 +133,9 @@ impl HncSource {
 
     /// A controller that cannot sample, or whose operator looks at the oscilloscope, is read without.
     fn begin_sampling(&mut self) -> Result<(), SourceError> {
-        if self.sampling.is_none() {
-            return Ok(());
-        }
+        let Some(before) = &self.sampling else { return Ok(()) };
         let axes: Vec<i32> = self.layout.axes.iter().map(|(_, number)| *number).collect();
-        let sampling = Sampling::of(self.layout.spindle, &axes);
+        let sampling = Sampling::of(self.layout.spindle, &axes).continuing(before);
         match self.line.sample(sampling.items()) {
             Ok(()) => self.sampling = Some(sampling),
             Err(SourceError::Refused { .. } | SourceError::Decode { .. }) => self.sampling = None,

@@ -1,5 +1,6 @@
 //! The vendor's library: one with the same functions, compiled here and really loaded in the real child process.
 
+use crate::broker::free_port;
 use crate::stand::until;
 use adapters::address::Endpoint;
 use adapters::clock::SystemClock;
@@ -11,21 +12,20 @@ use adapters::hnc::{HncActuator, HncSource};
 use adapters::nclink::mailbox::Register;
 use adapters::units::OverridePct;
 use adapters::{Absence, Reading, Source, SourceError};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// The library in a directory of its own, and the file that tells it which fault to have.
-struct Library {
+pub(crate) struct Library {
     _directory: tempfile::TempDir,
-    file: PathBuf,
+    pub(crate) file: PathBuf,
     fault: PathBuf,
 }
 
 impl Library {
-    fn build(flags: &[&str]) -> Self {
+    pub(crate) fn build(flags: &[&str]) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let (file, fault) = (directory.path().join("libfakehnc.so"), directory.path().join("fault"));
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/huazhong/fake_hnc.c");
@@ -44,13 +44,12 @@ impl Library {
     }
 
     fn settings(&self) -> HncSettings {
-        let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port").port();
         HncSettings {
             name: "hncnet://fake".to_owned(),
             library: self.file.clone(),
             at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
             local_host: Some("127.0.0.1".to_owned()),
-            local_port: port,
+            local_port: free_port(),
             long_bytes: size_of::<std::ffi::c_long>(),
             deadline: Duration::from_millis(1500),
             program: Some(PathBuf::from(env!("CARGO_BIN_EXE_cnc-gateway"))),

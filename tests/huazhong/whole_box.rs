@@ -1,7 +1,8 @@
 //! The programs as an integrator starts them: one serves the simulated machine as an NC-Link device, the other reads it.
 
-use crate::broker::Broker;
-use crate::process::{Gateway, get, program, run, stderr, wait_for};
+use crate::broker::{Broker, free_port};
+use crate::hnc::Library;
+use crate::process::{Gateway, get, program, run, stderr, stdout, wait_for};
 use std::time::Duration;
 
 #[test]
@@ -43,4 +44,28 @@ fn a_device_does_not_listen() {
     let refused = run(&["serve", "nclink", "--listen", "127.0.0.1:1883"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("--broker"), "{}", stderr(&refused));
+}
+
+#[test]
+fn the_doctor_examines_a_controller_through_the_library() {
+    let library = Library::build(&[]);
+    let keys = format!("local_host=127.0.0.1&local_port={}&sample=yes", free_port());
+    let address = format!("hncnet://192.0.2.1:10001?library={}&{keys}", library.file.display());
+    let examined = run(&["doctor", &address, "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&examined)).expect("JSON");
+    assert_eq!(report["reachable"], true, "{report}");
+    assert_eq!(
+        (&report["identity"]["serial"], &report["identity"]["nc version"]),
+        (&"SN848".into(), &"2.31.03".into())
+    );
+    let readings = report["readings"].as_array().expect("a list");
+    let speed = readings.iter().find(|reading| reading["channel"] == "spindle_speed_rpm").expect("read");
+    assert_eq!(speed["value"], 2987.25);
+    let absent = run(&["doctor", "hncnet://192.0.2.1?library=/does/not/exist.so"]);
+    assert_eq!(absent.status.code(), Some(1));
+    assert!(
+        stdout(&absent).contains("library=") && stdout(&absent).contains("/does/not/exist.so"),
+        "{}",
+        stdout(&absent)
+    );
 }
