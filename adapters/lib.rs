@@ -15,6 +15,7 @@ pub mod channel;
 pub mod child;
 pub mod clock;
 pub mod driver;
+pub mod eda9033a;
 pub mod fanuc;
 pub mod hnc;
 pub mod merge;
@@ -28,7 +29,9 @@ pub mod replay;
 pub mod sample;
 pub mod serial;
 pub mod simulated;
+pub mod temperature;
 pub mod units;
+pub mod waveform;
 pub mod words;
 pub mod worker;
 

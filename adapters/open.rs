@@ -3,10 +3,12 @@
 use crate::address::{Address, FanucBackend, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
 use crate::clock::TimeNs;
 use crate::driver::{Actuator, Pull, Source};
+use crate::eda9033a::Eda9033a;
 use crate::modbus::ModbusMeter;
 use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
+use crate::temperature::Temperatures;
 use thiserror::Error;
 
 /// Why an address could not be opened.
@@ -109,6 +111,8 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
         Target::HncNet(target) => Ok(crate::hnc::open(address, target)),
         Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::tcp(address, at, meter)),
         Target::ModbusRtu { line, meter } => read_only(address, ModbusMeter::rtu(address, line, meter)),
+        Target::Eda9033a { line, meter } => read_only(address, Eda9033a::new(address.text(), line, meter)),
+        Target::Temperature { file, sys } => read_only(address, Temperatures::open(address.text(), file, sys)),
         other => Err(not_built(address, other)),
     }
 }
@@ -205,6 +209,9 @@ pub fn missing_driver(address: &Address) -> Option<OpenError> {
         | Target::Replay(_)
         | Target::ModbusTcp { .. }
         | Target::ModbusRtu { .. }
+        | Target::Eda9033a { .. }
+        | Target::Temperature { .. }
+        | Target::Waveform { .. }
         | Target::Fanuc { .. } => None,
         Target::NcLink(target) if !target.tls => None,
         Target::HncNet(_) => None,
@@ -216,11 +223,12 @@ fn not_built(address: &Address, target: &Target) -> OpenError {
     let what = match target {
         Target::Simulated(_) | Target::Replay(_) => "this way of running",
         Target::Fanuc { .. } => "another pace than that of the clock for a real controller",
-        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } => "another pace than that of the clock for a real meter",
+        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } | Target::Eda9033a { .. } | Target::Temperature { .. } => {
+            "another pace than that of the clock for a real meter"
+        }
         Target::NcLink(target) if target.tls => "TLS to the broker",
         Target::NcLink(_) | Target::HncNet(_) => "another pace than that of the clock for a real controller",
-        Target::Eda9033a { .. } => "the EDA9033A meter driver",
-        Target::Waveform { .. } => "the waveform receiver",
+        Target::Waveform { .. } => "a feature of a waveform without the box that makes it",
     };
     OpenError::NotBuilt { address: address.text().to_owned(), what }
 }

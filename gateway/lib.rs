@@ -24,3 +24,4 @@ pub mod signals;
 pub mod status;
 pub mod twin;
 pub mod usage;
+pub mod waveform;

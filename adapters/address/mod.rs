@@ -3,13 +3,15 @@
 mod fanuc;
 mod huazhong;
 mod keys;
+mod meter;
 mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, NcLinkTarget};
+pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use target::{
-    Circuit, Endpoint, FanucBackend, MeterTarget, Parity, ReplayTarget, SerialTarget, SimulatedDevice,
-    SimulatedMachine, SimulatedTarget, Speed, Target,
+    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget, Speed,
+    Target,
 };
 
 use keys::Keys;
@@ -18,8 +20,19 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// The schemes of the notation, for "did you mean" and for help texts.
-pub const SCHEMES: [&str; 10] =
-    ["simulated", "replay", "fanuc", "nclink", "nclinks", "hncnet", "modbus-tcp", "modbus-rtu", "eda9033a", "waveform"];
+pub const SCHEMES: [&str; 11] = [
+    "simulated",
+    "replay",
+    "fanuc",
+    "nclink",
+    "nclinks",
+    "hncnet",
+    "modbus-tcp",
+    "modbus-rtu",
+    "eda9033a",
+    "temperature",
+    "waveform",
+];
 
 /// A text that is no usable address, with everything that is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -121,7 +134,11 @@ mod tests {
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",
             "modbus-rtu:///dev/ttyUSB0?baud=9600&parity=none&unit=1&profile=eda9033a",
             "eda9033a:///dev/ttyUSB0?baud=9600&address=1&ct=20",
+            "modbus-rtu:///dev/ttyS1?unit=2&profile=own&profiles=/etc/meters&circuit=spindle&ct=1&timeout_ms=200",
+            "eda9033a:///dev/ttyUSB0?ct=20&circuit=spindle",
+            "temperature:/etc/cnc-gateway/temperatures.toml",
             "waveform://daq:5000",
+            "waveform://daq:5000?keep=/var/lib/waveforms&keep_above_a=40",
         ] {
             assert_eq!(Address::from_str(text).expect(text).to_string(), text);
         }

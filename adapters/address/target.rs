@@ -4,10 +4,10 @@ use super::SCHEMES;
 use super::fanuc::FanucOptions;
 use super::huazhong::{HncNetTarget, NcLinkTarget, hncnet, nclink};
 use super::keys::Keys;
+use super::meter::{self, EdaTarget, MeterTarget, WaveformKeep};
 use crate::channel::nearest;
 use crate::driver::LadderRule;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// How fast a replay or a simulated machine runs against the clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,34 +124,6 @@ pub struct SerialTarget {
     pub parity: Parity,
 }
 
-/// What a power meter sits in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Circuit {
-    /// The supply of the whole machine: `total_power_w`.
-    Machine,
-    /// The supply of the spindle drive: `spindle_power_w`, `spindle_current_a`.
-    Spindle,
-}
-
-/// A Modbus meter on its line.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeterTarget {
-    /// Unit identifier.
-    pub unit: u8,
-    /// Name of the register profile.
-    pub profile: String,
-    /// Directory of the user's own profiles.
-    pub profiles: Option<PathBuf>,
-    /// What it measures.
-    pub circuit: Circuit,
-    /// Ratio of the current transformers, where the meter does not count it in.
-    pub ct: f64,
-    /// Ratio of the voltage transformers, where the meter does not count it in.
-    pub pt: f64,
-    /// How long a request may take.
-    pub timeout: Duration,
-}
-
 /// What an address means.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
@@ -192,15 +164,22 @@ pub enum Target {
     Eda9033a {
         /// Where.
         line: SerialTarget,
-        /// Device address.
-        address: u8,
-        /// Ratio of the current transformers.
-        ct: f64,
+        /// Which meter, and what it measures.
+        meter: EdaTarget,
+    },
+    /// Temperature sensors of the box itself.
+    Temperature {
+        /// The file that names them.
+        file: PathBuf,
+        /// Where the kernel shows devices; `/sys` everywhere but in tests.
+        sys: PathBuf,
     },
     /// A framed stream of samples.
     Waveform {
         /// Where.
         at: Endpoint,
+        /// Raw samples that stay.
+        keep: Option<WaveformKeep>,
     },
 }
 
@@ -213,19 +192,29 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "nclinks" => nclink(body, keys, true),
         "hncnet" => hncnet(body, keys),
         "modbus-tcp" => {
-            let meter = meter(keys, 0);
+            let meter = meter::modbus(keys, 0);
             Ok(Target::ModbusTcp { at: endpoint(body, Some(502))?, meter: meter? })
         }
         "modbus-rtu" => {
-            let (line, meter) = (serial(body, keys), meter(keys, 1));
+            let (line, meter) = (serial(body, keys), meter::modbus(keys, 1));
             Ok(Target::ModbusRtu { line: line?, meter: meter? })
         }
         "eda9033a" => {
-            let (line, address) = (serial(body, keys), keys.number("address", 1, 0, 255));
-            let ct = keys.number("ct", 1.0, 0.001, 10000.0);
-            Ok(Target::Eda9033a { line: line?, address, ct })
+            let (line, meter) = (serial(body, keys), meter::eda(keys));
+            Ok(Target::Eda9033a { line: line?, meter })
         }
-        "waveform" => Ok(Target::Waveform { at: endpoint(body, None)? }),
+        "temperature" => {
+            let sys = keys.text("sys").map_or_else(|| PathBuf::from("/sys"), PathBuf::from);
+            let file = body.strip_prefix("//").unwrap_or(body);
+            let named = !file.is_empty();
+            named
+                .then(|| Target::Temperature { file: PathBuf::from(file), sys })
+                .ok_or_else(|| "no file; write temperature:FILE".to_owned())
+        }
+        "waveform" => {
+            let keep = meter::keep(keys);
+            Ok(Target::Waveform { at: endpoint(body, None)?, keep: keep? })
+        }
         other => Err(unknown_scheme(other)),
     }
 }
@@ -296,21 +285,6 @@ fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
 
 pub(super) fn library(keys: &mut Keys) -> Result<PathBuf, String> {
     keys.text("library").map(PathBuf::from).ok_or_else(|| "name the vendor's library with library=FILE".to_owned())
-}
-
-fn meter(keys: &mut Keys, least_unit: u8) -> Result<MeterTarget, String> {
-    let unit = keys.number("unit", 1, least_unit, 247);
-    let profile = keys.text("profile");
-    let profiles = keys.text("profiles").map(PathBuf::from);
-    let circuit = keys.choice("circuit", &[("machine", Circuit::Machine), ("spindle", Circuit::Spindle)]);
-    let (ct, pt) = (keys.number("ct", 1.0, 0.001, 100_000.0), keys.number("pt", 1.0, 0.001, 100_000.0));
-    let timeout = timeout(keys);
-    let profile = profile.ok_or_else(|| "name the meter's registers with profile=NAME".to_owned())?;
-    Ok(MeterTarget { unit, profile, profiles, circuit, ct, pt, timeout })
-}
-
-fn timeout(keys: &mut Keys) -> Duration {
-    Duration::from_millis(keys.number("timeout_ms", 500, 10, 60_000))
 }
 
 fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {

@@ -28,7 +28,7 @@
 //! What a meter says is kept as it is, with its sign: a spindle that brakes feeds power back, and that is negative.
 
 mod crc;
-mod line;
+pub(crate) mod line;
 mod meter;
 mod number;
 pub mod pdu;

@@ -3,13 +3,14 @@
 use super::feed::Feed;
 use super::pace::Pace;
 use crate::config::Config;
+use crate::waveform::SpindleCurrent;
 use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
 use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
-use adapters::open::{OpenError, open, open_pull};
+use adapters::open::{OpenError, Opened, Refused, open, open_pull};
 use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
-use adapters::{Actuator, Pull, Source};
+use adapters::{Actuator, Address, Pull, Source};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -78,7 +79,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     let (mut found, mut actuators, mut problems) = (Vec::new(), Vec::new(), Vec::new());
     let mut machines = Vec::new();
     for source in &config.sources {
-        match open(&source.address, clock.now_ns()) {
+        match opened(&source.address, clock.now_ns()) {
             Ok(opened) => {
                 let (deadline, period) = (source.deadline, source.period);
                 let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
@@ -95,6 +96,14 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     let feed = threads(found, clock).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = Pace::on_clock(clock.clone(), period(config));
     Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
+}
+
+/// As [`open`], and streams that only become a channel in the box.
+fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+    let Target::Waveform { at, keep } = address.target() else { return open(address, now_ns) };
+    let source = SpindleCurrent::new(address.text(), at, keep.as_ref());
+    let sources: Vec<Box<dyn Source>> = vec![Box::new(source)];
+    Ok(Opened { sources, actuator: None, simulated: None, refused: Refused::default() })
 }
 
 fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Clock>) -> std::io::Result<Feed> {

@@ -16,10 +16,12 @@
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 //! | `power_separation` | no-load power and load loss from recordings |
+//! | `alignment` | lag, drift and averaging window between controller and meter |
 //! | `thermal` | thermal error from temperatures: sensors, laws, compensation, pulse insertion |
 //! | `spindle_current` | filter, feature and feed curve of the spindle current |
 //! | `regression` | least squares with intervals, distributions, refusals |
 
+pub mod alignment;
 mod bound;
 mod cutting;
 mod detector;

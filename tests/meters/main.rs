@@ -1,7 +1,9 @@
 //! Meters over real sockets, real pseudo terminals and against an implementation that is not ours: pymodbus.
 
+mod eda9033a;
 mod faults;
 mod modbus;
 mod partner;
 mod serial_faults;
 mod served;
+mod waveforms;

@@ -4,6 +4,7 @@
 mod fanuc;
 mod modbus;
 mod nclink;
+mod waveform;
 
 use super::{CannotRun, CommandResult, Outcome};
 use crate::signals::{Request, Signals};
@@ -14,6 +15,7 @@ use adapters::simulated::{Simulated, SimulatedSettings};
 use clap::{Args, Subcommand};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is served.
 #[derive(Debug, Subcommand)]
@@ -24,6 +26,8 @@ pub(super) enum Served {
     Nclink(nclink::NclinkArguments),
     /// A Modbus TCP meter: unit 1 in the machine's supply, unit 2 in that of the spindle drive.
     Modbus(modbus::ModbusArguments),
+    /// Three phases of spindle current as a stream of samples; or a file, or a Linux IIO device.
+    Waveform(waveform::WaveformArguments),
 }
 
 /// What every partner has in common.
@@ -73,7 +77,22 @@ pub(super) fn run(what: &Served) -> CommandResult {
         Served::Fanuc(arguments) => fanuc::serve(arguments),
         Served::Nclink(arguments) => nclink::serve(arguments),
         Served::Modbus(arguments) => modbus::serve(arguments),
+        Served::Waveform(arguments) => waveform::serve(arguments),
     }
+}
+
+/// Tells whether a signal has said stop, from a thread that listens.
+fn stop_flag() -> Result<impl Fn() -> bool, CannotRun> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let told = stopped.clone();
+    let listen = move || {
+        // Without signals the process is ended by the system.
+        let _heard = until_stopped();
+        told.store(true, Ordering::SeqCst);
+    };
+    let thread = std::thread::Builder::new().name("signals".to_owned()).spawn(listen);
+    thread.map_err(|error| CannotRun::new(format!("no thread for signals: {error}"), ""))?;
+    Ok(move || stopped.load(Ordering::SeqCst))
 }
 
 /// Returns when a signal says stop.

@@ -1,0 +1,212 @@
+//! A connection to a stream, with deadline, gaps, clipping and clock.
+
+use super::frame::{FRAME_HEAD, FrameError, HEADER_MAX, Header, head, samples};
+use super::timebase::TimeBase;
+use crate::address::Endpoint;
+use crate::clock::{Clock, TimeNs};
+use crate::driver::SourceError;
+use std::io::{ErrorKind, Read};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+/// No block within this time is a failure.
+const DEADLINE: Duration = Duration::from_secs(2);
+
+/// Some samples of every channel, in the header's unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// When the first sample was taken, on the gateway's clock.
+    pub first_ns: TimeNs,
+    /// Samples that are missing before this block.
+    pub gap: u64,
+    /// Samples of any channel that were clipped.
+    pub clipped: u32,
+    /// As they came; all channels of one instant together.
+    pub raw: Vec<i16>,
+}
+
+/// What a stream has gone through since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Blocks.
+    pub blocks: u64,
+    /// Instants.
+    pub samples: u64,
+    /// Times at which blocks were missing.
+    pub gaps: u64,
+    /// Instants that were missing.
+    pub missing: u64,
+    /// Clipped samples.
+    pub clipped: u64,
+    /// Connections, the first one included.
+    pub connections: u64,
+}
+
+struct Open {
+    stream: TcpStream,
+    header: Header,
+    next: Option<(u32, i64)>,
+}
+
+/// Reads a stream and keeps it open.
+pub struct Receiver {
+    name: String,
+    at: Endpoint,
+    open: Option<Open>,
+    header: Option<Header>,
+    time: TimeBase,
+    counts: Counts,
+}
+
+impl Receiver {
+    /// A receiver that connects at the first read. `name` is the address.
+    #[must_use]
+    pub fn new(name: &str, at: &Endpoint) -> Self {
+        let (time, counts) = (TimeBase::default(), Counts::default());
+        Self { name: name.to_owned(), at: at.clone(), open: None, header: None, time, counts }
+    }
+
+    /// What the stream carries, once it has been connected to.
+    #[must_use]
+    pub fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// What it has gone through.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// How slow the sampler's clock runs, ppm, once known.
+    #[must_use]
+    pub fn drift_ppm(&self) -> Option<f64> {
+        self.time.drift_ppm()
+    }
+
+    /// The next block. Blocks for two seconds at most.
+    ///
+    /// # Errors
+    /// See [`SourceError`]; the stream is connected to anew by the next read.
+    pub fn read(&mut self, clock: &dyn Clock) -> Result<Block, SourceError> {
+        let until = Instant::now() + DEADLINE;
+        if self.open.is_none() {
+            self.connect(until)?;
+        }
+        let read = self.block(clock, until);
+        if read.is_err() {
+            self.open = None;
+        }
+        read
+    }
+
+    fn connect(&mut self, until: Instant) -> Result<(), SourceError> {
+        let stream = connected(&self.at).map_err(|error| self.line(&format!("cannot connect: {error}")))?;
+        self.open = Some(Open { stream, header: Header::currents(1.0, &["?"], 1.0, 1), next: None });
+        let header = self.header_line(until).inspect_err(|_| self.open = None)?;
+        if let Some(open) = &mut self.open {
+            open.header = header.clone();
+        }
+        self.header = Some(header);
+        self.time = TimeBase::default();
+        self.counts.connections += 1;
+        Ok(())
+    }
+
+    fn header_line(&mut self, until: Instant) -> Result<Header, SourceError> {
+        let mut line = Vec::new();
+        while line.last() != Some(&b'\n') {
+            if line.len() >= HEADER_MAX {
+                return Err(self.decode(&FrameError::Header(format!("no line feed in {HEADER_MAX} bytes"))));
+            }
+            let mut byte = [0];
+            self.fill(&mut byte, until)?;
+            line.extend(byte);
+        }
+        Header::parse(String::from_utf8_lossy(&line).trim()).map_err(|error| self.decode(&error))
+    }
+
+    fn block(&mut self, clock: &dyn Clock, until: Instant) -> Result<Block, SourceError> {
+        let mut bytes = [0; FRAME_HEAD];
+        self.fill(&mut bytes, until)?;
+        let channels = self.open.as_ref().map_or(1, |open| open.header.channels.len());
+        let (sequence, first_ns, length) = head(&bytes, channels).map_err(|error| self.decode(&error))?;
+        let mut body = vec![0; length];
+        self.fill(&mut body, until)?;
+        let arrived_ns = clock.now_ns();
+        Ok(self.taken(sequence, first_ns, samples(&body), arrived_ns))
+    }
+
+    fn taken(&mut self, sequence: u32, first_ns: i64, raw: Vec<i16>, arrived_ns: TimeNs) -> Block {
+        let Some(open) = &mut self.open else { return Block { first_ns, gap: 0, clipped: 0, raw } };
+        let count = raw.len() / open.header.channels.len();
+        let instants = f64::from(u32::try_from(count).unwrap_or(u32::MAX));
+        let end_ns = first_ns.saturating_add(open.header.duration_ns(instants));
+        let gap = open.next.filter(|(wanted, _)| *wanted != sequence).map_or(0, |(_, wanted_ns)| {
+            let sample_ns = open.header.duration_ns(1.0).max(1);
+            ((first_ns.saturating_sub(wanted_ns) + sample_ns / 2) / sample_ns).max(1).unsigned_abs()
+        });
+        open.next = Some((sequence.wrapping_add(1), end_ns));
+        let full = open.header.full_scale.unsigned_abs();
+        let clipped = raw.iter().filter(|sample| sample.unsigned_abs() >= full).count();
+        let clipped = u32::try_from(clipped).unwrap_or(u32::MAX);
+        self.time.push(end_ns, arrived_ns);
+        self.counts.blocks += 1;
+        self.counts.samples += u64::try_from(count).unwrap_or(0);
+        self.counts.gaps += u64::from(gap > 0);
+        self.counts.missing += gap;
+        self.counts.clipped += u64::from(clipped);
+        Block { first_ns: self.time.gateway_ns(first_ns), gap, clipped, raw }
+    }
+
+    fn fill(&mut self, mut into: &mut [u8], until: Instant) -> Result<(), SourceError> {
+        while !into.is_empty() {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(self.silent());
+            }
+            let Some(open) = &mut self.open else { return Err(self.silent()) };
+            let read = open.stream.set_read_timeout(Some(left)).and_then(|()| open.stream.read(into));
+            match read {
+                Ok(0) => return Err(self.line("the sampler closed the stream")),
+                Ok(count) => into = &mut into[count..],
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                    return Err(self.silent());
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.line(&format!("the stream broke: {error}"))),
+            }
+        }
+        Ok(())
+    }
+
+    fn silent(&self) -> SourceError {
+        SourceError::Timeout {
+            source_name: self.name.clone(),
+            request: "the next samples".to_owned(),
+            deadline_ms: 2000,
+            next: "Is the sampler running?".to_owned(),
+        }
+    }
+
+    fn line(&self, what: &str) -> SourceError {
+        let next = "Start the sampler (cnc-gateway serve waveform), or check its address.".to_owned();
+        SourceError::Line { source_name: self.name.clone(), what: what.to_owned(), next }
+    }
+
+    fn decode(&self, error: &FrameError) -> SourceError {
+        let (source_name, request) = (self.name.clone(), "the stream".to_owned());
+        SourceError::Decode { source_name, request, what: error.to_string() }
+    }
+}
+
+fn connected(at: &Endpoint) -> std::io::Result<TcpStream> {
+    let mut last = std::io::Error::new(ErrorKind::NotFound, "the name has no address");
+    for address in (at.host.as_str(), at.port).to_socket_addrs()?.take(4) {
+        match TcpStream::connect_timeout(&address, DEADLINE) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
