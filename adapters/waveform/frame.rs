@@ -117,7 +117,7 @@ pub(super) fn head(bytes: &[u8; FRAME_HEAD], channels: usize) -> Result<(u32, i6
 }
 
 impl Frame {
-    /// The frame on the wire. At most [`COUNT_MAX`] samples per channel are sent.
+    /// The frame on the wire. At most 4096 samples per channel are sent.
     #[must_use]
     pub fn bytes(&self, channels: usize) -> Vec<u8> {
         let count = u16::try_from(self.samples.len() / channels.max(1)).unwrap_or(COUNT_MAX).min(COUNT_MAX);

@@ -36,7 +36,7 @@ struct Element {
     offset: usize,
 }
 
-/// See the [module](self).
+/// A Linux IIO device in buffered capture.
 pub struct Iio {
     device: File,
     sysfs: PathBuf,

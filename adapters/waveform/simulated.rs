@@ -16,7 +16,7 @@ const POLE_PAIRS: f64 = 2.0;
 const FIFTH: f64 = 0.03;
 const NOISE_COUNTS: f64 = 3.0;
 
-/// See the [module](self).
+/// Three phases of the built-in machine's spindle current.
 pub struct SimulatedCurrent {
     machine: Simulated,
     clock: Arc<dyn Clock>,

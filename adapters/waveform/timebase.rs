@@ -12,7 +12,7 @@ const STRETCH_NS: i64 = 2 * SECOND_NS;
 /// So many of them: a minute.
 const STRETCHES: usize = 30;
 
-/// See the [module](self).
+/// Maps one clock to the other by the lower envelope of their differences.
 #[derive(Debug, Clone, Default)]
 pub struct TimeBase {
     /// Sampler's time and difference, the least of each stretch, the oldest first.
