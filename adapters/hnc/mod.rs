@@ -16,7 +16,7 @@
 //! | `line` | the parent's side: the child, its deaths, the state of the connection |
 //! | `source` | the [`Source`](crate::Source) |
 //! | `actuator` | the [`Actuator`](crate::Actuator): the register mailbox of [`nclink::mailbox`](crate::nclink::mailbox) |
-//! | `sampling` | the 1 ms sampling channels: which, and whether a millisecond is missing |
+//! | `sampling` | the 1 ms sampling channels: which, and whether a millisecond is missing; blocks go to whoever asked for them |
 //!
 //! **What the library does**, and what follows (measured logs and headers of the vendor's SDK, "V1"):
 //! - `HNC_NetInit` opens a local TCP and UDP listener; it is called once per child. A second process on the same port

@@ -20,9 +20,10 @@
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for
 //! all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data, uploaded
-//! each 200 ms) and events arrive in between; their columns become readings, one mean per upload, and are handed on whole
-//! to whoever wants the waveform. A question that is not answered in time, a broker that is gone, a device that says `NG`
-//! and an answer without sense are four different errors. After a broken line the next poll connects anew.
+//! each 200 ms) and events arrive in between: they are followed by `track`, which counts missing milliseconds, and whole
+//! blocks go to whoever asked for them with [`NcLinkSource::on_block`]. They make no readings; the values at a tick are
+//! those of the query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an
+//! answer without sense are four different errors. After a broken line the next poll connects anew.
 //!
 //! **Dialects.** Read as they come: `setable` and `settable`, `datatype` and `dataType`, `WARNING` and `WARNNING`; items
 //! named by node number (`010302`) or by path, with or without a leading `/` and the device's type; numbers in quotes;
