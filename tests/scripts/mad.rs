@@ -5,7 +5,7 @@ use rules::script::TEXT_MAX;
 use std::time::{Duration, Instant};
 
 /// Scripts that want everything: time, memory, depth.
-const MAD: [(&str, &str); 27] = [
+const MAD: [(&str, &str); 31] = [
     ("endless loop", "loop {}"),
     ("endless while", "while true { let x = 1; }"),
     ("recursion", "fn f(x) { f(x + 1) } f(0);"),
@@ -38,6 +38,10 @@ const MAD: [(&str, &str); 27] = [
         "curves for ever",
         "const C = [[0.4, 0.2, 3.0, 1.45, 0.29, 0.14, 0.03, 0.01], [1.2, 0.2, 3.0, 1.5, 0.872, 0.4277, 0.0944, 0.01]]; loop { feed_curve_depth_mm(C, 1.0, 2.4); }",
     ),
+    ("looking up for ever", "let a = []; a.pad(120, 1.5); loop { a.contains(2.5); }"),
+    ("looking up words for ever", "let a = []; a.pad(100, \"abcdefg\"); loop { a.index_of(\"abcdefh\"); }"),
+    ("comparing maps for ever", "let m = #{}; for i in 0..120 { m[`k${i}`] = i; } let n = m; loop { let c = m == n; }"),
+    ("thinning for ever", "let a = []; for i in 0..120 { a.push(i); } loop { let b = a; b.dedup(); }"),
     ("timers without end", "let i = 0; loop { held_s(`a${i}`, true); i += 1; }"),
 ];
 
@@ -63,25 +67,31 @@ fn a_mad_script_is_stopped_and_told_and_the_next_tick_runs() {
     }
 }
 
-/// Least of several runs of each, which is the time it takes when nobody is in the way:
+/// Processor time of this thread, where the system tells it.
+fn processor_ns() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}
+
+/// How long each takes when nobody is in the way, as processor time:
 /// `cargo test --release --test scripts mad_scripts_take -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn mad_scripts_take_less_than_fifty_milliseconds() {
-    let mut worst = Duration::ZERO;
+    let mut worst = 0.0_f64;
     for (what, text) in MAD {
         let run = || {
             let mut host = host(text);
-            let began = Instant::now();
+            let began = processor_ns().expect("the system tells it");
             host.tick(&sample(0.0, &[]), &Estimates::none(0));
-            began.elapsed()
+            (processor_ns().expect("the system tells it") - began) as f64 / 1e6
         };
-        let least = (0..7).map(|_| run()).min().unwrap_or_default();
-        println!("{what:28} {:7.3} ms", least.as_secs_f64() * 1e3);
-        worst = worst.max(least);
+        let most_ms = (0..5).map(|_| run()).fold(0.0, f64::max);
+        println!("{what:28} {most_ms:7.3} ms");
+        worst = worst.max(most_ms);
     }
-    println!("worst {:.3} ms", worst.as_secs_f64() * 1e3);
-    assert!(worst < Duration::from_millis(50), "{worst:?}");
+    println!("worst {worst:.3} ms");
+    assert!(worst < 50.0, "{worst} ms");
 }
 
 #[test]
