@@ -2,6 +2,7 @@
 
 mod eda9033a;
 mod faults;
+mod joint;
 mod modbus;
 mod partner;
 mod serial_faults;
