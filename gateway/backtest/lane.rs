@@ -55,7 +55,7 @@ impl Asked {
     }
 }
 
-/// See the [module](self).
+/// One set of scripts on its way through the history, and what it did so far.
 pub struct Lane {
     from_ns: TimeNs,
     estimators: estimators::Pipeline,

@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Differences written out in words; the JSON has all of them.
 const SHOWN: usize = 200;
 
-/// See the [module](self).
+/// What a backtest found; written out as words, and as `backtest/1`.
 pub struct Report {
     /// The history.
     pub history: PathBuf,
