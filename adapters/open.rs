@@ -14,14 +14,6 @@ use thiserror::Error;
 /// Why an address could not be opened.
 #[derive(Debug, Error)]
 pub enum OpenError {
-    /// This build has no driver for the scheme.
-    #[error("{address}: {what} is not built yet; today there are simulated://lathe, simulated://mill and replay:FILE")]
-    NotBuilt {
-        /// The address.
-        address: String,
-        /// What is missing.
-        what: &'static str,
-    },
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -220,17 +212,13 @@ pub fn missing_driver(address: &Address) -> Option<OpenError> {
 }
 
 fn not_built(address: &Address, target: &Target) -> OpenError {
+    let address = address.text().to_owned();
     let what = match target {
-        Target::Simulated(_) | Target::Replay(_) => "this way of running",
-        Target::Fanuc { .. } => "another pace than that of the clock for a real controller",
-        Target::ModbusTcp { .. } | Target::ModbusRtu { .. } | Target::Eda9033a { .. } | Target::Temperature { .. } => {
-            "another pace than that of the clock for a real meter"
-        }
-        Target::NcLink(target) if target.tls => "TLS to the broker",
-        Target::NcLink(_) | Target::HncNet(_) => "another pace than that of the clock for a real controller",
-        Target::Waveform { .. } => "a feature of a waveform without the box that makes it",
+        Target::NcLink(target) if target.tls => crate::nclink::NO_TLS,
+        Target::Waveform { .. } => "a stream of samples becomes a channel in the box only: run and doctor read it",
+        _ => "a real device keeps its own pace: run reads it, without --speed",
     };
-    OpenError::NotBuilt { address: address.text().to_owned(), what }
+    OpenError::Unsuitable { address, what }
 }
 
 #[cfg(test)]
@@ -268,9 +256,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_built_says_so() {
-        let error = open(&address("waveform://cnc:5000"), 0).err().map(|error| error.to_string()).unwrap_or_default();
-        assert!(error.contains("waveform://cnc") && error.contains("not built yet"), "{error}");
+    fn what_cannot_be_opened_says_why() {
+        let of = |text: &str| open(&address(text), 0).err().map(|error| error.to_string()).unwrap_or_default();
+        let (stream, encrypted) = (of("waveform://cnc:5000"), of("nclinks://broker:8883/SIM0001"));
+        assert!(stream.contains("waveform://cnc") && stream.contains("doctor"), "{stream}");
+        assert!(encrypted.contains("TLS") && encrypted.contains("use nclink://"), "{encrypted}");
         assert!(open_pull(&address("replay:/does/not/exist.csv"), 0).is_err());
     }
 }

@@ -1,9 +1,9 @@
 //! One address examined: opened, named, read twice, timed, and everything that is wrong told with what to do next.
 //! Contract: sources of the project, section on `doctor`.
 
+use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
-use adapters::open::open;
 use adapters::{Absence, Address, ChannelId, Reading, Source, SourceError, Value};
 use serde_json::{Map, json};
 use std::fmt;
@@ -25,7 +25,11 @@ pub struct Shown(ChannelId, Value);
 impl fmt::Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.1 {
-            Value::Number(number) => write!(f, "{number} {}", self.0.channel().unit),
+            // Seven digits are what a meter's single-precision numbers hold.
+            Value::Number(number) => {
+                let rounded = format!("{number:.6e}").parse().unwrap_or(*number);
+                write!(f, "{rounded} {}", self.0.channel().unit)
+            }
             Value::Text(text) => write!(f, "{text:?}"),
         }
     }
@@ -58,7 +62,7 @@ pub fn examine(text: &str) -> Result<Report, String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
     let clock = SystemClock::new();
     let began = Instant::now();
-    let mut opened = open(&address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let mut opened = opened(&address, clock.now_ns()).map_err(|error| error.to_string())?;
     let mut report = Report {
         address: address.text().to_owned(),
         reachable: false,

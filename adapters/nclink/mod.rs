@@ -57,6 +57,6 @@ mod track;
 pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
 pub use message::{Answer, Ask, Params};
-pub use open::open;
+pub use open::{NO_TLS, open};
 pub use source::{BlockSink, NcLinkSource};
 pub use track::{ChannelTrack, Track};

@@ -7,14 +7,16 @@ use crate::address::{Address, NcLinkTarget};
 use crate::driver::Actuator;
 use crate::open::{OpenError, Opened, Refused};
 
+/// What `nclinks://` is answered with.
+pub const NO_TLS: &str = "this build has no TLS for MQTT; use nclink:// to a broker on this box or behind a tunnel";
+
 /// Opens an NC-Link address; nothing is connected before the first poll.
 ///
 /// # Errors
 /// TLS, which this build does not have; a password file that cannot be read.
 pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
     if target.tls {
-        let what = "this build has no TLS for MQTT; use nclink:// to a broker on this box or behind a tunnel";
-        return Err(OpenError::Unsuitable { address: address.text().to_owned(), what });
+        return Err(OpenError::Unsuitable { address: address.text().to_owned(), what: NO_TLS });
     }
     let login = login(target)?;
     let link = Link::of(address.text(), target, login.clone());

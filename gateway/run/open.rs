@@ -99,7 +99,10 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
 }
 
 /// As [`open`], and streams that only become a channel in the box.
-fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
+///
+/// # Errors
+/// See [`OpenError`].
+pub(crate) fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
     let Target::Waveform { at, keep } = address.target() else { return open(address, now_ns) };
     let source = SpindleCurrent::new(address.text(), at, keep.as_ref());
     let sources: Vec<Box<dyn Source>> = vec![Box::new(source)];
@@ -140,5 +143,5 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
 }
 
 fn accelerated(error: &OpenError) -> String {
-    format!("{error}. With --speed only simulated machines and recordings can be read")
+    format!("{error} (with --speed only simulated machines and recordings can be read)")
 }
