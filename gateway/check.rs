@@ -161,7 +161,7 @@ fn check_sources(name: &str, config: &Config, report: &mut Report) {
         match source.address.target() {
             Target::Replay(replay) => check_recording(&replay.file, report),
             Target::Fanuc { backend: FanucBackend::Vendor(library), .. } => check_library(library, report),
-            Target::HncNet(target) => check_library(&target.library, report),
+            Target::HncNet(target) => check_library(&target.vendor_library, report),
             _ => {}
         }
     }

@@ -34,7 +34,7 @@ pub struct HncNetTarget {
     /// Where.
     pub at: Endpoint,
     /// The vendor's library.
-    pub library: PathBuf,
+    pub vendor_library: PathBuf,
     /// Number of this computer in the controller's network; found out when not given.
     pub local_host: Option<String>,
     /// Port of the library's own listener; the controller dials back to it.
@@ -76,7 +76,7 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
 }
 
 pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
-    let library = library(keys);
+    let vendor_library = library(keys);
     let (local_host, local_port) = (keys.text("local_host"), keys.number("local_port", 10001, 1, u16::MAX));
     let long_bytes = match keys.text("long_bytes").as_deref() {
         None => size_of::<std::ffi::c_long>(),
@@ -90,8 +90,17 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
     let period_ms = keys.number("period_ms", 100, 10, 60_000);
     let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
     let mailbox = mailbox(keys);
-    let (at, library) = (endpoint(body, Some(10001))?, library?);
-    Ok(Target::HncNet(HncNetTarget { at, library, local_host, local_port, long_bytes, period_ms, sample, mailbox }))
+    let (at, vendor_library) = (endpoint(body, Some(10001))?, vendor_library?);
+    Ok(Target::HncNet(HncNetTarget {
+        at,
+        vendor_library,
+        local_host,
+        local_port,
+        long_bytes,
+        period_ms,
+        sample,
+        mailbox,
+    }))
 }
 
 /// `write=mailbox`, and where it begins.

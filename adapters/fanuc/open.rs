@@ -33,7 +33,7 @@ pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> Op
 #[must_use]
 pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
     let settings = VendorSettings {
-        library: library.to_owned(),
+        vendor_library: library.to_owned(),
         at: at.clone(),
         path: u16::from(path),
         timeout: options.timeout,

@@ -40,10 +40,10 @@ pub fn child() -> std::io::Result<()> {
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
-    if let Ask::Open { library, local_host, local_port, host, port, long_bytes } = ask {
+    if let Ask::Open { vendor_library, local_host, local_port, host, port, long_bytes } = ask {
         // The library's own connections are global: an old session goes before a new one.
         *session = None;
-        let opened = Session::open(&library, (&local_host, local_port), (&host, port), long_bytes);
+        let opened = Session::open(&vendor_library, (&local_host, local_port), (&host, port), long_bytes);
         return match opened {
             Ok(opened) => {
                 *session = Some(opened);

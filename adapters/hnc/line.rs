@@ -26,7 +26,7 @@ pub struct HncSettings {
     /// The address, as in the configuration.
     pub name: String,
     /// The library's file.
-    pub library: PathBuf,
+    pub vendor_library: PathBuf,
     /// Where the controller is.
     pub at: Endpoint,
     /// Number of this computer in the controller's network; `None` is found out.
@@ -219,7 +219,7 @@ impl Inner {
         }
         let settings = &self.settings;
         let ask = Ask::Open {
-            library: settings.library.clone(),
+            vendor_library: settings.vendor_library.clone(),
             local_host: settings.local_host.clone().unwrap_or_else(|| local_host(&settings.at)),
             local_port: settings.local_port,
             host: settings.at.host.clone(),
@@ -230,7 +230,7 @@ impl Inner {
         let failed = match told? {
             Tell::Opened => return Ok(()),
             Tell::Unloadable(what) => self.line_failed(
-                format!("the library {} cannot be used: {what}", self.settings.library.display()),
+                format!("the library {} cannot be used: {what}", self.settings.vendor_library.display()),
                 "Check library= in the address, and that the file is for this processor.",
             ),
             Tell::Code(function, code) if function == "HNC_NetInit" => self.line_failed(

@@ -12,7 +12,7 @@ pub(super) enum Ask {
     /// Load the library, listen, connect.
     Open {
         /// The library's file.
-        library: PathBuf,
+        vendor_library: PathBuf,
         /// Number of this computer in the controller's network.
         local_host: String,
         /// Port of the library's own listener.

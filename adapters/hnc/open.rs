@@ -16,7 +16,7 @@ const DEADLINE: Duration = Duration::from_millis(4500);
 pub fn open(address: &Address, target: &HncNetTarget) -> Opened {
     let line = Line::new(HncSettings {
         name: address.text().to_owned(),
-        library: target.library.clone(),
+        vendor_library: target.vendor_library.clone(),
         at: target.at.clone(),
         local_host: target.local_host.clone(),
         local_port: target.local_port,

@@ -48,7 +48,7 @@ impl Library {
 
     pub(crate) fn settings(&self) -> VendorSettings {
         VendorSettings {
-            library: self.file.clone(),
+            vendor_library: self.file.clone(),
             at: Endpoint { host: "192.0.2.1".to_owned(), port: 8193 },
             path: 1,
             timeout: Duration::from_secs(1),
@@ -175,7 +175,8 @@ fn a_library_that_overruns_its_structure_costs_one_channel() {
 fn what_cannot_be_loaded_or_connected_says_so() {
     let library = Library::build(&[]);
     let refused = |settings| Vendor::connect(settings).err().map(|error| error.to_string()).unwrap_or_default();
-    let text = refused(VendorSettings { library: "/does/not/exist.so".into(), ..library.settings() });
+    let absent = VendorSettings { vendor_library: "/does/not/exist.so".into(), ..Library::settings(&library) };
+    let text = refused(absent);
     assert!(text.contains("/does/not/exist.so"), "{text}");
     library.fault("code cnc_allclibhndl3 -16");
     assert!(refused(library.settings()).contains("does not answer"));

@@ -46,7 +46,7 @@ impl Library {
     fn settings(&self) -> HncSettings {
         HncSettings {
             name: "hncnet://fake".to_owned(),
-            library: self.file.clone(),
+            vendor_library: self.file.clone(),
             at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
             local_host: Some("127.0.0.1".to_owned()),
             local_port: free_port(),
@@ -225,7 +225,8 @@ fn the_state_of_the_connection_comes_from_the_events() {
 fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
     let library = Library::build(&[]);
     let said = |settings: HncSettings| Line::new(settings).alive().expect_err("it cannot").to_string();
-    let text = said(HncSettings { library: "/does/not/exist.so".into(), ..library.settings() });
+    let absent = HncSettings { vendor_library: "/does/not/exist.so".into(), ..Library::settings(&library) };
+    let text = said(absent);
     assert!(text.contains("/does/not/exist.so") && text.contains("library="), "{text}");
     let first = library.settings();
     let holder = Line::new(first.clone());

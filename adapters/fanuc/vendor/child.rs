@@ -45,9 +45,9 @@ pub fn child() -> std::io::Result<()> {
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
-    if let Ask::Open { library, host, port, path, timeout_s } = ask {
+    if let Ask::Open { vendor_library, host, port, path, timeout_s } = ask {
         *session = None;
-        return match Session::open(&library, &host, port, path, timeout_s) {
+        return match Session::open(&vendor_library, &host, port, path, timeout_s) {
             Ok((opened, opening)) => {
                 *session = Some(opened);
                 Tell::Opened(opening)

@@ -23,7 +23,7 @@ const GRACE: Duration = Duration::from_millis(1500);
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VendorSettings {
     /// The library's file.
-    pub library: PathBuf,
+    pub vendor_library: PathBuf,
     /// Where the controller is.
     pub at: Endpoint,
     /// Path from 1.
@@ -125,7 +125,7 @@ fn told(child: &mut Supervised, ask: &Ask) -> Result<Tell, ChildError> {
 
 fn open(child: &mut Supervised, settings: &VendorSettings) -> Result<Opening, FocasError> {
     let ask = Ask::Open {
-        library: settings.library.clone(),
+        vendor_library: settings.vendor_library.clone(),
         host: settings.at.host.clone(),
         port: settings.at.port,
         path: settings.path,
@@ -136,7 +136,7 @@ fn open(child: &mut Supervised, settings: &VendorSettings) -> Result<Opening, Fo
         Tell::Code(ReturnCode(-16)) => FocasError::Unreachable(ReturnCode::SOCKET.to_string()),
         Tell::Code(ReturnCode(-17)) => FocasError::NoSession,
         Tell::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
-        Tell::Unloadable(what) => FocasError::Library(format!("{}: {what}", settings.library.display())),
+        Tell::Unloadable(what) => FocasError::Library(format!("{}: {what}", settings.vendor_library.display())),
         other => FocasError::Library(format!("{other:?}")),
     };
     child.end();

@@ -13,7 +13,7 @@ pub(super) enum Ask {
     /// Load the library and connect.
     Open {
         /// The library's file.
-        library: PathBuf,
+        vendor_library: PathBuf,
         /// The controller.
         host: String,
         /// Its port.
