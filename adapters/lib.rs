@@ -29,6 +29,7 @@ pub mod replay;
 pub mod sample;
 pub mod serial;
 pub mod simulated;
+pub(crate) mod stream;
 pub mod temperature;
 pub mod units;
 pub mod waveform;

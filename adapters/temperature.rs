@@ -66,7 +66,12 @@ struct RawPoint {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Sensor {
-    Hwmon { chip: String, input: String },
+    /// With the chip's directory of this start of the system, once it has been found.
+    Hwmon {
+        chip: String,
+        input: String,
+        found: Option<PathBuf>,
+    },
     OneWire(String),
 }
 
@@ -133,7 +138,7 @@ fn point(raw: &RawPoint) -> Result<Point, String> {
     let plain = |part: &str| !part.is_empty() && !part.contains('/') && !part.starts_with('.');
     let sensor = match (&raw.hwmon, &raw.one_wire) {
         (Some(text), None) => match text.split_once('/').filter(|(chip, input)| plain(chip) && plain(input)) {
-            Some((chip, input)) => Sensor::Hwmon { chip: chip.to_owned(), input: input.to_owned() },
+            Some((chip, input)) => Sensor::Hwmon { chip: chip.to_owned(), input: input.to_owned(), found: None },
             None => return Err(format!("hwmon = {text:?}: write chip/temp1, see: sensors -u")),
         },
         (None, Some(id)) if plain(id) => Sensor::OneWire(id.clone()),
@@ -154,27 +159,38 @@ fn text_of(file: &Path, most: u64) -> io::Result<String> {
 
 impl Sensor {
     /// °C.
-    fn read(&self, sys: &Path) -> Result<f64, Absence> {
+    fn read(&mut self, sys: &Path) -> Result<f64, Absence> {
         match self {
-            Self::Hwmon { chip, input } => hwmon(sys, chip, input),
+            Self::Hwmon { chip, input, found } => {
+                if !found.as_deref().is_some_and(|directory| is_chip(directory, chip)) {
+                    *found = chip_of(sys, chip);
+                }
+                hwmon(found.as_deref().ok_or(Absence::Disconnected)?, input)
+            }
             Self::OneWire(id) => one_wire(sys, id),
         }
     }
 
     fn told(&self) -> String {
         match self {
-            Self::Hwmon { chip, input } => format!("hwmon {chip}/{input}"),
+            Self::Hwmon { chip, input, .. } => format!("hwmon {chip}/{input}"),
             Self::OneWire(id) => format!("1-wire {id}"),
         }
     }
 }
 
-/// The numbers of hwmon directories change from start to start; the chip's name does not.
-fn hwmon(sys: &Path, chip: &str, input: &str) -> Result<f64, Absence> {
-    let entries = std::fs::read_dir(sys.join("class/hwmon")).map_err(|_| Absence::Disconnected)?;
-    let named = |path: &PathBuf| text_of(&path.join("name"), SENSOR_MAX).is_ok_and(|name| name.trim() == chip);
-    let found = entries.filter_map(|entry| Some(entry.ok()?.path())).find(named).ok_or(Absence::Disconnected)?;
-    let text = text_of(&found.join(format!("{input}_input")), SENSOR_MAX).map_err(|error| absence(&error))?;
+/// The numbers of hwmon directories change from start to start, and when a chip is plugged in; its name does not.
+fn chip_of(sys: &Path, chip: &str) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(sys.join("class/hwmon")).ok()?;
+    entries.filter_map(|entry| Some(entry.ok()?.path())).find(|directory| is_chip(directory, chip))
+}
+
+fn is_chip(directory: &Path, chip: &str) -> bool {
+    text_of(&directory.join("name"), SENSOR_MAX).is_ok_and(|name| name.trim() == chip)
+}
+
+fn hwmon(directory: &Path, input: &str) -> Result<f64, Absence> {
+    let text = text_of(&directory.join(format!("{input}_input")), SENSOR_MAX).map_err(|error| absence(&error))?;
     thousandths(&text)
 }
 
@@ -216,7 +232,7 @@ impl Source for Temperatures {
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let begin = out.len();
-        for point in &self.points {
+        for point in &mut self.points {
             let began_ns = clock.now_ns();
             let read = point.sensor.read(&self.sys);
             let stamp = Stamp::of_request(began_ns, clock.now_ns());

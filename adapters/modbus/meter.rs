@@ -1,6 +1,7 @@
 //! A Modbus meter as a source.
 
 use super::line::{Fault, Line};
+use super::number::Format;
 use super::pdu::{Block, NoRegisters};
 use super::plan::Plan;
 use super::profile::{Profile, Quantity, Register, find};
@@ -29,8 +30,18 @@ enum Law {
 struct Output {
     channel: ChannelId,
     law: Law,
-    /// Positions in the profile's list.
-    registers: Vec<usize>,
+    parts: Vec<Part>,
+}
+
+/// Where a register stands in what a poll brings, and what is made of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Part {
+    block: usize,
+    /// Registers into the block.
+    offset: usize,
+    format: Format,
+    /// To the unit of the channel.
+    factor: f64,
 }
 
 /// A meter that is polled over Modbus.
@@ -40,7 +51,6 @@ pub struct ModbusMeter {
     unit: u8,
     profile: Profile,
     plan: Plan,
-    factors: Vec<f64>,
     outputs: Vec<Output>,
     channels: Vec<ChannelId>,
     period: Duration,
@@ -77,8 +87,8 @@ impl ModbusMeter {
     ) -> Result<Self, String> {
         let profile = find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
         let plan = Plan::of(&profile)?;
-        let factors = factors(&profile, meter)?;
-        let outputs = outputs(&profile, meter.circuit)?;
+        let parts = parts(&profile, &plan, &factors(&profile, meter)?)?;
+        let outputs = outputs(&profile, &parts, meter.circuit)?;
         let busy = serial.as_ref().map(|line| plan.wire_time(line) * 5 / 4).unwrap_or_default();
         Ok(Self {
             name: address.text().to_owned(),
@@ -88,7 +98,6 @@ impl ModbusMeter {
             channels: outputs.iter().map(|output| output.channel).collect(),
             plan,
             profile,
-            factors,
             outputs,
             serial,
             refresh: Refresh::default(),
@@ -117,14 +126,9 @@ impl ModbusMeter {
             self.registers.push(registers);
             self.stamps.push(stamp);
         }
-        match self
-            .registers
-            .iter()
-            .zip(&self.plan.blocks)
-            .find_map(|(found, block)| Some((found.as_ref().err()?, block)))
-        {
-            Some((code, block)) if self.registers.iter().all(Result::is_err) => {
-                Err(Fault::Refused(*code).of_source(&self.name, block.told(), self.line.deadline()))
+        match self.registers.first() {
+            Some(Err(code)) if self.registers.iter().all(Result::is_err) => {
+                Err(Fault::Refused(*code).of_source(&self.name, self.plan.blocks[0].told(), self.line.deadline()))
             }
             _ => Ok(()),
         }
@@ -133,8 +137,8 @@ impl ModbusMeter {
     fn reading(&self, output: &Output) -> Reading {
         let mut stamp = self.stamps[0];
         let mut numbers = Vec::with_capacity(3);
-        for index in &output.registers {
-            match self.number(*index) {
+        for part in &output.parts {
+            match self.number(part) {
                 Ok((number, at)) => {
                     stamp = at;
                     numbers.push(number);
@@ -145,27 +149,18 @@ impl ModbusMeter {
         Reading::number(output.channel, stamp, output.law.of(&numbers))
     }
 
-    fn number(&self, index: usize) -> Result<(f64, Stamp), (Absence, Stamp)> {
-        let register = &self.profile.registers[index];
-        let holds = |block: &Block| {
-            register.address >= block.start
-                && register.address - block.start + register.format.registers() <= block.count
-        };
-        let Some(at) = self.plan.blocks.iter().position(holds) else {
-            return Err((Absence::NotSupported, self.stamps[0]));
-        };
-        let (stamp, offset) = (self.stamps[at], usize::from(register.address - self.plan.blocks[at].start));
-        let registers = self.registers[at].as_ref().map_err(|_| (Absence::Refused, stamp))?;
-        let decoded = register.format.decode(&registers[offset..], self.profile.word_order);
+    fn number(&self, part: &Part) -> Result<(f64, Stamp), (Absence, Stamp)> {
+        let stamp = self.stamps[part.block];
+        let registers = self.registers[part.block].as_ref().map_err(|_| (Absence::Refused, stamp))?;
+        let decoded = part.format.decode(&registers[part.offset..], self.profile.word_order);
         // What a meter does not measure it gives as an IEEE number that is none.
         let number = decoded.ok_or((Absence::NotSupported, stamp))?;
-        Ok((number * self.factors[index], stamp))
+        Ok((number * part.factor, stamp))
     }
 
     fn look_at_refresh(&mut self) {
-        let all: Vec<u16> = self.registers.iter().flatten().flatten().copied().collect();
         if let Some(stamp) = self.stamps.first() {
-            self.refresh.push(&all, stamp.mid_ns);
+            self.refresh.push(self.registers.iter().flatten().flatten().copied(), stamp.mid_ns);
         }
     }
 }
@@ -206,10 +201,19 @@ fn factors(profile: &Profile, meter: &MeterTarget) -> Result<Vec<f64>, String> {
     Ok(profile.registers.iter().map(|register| register.factor * ratio(register.quantity)).collect())
 }
 
-fn outputs(profile: &Profile, circuit: Circuit) -> Result<Vec<Output>, String> {
-    let where_is = |wanted: &dyn Fn(Quantity) -> bool| -> Vec<usize> {
-        let each = profile.registers.iter().enumerate();
-        each.filter(|(_, register)| wanted(register.quantity)).map(|(index, _)| index).collect()
+/// Where each register of the profile is found in the blocks.
+fn parts(profile: &Profile, plan: &Plan, factors: &[f64]) -> Result<Vec<Part>, String> {
+    let part = |(register, factor): (&Register, &f64)| {
+        let place = plan.place(register).ok_or_else(|| format!("no block holds register {}", register.address));
+        place.map(|(block, offset)| Part { block, offset, format: register.format, factor: *factor })
+    };
+    profile.registers.iter().zip(factors).map(part).collect()
+}
+
+fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<Output>, String> {
+    let where_is = |wanted: &dyn Fn(Quantity) -> bool| -> Vec<Part> {
+        let each = profile.registers.iter().zip(parts);
+        each.filter(|(register, _)| wanted(register.quantity)).map(|(_, part)| *part).collect()
     };
     let total = where_is(&|quantity| quantity == Quantity::Power);
     let phases = where_is(&|quantity| matches!(quantity, Quantity::PhasePower(_)));
@@ -218,9 +222,9 @@ fn outputs(profile: &Profile, circuit: Circuit) -> Result<Vec<Output>, String> {
     let voltages = where_is(&|quantity| matches!(quantity, Quantity::Voltage(_)));
     let power = if circuit == Circuit::Spindle { "spindle_power_w" } else { "total_power_w" };
     let mut outputs = Vec::new();
-    let mut add = |name: &str, law, registers: Vec<usize>| {
-        if let Some(channel) = ChannelId::of(name).filter(|_| !registers.is_empty()) {
-            outputs.push(Output { channel, law, registers });
+    let mut add = |name: &str, law, parts: Vec<Part>| {
+        if let Some(channel) = ChannelId::of(name).filter(|_| !parts.is_empty()) {
+            outputs.push(Output { channel, law, parts });
         }
     };
     add(power, Law::Sum, if total.is_empty() { phases } else { total });
@@ -229,9 +233,9 @@ fn outputs(profile: &Profile, circuit: Circuit) -> Result<Vec<Output>, String> {
     }
     let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
     add("supply_voltage_v", law, voltages);
-    for (index, register) in profile.registers.iter().enumerate() {
+    for (register, part) in profile.registers.iter().zip(parts) {
         if let Quantity::Channel(channel) = register.quantity {
-            outputs.push(Output { channel, law: Law::Sum, registers: vec![index] });
+            outputs.push(Output { channel, law: Law::Sum, parts: vec![*part] });
         }
     }
     let mut seen = Vec::new();

@@ -46,6 +46,16 @@ impl Plan {
         Ok(Self { blocks: joined.into_iter().map(block).collect() })
     }
 
+    /// In which block a register stands, and how many registers into it.
+    pub(super) fn place(&self, register: &Register) -> Option<(usize, usize)> {
+        let holds = |block: &Block| {
+            register.address >= block.start
+                && register.address - block.start + register.format.registers() <= block.count
+        };
+        let at = self.blocks.iter().position(holds)?;
+        Some((at, usize::from(register.address - self.blocks[at].start)))
+    }
+
     /// What a poll takes on a serial line, with all silences.
     #[must_use]
     pub fn wire_time(&self, line: &SerialTarget) -> Duration {

@@ -38,9 +38,9 @@ pub struct Effective {
 
 impl Refresh {
     /// Takes the registers of a poll, in the order of the polls.
-    pub fn push(&mut self, registers: &[u16], at_ns: TimeNs) {
+    pub fn push(&mut self, registers: impl Iterator<Item = u16> + Clone, at_ns: TimeNs) {
         self.polls_since = self.polls_since.saturating_add(1);
-        if self.last == registers {
+        if self.last.iter().copied().eq(registers.clone()) {
             return;
         }
         if let Some(changed_ns) = self.changed_ns {
@@ -50,7 +50,7 @@ impl Refresh {
             self.intervals.push_back((at_ns - changed_ns, self.polls_since));
         }
         self.last.clear();
-        self.last.extend_from_slice(registers);
+        self.last.extend(registers);
         (self.changed_ns, self.polls_since) = (Some(at_ns), 0);
     }
 
@@ -99,7 +99,7 @@ mod tests {
         for poll in 0..polls {
             let at_ms = poll * poll_ms;
             let number = u16::try_from(at_ms / refresh_ms % 65536).expect("sixteen bits");
-            refresh.push(&[number, 7], at_ms * 1_000_000);
+            refresh.push([number, 7].into_iter(), at_ms * 1_000_000);
         }
         refresh.effective()
     }

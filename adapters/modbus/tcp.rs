@@ -7,8 +7,9 @@ use super::line::{Answer, Fault, Line};
 use crate::address::Endpoint;
 use crate::clock::Clock;
 use crate::reading::Stamp;
-use std::io::{self, ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use crate::stream::{self, Short};
+use std::io::{self, ErrorKind, Write};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 const HEADER: usize = 7;
@@ -16,6 +17,8 @@ const HEADER: usize = 7;
 const PDU_MAX: usize = 253;
 /// So many answers to other requests are passed over before the connection is given up.
 const STRAY_MAX: usize = 4;
+/// A request has at least so long to leave, however late the connection was made.
+const WRITE_LEAST: Duration = Duration::from_millis(10);
 
 pub(super) struct TcpLine {
     at: Endpoint,
@@ -33,9 +36,8 @@ impl TcpLine {
     /// The open connection, or a new one. It is put back only after a good exchange: whatever still comes on another one
     /// belongs to a request that was given up.
     fn connection(&mut self, until: Instant) -> Result<TcpStream, Fault> {
-        let Endpoint { host, port } = &self.at;
         let open = self.stream.take();
-        open.map_or_else(|| connect(host, *port, until), Ok).map_err(|error| unreachable(host, *port, &error))
+        open.map_or_else(|| connect(&self.at, until), Ok).map_err(|error| unreachable(&self.at, &error))
     }
 
     fn matching(&mut self, stream: &mut TcpStream, unit: u8, until: Instant) -> Result<Vec<u8>, Fault> {
@@ -80,23 +82,14 @@ impl Line for TcpLine {
     }
 }
 
-fn connect(host: &str, port: u16, until: Instant) -> io::Result<TcpStream> {
-    let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
-    for address in (host, port).to_socket_addrs()?.take(4) {
-        let left = until.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
-        match TcpStream::connect_timeout(&address, left) {
-            Ok(stream) => {
-                stream.set_nodelay(true)?;
-                stream.set_write_timeout(Some(left.max(Duration::from_millis(10))))?;
-                return Ok(stream);
-            }
-            Err(error) => last = error,
-        }
-    }
-    Err(last)
+fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+    let stream = stream::connect(at, until)?;
+    let left = until.saturating_duration_since(Instant::now()).max(WRITE_LEAST);
+    stream.set_write_timeout(Some(left))?;
+    Ok(stream)
 }
 
-fn unreachable(host: &str, port: u16, error: &io::Error) -> Fault {
+fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> Fault {
     let next = match error.kind() {
         ErrorKind::ConnectionRefused => {
             format!("{host} is there but nothing listens on port {port}: is Modbus TCP enabled, is the port right?")
@@ -152,27 +145,14 @@ fn receive(stream: &mut TcpStream, until: Instant) -> Result<(Header, Vec<u8>), 
     Ok((header, pdu))
 }
 
-fn fill(stream: &mut TcpStream, mut into: &mut [u8], until: Instant) -> Result<(), Fault> {
-    let silence = || Fault::Timeout {
-        next: "Check the unit number and the power of the meter; a slow one may need timeout_ms=2000.".to_owned(),
-    };
-    while !into.is_empty() {
-        let left = until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(silence());
-        }
-        stream.set_read_timeout(Some(left)).map_err(|error| broken(&error))?;
-        match stream.read(into) {
-            Ok(0) => return Err(broken(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it"))),
-            Ok(count) => into = &mut into[count..],
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                return Err(silence());
-            }
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(broken(&error)),
-        }
-    }
-    Ok(())
+fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Fault> {
+    stream::fill(stream, into, until).map_err(|short| match short {
+        Short::Silent => Fault::Timeout {
+            next: "Check the unit number and the power of the meter; a slow one may need timeout_ms=2000.".to_owned(),
+        },
+        Short::Closed => broken(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it")),
+        Short::Broken(error) => broken(&error),
+    })
 }
 
 #[cfg(test)]

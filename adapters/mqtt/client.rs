@@ -4,8 +4,10 @@ use super::inbox::Inbox;
 use super::packet::{self, Frames, Incoming, Qos};
 use super::reader::{READ_PAUSE, Reader, Writer};
 use super::{Message, MqttError, Options};
-use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use crate::address::Endpoint;
+use crate::stream;
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::JoinHandle;
@@ -22,16 +24,15 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects, with a clean session. Takes at most the deadline of the options, for each address of the host.
+    /// Connects, with a clean session. Takes at most the deadline of the options.
     ///
     /// # Errors
     /// [`MqttError::Unreachable`], [`MqttError::Refused`] in the broker's words, or [`MqttError::Closed`].
     pub fn connect(options: &Options) -> Result<Self, MqttError> {
-        let broker = format!("{}:{}", options.host, options.port);
-        let unreachable = |what: String| MqttError::Unreachable { broker: broker.clone(), what };
-        let io = |error: std::io::Error| unreachable(error.to_string());
-        let mut stream = dial(options).map_err(unreachable)?;
-        stream.set_nodelay(true).map_err(io)?;
+        let at = Endpoint { host: options.host.clone(), port: options.port };
+        let broker = || format!("{}:{}", options.host, options.port);
+        let io = |error: std::io::Error| MqttError::Unreachable { broker: broker(), what: error.to_string() };
+        let mut stream = stream::connect(&at, Instant::now() + options.deadline).map_err(io)?;
         stream.set_write_timeout(Some(options.deadline)).map_err(io)?;
         stream.set_read_timeout(Some(READ_PAUSE.min(options.deadline))).map_err(io)?;
         stream.write_all(&packet::connect(options)?).map_err(io)?;
@@ -130,19 +131,6 @@ impl Drop for Client {
     }
 }
 
-/// The first address of the host that answers.
-fn dial(options: &Options) -> Result<TcpStream, String> {
-    let addresses = (options.host.as_str(), options.port).to_socket_addrs().map_err(|error| error.to_string())?;
-    let mut why = "the name has no address".to_owned();
-    for address in addresses {
-        match TcpStream::connect_timeout(&address, options.deadline) {
-            Ok(stream) => return Ok(stream),
-            Err(error) => why = error.to_string(),
-        }
-    }
-    Err(why)
-}
-
 /// Waits for `CONNACK` (section 3.2); what came after it stays in the frames.
 fn greeted(stream: &mut TcpStream, deadline: Duration) -> Result<Frames, MqttError> {
     let until = Instant::now() + deadline;
@@ -151,7 +139,7 @@ fn greeted(stream: &mut TcpStream, deadline: Duration) -> Result<Frames, MqttErr
         match stream.read(&mut buffer) {
             Ok(0) => return Err(MqttError::Closed("the broker hung up at once".to_owned())),
             Ok(count) => frames.push(&buffer[..count]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => continue,
+            Err(error) if stream::is_silence(&error) => continue,
             Err(error) => return Err(MqttError::Closed(error.to_string())),
         }
         match frames.next().map_err(MqttError::Closed)? {

@@ -3,6 +3,7 @@
 use super::inbox::Inbox;
 use super::packet::{Frames, Incoming, PING, acknowledge};
 use super::{Message, MqttError};
+use crate::stream::is_silence;
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -67,7 +68,7 @@ impl Reader {
                     self.frames.push(&buffer[..count]);
                     self.dispatch()?;
                 }
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Err(error) if is_silence(&error) => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(error.to_string()),
             }

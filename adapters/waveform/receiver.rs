@@ -5,8 +5,8 @@ use super::timebase::TimeBase;
 use crate::address::Endpoint;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
-use std::io::{ErrorKind, Read};
-use std::net::{TcpStream, ToSocketAddrs};
+use crate::stream::{self, Short};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// No block within this time is a failure.
@@ -90,55 +90,49 @@ impl Receiver {
     /// See [`SourceError`]; the stream is connected to anew by the next read.
     pub fn read(&mut self, clock: &dyn Clock) -> Result<Block, SourceError> {
         let until = Instant::now() + DEADLINE;
-        if self.open.is_none() {
-            self.connect(until)?;
-        }
-        let read = self.block(clock, until);
-        if read.is_err() {
-            self.open = None;
-        }
-        read
+        let mut open = match self.open.take() {
+            Some(open) => open,
+            None => self.connect(until)?,
+        };
+        let block = self.block(&mut open, clock, until)?;
+        self.open = Some(open);
+        Ok(block)
     }
 
-    fn connect(&mut self, until: Instant) -> Result<(), SourceError> {
-        let stream = connected(&self.at).map_err(|error| self.line(&format!("cannot connect: {error}")))?;
-        self.open = Some(Open { stream, header: Header::currents(1.0, &["?"], 1.0, 1), next: None });
-        let header = self.header_line(until).inspect_err(|_| self.open = None)?;
-        if let Some(open) = &mut self.open {
-            open.header = header.clone();
-        }
-        self.header = Some(header);
+    fn connect(&mut self, until: Instant) -> Result<Open, SourceError> {
+        let connected = stream::connect(&self.at, until);
+        let mut stream = connected.map_err(|error| self.line(&format!("cannot connect: {error}")))?;
+        let header = self.header_line(&mut stream, until)?;
+        self.header = Some(header.clone());
         self.time = TimeBase::default();
         self.counts.connections += 1;
-        Ok(())
+        Ok(Open { stream, header, next: None })
     }
 
-    fn header_line(&mut self, until: Instant) -> Result<Header, SourceError> {
+    fn header_line(&self, stream: &mut TcpStream, until: Instant) -> Result<Header, SourceError> {
         let mut line = Vec::new();
         while line.last() != Some(&b'\n') {
             if line.len() >= HEADER_MAX {
                 return Err(self.decode(&FrameError::Header(format!("no line feed in {HEADER_MAX} bytes"))));
             }
             let mut byte = [0];
-            self.fill(&mut byte, until)?;
+            stream::fill(stream, &mut byte, until).map_err(|short| self.short(short))?;
             line.extend(byte);
         }
         Header::parse(String::from_utf8_lossy(&line).trim()).map_err(|error| self.decode(&error))
     }
 
-    fn block(&mut self, clock: &dyn Clock, until: Instant) -> Result<Block, SourceError> {
+    fn block(&mut self, open: &mut Open, clock: &dyn Clock, until: Instant) -> Result<Block, SourceError> {
         let mut bytes = [0; FRAME_HEAD];
-        self.fill(&mut bytes, until)?;
-        let channels = self.open.as_ref().map_or(1, |open| open.header.channels.len());
+        stream::fill(&mut open.stream, &mut bytes, until).map_err(|short| self.short(short))?;
+        let channels = open.header.channels.len();
         let (sequence, first_ns, length) = head(&bytes, channels).map_err(|error| self.decode(&error))?;
         let mut body = vec![0; length];
-        self.fill(&mut body, until)?;
-        let arrived_ns = clock.now_ns();
-        Ok(self.taken(sequence, first_ns, samples(&body), arrived_ns))
+        stream::fill(&mut open.stream, &mut body, until).map_err(|short| self.short(short))?;
+        Ok(self.taken(open, sequence, first_ns, samples(&body), clock.now_ns()))
     }
 
-    fn taken(&mut self, sequence: u32, first_ns: i64, raw: Vec<i16>, arrived_ns: TimeNs) -> Block {
-        let Some(open) = &mut self.open else { return Block { first_ns, gap: 0, clipped: 0, raw } };
+    fn taken(&mut self, open: &mut Open, sequence: u32, first_ns: i64, raw: Vec<i16>, arrived_ns: TimeNs) -> Block {
         let count = raw.len() / open.header.channels.len();
         let instants = f64::from(u32::try_from(count).unwrap_or(u32::MAX));
         let end_ns = first_ns.saturating_add(open.header.duration_ns(instants));
@@ -159,25 +153,12 @@ impl Receiver {
         Block { first_ns: self.time.gateway_ns(first_ns), gap, clipped, raw }
     }
 
-    fn fill(&mut self, mut into: &mut [u8], until: Instant) -> Result<(), SourceError> {
-        while !into.is_empty() {
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(self.silent());
-            }
-            let Some(open) = &mut self.open else { return Err(self.silent()) };
-            let read = open.stream.set_read_timeout(Some(left)).and_then(|()| open.stream.read(into));
-            match read {
-                Ok(0) => return Err(self.line("the sampler closed the stream")),
-                Ok(count) => into = &mut into[count..],
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                    return Err(self.silent());
-                }
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(self.line(&format!("the stream broke: {error}"))),
-            }
+    fn short(&self, short: Short) -> SourceError {
+        match short {
+            Short::Silent => self.silent(),
+            Short::Closed => self.line("the sampler closed the stream"),
+            Short::Broken(error) => self.line(&format!("the stream broke: {error}")),
         }
-        Ok(())
     }
 
     fn silent(&self) -> SourceError {
@@ -198,15 +179,4 @@ impl Receiver {
         let (source_name, request) = (self.name.clone(), "the stream".to_owned());
         SourceError::Decode { source_name, request, what: error.to_string() }
     }
-}
-
-fn connected(at: &Endpoint) -> std::io::Result<TcpStream> {
-    let mut last = std::io::Error::new(ErrorKind::NotFound, "the name has no address");
-    for address in (at.host.as_str(), at.port).to_socket_addrs()?.take(4) {
-        match TcpStream::connect_timeout(&address, DEADLINE) {
-            Ok(stream) => return Ok(stream),
-            Err(error) => last = error,
-        }
-    }
-    Err(last)
 }

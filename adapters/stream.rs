@@ -1,0 +1,63 @@
+//! A TCP stream that is read against a deadline: what every driver that speaks over one does, done once.
+
+use crate::address::Endpoint;
+use std::io::{self, ErrorKind, Read};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+/// A name that has more addresses than this is tried at the first ones.
+const ADDRESSES_MAX: usize = 4;
+/// A system refuses a timeout of zero.
+const LEAST: Duration = Duration::from_millis(1);
+
+/// The first address of the host that answers, tried one after the other until `until` (a millisecond each when that has
+/// passed). `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before.
+///
+/// # Errors
+/// What the system says of the last address.
+pub(crate) fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
+    for address in (at.host.as_str(), at.port).to_socket_addrs()?.take(ADDRESSES_MAX) {
+        let left = until.saturating_duration_since(Instant::now()).max(LEAST);
+        match TcpStream::connect_timeout(&address, left) {
+            Ok(stream) => return stream.set_nodelay(true).map(|()| stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+/// Why a stream gave less than was asked for.
+#[derive(Debug)]
+pub(crate) enum Short {
+    /// Nothing more came in time.
+    Silent,
+    /// The other side closed it.
+    Closed,
+    /// The system says so.
+    Broken(io::Error),
+}
+
+/// Fills all of `into`, waiting until `until` at most.
+pub(crate) fn fill(stream: &mut TcpStream, mut into: &mut [u8], until: Instant) -> Result<(), Short> {
+    while !into.is_empty() {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(Short::Silent);
+        }
+        stream.set_read_timeout(Some(left)).map_err(Short::Broken)?;
+        match stream.read(into) {
+            Ok(0) => return Err(Short::Closed),
+            Ok(count) => into = &mut into[count..],
+            Err(error) if is_silence(&error) => return Err(Short::Silent),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(Short::Broken(error)),
+        }
+    }
+    Ok(())
+}
+
+/// Did a read end because its time was over?
+pub(crate) fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
+}
