@@ -111,6 +111,13 @@ impl OverridePct {
         (percent <= 254).then_some(Self(percent))
     }
 
+    /// The whole percent nearest to a number; `None` when it is none from 0 to 254.
+    #[must_use]
+    pub fn nearest(percent: f64) -> Option<Self> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 254")]
+        (0.0..=254.0).contains(&percent).then(|| Self(percent.round() as u8))
+    }
+
     /// The override in percent.
     #[must_use]
     pub fn percent(self) -> u8 {
@@ -140,5 +147,9 @@ mod tests {
             assert_eq!(OverridePct::new(percent).map(OverridePct::percent), Some(percent));
         }
         assert_eq!(OverridePct::new(255), None);
+        assert_eq!(OverridePct::nearest(99.6), Some(OverridePct::FULL));
+        for none in [-0.5, 254.4, f64::NAN, f64::INFINITY] {
+            assert_eq!(OverridePct::nearest(none), None, "{none}");
+        }
     }
 }

@@ -22,8 +22,12 @@
 //! | `message` | length and bytes, bounded |
 //! | `supervise` | the parent's side |
 //! | `serve` | the child's side |
+//! | `client` | the parent's side with words of one's own, and what the library did not survive |
 //! | `guard` | buffers around what a library fills in, with a margin that shows an overrun |
+//! | `ffi` | loading, symbols and calls: the only `unsafe` |
 
+mod client;
+mod ffi;
 mod guard;
 mod message;
 mod serve;
@@ -32,7 +36,10 @@ mod supervise;
 #[cfg(test)]
 mod tests;
 
+pub use crate::vendor_functions as functions;
+pub use client::Client;
+pub use ffi::{Argument, Missing, Returned};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
 pub use message::MESSAGE_MAX;
-pub use serve::{SUBCOMMAND, serve};
+pub use serve::{SUBCOMMAND, serve, serve_words};
 pub use supervise::{ChildCounts, ChildError, ChildSettings, Supervised};

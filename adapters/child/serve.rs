@@ -1,6 +1,8 @@
 //! The child's side: requests from standard input, answers back on the same socket.
 
 use super::message;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::io::ErrorKind;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
@@ -26,6 +28,20 @@ pub fn serve(mut handler: impl FnMut(&[u8]) -> Vec<u8>) -> std::io::Result<()> {
             other => other?,
         }
     }
+}
+
+/// The same in words of one's own, as JSON: small, and legible in a debugger. What cannot be read is an `Err` with the
+/// reason.
+///
+/// # Errors
+/// As [`serve`].
+pub fn serve_words<Ask: DeserializeOwned, Tell: Serialize>(
+    mut handler: impl FnMut(Result<Ask, String>) -> Tell,
+) -> std::io::Result<()> {
+    serve(|request| {
+        let told = handler(serde_json::from_slice(request).map_err(|error| error.to_string()));
+        serde_json::to_vec(&told).unwrap_or_default()
+    })
 }
 
 fn gone(kind: ErrorKind) -> bool {

@@ -126,10 +126,7 @@ impl FanucActuator {
     }
 
     fn percent(&self, value: f64) -> Result<OverridePct, SourceError> {
-        let whole = value.round();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0 to 254")]
-        let percent = (0.0..=254.0).contains(&whole).then_some(whole as u8);
-        percent.and_then(OverridePct::new).ok_or_else(|| self.decode(&format!("{value} is no override")))
+        OverridePct::nearest(value).ok_or_else(|| self.decode(&format!("{value} is no override")))
     }
 }
 

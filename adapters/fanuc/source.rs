@@ -39,27 +39,32 @@ impl FanucSource {
         let names = readings::FAST.into_iter().chain([readings::OPERATION]).chain(power.map(|_| readings::POWER));
         let mut items = poll::fast(manner.path);
         items.extend(power.map(poll::power));
-        Self::of(name.to_owned(), line, Group::Fast, manner, items, readings::ids(names), options.period)
+        Self {
+            name: name.to_owned(),
+            line,
+            group: Group::Fast,
+            manner,
+            items,
+            channels: readings::ids(names),
+            period: options.period,
+            facts: None,
+        }
     }
 
     /// What changes slowly and holds in between: parts, gear stage.
     #[must_use]
     pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
         let joint = if name.contains('?') { '&' } else { '?' };
-        let name = format!("{name}{joint}group=slow");
-        Self::of(name, line, Group::Slow, manner, poll::slow(), readings::ids(readings::SLOW), options.slow)
-    }
-
-    fn of(
-        name: String,
-        line: Line,
-        group: Group,
-        manner: Manner,
-        items: Vec<super::item::Item>,
-        channels: Vec<ChannelId>,
-        period: Duration,
-    ) -> Self {
-        Self { name, line, group, manner, items, channels, period, facts: None }
+        Self {
+            name: format!("{name}{joint}group=slow"),
+            line,
+            group: Group::Slow,
+            manner,
+            items: poll::slow(),
+            channels: readings::ids(readings::SLOW),
+            period: options.slow,
+            facts: None,
+        }
     }
 }
 

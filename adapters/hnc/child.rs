@@ -2,11 +2,11 @@
 
 use super::answer::{Answer, ItemError, ItemResult, ReturnCode};
 use super::decode::text_of;
-use super::ffi::{Functions, Missing};
+use super::ffi::Functions;
 use super::item::{Item, Width};
 use super::message::{Ask, Tell};
 use super::sampling::{Columns, POINTS_MAX, SAMPLED_MAX, SampledItem};
-use crate::child::{Guarded, serve};
+use crate::child::{Guarded, Missing, serve_words};
 use std::ffi::CString;
 use std::path::Path;
 
@@ -30,13 +30,7 @@ const LEVEL_ERROR: i32 = 0;
 /// The line to the parent failed.
 pub fn child() -> std::io::Result<()> {
     let mut session = None;
-    serve(|request| {
-        let told = match serde_json::from_slice(request) {
-            Ok(ask) => answer(&mut session, ask),
-            Err(error) => Tell::Confused(error.to_string()),
-        };
-        serde_json::to_vec(&told).unwrap_or_default()
-    })
+    serve_words(|ask: Result<Ask, String>| ask.map_or_else(Tell::Confused, |ask| answer(&mut session, ask)))
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
@@ -120,11 +114,11 @@ impl Session {
         let mut session = Self { functions, client: -1, long_bytes, connected: 0, lost: 0, columns: 0 };
         match session.functions.HNC_NetInit(&local_host, local.1).map_err(without)? {
             0 => {}
-            code => return Err(Tell::Code("HNC_NetInit".to_owned(), ReturnCode(code))),
+            code => return Err(Tell::Code("HNC_NetInit".to_owned(), ReturnCode(i32::from(code)))),
         }
         match session.functions.HNC_NetConnect(&host, at.1).map_err(without)? {
-            client @ 0..=254 => session.client = i16::try_from(client).unwrap_or(-1),
-            code => return Err(Tell::Code("HNC_NetConnect".to_owned(), ReturnCode(code))),
+            client @ 0..=254 => session.client = client,
+            code => return Err(Tell::Code("HNC_NetConnect".to_owned(), ReturnCode(i32::from(code)))),
         }
         Ok(session)
     }
@@ -132,7 +126,7 @@ impl Session {
     fn alive(&mut self) -> Tell {
         self.events();
         match self.functions.HNC_NetIsConnect(self.client) {
-            Ok(code) => Tell::Alive { code, connected: self.connected, lost: self.lost },
+            Ok(code) => Tell::Alive { code: i32::from(code), connected: self.connected, lost: self.lost },
             Err(Missing(name)) => Tell::Confused(format!("the library has no {name}")),
         }
     }

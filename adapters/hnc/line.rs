@@ -6,17 +6,14 @@ use super::item::{Item, register_type};
 use super::message::{Ask, Tell};
 use super::sampling::{Columns, SampledItem};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Supervised};
+use crate::child::{ChildCounts, ChildError, ChildSettings, Client};
 use crate::driver::SourceError;
 use crate::nclink::mailbox::Register;
-use std::collections::HashMap;
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// An item in which the child ended this often is not asked for any more.
-const DEATHS_MAX: u32 = 2;
 /// A call that takes longer has met a dead link: the library waits for 3 s then.
 const DEAD_LINK: Duration = Duration::from_millis(2500);
 
@@ -55,9 +52,8 @@ pub struct Alive {
 }
 
 struct Inner {
-    child: Supervised,
+    child: Client<Item>,
     settings: HncSettings,
-    deaths: HashMap<Item, u32>,
 }
 
 /// A handle on the child; clones are handles on the same one.
@@ -75,7 +71,7 @@ impl Line {
         child.program.clone_from(&settings.program);
         child.environment.clone_from(&settings.environment);
         let name = settings.name.clone();
-        let inner = Inner { child: Supervised::new(child), settings, deaths: HashMap::new() };
+        let inner = Inner { child: Client::new(child), settings };
         Self { inner: Arc::new(Mutex::new(inner)), name }
     }
 
@@ -99,7 +95,7 @@ impl Line {
         let mut inner = self.locked();
         match inner.ask(&Ask::Alive, "its connection")? {
             Tell::Alive { code: 0, connected, lost } => {
-                Ok(Alive { connected, lost, generation: inner.child.generation() })
+                Ok(Alive { connected, lost, generation: inner.child.child().generation() })
             }
             Tell::Alive { code, .. } => Err(inner.line_failed(
                 format!("the controller is not connected ({})", ReturnCode(code)),
@@ -115,25 +111,22 @@ impl Line {
     /// [`SourceError::Timeout`] on a dead link, [`SourceError::Line`] when the library cannot be loaded or connected.
     pub fn read(&self, item: Item) -> Result<ItemResult, SourceError> {
         let mut inner = self.locked();
-        if inner.deaths.get(&item).is_some_and(|deaths| *deaths >= DEATHS_MAX) {
+        if inner.child.is_left_alone(item) {
             return Ok(Err(ItemError::NotOffered));
         }
         inner.open()?;
         let began = Instant::now();
-        match inner.told(&Ask::Read(item)) {
+        match inner.child.told(&Ask::Read(item)) {
             Ok(Tell::Read(_)) if began.elapsed() > DEAD_LINK => Err(inner.dead_link(began.elapsed())),
             Ok(Tell::Read(result)) => {
-                // A library that wrote beyond its value is not trusted any further.
                 if matches!(&result, Err(ItemError::Malformed(_))) {
-                    *inner.deaths.entry(item).or_default() += 1;
-                    inner.child.end();
+                    inner.child.blame(item);
                 }
                 Ok(result)
             }
             Ok(other) => Err(inner.nonsense("an item", &other)),
             Err(error) => {
-                *inner.deaths.entry(item).or_default() += 1;
-                inner.child.end();
+                inner.child.blame(item);
                 Ok(Err(ItemError::Malformed(error.to_string())))
             }
         }
@@ -202,19 +195,13 @@ impl Inner {
     fn ask(&mut self, ask: &Ask, request: &str) -> Result<Tell, SourceError> {
         self.open()?;
         let began = Instant::now();
-        let told = self.told(ask).map_err(|error| self.child_failed(&error, request))?;
+        let told = self.child.told(ask).map_err(|error| self.child_failed(&error, request))?;
         if began.elapsed() > DEAD_LINK { Err(self.dead_link(began.elapsed())) } else { Ok(told) }
-    }
-
-    fn told(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
-        let bytes = serde_json::to_vec(ask).map_err(|error| ChildError::NoAnswer(error.to_string()))?;
-        let answer = self.child.request(&bytes)?;
-        serde_json::from_slice(&answer).map_err(|error| ChildError::NoAnswer(error.to_string()))
     }
 
     /// A child in which the connection is open.
     fn open(&mut self) -> Result<(), SourceError> {
-        if self.child.process_id().is_some() {
+        if self.child.is_running() {
             return Ok(());
         }
         let settings = &self.settings;
@@ -226,7 +213,7 @@ impl Inner {
             port: settings.at.port,
             long_bytes: settings.long_bytes,
         };
-        let told = self.told(&ask).map_err(|error| self.child_failed(&error, "opening"));
+        let told = self.child.told(&ask).map_err(|error| self.child_failed(&error, "opening"));
         let failed = match told? {
             Tell::Opened => return Ok(()),
             Tell::Unloadable(what) => self.line_failed(

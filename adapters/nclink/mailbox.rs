@@ -144,10 +144,7 @@ pub fn in_force(name: &str, found: Result<f64, Absence>) -> Result<OverridePct, 
         what,
     };
     let percent = found.map_err(|reason| nonsense(format!("there is no value ({reason})")))?;
-    let whole = (0.0..=254.0).contains(&percent).then(|| percent.round());
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 254")]
-    let known = whole.and_then(|percent| OverridePct::new(percent as u8));
-    known.ok_or_else(|| nonsense(format!("{percent} % is no override")))
+    OverridePct::nearest(percent).ok_or_else(|| nonsense(format!("{percent} % is no override")))
 }
 
 #[cfg(test)]

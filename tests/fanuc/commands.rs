@@ -1,7 +1,7 @@
 //! The commands as a user calls them: `serve fanuc` and `doctor`, as processes.
 
 use crate::support::{controller, serve};
-use crate::vendor::Library;
+use crate::vendor::library;
 use adapters::fanuc::server::ServerSettings;
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
@@ -109,7 +109,7 @@ fn doctor_for_people_shows_values_with_units() {
 
 #[test]
 fn doctor_compares_our_own_words_with_the_librarys() {
-    let library = Library::build(&[]);
+    let library = library(&[]);
     let server = serve(controller(4), ServerSettings::default());
     let address = format!("fanuc://{}", server.address());
     let compare = |label: &str| {

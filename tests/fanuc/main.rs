@@ -4,6 +4,8 @@ mod closed_loop;
 mod commands;
 mod faults;
 mod flapping;
+#[path = "../support/library.rs"]
+mod library;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;

@@ -1,6 +1,6 @@
 //! What the channels say, for three generations.
 
-use crate::support::{address, controller, number, opened, poll, serve, text, value};
+use crate::support::{CUT, address, controller, number, opened, poll, serve, text, value};
 use adapters::fanuc::answer::Alarm;
 use adapters::fanuc::item::Area;
 use adapters::fanuc::server::ServerSettings;
@@ -15,13 +15,6 @@ fn every_channel_of_a_cut_in_all_generations() {
         let mut opened = opened(&server, "");
         let readings = poll(opened.sources[0].as_mut()).expect("answers");
         let numbers = [
-            ("spindle_speed_rpm", 1200.0),
-            ("spindle_programmed_rpm", 1200.0),
-            ("feed_mm_min", 240.0),
-            ("feed_programmed_mm_min", 250.0),
-            ("feed_override_pct", 80.0),
-            ("spindle_override_pct", 100.0),
-            ("spindle_load_pct", 41.0),
             ("x_axis_position_mm", 79.0),
             ("z_axis_position_mm", -12.345),
             ("z_axis_load_pct", -17.0),
@@ -29,7 +22,7 @@ fn every_channel_of_a_cut_in_all_generations() {
             ("rapid", 0.0),
             ("drive_on", 1.0),
         ];
-        for (channel, expected) in numbers {
+        for (channel, expected) in CUT.into_iter().chain(numbers) {
             assert_eq!(number(&readings, channel), expected, "{channel} of generation {version}");
         }
         let words = [("mode", "AUTOMATIC"), ("execution", "ACTIVE"), ("program", "O1001"), ("block", "N120")];

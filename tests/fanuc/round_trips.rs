@@ -1,7 +1,7 @@
 //! What a poll costs, against a served machine in another process.
 
 use crate::commands::Serving;
-use crate::vendor::Library;
+use crate::vendor::{library, settings};
 use adapters::address::{Address, Target};
 use adapters::fanuc::focas::Focas;
 use adapters::fanuc::native::{Native, NativeSettings};
@@ -51,8 +51,8 @@ fn the_whole_poll_set_is_one_round_trip() {
 
 #[test]
 fn the_whole_poll_set_through_a_library_in_its_child() {
-    let library = Library::build(&[]);
-    let mut vendor = Vendor::connect(library.settings()).expect("connects");
+    let library = library(&[]);
+    let mut vendor = Vendor::connect(settings(&library)).expect("connects");
     let (half, most) = median(polls(&mut vendor, 100));
     let answers = vendor.counts().answers;
     println!(

@@ -9,6 +9,17 @@ use adapters::open::{Opened, open};
 use adapters::{Absence, Reading, Source, SourceError, Value};
 use std::net::TcpListener;
 
+/// What a cut of [`controller`] says, whoever reads it.
+pub(crate) const CUT: [(&str, f64); 7] = [
+    ("spindle_speed_rpm", 1200.0),
+    ("spindle_programmed_rpm", 1200.0),
+    ("feed_mm_min", 240.0),
+    ("feed_programmed_mm_min", 250.0),
+    ("feed_override_pct", 80.0),
+    ("spindle_override_pct", 100.0),
+    ("spindle_load_pct", 41.0),
+];
+
 /// A lathe that cuts: 1200 rpm, 0.2 mm per turn, load 41 %.
 pub(crate) fn controller(version: u16) -> Controller {
     let mut control = Controller::new(version, &['X', 'Z']);

@@ -1,6 +1,7 @@
 //! The vendor's library: one with the same functions, compiled here and really loaded in the real child process.
 
 use crate::broker::free_port;
+use crate::library::{Library, nothing_is_left, poll_survives};
 use crate::stand::until;
 use adapters::address::Endpoint;
 use adapters::clock::SystemClock;
@@ -12,58 +13,33 @@ use adapters::hnc::{HncActuator, HncSource};
 use adapters::nclink::mailbox::Register;
 use adapters::units::OverridePct;
 use adapters::{Absence, Reading, Source, SourceError};
-use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// The library in a directory of its own, and the file that tells it which fault to have.
-pub(crate) struct Library {
-    _directory: tempfile::TempDir,
-    pub(crate) file: PathBuf,
-    fault: PathBuf,
+pub(crate) fn library(flags: &[&str]) -> Library {
+    Library::compiled("huazhong/fake_hnc.c", flags)
 }
 
-impl Library {
-    pub(crate) fn build(flags: &[&str]) -> Self {
-        let directory = tempfile::tempdir().expect("a directory");
-        let (file, fault) = (directory.path().join("libfakehnc.so"), directory.path().join("fault"));
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/huazhong/fake_hnc.c");
-        let mut compiler = Command::new("cc");
-        compiler.args(["-shared", "-fPIC", "-O1", "-w", "-pthread"]).args(flags).arg("-o").arg(&file).arg(source);
-        assert!(compiler.status().expect("a C compiler").success());
-        Self { _directory: directory, file, fault }
+fn settings(library: &Library) -> HncSettings {
+    HncSettings {
+        name: "hncnet://fake".to_owned(),
+        vendor_library: library.file.clone(),
+        at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
+        local_host: Some("127.0.0.1".to_owned()),
+        local_port: free_port(),
+        long_bytes: size_of::<std::ffi::c_long>(),
+        deadline: Duration::from_millis(1500),
+        program: Some(Library::program()),
+        environment: library.environment(),
     }
+}
 
-    fn fault(&self, text: &str) {
-        std::fs::write(&self.fault, text).expect("written");
-    }
+fn line(library: &Library) -> Line {
+    Line::new(settings(library))
+}
 
-    fn well(&self) {
-        let _was_well = std::fs::remove_file(&self.fault);
-    }
-
-    fn settings(&self) -> HncSettings {
-        HncSettings {
-            name: "hncnet://fake".to_owned(),
-            vendor_library: self.file.clone(),
-            at: Endpoint { host: "192.0.2.1".to_owned(), port: 10001 },
-            local_host: Some("127.0.0.1".to_owned()),
-            local_port: free_port(),
-            long_bytes: size_of::<std::ffi::c_long>(),
-            deadline: Duration::from_millis(1500),
-            program: Some(PathBuf::from(env!("CARGO_BIN_EXE_cnc-gateway"))),
-            environment: vec![("FAKE_LIBRARY_FAULT".to_owned(), self.fault.display().to_string())],
-        }
-    }
-
-    fn line(&self) -> Line {
-        Line::new(self.settings())
-    }
-
-    fn source(&self) -> HncSource {
-        HncSource::new(self.line(), Duration::from_millis(100), false)
-    }
+fn source(library: &Library) -> HncSource {
+    HncSource::new(line(library), Duration::from_millis(100), false)
 }
 
 fn poll(source: &mut dyn Source) -> Result<Vec<Reading>, SourceError> {
@@ -105,8 +81,8 @@ fn cut(readings: &[Reading]) {
 
 #[test]
 fn the_library_is_loaded_and_gives_values_in_units() {
-    let library = Library::build(&[]);
-    let mut source = library.source();
+    let library = library(&[]);
+    let mut source = source(&library);
     let readings = poll(&mut source).expect("answers");
     cut(&readings);
     assert_eq!(text(&readings, "alarm").as_deref(), Ok("1010101 机床跑飞车"), "GBK");
@@ -116,8 +92,8 @@ fn the_library_is_loaded_and_gives_values_in_units() {
 
 #[test]
 fn a_library_without_a_function_lacks_its_channels_only() {
-    let library = Library::build(&["-DWITHOUT_AXIS"]);
-    let readings = poll(&mut library.source()).expect("answers");
+    let library = library(&["-DWITHOUT_AXIS"]);
+    let readings = poll(&mut source(&library)).expect("answers");
     assert_eq!(number(&readings, "spindle_speed_rpm"), Ok(2987.25));
     assert_eq!(number(&readings, "spindle_current_a"), Err(Absence::NotSupported));
     assert_eq!(number(&readings, "x_axis_position_mm"), Err(Absence::NotSupported));
@@ -125,8 +101,8 @@ fn a_library_without_a_function_lacks_its_channels_only() {
 
 #[test]
 fn not_yet_and_refused_never_show_what_was_scribbled() {
-    let library = Library::build(&[]);
-    let mut source = library.source();
+    let library = library(&[]);
+    let mut source = source(&library);
     cut(&poll(&mut source).expect("well before"));
     library.fault("later HNC_ChannelGetValue");
     let readings = poll(&mut source).expect("the others flow");
@@ -139,7 +115,7 @@ fn not_yet_and_refused_never_show_what_was_scribbled() {
         assert_eq!(number(&readings, "spindle_current_a"), Err(expected), "code {code}");
         assert_eq!(number(&readings, "feed_mm_min"), Ok(812.5));
     }
-    let line = library.line();
+    let line = line(&library);
     library.fault("later HNC_RegGetValue");
     assert!(line.read(Item::Register(6, 5)).expect("alive").is_err());
     library.well();
@@ -148,17 +124,19 @@ fn not_yet_and_refused_never_show_what_was_scribbled() {
 
 /// A fault in one function: its channel has a reason, the others flow; afterwards all is well.
 fn survives(kind: &str) {
-    let library = Library::build(&[]);
-    let mut source = library.source();
+    let library = library(&[]);
+    let mut source = source(&library);
     cut(&poll(&mut source).expect("well before"));
-    library.fault(&format!("{kind} HNC_FprogGetFullName"));
-    let began = Instant::now();
-    let readings = poll(&mut source).expect("the others flow");
-    let took = began.elapsed();
-    assert_eq!(text(&readings, "program"), Err(Absence::OutOfRange), "{kind}");
-    assert_eq!(number(&readings, "spindle_speed_rpm"), Ok(2987.25));
-    println!("{kind}: one channel lost, {} others in the same poll, {} ms", readings.len() - 1, took.as_millis());
-    library.well();
+    let fault = format!("{kind} HNC_FprogGetFullName");
+    poll_survives(
+        &library,
+        &fault,
+        || poll(&mut source).expect("the others flow"),
+        |readings| {
+            assert_eq!(text(readings, "program"), Err(Absence::OutOfRange), "{kind}");
+            assert_eq!(number(readings, "spindle_speed_rpm"), Ok(2987.25));
+        },
+    );
     until("well again", || poll(&mut source).ok().filter(|readings| text(readings, "program").is_ok()));
 }
 
@@ -179,8 +157,8 @@ fn a_library_that_overruns_its_value_costs_one_channel() {
 
 #[test]
 fn absurd_counts_are_bounded() {
-    let library = Library::build(&[]);
-    let mut source = HncSource::new(library.line(), Duration::from_millis(100), true);
+    let library = library(&[]);
+    let mut source = HncSource::new(line(&library), Duration::from_millis(100), true);
     poll(&mut source).expect("well before");
     library.fault("lots HNC_AlarmGetNum 2000000000");
     let readings = poll(&mut source).expect("answers");
@@ -194,8 +172,8 @@ fn absurd_counts_are_bounded() {
 
 #[test]
 fn a_dead_link_ends_the_poll_after_one_call() {
-    let library = Library::build(&[]);
-    let mut settings = library.settings();
+    let library = library(&[]);
+    let mut settings = settings(&library);
     settings.deadline = Duration::from_millis(4500);
     let mut source = HncSource::new(Line::new(settings), Duration::from_millis(100), false);
     cut(&poll(&mut source).expect("well before"));
@@ -213,8 +191,8 @@ fn a_dead_link_ends_the_poll_after_one_call() {
 
 #[test]
 fn the_state_of_the_connection_comes_from_the_events() {
-    let library = Library::build(&[]);
-    let line = library.line();
+    let library = library(&[]);
+    let line = line(&library);
     let alive = line.alive().expect("connected");
     assert_eq!((alive.connected, alive.lost, alive.generation), (1, 0, 1));
     line.end();
@@ -223,28 +201,28 @@ fn the_state_of_the_connection_comes_from_the_events() {
 
 #[test]
 fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
-    let library = Library::build(&[]);
+    let library = library(&[]);
     let said = |settings: HncSettings| Line::new(settings).alive().expect_err("it cannot").to_string();
-    let absent = HncSettings { vendor_library: "/does/not/exist.so".into(), ..Library::settings(&library) };
+    let absent = HncSettings { vendor_library: "/does/not/exist.so".into(), ..settings(&library) };
     let text = said(absent);
     assert!(text.contains("/does/not/exist.so") && text.contains("library="), "{text}");
-    let first = library.settings();
+    let first = settings(&library);
     let holder = Line::new(first.clone());
     holder.alive().expect("it listens");
     let text = said(first);
     assert!(text.contains("1009") && text.contains("local_port="), "{text}");
     library.fault("code HNC_NetConnect -1");
-    assert!(said(library.settings()).contains("does not answer"));
+    assert!(said(settings(&library)).contains("does not answer"));
     library.fault("abort HNC_NetConnect");
-    assert!(said(library.settings()).contains("signal"));
+    assert!(said(settings(&library)).contains("signal"));
     library.fault("hang HNC_NetConnect");
-    assert!(said(library.settings()).contains("hung"));
+    assert!(said(settings(&library)).contains("hung"));
 }
 
 #[test]
 fn registers_are_written_and_the_override_in_force_is_read_back() {
-    let library = Library::build(&[]);
-    let line = library.line();
+    let library = library(&[]);
+    let line = line(&library);
     let mut actuator = HncActuator::new(line.clone(), Register { kind: 'D', index: 100 });
     let clock = SystemClock::new();
     assert_eq!(actuator.read_feed_override(&clock).map(OverridePct::percent), Ok(80));
@@ -264,8 +242,8 @@ fn registers_are_written_and_the_override_in_force_is_read_back() {
 
 #[test]
 fn every_sampled_millisecond_comes_once() {
-    let library = Library::build(&[]);
-    let mut source = HncSource::new(library.line(), Duration::from_millis(100), true);
+    let library = library(&[]);
+    let mut source = HncSource::new(line(&library), Duration::from_millis(100), true);
     let (sender, blocks) = mpsc::channel();
     source.on_block(Box::new(move |block, _| sender.send(block.clone()).expect("the test listens")));
     let end = Instant::now() + Duration::from_secs(3);
@@ -289,32 +267,12 @@ fn every_sampled_millisecond_comes_once() {
     );
 }
 
-/// Files and children of this process.
-fn own() -> (usize, usize) {
-    let files = std::fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
-    let me = std::process::id().to_string();
-    let parent = |path: PathBuf| {
-        let text = std::fs::read_to_string(path.join("stat")).ok()?;
-        text.rsplit_once(')')?.1.split_whitespace().nth(1).map(str::to_owned)
-    };
-    let processes = std::fs::read_dir("/proc").expect("readable").flatten();
-    (files, processes.filter_map(|entry| parent(entry.path())).filter(|parent| *parent == me).count())
-}
-
 fn cycles(count: usize) {
-    let library = Library::build(&[]);
-    let (before, began) = (own(), Instant::now());
-    for cycle in 0..count {
-        library.fault(["abort HNC_NetConnect", "overrun HNC_FprogGetFullName", "code HNC_NetConnect -1"][cycle % 3]);
-        let mut source = library.source();
-        let _typed = poll(&mut source);
-    }
-    let after = own();
-    println!(
-        "{count} cycles with a dying library in {:.1} s: files and children {before:?} before, {after:?} after",
-        began.elapsed().as_secs_f64()
-    );
-    assert!(after.0 <= before.0 + 60 && after.1 <= before.1 + 12, "other tests run beside this one; a leak is more");
+    let library = library(&[]);
+    let faults = ["abort HNC_NetConnect", "overrun HNC_FprogGetFullName", "code HNC_NetConnect -1"];
+    nothing_is_left(&library, count, faults, || {
+        let _typed = poll(&mut source(&library));
+    });
 }
 
 #[test]

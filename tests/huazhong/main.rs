@@ -10,6 +10,8 @@ mod process;
 mod broker;
 mod dialects;
 mod hnc;
+#[path = "../support/library.rs"]
+mod library;
 mod nclink;
 mod sampling;
 mod stand;

@@ -1,7 +1,7 @@
 //! The programs as an integrator starts them: one serves the simulated machine as an NC-Link device, the other reads it.
 
 use crate::broker::{Broker, free_port};
-use crate::hnc::Library;
+use crate::hnc::library;
 use crate::process::{Gateway, get, program, run, stderr, stdout, wait_for};
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ fn a_device_does_not_listen() {
 
 #[test]
 fn the_doctor_examines_a_controller_through_the_library() {
-    let library = Library::build(&[]);
+    let library = library(&[]);
     let keys = format!("local_host=127.0.0.1&local_port={}&sample=yes", free_port());
     let address = format!("hncnet://192.0.2.1:10001?library={}&{keys}", library.file.display());
     let examined = run(&["doctor", &address, "--json"]);

@@ -66,6 +66,15 @@ pub(super) fn data(kind: i16, value: f64) -> Answer {
     Answer::Data { kind, values: vec![Some(value)] }
 }
 
+/// One quantity of the only spindle.
+fn spindle(what: Spindle, value: f64) -> (Item, Answer) {
+    (Item::Spindles(what), numbers(&[value], 1))
+}
+
+fn count(which: i16, count: i32) -> (Item, Answer) {
+    (Item::Count(which), Answer::Whole(count))
+}
+
 fn names(names: &[&str]) -> Answer {
     Answer::Names(names.iter().map(ToString::to_string).collect())
 }
@@ -135,8 +144,6 @@ fn state() -> Vec<Row> {
 
 fn speeds() -> Vec<Row> {
     use Answer::Whole;
-    let spindle = |what, value| (Item::Spindles(what), numbers(&[value], 1));
-    let count = |which, count| (Item::Count(which), Whole(count));
     let none = |parameter| (Item::Parameter(parameter, 0), data(3, 0.0));
     vec![
         read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(Item::Feed, number(1200.0))]),
@@ -185,8 +192,6 @@ fn speeds() -> Vec<Row> {
 }
 
 fn meters() -> Vec<Row> {
-    let spindle = |what, value| (Item::Spindles(what), numbers(&[value], 1));
-    let count = |which, count| (Item::Count(which), Answer::Whole(count));
     let servo = (Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
     let axis_names = (Item::AxisNames, names(&["X", "Y", "Z"]));
     vec![

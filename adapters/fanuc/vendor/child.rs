@@ -1,13 +1,13 @@
 //! The child's side: items to calls, structures to answers.
 
-use super::ffi::{Functions, Missing};
+use super::ffi::Functions;
 use super::layout::{
     LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbDy2, OdbExePrg, OdbM, OdbPro, OdbSeq,
     OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, ZOFS_LEN,
 };
 use super::message::{Ask, Tell};
 use super::structure::{Bytes, checked, decimal, filled};
-use crate::child::{Guarded, serve};
+use crate::child::{Guarded, Missing, serve_words};
 use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Status, System};
 use crate::fanuc::code::ReturnCode;
 use crate::fanuc::item::{Item, Position, Servo, Spindle, Stretch, Width, Write};
@@ -35,13 +35,7 @@ const BIT_PARAMETERS: [u16; 1] = [1001];
 /// The line to the parent failed.
 pub fn child() -> std::io::Result<()> {
     let mut session = None;
-    serve(|request| {
-        let told = match serde_json::from_slice(request) {
-            Ok(ask) => answer(&mut session, ask),
-            Err(error) => Tell::Confused(error.to_string()),
-        };
-        serde_json::to_vec(&told).unwrap_or_default()
-    })
+    serve_words(|ask: Result<Ask, String>| ask.map_or_else(Tell::Confused, |ask| answer(&mut session, ask)))
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {

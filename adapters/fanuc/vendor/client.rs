@@ -3,18 +3,14 @@
 use super::KIND;
 use super::message::{Ask, Tell};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Supervised};
+use crate::child::{ChildCounts, ChildError, ChildSettings, Client};
 use crate::fanuc::answer::{ItemError, ItemResult, Refusal};
 use crate::fanuc::code::{Consequence, ReturnCode};
 use crate::fanuc::focas::{Focas, FocasError};
 use crate::fanuc::item::{Item, Write};
 use crate::fanuc::opening::Opening;
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// An item in which the child ended this often is not asked for any more.
-const DEATHS_MAX: u32 = 2;
 
 /// What the child may take longer than the library's own patience, which is about a second more than it is told.
 const GRACE: Duration = Duration::from_millis(1500);
@@ -40,12 +36,9 @@ pub struct VendorSettings {
 
 /// A controller through the vendor's library.
 pub struct Vendor {
-    child: Supervised,
+    child: Client<Item>,
     settings: VendorSettings,
     opening: Opening,
-    /// The start of the child in which the connection is open.
-    open_in: u64,
-    deaths: HashMap<Item, u32>,
 }
 
 impl Vendor {
@@ -59,10 +52,9 @@ impl Vendor {
         child.program.clone_from(&settings.program);
         child.environment.clone_from(&settings.environment);
         child.pause_min = Duration::ZERO;
-        let mut child = Supervised::new(child);
+        let mut child = Client::new(child);
         let opening = open(&mut child, &settings)?;
-        let open_in = child.generation();
-        Ok(Self { child, settings, opening, open_in, deaths: HashMap::new() })
+        Ok(Self { child, settings, opening })
     }
 
     /// How the child has been doing.
@@ -74,41 +66,34 @@ impl Vendor {
     /// Process number of the child.
     #[must_use]
     pub fn process_id(&self) -> Option<u32> {
-        self.child.process_id()
+        self.child.child().process_id()
     }
 
     /// Asks a child in which the connection is open; opens it in a new child.
     fn request(&mut self, ask: &Ask) -> Result<Result<Tell, ChildError>, FocasError> {
-        if self.child.process_id().is_none() {
+        if !self.child.is_running() {
             self.opening = open(&mut self.child, &self.settings)?;
-            self.open_in = self.child.generation();
         }
-        Ok(told(&mut self.child, ask))
+        Ok(self.child.told(ask))
     }
 
     fn read(&mut self, item: Item) -> Result<ItemResult, FocasError> {
-        if self.deaths.get(&item).is_some_and(|deaths| *deaths >= DEATHS_MAX) {
+        if self.child.is_left_alone(item) {
             return Ok(Err(ItemError::NotOffered));
         }
         Ok(match self.request(&Ask::Read(item))? {
             Ok(Tell::Read(result)) => {
-                self.suspect(item, &result);
+                if matches!(result, Err(ItemError::Malformed(_))) {
+                    self.child.blame(item);
+                }
                 result
             }
             Ok(other) => Err(ItemError::Malformed(format!("{other:?}"))),
             Err(error) => {
-                *self.deaths.entry(item).or_default() += 1;
+                self.child.blame(item);
                 Err(ItemError::Malformed(format!("the library failed in {item:?}: {error}")))
             }
         })
-    }
-
-    /// A library that wrote beyond its structures has hurt nothing outside its margin, but is not trusted any further.
-    fn suspect(&mut self, item: Item, result: &ItemResult) {
-        if matches!(result, Err(ItemError::Malformed(_))) {
-            *self.deaths.entry(item).or_default() += 1;
-            self.child.end();
-        }
     }
 }
 
@@ -117,13 +102,7 @@ fn seconds(timeout: Duration) -> i32 {
     i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
 }
 
-fn told(child: &mut Supervised, ask: &Ask) -> Result<Tell, ChildError> {
-    let bytes = serde_json::to_vec(ask).map_err(|error| ChildError::NoAnswer(error.to_string()))?;
-    let answer = child.request(&bytes)?;
-    serde_json::from_slice(&answer).map_err(|error| ChildError::NoAnswer(error.to_string()))
-}
-
-fn open(child: &mut Supervised, settings: &VendorSettings) -> Result<Opening, FocasError> {
+fn open(child: &mut Client<Item>, settings: &VendorSettings) -> Result<Opening, FocasError> {
     let ask = Ask::Open {
         vendor_library: settings.vendor_library.clone(),
         host: settings.at.host.clone(),
@@ -131,7 +110,7 @@ fn open(child: &mut Supervised, settings: &VendorSettings) -> Result<Opening, Fo
         path: settings.path,
         timeout_s: seconds(settings.timeout),
     };
-    let opened = match told(child, &ask).map_err(|error| FocasError::Library(error.to_string()))? {
+    let opened = match child.told(&ask).map_err(|error| FocasError::Library(error.to_string()))? {
         Tell::Opened(opening) => return Ok(opening),
         Tell::Code(ReturnCode(-16)) => FocasError::Unreachable(ReturnCode::SOCKET.to_string()),
         Tell::Code(ReturnCode(-17)) => FocasError::NoSession,

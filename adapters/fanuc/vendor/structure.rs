@@ -1,8 +1,7 @@
 //! A structure that the library filled in, read field by field.
 
-use super::ffi::Missing;
 use super::layout::LoadElm;
-use crate::child::Guarded;
+use crate::child::{Guarded, Missing};
 use crate::fanuc::answer::{ItemError, Refusal};
 use crate::fanuc::code::ReturnCode;
 use std::mem::offset_of;

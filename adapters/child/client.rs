@@ -1,0 +1,70 @@
+//! The parent's side of a vendor's child: typed questions, and questions that the library did not survive.
+
+use super::{ChildCounts, ChildError, ChildSettings, Supervised};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::HashMap;
+use std::hash::Hash;
+
+/// A question in which the child ended this often is not asked any more.
+const DEATHS_MAX: u32 = 2;
+
+/// A child that is asked in words of one's own. `Q` names what it can die of.
+pub struct Client<Q> {
+    child: Supervised,
+    deaths: HashMap<Q, u32>,
+}
+
+impl<Q: Copy + Eq + Hash> Client<Q> {
+    /// Nothing is started before the first question.
+    #[must_use]
+    pub fn new(settings: ChildSettings) -> Self {
+        Self { child: Supervised::new(settings), deaths: HashMap::new() }
+    }
+
+    /// The process.
+    #[must_use]
+    pub fn child(&self) -> &Supervised {
+        &self.child
+    }
+
+    /// How it has been doing.
+    #[must_use]
+    pub fn counts(&self) -> ChildCounts {
+        self.child.counts()
+    }
+
+    /// Is there a child, so that what was opened in it is open?
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.child.process_id().is_some()
+    }
+
+    /// Ends the child; the next question starts another one at once.
+    pub fn end(&mut self) {
+        self.child.end();
+    }
+
+    /// Asks and waits for the answer.
+    ///
+    /// # Errors
+    /// See [`ChildError`].
+    pub fn told<Ask: Serialize, Tell: DeserializeOwned>(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
+        let no_answer = |error: serde_json::Error| ChildError::NoAnswer(error.to_string());
+        let answer = self.child.request(&serde_json::to_vec(ask).map_err(no_answer)?)?;
+        serde_json::from_slice(&answer).map_err(no_answer)
+    }
+
+    /// Has the child died of this so often that it is left alone?
+    #[must_use]
+    pub fn is_left_alone(&self, question: Q) -> bool {
+        self.deaths.get(&question).is_some_and(|deaths| *deaths >= DEATHS_MAX)
+    }
+
+    /// The library died of this question, or wrote beyond its structures: it has hurt nothing outside its margin, but
+    /// is not trusted any further.
+    pub fn blame(&mut self, question: Q) {
+        *self.deaths.entry(question).or_default() += 1;
+        self.end();
+    }
+}
