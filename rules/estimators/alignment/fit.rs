@@ -1,6 +1,7 @@
 //! The power model at one lag and window, and its residual.
 
 use super::speed::{PREDICTORS, Running, Transient};
+use super::steady::steadied;
 
 /// Constant, and every predictor.
 const COLUMNS: usize = PREDICTORS + 1;
@@ -38,7 +39,7 @@ impl Ready {
     /// Power readings for which every lag up to `reach_s` and window up to `window_s` lies within the course of speed, so
     /// that all are judged by the same rows.
     pub(super) fn of(transient: &Transient, top_rpm: f64, tau_s: f64, reach_s: (f64, f64), window_s: f64) -> Self {
-        let running = Running::of(&transient.speed, top_rpm, tau_s);
+        let running = Running::of(&steadied(&transient.speed), top_rpm, tau_s);
         let inside = |time_s: f64| {
             running.mean(time_s - reach_s.0, window_s).is_some() && running.mean(time_s - reach_s.1, window_s).is_some()
         };

@@ -14,6 +14,7 @@
 //! | file | what |
 //! |---|---|
 //! | `speed` | a course of speed, and running integrals of everything that is predicted from it |
+//! | `steady` | stamps of the controller put on the beat of its polling, where that is the steadier clock |
 //! | `fit` | the power model at one lag and window, and its residual |
 //! | `profile` | the residual over lag and window, its minimum and its rivals |
 //! | `estimate` | [`align`]: lag, width, drift and window over all transients, or why they cannot be known |
@@ -31,6 +32,7 @@ mod estimate;
 mod fit;
 mod profile;
 mod speed;
+mod steady;
 
 #[cfg(test)]
 mod tests;

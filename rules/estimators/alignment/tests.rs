@@ -134,10 +134,18 @@ struct Score {
     naive_near: usize,
     refused: usize,
     worst_s: f64,
+    /// The windows that were found, s, the shortest first.
+    windows_s: Vec<f64>,
+}
+
+impl Score {
+    fn window_s(&self, share: usize) -> f64 {
+        self.windows_s.get(self.windows_s.len() * share / 100).copied().unwrap_or(f64::NAN)
+    }
 }
 
 fn score(seeds: u64, bench: Bench) -> Score {
-    let mut score = Score { near: 0, covered: 0, naive_near: 0, refused: 0, worst_s: 0.0 };
+    let mut score = Score { near: 0, covered: 0, naive_near: 0, refused: 0, worst_s: 0.0, windows_s: Vec::new() };
     for seed in 0..seeds {
         let transients = transients(seed, bench);
         score.naive_near += usize::from((naive(&transients) - TRUE_LAG_S).abs() <= 0.02);
@@ -147,21 +155,26 @@ fn score(seeds: u64, bench: Bench) -> Score {
                 score.near += usize::from(error_s <= 0.02);
                 score.covered += usize::from(error_s <= lag.uncertainty_s);
                 score.worst_s = score.worst_s.max(error_s);
+                score.windows_s.push(lag.window_s);
             }
             Err(_) => score.refused += 1,
         }
     }
+    score.windows_s.sort_by(f64::total_cmp);
     score
 }
 
 fn told(name: &str, seeds: u64, score: &Score) {
     println!(
-        "{name}: within 20 ms {} of {seeds}, truth inside the stated interval {}, no answer {}, worst {:.0} ms; \
-         greatest correlation of speed and power: within 20 ms {} of {seeds}",
+        "{name}: within 20 ms {} of {seeds}, truth inside the stated interval {}, no answer {}, worst {:.0} ms, \
+         window of {TRUE_WINDOW_S} s: {:.2} ({:.2} to {:.2}) s; greatest correlation of speed and power: within 20 ms {} of {seeds}",
         score.near,
         score.covered,
         score.refused,
         1e3 * score.worst_s,
+        score.window_s(50),
+        score.window_s(5),
+        score.window_s(95),
         score.naive_near
     );
 }
