@@ -298,6 +298,8 @@ pub struct Status {
     pub gate: GateStatus,
     /// Sources.
     pub sources: Vec<SourceStatus>,
+    /// How late each meter is against the controller.
+    pub alignment: Vec<crate::alignment::AlignmentStatus>,
     /// Scripts.
     pub scripts: Vec<ScriptStatus>,
     /// The operations recipe, where one is configured.

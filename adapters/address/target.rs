@@ -57,6 +57,8 @@ pub struct SimulatedTarget {
     pub noise_pct: f64,
     /// Meter dropouts per hour.
     pub dropouts_per_h: f64,
+    /// How late the meter's averages are on the average against what the controller says at the same stamp, ms.
+    pub meter_lag_ms: f64,
     /// Does the spindle change its speed between the passes of one operation?
     pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with (depth of cut, diameter, operation)?
@@ -235,6 +237,7 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         tau_s: keys.number("tau_s", 0.6, 0.05, 10.0),
         cut_pct: keys.number("cut_pct", 100.0, 0.0, 300.0),
         noise_pct: keys.number("noise_pct", 1.0, 0.0, 50.0),
+        meter_lag_ms: keys.number("meter_lag_ms", 78.0, 50.0, 1500.0),
         dropouts_per_h: keys.number("dropouts_per_h", 1.0, 0.0, 3600.0),
         speed_changes: keys.choice("speed_changes", &[("no", false), ("yes", true)]),
         annotations: keys.choice("annotations", &[("yes", true), ("no", false)]),

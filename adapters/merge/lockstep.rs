@@ -37,24 +37,38 @@ impl Lockstep {
     /// Reads everything that has arrived by `now_ns` and samples at `now_ns` minus the delay. `false` when every source
     /// has ended and there is nothing left to read; the sample is written all the same.
     pub fn sample_into(&mut self, sample: &mut Sample, now_ns: TimeNs) -> bool {
+        self.sample_seen_into(sample, now_ns, |_, _| {})
+    }
+
+    /// The same, and shows every poll to `see` before the merge takes it: its readings, or that it failed (`None`).
+    pub fn sample_seen_into(
+        &mut self,
+        sample: &mut Sample,
+        now_ns: TimeNs,
+        mut see: impl FnMut(SourceId, Option<&[Reading]>),
+    ) -> bool {
         let mut alive = false;
         for index in 0..self.sources.len() {
-            alive |= self.read_due(index, now_ns);
+            alive |= self.read_due(index, now_ns, &mut see);
         }
         let at_ns = now_ns.saturating_sub(self.merge.delay_ns());
         self.merge.sample_into(sample, at_ns);
         alive
     }
 
-    fn read_due(&mut self, index: usize, now_ns: TimeNs) -> bool {
+    fn read_due(&mut self, index: usize, now_ns: TimeNs, see: &mut impl FnMut(SourceId, Option<&[Reading]>)) -> bool {
         let feed = &mut self.sources[index];
         while let Some(at_ns) = feed.source.next_ns() {
             if at_ns > now_ns {
                 return true;
             }
             match feed.source.pull(&mut self.readings) {
-                Ok(()) => feed.last_error = None,
+                Ok(()) => {
+                    see(SourceId(index), Some(&self.readings));
+                    feed.last_error = None;
+                }
                 Err(error) => {
+                    see(SourceId(index), None);
                     self.merge.fail(SourceId(index), at_ns, &error);
                     feed.last_error = Some(error);
                     if feed.source.next_ns() == Some(at_ns) {
@@ -71,6 +85,11 @@ impl Lockstep {
     #[must_use]
     pub fn last_error(&self, source: SourceId) -> Option<&SourceError> {
         self.sources.get(source.0).and_then(|feed| feed.last_error.as_ref())
+    }
+
+    /// The merge, to be told of the lag of a source.
+    pub fn merge_mut(&mut self) -> &mut Merge {
+        &mut self.merge
     }
 
     /// The merge, for its counts.

@@ -8,6 +8,9 @@
 //! A source may deliver late and out of order: a reading that still matters is put in its place, one that does not is
 //! counted and dropped. Where a clock steps, readings stamped by the wrong clock are dropped and counted.
 //!
+//! A source whose readings were true some time before their stamps (a meter that averages and transmits) is told so by
+//! [`Merge::set_lag_ns`]; its stamps are shifted and every tick looks back further by as much.
+//!
 //! The merge is pure: time is an argument, the same readings and ticks give the same samples. It allocates nothing per
 //! tick once its rings have their size.
 
@@ -72,11 +75,16 @@ pub enum Delay {
 /// [`Delay::SlowestPeriod`] waits no longer than this for a slow source; its values are then held between readings.
 pub const DELAY_MAX: Duration = Duration::from_secs(1);
 
+/// A source is never shifted by more than this.
+pub const LAG_MAX: Duration = Duration::from_secs(2);
+
 /// No gap of more than this many periods of a source is bridged.
 pub const GAP_PERIODS: i64 = 2;
 
 struct SourceState {
     pace: Pace,
+    /// Its readings were true so much before their stamps.
+    lag_ns: i64,
     newest_ns: TimeNs,
     failure: Option<Failure>,
     counts: MergeCounts,
@@ -130,6 +138,7 @@ impl Merge {
                 .iter()
                 .map(|plan| SourceState {
                     pace: pace(plan),
+                    lag_ns: 0,
                     newest_ns: TimeNs::MIN,
                     failure: None,
                     counts: MergeCounts::default(),
@@ -158,10 +167,25 @@ impl Merge {
         }
     }
 
-    /// How far back to look: sample at `now - delay_ns`.
+    /// How far back to look: sample at `now - delay_ns`. The lag of the latest source comes on top.
     #[must_use]
     pub fn delay_ns(&self) -> i64 {
-        self.delay_ns
+        self.delay_ns + self.sources.iter().map(|state| state.lag_ns).fold(0, i64::max)
+    }
+
+    /// What this source says from now on was true so much before its stamps (behind them where negative). Whoever changes
+    /// it does so slowly, by less than the time that passes; beyond [`LAG_MAX`] it is cut off.
+    pub fn set_lag_ns(&mut self, source: SourceId, lag_ns: i64) {
+        let most_ns = nanoseconds(LAG_MAX);
+        if let Some(state) = self.sources.get_mut(source.0) {
+            state.lag_ns = lag_ns.clamp(-most_ns, most_ns);
+        }
+    }
+
+    /// The lag of a source, ns.
+    #[must_use]
+    pub fn lag_ns(&self, source: SourceId) -> i64 {
+        self.sources.get(source.0).map_or(0, |state| state.lag_ns)
     }
 
     /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
@@ -179,7 +203,7 @@ impl Merge {
             state.counts.unannounced += 1;
             return;
         };
-        let mid_ns = reading.stamp.mid_ns;
+        let mid_ns = reading.stamp.mid_ns - state.lag_ns;
         if let Some(failure) = state.failure.as_mut().filter(|failure| failure.since_ns < mid_ns) {
             failure.until_ns.get_or_insert(mid_ns);
         }
@@ -199,7 +223,8 @@ impl Merge {
     pub fn fail(&mut self, source: SourceId, at_ns: TimeNs, error: &SourceError) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
         state.counts.failures += 1;
-        let new = Failure { after_ns: state.newest_ns, since_ns: at_ns, until_ns: None, reason: error.absence() };
+        let since_ns = at_ns - state.lag_ns;
+        let new = Failure { after_ns: state.newest_ns, since_ns, until_ns: None, reason: error.absence() };
         let going_on = state.failure.filter(|failure| failure.until_ns.is_none());
         state.failure = Some(going_on.map_or(new, |failure| Failure { reason: new.reason, ..failure }));
     }

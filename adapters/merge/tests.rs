@@ -185,3 +185,31 @@ fn a_slower_source_than_promised_can_be_told() {
     merge.push(SourceId(0), number("spindle_speed_rpm", 0, 100.0));
     assert_eq!(speed(&mut merge, 600), Ok(100.0));
 }
+
+#[test]
+fn a_source_that_lags_is_put_back_to_its_time() {
+    let power = ChannelId::of("spindle_power_w").expect("in the table");
+    let plan = SourcePlan { name: "meter".to_owned(), channels: vec![power], period: Duration::from_millis(100) };
+    let mut merge = Merge::new(&[plan], Delay::SlowestPeriod);
+    let plain_ns = merge.delay_ns();
+    let (mut sample, mut last_ns, mut error) = (Sample::empty(0), i64::MIN, f64::INFINITY);
+    for tick in 1..=100_i64 {
+        let now_ns = tick * 100_000_000;
+        merge.set_lag_ns(SourceId(0), (tick * 5_000_000).min(240_000_000));
+        // The meter says at t what was true 240 ms before: a ramp of 1 W per ms.
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let said_w = (now_ns / 1_000_000 - 240) as f64;
+        merge.push(SourceId(0), Reading::number(power, Stamp::exact(now_ns), said_w));
+        let at_ns = now_ns - merge.delay_ns();
+        assert!(at_ns > last_ns, "ticks keep their order");
+        last_ns = at_ns;
+        merge.sample_into(&mut sample, at_ns);
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let truth_w = at_ns as f64 / 1e6;
+        error = sample.number(power).map_or(f64::INFINITY, |found_w| (found_w - truth_w).abs());
+    }
+    assert_eq!((merge.delay_ns() - plain_ns, merge.lag_ns(SourceId(0))), (240_000_000, 240_000_000));
+    assert!(error < 1e-6, "{error} W");
+    merge.set_lag_ns(SourceId(0), i64::MIN);
+    assert_eq!(merge.lag_ns(SourceId(0)), -2_000_000_000, "bounded");
+}

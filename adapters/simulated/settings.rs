@@ -169,6 +169,13 @@ impl MeterSettings {
     pub fn mean_lag(&self) -> Duration {
         self.device.mean_age() + self.device.refresh / 2
     }
+
+    /// The same meter with this lag against that controller, or the least one that its window allows.
+    #[must_use]
+    pub fn lagging(mut self, lag: Duration, controller: &DeviceSettings) -> Self {
+        self.device.latency = (lag + controller.mean_age()).saturating_sub(self.device.refresh);
+        self
+    }
 }
 
 impl Default for MeterSettings {
@@ -215,7 +222,8 @@ impl SimulatedSettings {
                 friction: target.change_friction_pct / 100.0,
             },
             ladder: LadderSettings { rule: target.ladder, ..base.ladder },
-            meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter },
+            meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter }
+                .lagging(Duration::from_secs_f64(target.meter_lag_ms / 1e3), &base.controller),
             ..base
         }
     }

@@ -115,7 +115,13 @@ impl Worker {
     /// Gives every waiting poll to the merge, and tells it when the source keeps a slower pace than it promised.
     /// Returns how many polls there were.
     pub fn drain_into(&self, merge: &mut Merge, source: SourceId) -> usize {
+        self.drain_seen_into(merge, source, |_| {})
+    }
+
+    /// The same, and shows every poll to `see` before the merge takes it.
+    pub fn drain_seen_into(&self, merge: &mut Merge, source: SourceId, mut see: impl FnMut(&Poll)) -> usize {
         let polls = self.drain(|poll| {
+            see(poll);
             merge.push_all(source, &mut poll.readings);
             if let Some(error) = &poll.error {
                 merge.fail(source, poll.ended_ns, error);

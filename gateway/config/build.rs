@@ -2,7 +2,9 @@
 
 use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
-use super::{Config, Gate, GateMode, Gateway, History, Http, Log, Operations, Scripts, Source, Twin};
+use super::{
+    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Http, Log, Operations, Scripts, Source, Twin,
+};
 use crate::log::LogFormat;
 use adapters::channel::nearest;
 use rules::physics::explain::Language;
@@ -16,6 +18,10 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     check_gate(reading);
     let gateway = gateway(reading, base)?;
     Some(Config {
+        alignment: Alignment {
+            spindle_power: alignment_use(&text(reading, "alignment", "spindle_power")?),
+            total_power: alignment_use(&text(reading, "alignment", "total_power")?),
+        },
         scripts: scripts(reading, &gateway.data_dir)?,
         operations: Operations { path: text(reading, "operations", "path").map(|path| base.join(path)) },
         gate: gate(reading)?,
@@ -26,6 +32,14 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         gateway,
         sources: sources?,
     })
+}
+
+fn alignment_use(word: &str) -> AlignmentUse {
+    match word {
+        "off" => AlignmentUse::Off,
+        "merge" => AlignmentUse::Merge,
+        _ => AlignmentUse::Show,
+    }
 }
 
 fn log(reading: &Reading<'_>) -> Option<Log> {

@@ -66,6 +66,7 @@ const fn section(name: &'static str, en: &'static str) -> Section {
 pub const SECTIONS: &[Section] = &[
     section("gateway", "the box itself"),
     Section { name: "source", repeated: true, en: "one controller or meter; write the section once for each" },
+    section("alignment", "one time base: how late each power meter is against the controller"),
     section("scripts", "the rules that the integrator edits"),
     section("operations", "how each stretch of an NC program cuts, which no controller can be asked for"),
     section("gate", "what may be written to the machine"),
@@ -139,6 +140,20 @@ pub const KEYS: &[Key] = &[
         Default("3.0"),
         "A poll that takes longer has failed",
         "轮询超时（秒）",
+    ),
+    key(
+        ("alignment", "spindle_power"),
+        OneOf(&["off", "show", "merge"]),
+        Default("\"show\""),
+        "Lag of the source of spindle_power_w behind the spindle speed: show it, or also put its readings back by it",
+        "主轴功率计的滞后：off 不估计，show 仅显示，merge 用于校正",
+    ),
+    key(
+        ("alignment", "total_power"),
+        OneOf(&["off", "show", "merge"]),
+        Default("\"show\""),
+        "The same for the source of total_power_w, where that is another one",
+        "整机功率计的滞后",
     ),
     key(
         ("scripts", "directory"),

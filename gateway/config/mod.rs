@@ -37,6 +37,8 @@ pub struct Config {
     pub gateway: Gateway,
     /// At least one source.
     pub sources: Vec<Source>,
+    /// One time base for controller and meters.
+    pub alignment: Alignment,
     /// The scripts.
     pub scripts: Scripts,
     /// How each stretch of an NC program cuts.
@@ -77,6 +79,38 @@ pub struct Source {
     pub period: Option<Duration>,
     /// A poll that takes longer has failed.
     pub deadline: Duration,
+}
+
+/// What is done with the lag between the controller and a meter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AlignmentUse {
+    /// It is not looked for.
+    Off,
+    /// It is shown.
+    Show,
+    /// It is shown, and the meter's readings are put back by it.
+    Merge,
+}
+
+impl AlignmentUse {
+    /// The word in the configuration and in the status.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Show => "show",
+            Self::Merge => "merge",
+        }
+    }
+}
+
+/// `[alignment]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Alignment {
+    /// For the source of `spindle_power_w`.
+    pub spindle_power: AlignmentUse,
+    /// For the source of `total_power_w`, where that is another one.
+    pub total_power: AlignmentUse,
 }
 
 /// `[scripts]`.

@@ -3,6 +3,7 @@
 
 use super::Shared;
 use super::problem::ApiProblem;
+use crate::alignment::AlignmentStatus;
 use crate::status::{Shown, Status};
 use axum::extract::State;
 use axum::http::header;
@@ -126,6 +127,25 @@ fn sources(page: &mut Page, status: &Status) {
     page.family("cncgw_source_round_trip_seconds", "gauge", "From asking to answer, median", trip);
 }
 
+fn alignment(page: &mut Page, status: &Status) {
+    let each = |value: fn(&AlignmentStatus) -> Option<f64>| {
+        let of = |one: &AlignmentStatus| Some((label("power", one.power), value(one)?));
+        status.alignment.iter().filter_map(of).collect::<Vec<_>>()
+    };
+    let known = each(|one| Some(f64::from(u8::from(one.lag_s.is_some()))));
+    page.family("cncgw_meter_lag_known", "gauge", "1 while the lag of the meter behind the controller is known", known);
+    let lag = each(|one| one.lag_s);
+    page.family("cncgw_meter_lag_seconds", "gauge", "How much later the meter is than the controller", lag);
+    let width = each(|one| one.uncertainty_s);
+    page.family("cncgw_meter_lag_uncertainty_seconds", "gauge", "Half the 95 % interval of the lag", width);
+    let window = each(|one| one.window_s);
+    page.family("cncgw_meter_window_seconds", "gauge", "How long the meter averages", window);
+    let drift = each(|one| one.drift_ppm.map(|ppm| 1e-6 * ppm));
+    page.family("cncgw_meter_lag_drift_ratio", "gauge", "Change of the lag over time", drift);
+    let applied = each(|one| Some(one.applied_s));
+    page.family("cncgw_meter_lag_applied_seconds", "gauge", "What the meter's readings are put back by", applied);
+}
+
 fn machine(page: &mut Page, status: &Status) {
     let current = [(label("state", status.state.word), 1.0)];
     page.family("cncgw_machine_state", "gauge", "1 for the state the machine is in", current);
@@ -181,6 +201,7 @@ pub fn render(status: &Status) -> String {
     machine(&mut page, status);
     quantities(&mut page, status);
     sources(&mut page, status);
+    alignment(&mut page, status);
     own(&mut page, status);
     page.0
 }

@@ -18,7 +18,7 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 7] = [
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 16] = [
+const NO_ESTIMATES: [(&str, &str, &str); 22] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -34,6 +34,12 @@ const NO_ESTIMATES: [(&str, &str, &str); 16] = [
     ("not_observable", "wear cannot be seen in this cut", "此切削中不可观测"),
     ("not_cutting", "nothing is being cut", "未切削"),
     ("output_missing", "the measured value is missing", "缺少测量值"),
+    ("too_few_transients", "too few changes of spindle speed without cutting", "未切削时的主轴变速次数不足"),
+    ("unexplained", "the speed does not explain this power", "转速无法解释该功率"),
+    ("too_slow", "the speed changes too slowly", "主轴变速过慢"),
+    ("ambiguous", "two lags explain the power alike", "存在两个同样合理的滞后"),
+    ("too_wide", "not known closely enough", "不确定度过大"),
+    ("shown_only", "not applied, only shown", "仅显示，未校正"),
     ("warming_up", "the model has not seen enough yet", "模型数据尚不足"),
 ];
 

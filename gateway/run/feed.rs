@@ -1,9 +1,10 @@
 //! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
 
+use crate::alignment::Alignment;
 use crate::status::{FactStatus, Shown, SourceStatus};
 use adapters::clock::TimeNs;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
-use adapters::worker::{Worker, WorkerState, WorkerStats};
+use adapters::worker::{Poll, Worker, WorkerState, WorkerStats};
 use adapters::{Fact, FactValue, Sample, SourceError};
 use std::time::Duration;
 
@@ -15,6 +16,8 @@ pub enum Feed {
         workers: Vec<Worker>,
         /// Their readings.
         merge: Merge,
+        /// Lag of each meter.
+        alignment: Alignment,
     },
     /// Sources that bring their own time.
     Stepped {
@@ -22,6 +25,8 @@ pub enum Feed {
         lockstep: Lockstep,
         /// Name and period of each source.
         sources: Vec<(String, Duration)>,
+        /// Lag of each meter.
+        alignment: Alignment,
     },
 }
 
@@ -29,14 +34,35 @@ impl Feed {
     /// Samples at the tick `now_ns` (minus the merge's delay). `false` when every source has come to its end.
     pub fn sample_into(&mut self, sample: &mut Sample, now_ns: TimeNs) -> bool {
         match self {
-            Self::Threads { workers, merge } => {
+            Self::Threads { workers, merge, alignment } => {
                 for (index, worker) in workers.iter().enumerate() {
-                    worker.drain_into(merge, SourceId(index));
+                    let source = SourceId(index);
+                    let see = |poll: &Poll| alignment.see(source, poll.error.is_none().then_some(&poll.readings));
+                    worker.drain_seen_into(merge, source, see);
                 }
+                alignment.step(now_ns, merge);
                 merge.sample_into(sample, now_ns.saturating_sub(merge.delay_ns()));
                 !workers.iter().all(Worker::is_finished)
             }
-            Self::Stepped { lockstep, .. } => lockstep.sample_into(sample, now_ns),
+            Self::Stepped { lockstep, alignment, .. } => {
+                alignment.step(now_ns, lockstep.merge_mut());
+                lockstep.sample_seen_into(sample, now_ns, |source, readings| alignment.see(source, readings))
+            }
+        }
+    }
+
+    /// Lag of each meter.
+    #[must_use]
+    pub fn alignment(&self) -> &Alignment {
+        match self {
+            Self::Threads { alignment, .. } | Self::Stepped { alignment, .. } => alignment,
+        }
+    }
+
+    /// Lag of each meter, to be told what the machine does.
+    pub fn alignment_mut(&mut self) -> &mut Alignment {
+        match self {
+            Self::Threads { alignment, .. } | Self::Stepped { alignment, .. } => alignment,
         }
     }
 
@@ -44,12 +70,12 @@ impl Feed {
     #[must_use]
     pub fn status(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
         match self {
-            Self::Threads { workers, merge } => {
+            Self::Threads { workers, merge, .. } => {
                 let each = workers.iter().enumerate();
                 each.map(|(i, worker)| of_worker(worker.name(), &worker.stats(now_ns), merge.counts(SourceId(i))))
                     .collect()
             }
-            Self::Stepped { lockstep, sources } => {
+            Self::Stepped { lockstep, sources, .. } => {
                 let each = sources.iter().enumerate();
                 each.map(|(i, (name, period))| {
                     of_step(name, *period, lockstep.last_error(SourceId(i)), lockstep.merge().counts(SourceId(i)))

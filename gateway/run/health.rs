@@ -4,6 +4,7 @@
 use super::clock::{BoxClock, ClockStep};
 use super::feed::Feed;
 use super::keep::Kept;
+use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
@@ -37,7 +38,9 @@ pub struct Health {
     saved: Instant,
     day: Option<i64>,
     stores: bool,
-    /// Values that are stored beside those of the pipeline.
+    /// The lags of the meters, stored beside the values of the pipeline.
+    lags: [ExtraValue<'static>; alignment::SERIES],
+    /// Values that are stored after these.
     beside: Option<[ExtraValue<'static>; 2]>,
 }
 
@@ -63,6 +66,7 @@ impl Health {
             saved: Instant::now(),
             day: None,
             stores,
+            lags: [ExtraValue::Missing("not_yet"); alignment::SERIES],
             beside: None,
         }
     }
@@ -92,7 +96,16 @@ impl Health {
         self.stores
     }
 
-    /// From now on these values are stored with every sample, after those of the pipeline.
+    /// From now on these lags are stored with every sample, after the values of the pipeline, and what has happened to
+    /// them is remembered.
+    pub fn aligned(&mut self, at_ns: TimeNs, alignment: &mut Alignment) {
+        self.lags = alignment.values();
+        for notice in alignment.take_notices() {
+            self.event(at_ns, "alignment", &notice);
+        }
+    }
+
+    /// From now on these values are stored with every sample, after all others.
     pub fn beside(&mut self, values: [ExtraValue<'static>; 2]) {
         self.beside = Some(values);
     }
@@ -228,10 +241,8 @@ fn span(ns: i64) -> String {
 
 impl Store for Health {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
-        match self.beside {
-            Some(beside) => self.kept.sample(sample, &[extras, &beside].concat()),
-            None => self.kept.sample(sample, extras),
-        }
+        let beside: &[ExtraValue<'_>] = self.beside.as_ref().map_or(&[], |beside| beside);
+        self.kept.sample(sample, &[extras, &self.lags, beside].concat());
     }
 
     fn record(&mut self, record: Record) {

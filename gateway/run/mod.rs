@@ -14,6 +14,7 @@ pub mod tick;
 pub mod twin;
 pub mod wear;
 
+use crate::alignment;
 use crate::cli::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control;
@@ -120,7 +121,7 @@ fn ticker(
     let (scripts, watched) = rules::load(config);
     let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
-    let beside = [pipeline.series(), beside].concat();
+    let beside = [pipeline.series(), alignment::series(), beside].concat();
     let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();

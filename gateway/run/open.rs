@@ -2,7 +2,8 @@
 
 use super::feed::Feed;
 use super::pace::Pace;
-use crate::config::Config;
+use crate::alignment::{Alignment, Patience};
+use crate::config::{self, Config};
 use crate::waveform::SpindleCurrent;
 use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
@@ -93,7 +94,8 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     if !problems.is_empty() {
         return Err(problems);
     }
-    let feed = threads(found, clock).map_err(|error| vec![format!("no thread for a source: {error}")])?;
+    let feed =
+        threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = Pace::on_clock(clock.clone(), period(config));
     Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
 }
@@ -109,7 +111,11 @@ pub(crate) fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenEr
     Ok(Opened { sources, actuator: None, simulated: None, refused: Refused::default() })
 }
 
-fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Clock>) -> std::io::Result<Feed> {
+fn threads(
+    sources: Vec<(Box<dyn Source>, WorkerSettings)>,
+    clock: &Arc<dyn Clock>,
+    alignment: &config::Alignment,
+) -> std::io::Result<Feed> {
     let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
         let plan = SourcePlan::of(source.as_ref());
         SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
@@ -117,7 +123,8 @@ fn threads(sources: Vec<(Box<dyn Source>, WorkerSettings)>, clock: &Arc<dyn Cloc
     let plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
     let merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
-    Ok(Feed::Threads { workers: sources.into_iter().map(start).collect::<Result<_, _>>()?, merge })
+    let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
+    Ok(Feed::Threads { workers, merge, alignment: Alignment::of(&plans, alignment, Patience::GoesOn) })
 }
 
 fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
@@ -137,7 +144,9 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
         return Err(problems);
     }
     let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
-    let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names };
+    let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
+    let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
+    let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
     let pace = Pace::stepped(speed.factor(), start_ns, period(config));
     Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
 }

@@ -94,6 +94,8 @@ impl Ticker {
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
             let inferred = *self.pipeline.infer(&sample);
+            self.feed.alignment_mut().told(sample.at_ns, inferred.state);
+            self.health.aligned(sample.at_ns, self.feed.alignment_mut());
             self.pipeline.inform(self.wear.step(&sample, &inferred, &mut self.health));
             self.pipeline.decide(&sample, &mut self.health);
             let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
@@ -163,6 +165,7 @@ impl Ticker {
             parts: self.pipeline.parts().finished(),
             gate: report::gate(&self.pipeline, self.commands.written_pct()),
             sources: self.feed.status(now_ns),
+            alignment: self.feed.alignment().status(),
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
             wear: self.wear.status(),

@@ -115,7 +115,15 @@ function showCards() {
     const line = row(source.name, `${text("period")} ${number(source.period_s)} s`, source.error ?? figures.join(" · "), { dot: source.error ? "bad" : "good", bad: Boolean(source.error) });
     line.title = (source.facts ?? []).map((fact) => `${fact.name}: ${typeof fact.value === "number" ? number(fact.value) : fact.value}`).join("\n");
     return line;
-  }), text("none"));
+  }).concat(status.alignment.map((pair) => {
+    const milliseconds = (seconds) => number(Math.round(seconds * 1000));
+    const shown = pair.missing ? reason(pair.missing) : `${milliseconds(pair.lag_s)} ± ${milliseconds(pair.uncertainty_s)} ms`;
+    const more = pair.missing ? pair.why : `${text("window")} ${milliseconds(pair.window_s)} ms` + (pair.drift_ppm === null ? "" : ` · ${text("drift")} ${number(pair.drift_ppm)} ± ${number(pair.drift_uncertainty_ppm)} ppm`);
+    const used = pair.use === "merge" ? ` · ${text("putBack")} ${milliseconds(pair.applied_s)} ms` : "";
+    const line = row(`${text("meterLag")} (${name(pair.power)})`, shown, more + used);
+    line.title = `${pair.controller} → ${pair.meter}`;
+    return line;
+  })), text("none"));
   filled("scripts", status.scripts.map((script) => {
     const line = row(script.file, script.version, text(script.condition), { dot: CONDITIONS[script.condition] ?? "warn", bad: CONDITIONS[script.condition] === "bad" });
     if (script.error) line.append(make("pre", script.condition === "waiting" ? "error soft" : "error", script.error));

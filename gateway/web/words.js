@@ -16,7 +16,7 @@ const TEXTS = {
     bearing_temperature_c: "Bearing",
     twin: "Simulation beside the machine", expected: "Expected", residual: "Recorded minus expected", learning: "learning what is usual", watching: "watched, usual", differing: "differs",
     regime_standby: "Standstill", regime_idle: "Idling", regime_cutting: "Cutting", regime_moving: "Moving", diagnosing: "Diagnosis under way", diagnosis: "Diagnosis",
-    none: "–", lag: "delay", running: "in charge", waiting: "in charge, waiting for a value", reverted: "failed: the version before it is in charge", suspended: "failed: asks for nothing until it is changed", refused: "refused", because: "because", missing: "no value", decisions: "Latest decisions",
+    none: "–", meterLag: "Lag of the meter", window: "averages over", drift: "drift", putBack: "readings put back by", lag: "delay", running: "in charge", waiting: "in charge, waiting for a value", reverted: "failed: the version before it is in charge", suspended: "failed: asks for nothing until it is changed", refused: "refused", because: "because", missing: "no value", decisions: "Latest decisions",
   },
   zh: {
     state: "机床状态", for: "已持续", power: "功率", alarms: "报警", gate: "进给倍率", sources: "数据源",
@@ -33,7 +33,7 @@ const TEXTS = {
     no_load_power_w: "空载功率", feed_override_pct: "进给倍率", total_power_w: "整机功率", bearing_temperature_c: "轴承温度",
     twin: "仿真对照", expected: "仿真值", residual: "实测减仿真", learning: "正在学习正常范围", watching: "监视中，正常范围", differing: "出现偏差",
     regime_standby: "静止", regime_idle: "空转", regime_cutting: "切削", regime_moving: "轴运动", diagnosing: "正在诊断", diagnosis: "诊断结果",
-    none: "–", lag: "延迟", running: "生效中", waiting: "生效中，等待数值", reverted: "运行出错：仍由上一版本控制", suspended: "运行出错：修改前不再请求", refused: "未被接受", because: "原因", missing: "无数值", decisions: "最近的决定",
+    none: "–", meterLag: "功率计滞后", window: "平均时间", drift: "漂移", putBack: "已校正", lag: "延迟", running: "生效中", waiting: "生效中，等待数值", reverted: "运行出错：仍由上一版本控制", suspended: "运行出错：修改前不再请求", refused: "未被接受", because: "原因", missing: "无数值", decisions: "最近的决定",
   },
 };
 

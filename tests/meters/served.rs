@@ -14,7 +14,7 @@ impl Drop for Serving {
     }
 }
 
-fn gateway() -> Command {
+pub(super) fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
 }
 
@@ -22,7 +22,7 @@ fn gateway() -> Command {
 fn serve(profile: &str) -> (Serving, String) {
     let at = format!("127.0.0.1:{}", free_port());
     let machine = "simulated://lathe?dropouts_per_h=0&speed=20";
-    let mut command = gateway();
+    let mut command = program();
     command.args(["serve", "modbus", "--listen", &at, "--machine", machine, "--profile", profile]);
     let mut child = command.stdout(Stdio::piped()).spawn().expect("the program starts");
     let mut line = String::new();
@@ -83,11 +83,11 @@ fn the_box_runs_with_two_meters() {
     );
     std::fs::write(&config, text).expect("written");
     let data = directory.path().join("data");
-    let mut run = gateway();
+    let mut run = program();
     run.args(["run", "--config"]).arg(&config).arg("--data-dir").arg(&data).args(["--for", "4"]);
     let output = run.output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let mut query = gateway();
+    let mut query = program();
     query.args(["history", "query", "--from", "-1h", "--channels", "total_power_w,spindle_power_w", "--history"]);
     let output = query.arg(data.join("history.db")).output().expect("it runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

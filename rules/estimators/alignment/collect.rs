@@ -1,4 +1,4 @@
-//! Transients out of a running machine: kept around every change of speed, never while it cuts.
+//! Transients out of a running machine: kept around every change of speed, without anything that was measured while it cut.
 
 use super::speed::{PowerPoint, SpeedPoint, Transient};
 use std::collections::VecDeque;
@@ -6,8 +6,7 @@ use std::collections::VecDeque;
 /// A transient reaches so far before and behind the change of speed, s.
 const BEFORE_S: f64 = 3.5;
 const BEHIND_S: f64 = 4.5;
-/// A change of speed goes on until it has stood still for so long, s; a longer transient is cut off.
-const STILL_S: f64 = 1.0;
+/// A longer transient is cut off, s.
 const LONGEST_S: f64 = 30.0;
 /// So many transients are kept, the newest; each of so many readings at most.
 const TRANSIENTS_MAX: usize = 24;
@@ -15,6 +14,17 @@ const READINGS_MAX: usize = 4096;
 /// The speed has changed when it moved by this share of itself and by at least so many rpm within half a second.
 const CHANGE_SHARE: f64 = 0.02;
 const CHANGE_RPM: f64 = 20.0;
+/// Power is left out from so long before a cut is noticed to so long behind its end, s: a cut is noticed late, and a meter
+/// shows it with its lag and window.
+const CUT_BEFORE_S: f64 = 1.5;
+const CUT_BEHIND_S: f64 = 2.5;
+/// Marks of cutting that lie closer together than this are one cut, s.
+const CUT_JOIN_S: f64 = 1.0;
+const CUTS_MAX: usize = 64;
+/// Within the change of speed at least this share of the power must be left.
+const LEFT_SHARE: f64 = 0.8;
+/// Nothing is known of a change with a longer gap in it, s.
+const GAP_S: f64 = 1.0;
 
 /// What has been collected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -33,7 +43,8 @@ pub struct Collector {
     speed: VecDeque<SpeedPoint>,
     power: VecDeque<PowerPoint>,
     changed_s: Option<(f64, f64)>,
-    cut_s: f64,
+    /// From and to, the oldest first.
+    cuts: VecDeque<(f64, f64)>,
     kept: VecDeque<Transient>,
     gathered: Gathered,
 }
@@ -42,17 +53,27 @@ impl Collector {
     /// A collector that has seen nothing.
     #[must_use]
     pub fn new() -> Self {
-        Self { cut_s: f64::NEG_INFINITY, ..Self::default() }
+        Self::default()
     }
 
-    /// Takes a reading of the spindle speed; `cutting` when the machine cuts, or might. Readings come in the order of their
-    /// stamps; one that goes back begins anew.
-    pub fn speed(&mut self, point: SpeedPoint, cutting: bool) {
-        if self.speed.back().is_some_and(|last| point.time_s <= last.time_s) {
-            self.forget();
+    /// At this time the machine cut, or may have. Told at every tick at which it does, within four seconds; what was
+    /// measured about then is not used.
+    pub fn cutting(&mut self, time_s: f64) {
+        match self.cuts.back_mut().filter(|cut| (cut.0 - CUT_JOIN_S..=cut.1 + CUT_JOIN_S).contains(&time_s)) {
+            Some(cut) => *cut = (cut.0.min(time_s), cut.1.max(time_s)),
+            None => self.cuts.push_back((time_s, time_s)),
         }
-        if cutting {
-            self.cut_s = point.time_s;
+        if self.cuts.len() > CUTS_MAX {
+            self.cuts.pop_front();
+        }
+    }
+
+    /// Takes a reading of the spindle speed. Readings come in the order of their stamps; one that goes back, or comes after
+    /// a gap, begins anew.
+    pub fn speed(&mut self, point: SpeedPoint) {
+        let since_s = self.speed.back().map(|last| point.time_s - last.time_s);
+        if since_s.is_some_and(|since_s| since_s <= 0.0 || since_s > GAP_S) {
+            self.interrupt();
         }
         let past = self.speed.iter().rev().find(|past| past.time_s <= point.time_s - 0.5).copied();
         let moved = past.is_some_and(|past| changed(past.speed_rpm, point.speed_rpm));
@@ -76,10 +97,6 @@ impl Collector {
 
     /// A source failed: what is half collected is of no use.
     pub fn interrupt(&mut self) {
-        self.forget();
-    }
-
-    fn forget(&mut self) {
         self.speed.clear();
         self.power.clear();
         self.changed_s = None;
@@ -88,28 +105,34 @@ impl Collector {
     /// The change is over and its surroundings are complete.
     fn finish(&mut self, now_s: f64) {
         let Some((from_s, to_s)) = self.changed_s else { return };
-        let over = now_s - to_s > BEHIND_S.max(STILL_S);
         let too_long = now_s - from_s > LONGEST_S;
-        if !(over || too_long) {
+        if !(now_s - to_s > BEHIND_S || too_long) {
             return;
         }
         self.changed_s = None;
-        if self.cut_s >= from_s - BEFORE_S {
-            self.gathered.while_cutting += 1;
-            return;
-        }
         if too_long {
             return;
         }
-        let transient = Transient {
-            speed: self.speed.iter().filter(|point| point.time_s >= from_s - BEFORE_S).copied().collect(),
-            power: self.power.iter().filter(|point| point.time_s >= from_s - BEFORE_S).copied().collect(),
-        };
+        let within = |point: &&PowerPoint| point.time_s >= from_s - BEFORE_S;
+        let free: Vec<PowerPoint> =
+            self.power.iter().filter(within).filter(|point| !self.is_cut(point.time_s)).copied().collect();
+        let of_change =
+            |points: usize, point: &PowerPoint| points + usize::from((from_s..=to_s).contains(&point.time_s));
+        let (all, left) = (self.power.iter().fold(0, of_change), free.iter().fold(0, of_change));
+        if count(left) < LEFT_SHARE * count(all) {
+            self.gathered.while_cutting += 1;
+            return;
+        }
+        let speed = self.speed.iter().filter(|point| point.time_s >= from_s - BEFORE_S).copied().collect();
         if self.kept.len() >= TRANSIENTS_MAX {
             self.kept.pop_front();
         }
-        self.kept.push_back(transient);
+        self.kept.push_back(Transient { speed, power: free });
         self.gathered.new = true;
+    }
+
+    fn is_cut(&self, time_s: f64) -> bool {
+        self.cuts.iter().any(|(from_s, to_s)| (from_s - CUT_BEFORE_S..=to_s + CUT_BEHIND_S).contains(&time_s))
     }
 
     /// What there is; `new` is then false until the next transient.
@@ -127,6 +150,10 @@ impl Collector {
 
 fn changed(from_rpm: f64, to_rpm: f64) -> bool {
     (to_rpm - from_rpm).abs() > CHANGE_RPM.max(CHANGE_SHARE * from_rpm.abs().max(to_rpm.abs()))
+}
+
+fn count(number: usize) -> f64 {
+    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
 }
 
 fn trim<T>(points: &mut VecDeque<T>, time_s: impl Fn(&T) -> f64, from_s: f64) {

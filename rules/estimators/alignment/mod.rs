@@ -18,7 +18,8 @@
 //! | `fit` | the power model at one lag and window, and its residual |
 //! | `profile` | the residual over lag and window, its minimum and its rivals |
 //! | `estimate` | [`align`]: lag, width, drift and window over all transients, or why they cannot be known |
-//! | `collect` | transients out of a running machine, never while it cuts |
+//! | `collect` | transients out of a running machine, without what was measured while it cut |
+//! | `follow` | the lag in force: follows the estimates slowly, stands still while the machine cuts |
 //!
 //! What makes a lag not identifiable is an answer of its own ([`NotIdentifiable`]): no change of speed, changes too slow to
 //! tell delay from level, a model that does not explain the power, a second lag as good as the first.
@@ -30,6 +31,7 @@
 mod collect;
 mod estimate;
 mod fit;
+mod follow;
 mod profile;
 mod speed;
 mod steady;
@@ -40,4 +42,5 @@ mod tests;
 pub use collect::{Collector, Gathered};
 pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, align};
 pub use fit::PowerModel;
+pub use follow::Follower;
 pub use speed::{PowerPoint, SpeedPoint, Transient};

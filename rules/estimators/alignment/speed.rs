@@ -58,10 +58,13 @@ impl Running {
                 let dt_s = (speed[index].time_s - speed[index - 1].time_s).max(0.0);
                 add_levels(&mut sum, krpm[index - 1], krpm[index], dt_s);
                 add_energy(&mut sum, &krpm, index, NOISE_SHARE * top_rpm / 1000.0);
-                if starts(&krpm, index, top_rpm) {
+                let since_s = if starts(&krpm, index, top_rpm) {
                     excess = 1.0;
-                }
-                let left = (-dt_s / tau_s).exp();
+                    running_s(speed, index)
+                } else {
+                    dt_s
+                };
+                let left = (-since_s / tau_s).exp();
                 sum[5] += excess * tau_s * (1.0 - left);
                 excess *= left;
             }
@@ -112,6 +115,17 @@ fn add_energy(sum: &mut [f64; PREDICTORS], krpm: &[f64], index: usize, noise: f6
         change if change < -noise => sum[4] += energy,
         _ => {}
     }
+}
+
+/// How long before this point, the first of a run-up, the run-up began, s: where the energy, put in at the pace of the
+/// interval that follows, was that of the point before. At ten readings a second the excess of a run-up would else begin up
+/// to a tenth of a second too early, and take the lag with it.
+fn running_s(speed: &[SpeedPoint], index: usize) -> f64 {
+    let dt_s = (speed[index].time_s - speed[index - 1].time_s).max(0.0);
+    let Some(next) = speed.get(index + 1) else { return 0.5 * dt_s };
+    let [before, here, behind] = [&speed[index - 1], &speed[index], next].map(|point| point.speed_rpm.powi(2));
+    let pace = (behind - here) / (next.time_s - speed[index].time_s);
+    if pace > 0.0 { ((here - before) / pace).clamp(0.0, dt_s) } else { 0.5 * dt_s }
 }
 
 /// Does a run-up begin with this point?

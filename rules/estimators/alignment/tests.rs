@@ -97,7 +97,10 @@ fn gather(speed: &[SpeedPoint], power: &[PowerPoint], cutting: impl Fn(f64) -> b
         while let Some(earlier) = power.next_if(|power| power.time_s < point.time_s) {
             collector.power(*earlier);
         }
-        collector.speed(*point, cutting(point.time_s));
+        if cutting(point.time_s) {
+            collector.cutting(point.time_s);
+        }
+        collector.speed(*point);
     }
     collector.transients().to_vec()
 }
@@ -186,6 +189,7 @@ fn the_lag_is_found_within_20_ms_in_95_of_100_seeds() {
         let score = score(100, Bench { back, slower: 1.0, changes: 12 });
         told(name, 100, &score);
         assert!(score.near >= 95 && score.covered >= 88 && score.naive_near <= 5);
+        assert!((score.window_s(50) - TRUE_WINDOW_S).abs() <= 0.05, "{}", score.window_s(50));
     }
 }
 
@@ -222,6 +226,17 @@ fn nothing_is_gathered_while_it_cuts() {
         (speed.concat(), power.concat())
     };
     assert!(gather(&speed, &power, |_| true).is_empty());
+}
+
+#[test]
+fn a_cut_behind_a_change_takes_its_power_away_and_leaves_the_change() {
+    let bench = Bench { back: 0.7, slower: 1.0, changes: 2 };
+    let one = transients(3, bench).swap_remove(0);
+    let last_s = one.speed[one.speed.len() - 1].time_s;
+    let kept = gather(&one.speed, &one.power, |time_s| time_s > last_s - 1.0);
+    let latest_s = kept[0].power.iter().map(|point| point.time_s).fold(0.0, f64::max);
+    assert_eq!(kept.len(), 1);
+    assert!(latest_s < last_s - 2.0 && kept[0].power.len() >= 10, "{latest_s} of {last_s}");
 }
 
 #[test]

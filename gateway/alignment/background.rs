@@ -1,0 +1,88 @@
+//! The thread that estimates: one estimate at a time, started with the first one.
+
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::estimators::alignment::{Lag, LagSettings, NotIdentifiable, Transient, align};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+
+/// An answer is taken so long after it was asked for, on the clock of the ticks.
+const TAKEN_AFTER_NS: i64 = 2 * SECOND_NS;
+
+/// What a tick does when the time of an answer has come and it has not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Patience {
+    /// Goes on, and takes it when it comes: time does not wait.
+    GoesOn,
+    /// Waits: time is simulated, and the same readings shall give the same samples.
+    Waits,
+}
+
+/// What is found.
+pub(super) type Found = Result<Lag, NotIdentifiable>;
+
+struct Line {
+    ask: SyncSender<Vec<Transient>>,
+    answers: Receiver<Found>,
+}
+
+/// See the [module](self).
+pub(super) struct Background {
+    patience: Patience,
+    line: Option<Line>,
+    /// For which pair, and when the answer is due.
+    asked: Option<(usize, TimeNs)>,
+}
+
+impl Background {
+    pub(super) fn new(patience: Patience) -> Self {
+        Self { patience, line: None, asked: None }
+    }
+
+    pub(super) fn is_idle(&self) -> bool {
+        self.asked.is_none()
+    }
+
+    /// Asks for an estimate. Without a thread there is none, and the next transient asks again.
+    pub(super) fn ask(&mut self, pair: usize, transients: Vec<Transient>, now_ns: TimeNs) {
+        if self.line.is_none() {
+            self.line = start();
+        }
+        let asked = self.line.as_ref().is_some_and(|line| line.ask.try_send(transients).is_ok());
+        self.asked = asked.then_some((pair, now_ns + TAKEN_AFTER_NS));
+    }
+
+    /// The answer for a pair, when it is due and there.
+    pub(super) fn answer(&mut self, pair: usize, now_ns: TimeNs) -> Option<Found> {
+        let due = self.asked.is_some_and(|(asked, due_ns)| asked == pair && due_ns <= now_ns);
+        let line = self.line.as_ref().filter(|_| due)?;
+        let answer = match self.patience {
+            Patience::Waits => line.answers.recv().map_err(|_| TryRecvError::Disconnected),
+            Patience::GoesOn => line.answers.try_recv(),
+        };
+        match answer {
+            Ok(found) => {
+                self.asked = None;
+                Some(found)
+            }
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                (self.line, self.asked) = (None, None);
+                None
+            }
+        }
+    }
+}
+
+/// The thread ends when nobody asks any more.
+fn start() -> Option<Line> {
+    let (ask, asked) = sync_channel::<Vec<Transient>>(1);
+    let (answer, answers) = sync_channel(1);
+    let estimate = move || {
+        while let Ok(transients) = asked.recv() {
+            if answer.send(align(&transients, &LagSettings::default())).is_err() {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new().name("align".to_owned()).spawn(estimate).ok()?;
+    Some(Line { ask, answers })
+}
