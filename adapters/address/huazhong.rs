@@ -1,12 +1,13 @@
 //! Addresses of Huazhong controllers: `nclink://`, `nclinks://` and `hncnet://`.
 
 use super::keys::Keys;
+use super::meter::{self, WaveformKeep};
 use super::target::{Endpoint, Target, endpoint, library};
 use crate::nclink::mailbox::{Mailbox, Register};
 use std::path::PathBuf;
 
 /// A Huazhong controller behind a broker.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NcLinkTarget {
     /// The broker.
     pub at: Endpoint,
@@ -26,10 +27,14 @@ pub struct NcLinkTarget {
     pub spindle_axis: Option<u32>,
     /// First register of the mailbox for the feed override; without one nothing is ever written.
     pub mailbox: Option<Register>,
+    /// Make the spindle's current out of the device's sample channel?
+    pub sample: bool,
+    /// Keep its raw samples around high currents?
+    pub keep: Option<WaveformKeep>,
 }
 
 /// A Huazhong controller through its vendor's library.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct HncNetTarget {
     /// Where.
     pub at: Endpoint,
@@ -45,6 +50,11 @@ pub struct HncNetTarget {
     pub period_ms: u64,
     /// Run the controller's 1 ms sampling?
     pub sample: bool,
+    /// What a sampled load current of 1 is, A; without it the samples are only counted. It is not published and has to be
+    /// compared once with the load current that is polled.
+    pub sample_scale_a: Option<f64>,
+    /// Keep raw samples of the spindle's current around high ones?
+    pub keep: Option<WaveformKeep>,
     /// First register of the mailbox for the feed override; without one nothing is ever written.
     pub mailbox: Option<Register>,
 }
@@ -55,6 +65,8 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
     let f_channel = keys.number("f_channel", 2560, 0, 65_535);
     let spindle_axis = keys.optional("spindle_axis", 0, 63);
     let mailbox = mailbox(keys);
+    let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
+    let keep = kept(keys, sample, "sample=yes")?;
     let rest = body.strip_prefix("//").unwrap_or(body);
     let (broker, serial) = rest.split_once('/').unwrap_or((rest, ""));
     if serial.is_empty() || serial.contains(['+', '#']) {
@@ -72,6 +84,8 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
         f_channel,
         spindle_axis,
         mailbox,
+        sample,
+        keep,
     }))
 }
 
@@ -89,6 +103,11 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
     };
     let period_ms = keys.number("period_ms", 100, 10, 60_000);
     let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
+    let sample_scale_a = keys.optional("sample_scale_a", 1e-9, 1e3);
+    if sample_scale_a.is_some() && !sample {
+        keys.problem("sample_scale_a counts only with sample=yes".to_owned());
+    }
+    let keep = kept(keys, sample_scale_a.is_some(), "sample=yes&sample_scale_a=A")?;
     let mailbox = mailbox(keys);
     let (at, vendor_library) = (endpoint(body, Some(10001))?, vendor_library?);
     Ok(Target::HncNet(HncNetTarget {
@@ -99,8 +118,19 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
         long_bytes,
         period_ms,
         sample,
+        sample_scale_a,
+        keep,
         mailbox,
     }))
+}
+
+/// `keep=` and `keep_above_a=`, where there are samples to be kept.
+fn kept(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKeep>, String> {
+    let keep = meter::keep(keys)?;
+    if keep.is_some() && !sampled {
+        keys.problem(format!("keep needs samples: write {next} as well"));
+    }
+    Ok(keep)
 }
 
 /// `write=mailbox`, and where it begins.

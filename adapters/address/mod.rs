@@ -129,6 +129,8 @@ mod tests {
             "nclink://broker/SN1?user=u&password_file=/etc/pw&period_ms=50&f_channel=6400&spindle_axis=3",
             "nclinks://broker:8883/SERIAL",
             "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
+            "nclink://broker/SN1?sample=yes&keep=/var/lib/waveforms&keep_above_a=40",
+            "hncnet://cnc?library=x.so&sample=yes&sample_scale_a=0.001",
             "hncnet://cnc?library=x.so&local_host=10.0.0.2&local_port=9090&long_bytes=4&period_ms=200&sample=yes",
             "nclink://broker/SN1?write=mailbox&mailbox=R200",
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",

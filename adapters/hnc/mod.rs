@@ -49,7 +49,7 @@ mod source;
 
 pub use actuator::HncActuator;
 pub use child::child;
-pub use open::open;
+pub use open::{open, open_sampled};
 pub use source::HncSource;
 
 /// What the hidden subcommand calls this child.

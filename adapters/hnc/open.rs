@@ -5,6 +5,7 @@ use super::line::{HncSettings, Line};
 use super::source::HncSource;
 use crate::address::{Address, HncNetTarget};
 use crate::driver::Actuator;
+use crate::nclink::BlockSink;
 use crate::open::{Opened, Refused};
 use std::time::Duration;
 
@@ -14,6 +15,12 @@ const DEADLINE: Duration = Duration::from_millis(4500);
 /// Opens an address; the child is started with the first poll.
 #[must_use]
 pub fn open(address: &Address, target: &HncNetTarget) -> Opened {
+    open_sampled(address, target, None)
+}
+
+/// The same; whole blocks of the controller's sampling go to `sink`.
+#[must_use]
+pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<BlockSink>) -> Opened {
     let line = Line::new(HncSettings {
         name: address.text().to_owned(),
         vendor_library: target.vendor_library.clone(),
@@ -25,7 +32,10 @@ pub fn open(address: &Address, target: &HncNetTarget) -> Opened {
         program: None,
         environment: Vec::new(),
     });
-    let source = HncSource::new(line.clone(), Duration::from_millis(target.period_ms), target.sample);
+    let mut source = HncSource::new(line.clone(), Duration::from_millis(target.period_ms), target.sample);
+    if let Some(sink) = sink {
+        source.on_block(sink);
+    }
     let actuator = target.mailbox.map(|first| Box::new(HncActuator::new(line, first)) as Box<dyn Actuator>);
     Opened { sources: vec![Box::new(source)], actuator, simulated: None, refused: Refused::default() }
 }

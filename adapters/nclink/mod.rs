@@ -21,8 +21,8 @@
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for
 //! all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data, uploaded
 //! each 200 ms) and events arrive in between: they are followed by `track`, which counts missing milliseconds, and whole
-//! blocks go to whoever asked for them with [`NcLinkSource::on_block`]. They make no readings; the values at a tick are
-//! those of the query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an
+//! blocks go to whoever asked for them with [`NcLinkSource::on_block`]: with `sample=yes` the box makes a feature of the spindle's
+//! load current out of them. They make no readings here; the values at a tick are those of the query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an
 //! answer without sense are four different errors. After a broken line the next poll connects anew.
 //!
 //! **Dialects.** Read as they come: `setable` and `settable`, `datatype` and `dataType`, `WARNING` and `WARNNING`; items
@@ -57,6 +57,6 @@ mod track;
 pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
 pub use message::{Answer, Ask, Params};
-pub use open::{NO_TLS, open};
+pub use open::{NO_TLS, open, open_sampled};
 pub use source::{BlockSink, NcLinkSource};
 pub use track::{ChannelTrack, Track};

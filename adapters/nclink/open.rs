@@ -2,7 +2,7 @@
 
 use super::actuator::NcLinkActuator;
 use super::connection::Link;
-use super::source::NcLinkSource;
+use super::source::{BlockSink, NcLinkSource};
 use crate::address::{Address, NcLinkTarget};
 use crate::driver::Actuator;
 use crate::open::{OpenError, Opened, Refused};
@@ -15,12 +15,23 @@ pub const NO_TLS: &str = "this build has no TLS for MQTT; use nclink:// to a bro
 /// # Errors
 /// TLS, which this build does not have; a password file that cannot be read.
 pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
+    open_sampled(address, target, None)
+}
+
+/// The same; whole blocks of its sample channels go to `sink`.
+///
+/// # Errors
+/// See [`open`].
+pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<BlockSink>) -> Result<Opened, OpenError> {
     if target.tls {
         return Err(OpenError::Unsuitable { address: address.text().to_owned(), what: NO_TLS });
     }
     let login = login(target)?;
     let link = Link::of(address.text(), target, login.clone());
-    let source = NcLinkSource::new(address.text(), target, login);
+    let mut source = NcLinkSource::new(address.text(), target, login);
+    if let Some(sink) = sink {
+        source.on_block(sink);
+    }
     let actuator = target.mailbox.map(|first| Box::new(NcLinkActuator::new(link, first)) as Box<dyn Actuator>);
     Ok(Opened { sources: vec![Box::new(source)], actuator, simulated: None, refused: Refused::default() })
 }

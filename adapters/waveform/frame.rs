@@ -12,6 +12,8 @@ const CHANNELS_MAX: usize = 8;
 /// Samples per channel in one frame.
 pub(super) const COUNT_MAX: u16 = 4096;
 const FORMAT: &str = "waveform/1";
+/// Unit of a current that is an amplitude already.
+pub const AMPLITUDE: &str = "A rms";
 
 /// What a stream carries.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,6 +55,12 @@ impl Header {
             scale: vec![scale_a; channels.len()],
             full_scale,
         }
+    }
+
+    /// One current whose amplitude is sampled, not its course: the load current as a drive knows it.
+    #[must_use]
+    pub fn amplitude(rate_hz: f64, scale_a: f64, full_scale: i16) -> Self {
+        Self { unit: AMPLITUDE.to_owned(), ..Self::currents(rate_hz, &["load_current"], scale_a, full_scale) }
     }
 
     /// The header in a line.

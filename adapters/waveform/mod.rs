@@ -16,7 +16,9 @@
 //! | file | what |
 //! |---|---|
 //! | `frame` | the stream, both directions |
-//! | `receiver` | a connection with deadline, gaps, clipping, clock |
+//! | `receiver` | a connection to a stream with its deadline |
+//! | `sampled` | a controller's own sampling (NC-Link, HNC) as the same blocks |
+//! | `intake` | what every stream goes through: gaps, clipping, clock, counts |
 //! | `timebase` | the sampler's clock on the gateway's |
 //! | `producer` | the other side: serves blocks from anything that samples |
 //! | `iio` | a Linux IIO device as a sampler |
@@ -27,16 +29,20 @@
 
 mod frame;
 mod iio;
+mod intake;
 mod producer;
 mod receiver;
 mod recorded;
+mod sampled;
 mod simulated;
 mod timebase;
 
-pub use frame::{Frame, FrameError, Header};
+pub use frame::{AMPLITUDE, Frame, FrameError, Header};
 pub use iio::Iio;
+pub use intake::{Block, Counts};
 pub use producer::{Producer, Sampler};
-pub use receiver::{Block, Counts, Receiver};
+pub use receiver::Receiver;
 pub use recorded::Recorded;
+pub use sampled::SampledCurrent;
 pub use simulated::SimulatedCurrent;
 pub use timebase::TimeBase;

@@ -1,7 +1,7 @@
 //! A connection to a stream, with deadline, gaps, clipping and clock.
 
 use super::frame::{FRAME_HEAD, FrameError, HEADER_MAX, Header, head, samples};
-use super::timebase::TimeBase;
+use super::intake::{Block, Counts, Intake, end_ns, missing};
 use crate::address::Endpoint;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
@@ -11,36 +11,6 @@ use std::time::{Duration, Instant};
 
 /// No block within this time is a failure.
 const DEADLINE: Duration = Duration::from_secs(2);
-
-/// Some samples of every channel, in the header's unit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Block {
-    /// When the first sample was taken, on the gateway's clock.
-    pub first_ns: TimeNs,
-    /// Samples that are missing before this block.
-    pub gap: u64,
-    /// Samples of any channel that were clipped.
-    pub clipped: u32,
-    /// As they came; all channels of one instant together.
-    pub raw: Vec<i16>,
-}
-
-/// What a stream has gone through since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    /// Blocks.
-    pub blocks: u64,
-    /// Instants.
-    pub samples: u64,
-    /// Times at which blocks were missing.
-    pub gaps: u64,
-    /// Instants that were missing.
-    pub missing: u64,
-    /// Clipped samples.
-    pub clipped: u64,
-    /// Connections, the first one included.
-    pub connections: u64,
-}
 
 struct Open {
     stream: TcpStream,
@@ -54,16 +24,14 @@ pub struct Receiver {
     at: Endpoint,
     open: Option<Open>,
     header: Option<Header>,
-    time: TimeBase,
-    counts: Counts,
+    intake: Intake,
 }
 
 impl Receiver {
     /// A receiver that connects at the first read. `name` is the address.
     #[must_use]
     pub fn new(name: &str, at: &Endpoint) -> Self {
-        let (time, counts) = (TimeBase::default(), Counts::default());
-        Self { name: name.to_owned(), at: at.clone(), open: None, header: None, time, counts }
+        Self { name: name.to_owned(), at: at.clone(), open: None, header: None, intake: Intake::default() }
     }
 
     /// What the stream carries, once it has been connected to.
@@ -75,13 +43,13 @@ impl Receiver {
     /// What it has gone through.
     #[must_use]
     pub fn counts(&self) -> Counts {
-        self.counts
+        self.intake.counts
     }
 
     /// How slow the sampler's clock runs, ppm, once known.
     #[must_use]
     pub fn drift_ppm(&self) -> Option<f64> {
-        self.time.drift_ppm()
+        self.intake.drift_ppm()
     }
 
     /// The next block. Blocks for two seconds at most.
@@ -104,8 +72,7 @@ impl Receiver {
         let mut stream = connected.map_err(|error| self.line(&format!("cannot connect: {error}")))?;
         let header = self.header_line(&mut stream, until)?;
         self.header = Some(header.clone());
-        self.time = TimeBase::default();
-        self.counts.connections += 1;
+        self.intake.connected();
         Ok(Open { stream, header, next: None })
     }
 
@@ -133,24 +100,11 @@ impl Receiver {
     }
 
     fn taken(&mut self, open: &mut Open, sequence: u32, first_ns: i64, raw: Vec<i16>, arrived_ns: TimeNs) -> Block {
+        let out_of_turn = open.next.filter(|(wanted, _)| *wanted != sequence);
+        let gap = out_of_turn.map_or(0, |(_, due_ns)| missing(&open.header, due_ns, first_ns).max(1).unsigned_abs());
         let count = raw.len() / open.header.channels.len();
-        let instants = f64::from(u32::try_from(count).unwrap_or(u32::MAX));
-        let end_ns = first_ns.saturating_add(open.header.duration_ns(instants));
-        let gap = open.next.filter(|(wanted, _)| *wanted != sequence).map_or(0, |(_, wanted_ns)| {
-            let sample_ns = open.header.duration_ns(1.0).max(1);
-            ((first_ns.saturating_sub(wanted_ns) + sample_ns / 2) / sample_ns).max(1).unsigned_abs()
-        });
-        open.next = Some((sequence.wrapping_add(1), end_ns));
-        let full = open.header.full_scale.unsigned_abs();
-        let clipped = raw.iter().filter(|sample| sample.unsigned_abs() >= full).count();
-        let clipped = u32::try_from(clipped).unwrap_or(u32::MAX);
-        self.time.push(end_ns, arrived_ns);
-        self.counts.blocks += 1;
-        self.counts.samples += u64::try_from(count).unwrap_or(0);
-        self.counts.gaps += u64::from(gap > 0);
-        self.counts.missing += gap;
-        self.counts.clipped += u64::from(clipped);
-        Block { first_ns: self.time.gateway_ns(first_ns), gap, clipped, raw }
+        open.next = Some((sequence.wrapping_add(1), end_ns(&open.header, first_ns, count)));
+        self.intake.block(&open.header, first_ns, gap, raw, arrived_ns)
     }
 
     fn short(&self, short: Short) -> SourceError {

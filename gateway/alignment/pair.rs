@@ -81,7 +81,12 @@ impl Pair {
 
     /// Takes an answer. The kind and the text of an event when there is something to tell.
     pub(super) fn settle(&mut self, found: Found, now_ns: TimeNs, now_s: f64) -> Option<(&'static str, String)> {
-        self.pause_ns = if found.is_ok() { PAUSE_NS.1 } else { (2 * self.pause_ns).min(PAUSE_NS.1) };
+        self.pause_ns = match &found {
+            Ok(_) => PAUSE_NS.1,
+            // That costs nothing, and the next change of speed may be the one that was missing.
+            Err(NotIdentifiable::TooFewTransients { .. }) => PAUSE_NS.0,
+            Err(_) => (2 * self.pause_ns).min(PAUSE_NS.1),
+        };
         self.due_ns = now_ns + self.pause_ns;
         let aim_s = found.as_ref().ok().and_then(|lag| self.follower.aim(lag, now_s));
         let event = match (&self.found, &found) {

@@ -4,11 +4,10 @@ use super::feed::Feed;
 use super::pace::Pace;
 use crate::alignment::{Alignment, Patience};
 use crate::config::{self, Config};
-use crate::waveform::SpindleCurrent;
 use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
 use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
-use adapters::open::{OpenError, Opened, Refused, open, open_pull};
+use adapters::open::{OpenError, Opened, open, open_pull};
 use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
 use adapters::{Actuator, Address, Pull, Source};
@@ -105,10 +104,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
 /// # Errors
 /// See [`OpenError`].
 pub(crate) fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
-    let Target::Waveform { at, keep } = address.target() else { return open(address, now_ns) };
-    let source = SpindleCurrent::new(address.text(), at, keep.as_ref());
-    let sources: Vec<Box<dyn Source>> = vec![Box::new(source)];
-    Ok(Opened { sources, actuator: None, simulated: None, refused: Refused::default() })
+    crate::waveform::opened(address).unwrap_or_else(|| open(address, now_ns))
 }
 
 fn threads(

@@ -3,7 +3,7 @@
 use super::nanoseconds;
 use adapters::Stamp;
 use adapters::clock::TimeNs;
-use adapters::waveform::{Block, Header};
+use adapters::waveform::{AMPLITUDE, Block, Header};
 use rules::estimators::spindle_current::{Design, Feature, FeatureKind, LowPass, PhaseFeature, Span, ThreePhase};
 
 /// The low-pass of the source of the method, Hz, and its greatest share of the rate.
@@ -13,6 +13,8 @@ const CUTOFF_SHARE: f64 = 0.35;
 const LEAST_SHARE: f64 = 0.002;
 /// A whole period.
 const HALVES: usize = 2;
+/// The window of an amplitude is a period of this, Hz: a tenth of a second.
+const AMPLITUDE_HZ: f64 = 10.0;
 
 enum Phases {
     One(Box<(LowPass, PhaseFeature)>),
@@ -50,9 +52,12 @@ impl Chain {
         let least_a = LEAST_SHARE * f64::from(header.full_scale) * header.scale[0].abs();
         let text = |refusal: rules::estimators::regression::Refusal| refusal.to_string();
         let design = Design::low_pass(CUTOFF_HZ.min(CUTOFF_SHARE * rate_hz), rate_hz).map_err(text)?;
-        let phase = PhaseFeature::new(FeatureKind::Rms, Span::Crossings { least_a }, HALVES, rate_hz).map_err(text)?;
+        // An amplitude passes no zero: its window has a length of its own.
+        let amplitude = header.unit == AMPLITUDE;
+        let span = if amplitude { Span::Known { hz: AMPLITUDE_HZ } } else { Span::Crossings { least_a } };
+        let phase = PhaseFeature::new(FeatureKind::Rms, span, HALVES, rate_hz).map_err(text)?;
         let phases = match (header.channels.len(), header.unit.as_str()) {
-            (1, "A") => Phases::One(Box::new((design.filter(), phase))),
+            (1, "A" | AMPLITUDE) => Phases::One(Box::new((design.filter(), phase))),
             (3, "A") => Phases::Three(Box::new(ThreePhase::new(&design, phase))),
             (channels, unit) => {
                 return Err(format!("{channels} channels in {unit:?}: spindle current is 1 or 3 in \"A\""));
@@ -158,6 +163,16 @@ mod tests {
         assert!((value_a - 10.0).abs() < 0.05, "{value_a}");
         assert!((stamp.mid_ns - 500_000_000).abs() < 20_000_000, "{stamp:?}");
         assert!(chain.unbalance().is_some_and(|unbalance| unbalance < 0.01));
+    }
+
+    #[test]
+    fn an_amplitude_is_its_own_root_mean_square() {
+        let mut chain = Chain::new(&Header::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
+        let mut sums = Sums::default();
+        chain.push(&Block { first_ns: 0, gap: 0, clipped: 0, raw: vec![-1234; 1000] }, &mut sums);
+        let (stamp, value_a) = sums.reading().expect("a second");
+        assert!((value_a - 12.34).abs() < 0.2, "{value_a}");
+        assert!((stamp.mid_ns - 500_000_000).abs() < 60_000_000, "{stamp:?}");
     }
 
     #[test]

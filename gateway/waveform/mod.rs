@@ -1,6 +1,13 @@
 //! Waveforms on their way to the tick: filter and feature make a channel of a stream, raw samples stay around what is
 //! remarkable.
 //!
+//! | file | what |
+//! |---|---|
+//! | `chain` | filter and feature of one stream |
+//! | `features` | blocks in, one value per poll out, whoever sends the blocks |
+//! | `keep` | raw samples around what is remarkable |
+//! | `sampled` | a controller's own sampling (NC-Link, HNC) as such a sender |
+//!
 //! The receiver (`adapters::waveform`) knows nothing of features and the estimator (`rules::estimators::spindle_current`)
 //! nothing of sockets; here they meet, on the source's own thread. Each poll takes every block that has arrived and gives
 //! one `spindle_current_a`: the root mean square over whole periods, mean of the phases, stamped in the middle of the
@@ -8,15 +15,19 @@
 //! anew; a poll with clipped samples has no value, because its value would be too low.
 
 mod chain;
+mod features;
 mod keep;
+mod sampled;
 
-use adapters::address::{Endpoint, WaveformKeep};
+pub use sampled::ControllerSamples;
+
+use adapters::address::{Address, Endpoint, Target, WaveformKeep};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::driver::Fact;
-use adapters::waveform::{Block, Header, Receiver};
-use adapters::{Absence, ChannelId, Reading, Source, SourceError};
-use chain::Chain;
-use keep::Keeper;
+use adapters::open::{OpenError, Opened, Refused};
+use adapters::waveform::Receiver;
+use adapters::{ChannelId, Reading, Source, SourceError};
+use features::Features;
 use std::time::Duration;
 
 /// One value per poll.
@@ -24,13 +35,20 @@ const PERIOD: Duration = Duration::from_millis(100);
 /// A poll that is behind takes at most so many blocks to catch up.
 const BLOCKS_MAX: usize = 512;
 
+/// An address whose samples become a channel only here: a stream, or a controller whose own sampling is wanted. `None` for
+/// every other address.
+#[must_use]
+pub fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
+    let Target::Waveform { at, keep } = address.target() else { return sampled::opened(address) };
+    let source: Box<dyn Source> = Box::new(SpindleCurrent::new(address.text(), at, keep.as_ref()));
+    Some(Ok(Opened { sources: vec![source], actuator: None, simulated: None, refused: Refused::default() }))
+}
+
 /// A stream of spindle current as a source.
 pub struct SpindleCurrent {
     name: String,
     receiver: Receiver,
-    chain: Option<Chain>,
-    keeper: Option<Keeper>,
-    channels: Vec<ChannelId>,
+    features: Features,
 }
 
 impl SpindleCurrent {
@@ -38,57 +56,25 @@ impl SpindleCurrent {
     /// currents.
     #[must_use]
     pub fn new(name: &str, at: &Endpoint, keep: Option<&WaveformKeep>) -> Self {
-        Self {
-            name: name.to_owned(),
-            receiver: Receiver::new(name, at),
-            chain: None,
-            keeper: keep.map(|keep| Keeper::new(&keep.directory, keep.above_a)),
-            channels: ChannelId::of("spindle_current_a").into_iter().collect(),
-        }
+        Self { name: name.to_owned(), receiver: Receiver::new(name, at), features: Features::new(keep) }
     }
 
     /// Takes what has arrived; stops with the block that reaches the beginning of this poll.
-    fn take(&mut self, clock: &dyn Clock) -> Result<Taken, SourceError> {
+    fn take(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         let began_ns = clock.now_ns();
-        let mut taken = Taken::default();
         for _ in 0..BLOCKS_MAX {
             let block = self.receiver.read(clock)?;
             let Some(header) = self.receiver.header().cloned() else { break };
             let instants = block.raw.len() / header.channels.len();
             let length_ns = header.duration_ns(f64::from(u32::try_from(instants).unwrap_or(u32::MAX)));
             let end_ns = block.first_ns + length_ns;
-            self.feed(&header, &block, &mut taken)?;
+            self.features.feed(&self.name, &header, &block)?;
             if end_ns + length_ns >= began_ns {
                 break;
             }
         }
-        Ok(taken)
-    }
-
-    fn feed(&mut self, header: &Header, block: &Block, taken: &mut Taken) -> Result<(), SourceError> {
-        if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.fits(header)) {
-            let chain = Chain::new(header).map_err(|what| self.unsuitable(what))?;
-            self.chain = Some(chain);
-        }
-        let Some(chain) = &mut self.chain else { return Ok(()) };
-        taken.clipped |= block.clipped > 0;
-        let features = chain.push(block, &mut taken.sums);
-        if let Some(keeper) = &mut self.keeper {
-            keeper.push(header, block, features);
-        }
         Ok(())
     }
-
-    fn unsuitable(&self, what: String) -> SourceError {
-        SourceError::Decode { source_name: self.name.clone(), request: "the header of the stream".to_owned(), what }
-    }
-}
-
-/// What the blocks of one poll gave.
-#[derive(Debug, Default)]
-struct Taken {
-    sums: chain::Sums,
-    clipped: bool,
 }
 
 impl Source for SpindleCurrent {
@@ -97,7 +83,7 @@ impl Source for SpindleCurrent {
     }
 
     fn channels(&self) -> &[ChannelId] {
-        &self.channels
+        self.features.channels()
     }
 
     fn period(&self) -> Duration {
@@ -105,38 +91,14 @@ impl Source for SpindleCurrent {
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        let taken = self.take(clock).inspect_err(|_| self.chain = None)?;
-        let found = taken.sums.reading();
-        for channel in &self.channels {
-            match found {
-                Some((stamp, _)) if taken.clipped => {
-                    out.push(Reading::absent(*channel, stamp, Absence::OutOfRange));
-                }
-                Some((stamp, value_a)) => out.push(Reading::number(*channel, stamp, value_a)),
-                None => {}
-            }
-        }
+        self.take(clock).inspect_err(|_| self.features.interrupt())?;
+        out.extend(self.features.reading());
         Ok(())
     }
 
     fn facts(&self) -> Vec<Fact> {
-        #[expect(clippy::cast_precision_loss, reason = "counts of samples stay far below 2^53 for centuries")]
-        let count = |name: &str, count: u64| Fact::number(name, count as f64);
-        let counts = self.receiver.counts();
-        let mut facts = vec![
-            count("waveform_samples", counts.samples),
-            count("waveform_gaps", counts.gaps),
-            count("waveform_missing_samples", counts.missing),
-            count("waveform_clipped_samples", counts.clipped),
-            count("waveform_connections", counts.connections),
-        ];
-        facts.extend(self.receiver.header().map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
-        facts.extend(self.receiver.drift_ppm().map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
-        if let Some(unbalance) = self.chain.as_ref().and_then(Chain::unbalance) {
-            facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
-        }
-        facts.extend(self.keeper.as_ref().map(|keeper| count("waveform_files_kept", keeper.written())));
-        facts
+        let receiver = &self.receiver;
+        self.features.facts(receiver.counts(), receiver.header(), receiver.drift_ppm())
     }
 }
 

@@ -13,6 +13,7 @@ mod hnc;
 #[path = "../support/library.rs"]
 mod library;
 mod nclink;
+mod samples;
 mod sampling;
 mod stand;
 mod whole_box;

@@ -1,0 +1,93 @@
+//! What every stream of spindle current gives, whoever sends it: filter, feature, raw samples around what is remarkable.
+
+use super::chain::{Chain, Sums};
+use super::keep::Keeper;
+use adapters::address::WaveformKeep;
+use adapters::driver::Fact;
+use adapters::waveform::{Block, Counts, Header};
+use adapters::{Absence, ChannelId, Reading, SourceError};
+
+/// Blocks in, one reading of `spindle_current_a` out whenever it is asked for.
+pub(super) struct Features {
+    chain: Option<Chain>,
+    keeper: Option<Keeper>,
+    channels: Vec<ChannelId>,
+    sums: Sums,
+    clipped: bool,
+}
+
+impl Features {
+    /// `keep` says whether raw samples stay around high currents.
+    pub(super) fn new(keep: Option<&WaveformKeep>) -> Self {
+        Self {
+            chain: None,
+            keeper: keep.map(|keep| Keeper::new(&keep.directory, keep.above_a)),
+            channels: ChannelId::of("spindle_current_a").into_iter().collect(),
+            sums: Sums::default(),
+            clipped: false,
+        }
+    }
+
+    pub(super) fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    /// Takes a block. Behind a gap, and with another header, filter and feature begin anew.
+    ///
+    /// # Errors
+    /// [`SourceError::Decode`]: a stream that is no spindle current.
+    pub(super) fn feed(&mut self, source_name: &str, header: &Header, block: &Block) -> Result<(), SourceError> {
+        if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.fits(header)) {
+            let unsuitable = |what| SourceError::Decode {
+                source_name: source_name.to_owned(),
+                request: "the header of the stream".to_owned(),
+                what,
+            };
+            self.chain = Some(Chain::new(header).map_err(unsuitable)?);
+        }
+        let Some(chain) = &mut self.chain else { return Ok(()) };
+        self.clipped |= block.clipped > 0;
+        let feature_a = chain.push(block, &mut self.sums);
+        if let Some(keeper) = &mut self.keeper {
+            keeper.push(header, block, feature_a);
+        }
+        Ok(())
+    }
+
+    /// The stream is interrupted: what comes next has nothing to do with what was.
+    pub(super) fn interrupt(&mut self) {
+        (self.chain, self.sums, self.clipped) = (None, Sums::default(), false);
+    }
+
+    /// The value of the blocks since the last one, where they give one. With a clipped sample among them there is none,
+    /// because it would be too low.
+    pub(super) fn reading(&mut self) -> Option<Reading> {
+        let (sums, clipped) = (std::mem::take(&mut self.sums), std::mem::take(&mut self.clipped));
+        let (channel, (stamp, value_a)) = (*self.channels.first()?, sums.reading()?);
+        Some(if clipped {
+            Reading::absent(channel, stamp, Absence::OutOfRange)
+        } else {
+            Reading::number(channel, stamp, value_a)
+        })
+    }
+
+    /// What is known of the stream.
+    pub(super) fn facts(&self, counts: Counts, header: Option<&Header>, drift_ppm: Option<f64>) -> Vec<Fact> {
+        #[expect(clippy::cast_precision_loss, reason = "counts of samples stay far below 2^53 for centuries")]
+        let count = |name: &str, count: u64| Fact::number(name, count as f64);
+        let mut facts = vec![
+            count("waveform_samples", counts.samples),
+            count("waveform_gaps", counts.gaps),
+            count("waveform_missing_samples", counts.missing),
+            count("waveform_clipped_samples", counts.clipped),
+            count("waveform_connections", counts.connections),
+        ];
+        facts.extend(header.map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
+        facts.extend(drift_ppm.map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
+        if let Some(unbalance) = self.chain.as_ref().and_then(Chain::unbalance) {
+            facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
+        }
+        facts.extend(self.keeper.as_ref().map(|keeper| count("waveform_files_kept", keeper.written())));
+        facts
+    }
+}

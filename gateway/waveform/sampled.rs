@@ -1,0 +1,148 @@
+//! A controller's own 1 ms sampling of the spindle's load current, on the way of every stream.
+//!
+//! The driver of the controller hands over whole blocks as they come (`on_block`); they wait in a bounded queue for this
+//! source, which has a thread and a pace of its own: the controller uploads every 200 ms, and what it samples is merged
+//! before what is polled of the same current.
+
+use super::features::Features;
+use adapters::address::{Address, HncNetTarget, NcLinkTarget, Target, WaveformKeep};
+use adapters::clock::{Clock, TimeNs};
+use adapters::driver::Fact;
+use adapters::nclink::BlockSink;
+use adapters::nclink::sample::Block;
+use adapters::open::{OpenError, Opened};
+use adapters::waveform::SampledCurrent;
+use adapters::{ChannelId, Reading, Source, SourceError};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How often the devices seen so far upload.
+const PERIOD: Duration = Duration::from_millis(200);
+/// Blocks that wait; then the oldest goes, and shows as a gap.
+const WAITING_MAX: usize = 64;
+/// No block for so long is a failure.
+const SILENT: Duration = Duration::from_secs(3);
+/// The spindle among the axes of an HNC-8, where the address does not say.
+const SPINDLE_AXIS: u32 = 5;
+
+type Waiting = Arc<Mutex<VecDeque<(Block, Instant)>>>;
+
+/// A controller whose sampling is wanted, opened with it; `None` for every other address.
+pub(super) fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
+    match address.target() {
+        Target::NcLink(target) if target.sample => Some(nclink(address, target)),
+        Target::HncNet(target) => target.sample_scale_a.map(|scale_a| Ok(hnc(address, target, scale_a))),
+        _ => None,
+    }
+}
+
+fn nclink(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
+    let (waiting, sink) = queue();
+    let current = SampledCurrent::new(Some(target.spindle_axis.unwrap_or(SPINDLE_AXIS)), 1.0);
+    let opened = adapters::nclink::open_sampled(address, target, Some(sink))?;
+    Ok(joined(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened))
+}
+
+fn hnc(address: &Address, target: &HncNetTarget, scale_a: f64) -> Opened {
+    let (waiting, sink) = queue();
+    // The driver lets the spindle be the first of the load currents.
+    let current = SampledCurrent::new(None, scale_a);
+    let opened = adapters::hnc::open_sampled(address, target, Some(sink));
+    joined(ControllerSamples::new(address.text(), current, waiting, target.keep.as_ref()), opened)
+}
+
+/// What is sampled goes before what is polled.
+fn joined(samples: ControllerSamples, mut opened: Opened) -> Opened {
+    opened.sources.insert(0, Box::new(samples));
+    opened
+}
+
+fn queue() -> (Waiting, BlockSink) {
+    let waiting = Waiting::default();
+    let filled = waiting.clone();
+    let sink = move |block: &Block, arrived: Instant| {
+        let mut waiting = filled.lock().unwrap_or_else(PoisonError::into_inner);
+        waiting.push_back((block.clone(), arrived));
+        if waiting.len() > WAITING_MAX {
+            waiting.pop_front();
+        }
+    };
+    (waiting, Box::new(sink))
+}
+
+/// The sampled load current as a source.
+pub struct ControllerSamples {
+    name: String,
+    current: SampledCurrent,
+    waiting: Waiting,
+    features: Features,
+    heard: Option<Instant>,
+}
+
+impl ControllerSamples {
+    fn new(address: &str, current: SampledCurrent, waiting: Waiting, keep: Option<&WaveformKeep>) -> Self {
+        Self { name: format!("{address}#samples"), current, waiting, features: Features::new(keep), heard: None }
+    }
+
+    fn take(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<bool, SourceError> {
+        let waiting = std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
+        let some = !waiting.is_empty();
+        for (block, arrived) in waiting {
+            let blocks = self.current.take(&block, arrived_ns(clock, arrived));
+            let Some(header) = self.current.header().cloned() else { continue };
+            for block in &blocks {
+                self.features.feed(&self.name, &header, block)?;
+            }
+            // One reading for every block of the controller's.
+            out.extend(self.features.reading());
+        }
+        Ok(some)
+    }
+
+    fn silent(&self) -> SourceError {
+        SourceError::Timeout {
+            source_name: self.name.clone(),
+            request: "the sampled load current of the spindle".to_owned(),
+            deadline_ms: u64::try_from(SILENT.as_millis()).unwrap_or(u64::MAX),
+            next: "Does the controller's model have a sample channel with the spindle's MOTOR/CURRENT, and is nobody using \
+                   the oscilloscope at its panel?"
+                .to_owned(),
+        }
+    }
+}
+
+/// When it arrived, on the clock of the readings.
+fn arrived_ns(clock: &dyn Clock, arrived: Instant) -> TimeNs {
+    clock.now_ns() - i64::try_from(arrived.elapsed().as_nanos()).unwrap_or(0)
+}
+
+impl Source for ControllerSamples {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        self.features.channels()
+    }
+
+    fn period(&self) -> Duration {
+        PERIOD
+    }
+
+    fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let now = Instant::now();
+        let heard = *self.heard.get_or_insert(now);
+        if self.take(clock, out)? {
+            self.heard = Some(now);
+        } else if now.saturating_duration_since(heard) > SILENT {
+            self.features.interrupt();
+            return Err(self.silent());
+        }
+        Ok(())
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.features.facts(self.current.counts(), self.current.header(), self.current.drift_ppm())
+    }
+}
