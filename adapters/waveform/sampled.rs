@@ -18,7 +18,7 @@ const FULL_SCALE: i16 = i16::MAX;
 const CURRENT: &str = "/MOTOR/CURRENT";
 const MS_NS: f64 = 1e6;
 
-/// See the [module](self).
+/// Blocks of a controller in, blocks of the spindle's load current out.
 #[derive(Debug, Clone)]
 pub struct SampledCurrent {
     axis: Option<u32>,
