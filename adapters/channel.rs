@@ -2,6 +2,10 @@
 //!
 //! A channel's name ends in its unit; the names are those of the recording format.
 
+mod paths;
+
+pub use paths::{PATHS, on_path};
+
 use std::fmt;
 
 /// How a channel behaves between two readings.
@@ -56,7 +60,21 @@ const fn text(name: &'static str, en: &'static str, zh: &'static str) -> Channel
 }
 
 /// Every channel the gateway knows. The position is the [`ChannelId`]; new channels are appended.
-pub static CHANNELS: &[Channel] = &[
+pub static CHANNELS: &[Channel] = &ALL;
+
+static ALL: [Channel; FIRST.len() + paths::FURTHER.as_flattened().len()] = {
+    let (mut all, further) =
+        ([FIRST[0]; FIRST.len() + paths::FURTHER.as_flattened().len()], paths::FURTHER.as_flattened());
+    let mut index = 0;
+    while index < all.len() {
+        all[index] = if index < FIRST.len() { FIRST[index] } else { further[index - FIRST.len()] };
+        index += 1;
+    }
+    all
+};
+
+/// Of a machine with one path, and what belongs to none.
+const FIRST: &[Channel] = &[
     number(
         "spindle_programmed_rpm",
         "rpm",

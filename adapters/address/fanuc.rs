@@ -1,6 +1,9 @@
 //! What follows the question mark of a `fanuc://` address.
 
 use super::keys::Keys;
+use crate::channel::PATHS;
+use crate::fanuc::dial::Dial;
+use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
 use std::time::Duration;
 
@@ -35,6 +38,8 @@ pub enum WriteMethod {
 /// Keys of a `fanuc://` address besides path and backend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FanucOptions {
+    /// Paths that are read besides the one with the plain channel names, over the same connection.
+    pub further: Vec<u8>,
     /// Pace of what changes quickly.
     pub period: Duration,
     /// Pace of what changes slowly.
@@ -48,6 +53,10 @@ pub struct FanucOptions {
     pub power_diagnosis: Option<u16>,
     /// How the feed override is written.
     pub write: WriteMethod,
+    /// Byte into which a feed hold or a stop is asked; the ladder answers in the one behind it.
+    pub request: Option<(Area, u16)>,
+    /// Where the operator's dial stands.
+    pub dial: Option<Dial>,
     /// An override is looked at again after this time: several scans of the ladder.
     pub settle: Duration,
     /// Texts of further addresses that may be written.
@@ -70,17 +79,43 @@ impl FanucOptions {
         for text in allow.iter().filter(|text| crate::fanuc::allow::Allowed::read(text).is_none()) {
             keys.problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
         }
+        let write = write(keys);
         Self {
+            further: further(keys),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),
             duty_pct: keys.number("duty_pct", 50, 1, 100),
             timeout: ms(keys, "timeout_ms", 2000, 50, 30_000),
             settle: ms(keys, "settle_ms", 50, 0, 2000),
             power_diagnosis: Some(keys.number("power_diagnosis", 0, 0, 9999)).filter(|number| *number > 0),
-            write: write(keys),
+            request: keys.text("request").and_then(|text| place(keys, "request", &text)),
+            dial: dial(keys, write),
+            write,
             allow,
         }
     }
+}
+
+/// `paths=1,2`: path 1 keeps the plain channel names, the others have a prefix.
+fn further(keys: &mut Keys) -> Vec<u8> {
+    let Some(text) = keys.text("paths") else { return Vec::new() };
+    let paths: Option<Vec<u8>> = text.split(',').map(|path| path.trim().parse().ok()).collect();
+    match paths.as_deref() {
+        Some([1, further @ ..])
+            if further.is_sorted_by(|a, b| a < b) && further.iter().all(|path| further_exists(*path)) =>
+        {
+            further.to_vec()
+        }
+        _ => {
+            let last = PATHS.end();
+            keys.problem(format!("paths={text}: name path 1 first, then others up to {last}, for example paths=1,2"));
+            Vec::new()
+        }
+    }
+}
+
+fn further_exists(path: u8) -> bool {
+    path > 1 && PATHS.contains(&path)
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -103,11 +138,11 @@ fn write(keys: &mut Keys) -> WriteMethod {
     match keys.choice("write", &words) {
         Word::None => WriteMethod::None,
         Word::Mailbox => {
-            let (area, at) = place(keys, "mailbox", (Area::R, 900));
+            let (area, at) = place_or(keys, "mailbox", (Area::R, 900));
             WriteMethod::Mailbox { area, at }
         }
         Word::Second => {
-            let (area, at) = place(keys, "second_override", (Area::R, 910));
+            let (area, at) = place_or(keys, "second_override", (Area::R, 910));
             WriteMethod::SecondOverride { area, at }
         }
         Word::Macro => WriteMethod::Macro { variable: keys.number("macro", 500, 100, 999) },
@@ -115,16 +150,36 @@ fn write(keys: &mut Keys) -> WriteMethod {
     }
 }
 
+/// A byte that may be left out.
+fn place_or(keys: &mut Keys, key: &'static str, default: (Area, u16)) -> (Area, u16) {
+    keys.text(key).and_then(|text| place(keys, key, &text)).unwrap_or(default)
+}
+
 /// `R900`: a byte of an area that belongs to the ladder's data.
-fn place(keys: &mut Keys, key: &'static str, default: (Area, u16)) -> (Area, u16) {
-    let Some(text) = keys.text(key) else { return default };
+fn place(keys: &mut Keys, key: &str, text: &str) -> Option<(Area, u16)> {
     let mut letters = text.chars();
     let area = letters.next().and_then(Area::of_letter).filter(|area| matches!(area, Area::R | Area::D | Area::E));
-    match (area, letters.as_str().parse::<u16>()) {
-        (Some(area), Ok(at)) if at < 60_000 => (area, at),
-        _ => {
-            keys.problem(format!("{key}={text}: give a byte of R, D or E, for example R900"));
-            default
-        }
+    let found = area.zip(letters.as_str().parse::<u16>().ok()).filter(|(_, at)| *at < 60_000);
+    if found.is_none() {
+        keys.problem(format!("{key}={text}: give a byte of R, D or E, for example R900"));
     }
+    found
+}
+
+/// The dial; with a mailbox or a direct write G012 does not show it.
+fn dial(keys: &mut Keys, write: WriteMethod) -> Option<Dial> {
+    let text = keys.text("dial")?;
+    let Some(dial) = Dial::of(&text) else {
+        keys.problem(format!("dial={text}: give the byte with the operator's dial, for example R907 or G12"));
+        return None;
+    };
+    let shared = matches!(write, WriteMethod::Mailbox { .. } | WriteMethod::Direct);
+    if shared && dial.area == Area::G && dial.at % 1000 == feed_override::AT {
+        keys.problem(format!(
+            "dial={text}: with this way of writing G12 is what the ladder makes of dial and gateway; let the ladder \
+             leave the dial alone in another byte, for example R907"
+        ));
+        return None;
+    }
+    Some(dial)
 }

@@ -124,6 +124,9 @@ mod tests {
             "replay:/data/with space.csv",
             "fanuc://10.0.0.5:8193?path=1&backend=native",
             "fanuc://cnc?backend=vendor&library=/opt/fwlib/libfwlib32.so",
+            "fanuc://cnc?paths=1,2",
+            "fanuc://cnc?write=mailbox&request=R905&dial=R907",
+            "fanuc://cnc?write=second_override&dial=G12",
             "fanuc://cnc?write=mailbox&mailbox=D900&period_ms=50&duty_pct=25&allow=#500-#509,EXT",
             "nclink://broker:1883/SERIAL",
             "nclink://broker/SN1?user=u&password_file=/etc/pw&period_ms=50&f_channel=6400&spindle_axis=3",
@@ -180,6 +183,21 @@ mod tests {
     }
 
     #[test]
+    fn several_paths_begin_with_the_first() {
+        let further = |text| match parse(text) {
+            Target::Fanuc { options, .. } => options.further,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(further("fanuc://cnc"), [0u8; 0]);
+        assert_eq!(further("fanuc://cnc?paths=1"), [0u8; 0]);
+        assert_eq!(further("fanuc://cnc?paths=1,3"), [3]);
+        for wrong in ["2", "1,1", "1,4", "2,1", "1,2,", "x"] {
+            assert!(refused(&format!("fanuc://cnc?paths={wrong}")).contains("for example paths=1,2"), "{wrong}");
+        }
+        assert!(refused("fanuc://cnc?path=2&paths=1,2").contains("either"));
+    }
+
+    #[test]
     fn the_ways_of_writing_to_a_fanuc_are_read() {
         let write = |text| match parse(text) {
             Target::Fanuc { options, .. } => options.write,
@@ -191,6 +209,9 @@ mod tests {
         let place = WriteMethod::Mailbox { area: crate::fanuc::item::Area::D, at: 900 };
         assert_eq!(write("fanuc://cnc?write=mailbox&mailbox=D900"), place);
         assert!(refused("fanuc://cnc?write=mailbox&mailbox=G12").contains("R, D or E"));
+        assert!(refused("fanuc://cnc?write=mailbox&request=X5").contains("R, D or E"));
+        assert!(refused("fanuc://cnc?write=mailbox&dial=G12").contains("leave the dial alone in another byte"));
+        assert!(refused("fanuc://cnc?dial=X3").contains("for example R907"));
         assert!(refused("fanuc://cnc?allow=G12").contains("allow=G12"));
     }
 

@@ -279,10 +279,14 @@ fn speed(keys: &mut Keys) -> Speed {
 }
 
 fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
-    let path = keys.number("path", 1, 1, 10);
+    let named = keys.optional("path", 1, 10);
+    let path = named.unwrap_or(1);
     let vendor = keys.choice("backend", &[("native", false), ("vendor", true)]);
     let backend = if vendor { library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
     let options = Box::new(FanucOptions::read(keys));
+    if named.is_some() && !options.further.is_empty() {
+        keys.problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
+    }
     Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 

@@ -9,6 +9,17 @@ use std::hash::Hash;
 /// A question in which the child ended this often is not asked any more.
 const DEATHS_MAX: u32 = 2;
 
+/// What became of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// Well; the next one.
+    Good,
+    /// It cannot be trusted, and the child neither; no other comes.
+    Suspect,
+    /// The child has ended the list by itself.
+    Last,
+}
+
 /// A child that is asked in words of one's own. `Q` names what it can die of.
 pub struct Client<Q> {
     child: Supervised,
@@ -50,9 +61,50 @@ impl<Q: Copy + Eq + Hash> Client<Q> {
     /// # Errors
     /// See [`ChildError`].
     pub fn told<Ask: Serialize, Tell: DeserializeOwned>(&mut self, ask: &Ask) -> Result<Tell, ChildError> {
-        let no_answer = |error: serde_json::Error| ChildError::NoAnswer(error.to_string());
         let answer = self.child.request(&serde_json::to_vec(ask).map_err(no_answer)?)?;
         serde_json::from_slice(&answer).map_err(no_answer)
+    }
+
+    /// Asks once for several things and takes an answer for each, in order, until `take` wants no more. Answers before a
+    /// failure have been taken. What the child died of, and what cannot be trusted, is blamed.
+    ///
+    /// # Errors
+    /// The question that the child died of, or hung in, with what happened. It has no answer; those behind it have none
+    /// either.
+    pub fn told_each<Ask: Serialize, Tell: DeserializeOwned>(
+        &mut self,
+        questions: &[Q],
+        ask: &Ask,
+        mut take: impl FnMut(Tell) -> Taken,
+    ) -> Result<(), (Q, ChildError)> {
+        let Some(last) = questions.last() else { return Ok(()) };
+        let (mut taken, mut outcome) = (0, Ok(Taken::Good));
+        let mut one = |answer: &[u8]| {
+            taken += 1;
+            outcome = serde_json::from_slice(answer).map(&mut take).map_err(no_answer);
+            matches!(outcome, Ok(Taken::Good))
+        };
+        let asked = match serde_json::to_vec(ask) {
+            Ok(bytes) => self.child.request_each(&bytes, questions.len(), &mut one),
+            Err(error) => Err(no_answer(error)),
+        };
+        let at = |index: usize| *questions.get(index).unwrap_or(last);
+        match asked.and(outcome) {
+            Ok(Taken::Suspect) => self.blame(at(taken - 1)),
+            Ok(_) => {}
+            Err(error) => {
+                let fatal = at(taken);
+                self.blame(fatal);
+                return Err((fatal, error));
+            }
+        }
+        Ok(())
+    }
+
+    /// How many of these, from the first on, the child has survived so far.
+    #[must_use]
+    pub fn survived(&self, questions: &[Q]) -> usize {
+        questions.iter().take_while(|question| !self.is_left_alone(**question)).count()
     }
 
     /// Has the child died of this so often that it is left alone?
@@ -67,4 +119,8 @@ impl<Q: Copy + Eq + Hash> Client<Q> {
         *self.deaths.entry(question).or_default() += 1;
         self.end();
     }
+}
+
+fn no_answer(error: serde_json::Error) -> ChildError {
+    ChildError::NoAnswer(error.to_string())
 }

@@ -21,19 +21,29 @@ pub(super) fn send(stream: &mut impl Write, bytes: &[u8]) -> Result<()> {
 }
 
 /// Bytes before a message.
-pub(super) const HEAD_LEN: usize = 8;
+const HEAD_LEN: usize = 8;
 
 /// The length that a head announces.
 ///
 /// # Errors
 /// It is no head, or announces too much.
-pub(super) fn length(head: [u8; HEAD_LEN]) -> Result<usize> {
+fn length(head: [u8; HEAD_LEN]) -> Result<usize> {
     let [a, b, c, d, length @ ..] = head;
     let length = usize::try_from(u32::from_le_bytes(length)).unwrap_or(usize::MAX);
     match [a, b, c, d] == MARK && length <= MESSAGE_MAX {
         true => Ok(length),
         false => Err(Error::new(ErrorKind::InvalidData, "the message begins with something else")),
     }
+}
+
+/// The first message of what has arrived, with the bytes it takes; `None` when it is not whole yet.
+///
+/// # Errors
+/// What has arrived is no message.
+pub(super) fn first(arrived: &[u8]) -> Result<Option<(&[u8], usize)>> {
+    let Some(head) = arrived.first_chunk::<HEAD_LEN>() else { return Ok(None) };
+    let end = HEAD_LEN + length(*head)?;
+    Ok(arrived.get(HEAD_LEN..end).map(|bytes| (bytes, end)))
 }
 
 /// Receives one message, however long it takes.

@@ -10,8 +10,9 @@
 //! The child is this same program started with a hidden subcommand, so that nothing else has to be installed. Its
 //! standard input is one end of a socket pair on which requests and answers travel; standard output and error go
 //! nowhere, because such libraries print there. A request and its answer are bytes of the user's own choosing, at most
-//! [`MESSAGE_MAX`] of them, each behind its length. One request is outstanding; the child is single-threaded, so a
-//! handle that is bound to its thread stays where it was made.
+//! [`MESSAGE_MAX`] of them, each behind its length. One request is outstanding; it may have several answers, which come as
+//! the child has them, so that it is known at which of them it died. The child is single-threaded: a handle that is bound
+//! to its thread stays where it was made.
 //!
 //! When an answer does not come in time, or the child is gone, it is killed and waited for, and the next request
 //! starts another one, after a pause that doubles from [`ChildSettings::pause_min`] to [`ChildSettings::pause_max`]
@@ -37,7 +38,7 @@ mod supervise;
 mod tests;
 
 pub use crate::vendor_functions as functions;
-pub use client::Client;
+pub use client::{Client, Taken};
 pub use ffi::{Argument, Missing, Returned};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
 pub use message::MESSAGE_MAX;

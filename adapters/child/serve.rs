@@ -10,20 +10,25 @@ use std::os::unix::net::UnixStream;
 /// The hidden subcommand with which the program starts as a child: `cnc-gateway vendor-child KIND ARGUMENT...`.
 pub const SUBCOMMAND: &str = "vendor-child";
 
-/// Answers requests until the parent is gone. `handler` makes the answer to a request; it is never called from another
-/// thread.
+/// Answers requests until the parent is gone. `handler` gives the answers to a request, each as soon as it has it; it is
+/// never called from another thread.
 ///
 /// # Errors
 /// Standard input is no socket of a parent, or the line failed in another way than by the parent's going.
-pub fn serve(mut handler: impl FnMut(&[u8]) -> Vec<u8>) -> std::io::Result<()> {
+pub fn serve(mut handler: impl FnMut(&[u8], &mut dyn FnMut(&[u8]))) -> std::io::Result<()> {
     let mut stream = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
     loop {
         let request = match message::receive(&mut stream) {
             Err(error) if gone(error.kind()) => return Ok(()),
             other => other?,
         };
-        let answer = handler(&request);
-        match message::send(&mut stream, &answer) {
+        let mut sent = Ok(());
+        handler(&request, &mut |answer| {
+            if sent.is_ok() {
+                sent = message::send(&mut stream, answer);
+            }
+        });
+        match sent {
             Err(error) if gone(error.kind()) => return Ok(()),
             other => other?,
         }
@@ -36,11 +41,12 @@ pub fn serve(mut handler: impl FnMut(&[u8]) -> Vec<u8>) -> std::io::Result<()> {
 /// # Errors
 /// As [`serve`].
 pub fn serve_words<Ask: DeserializeOwned, Tell: Serialize>(
-    mut handler: impl FnMut(Result<Ask, String>) -> Tell,
+    mut handler: impl FnMut(Result<Ask, String>, &mut dyn FnMut(&Tell)),
 ) -> std::io::Result<()> {
-    serve(|request| {
-        let told = handler(serde_json::from_slice(request).map_err(|error| error.to_string()));
-        serde_json::to_vec(&told).unwrap_or_default()
+    serve(|request, give| {
+        handler(serde_json::from_slice(request).map_err(|error| error.to_string()), &mut |told| {
+            give(&serde_json::to_vec(told).unwrap_or_default());
+        });
     })
 }
 

@@ -1,6 +1,6 @@
 //! The parent's side: start, ask, give up, kill, start again.
 
-use super::message::{self, HEAD_LEN};
+use super::message;
 use super::serve::SUBCOMMAND;
 use std::io::{ErrorKind, Read};
 use std::os::fd::OwnedFd;
@@ -80,9 +80,38 @@ pub struct ChildCounts {
 struct Running {
     child: Child,
     stream: UnixStream,
+    /// What has come of answers that are not whole yet, or not looked at yet.
+    arrived: Vec<u8>,
 }
 
 impl Running {
+    /// Waits for one answer and shows it.
+    fn answer(&mut self, deadline: Instant, take: &mut impl FnMut(&[u8]) -> bool) -> std::io::Result<bool> {
+        loop {
+            if let Some((bytes, end)) = message::first(&self.arrived)? {
+                let more = take(bytes);
+                self.arrived.drain(..end);
+                return Ok(more);
+            }
+            self.more(deadline)?;
+        }
+    }
+
+    /// What has come, or comes before the deadline.
+    fn more(&mut self, deadline: Instant) -> std::io::Result<()> {
+        let mut chunk = [0; 16 * 1024];
+        self.stream.set_read_timeout(Some(left(deadline)?))?;
+        match self.stream.read(&mut chunk) {
+            Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
+            Ok(count) => {
+                self.arrived.extend_from_slice(&chunk[..count]);
+                Ok(())
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Ends the child, whatever it does, and waits until the system has let go of it.
     fn end(mut self) -> Option<ExitStatus> {
         let _ended_already = self.child.kill();
@@ -133,17 +162,53 @@ impl Supervised {
     /// # Errors
     /// See [`ChildError`]; afterwards there is no child, until the next request starts one.
     pub fn request(&mut self, bytes: &[u8]) -> Result<Vec<u8>, ChildError> {
-        let deadline = Instant::now() + self.settings.deadline;
+        let mut answer = Vec::new();
+        self.request_each(bytes, 1, |bytes| {
+            answer = bytes.to_vec();
+            true
+        })?;
+        Ok(answer)
+    }
+
+    /// Asks once and takes so many answers, each within the deadline, or fewer: `take` says whether to wait for more. What
+    /// came before a failure has been taken: who asks for several things at a time knows which one the child did not
+    /// survive.
+    ///
+    /// # Errors
+    /// As [`Supervised::request`].
+    pub fn request_each(
+        &mut self,
+        bytes: &[u8],
+        answers: usize,
+        mut take: impl FnMut(&[u8]) -> bool,
+    ) -> Result<(), ChildError> {
         let mut running = match self.running.take() {
             Some(running) => running,
             None => self.start()?,
         };
-        match exchange(&mut running.stream, bytes, deadline) {
-            Ok(answer) => {
+        let patience = self.settings.deadline;
+        let mut taken = 0;
+        let mut exchange = || {
+            running.stream.set_write_timeout(Some(patience))?;
+            message::send(&mut running.stream, bytes)?;
+            while taken < answers {
+                let more = running.answer(Instant::now() + patience, &mut take)?;
+                taken += 1;
+                if !more {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        let outcome = exchange();
+        self.counts.answers += taken as u64;
+        if taken > 0 {
+            self.deaths = 0;
+        }
+        match outcome {
+            Ok(()) => {
                 self.running = Some(running);
-                self.deaths = 0;
-                self.counts.answers += 1;
-                Ok(answer)
+                Ok(())
             }
             Err(error) => Err(self.give_up(running, &error)),
         }
@@ -227,33 +292,10 @@ fn spawn(settings: &ChildSettings) -> std::io::Result<Running> {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()?;
-    Ok(Running { child, stream })
-}
-
-fn exchange(stream: &mut UnixStream, bytes: &[u8], deadline: Instant) -> std::io::Result<Vec<u8>> {
-    stream.set_write_timeout(Some(left(deadline)?))?;
-    message::send(stream, bytes)?;
-    let mut head = [0; HEAD_LEN];
-    fill(stream, &mut head, deadline)?;
-    let mut answer = vec![0; message::length(head)?];
-    fill(stream, &mut answer, deadline)?;
-    Ok(answer)
+    Ok(Running { child, stream, arrived: Vec::new() })
 }
 
 fn left(deadline: Instant) -> std::io::Result<Duration> {
     let left = deadline.saturating_duration_since(Instant::now());
     if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { Ok(left) }
-}
-
-fn fill(stream: &mut UnixStream, mut buffer: &mut [u8], deadline: Instant) -> std::io::Result<()> {
-    while !buffer.is_empty() {
-        stream.set_read_timeout(Some(left(deadline)?))?;
-        match stream.read(buffer) {
-            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-            Ok(count) => buffer = &mut buffer[count..],
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }

@@ -7,18 +7,24 @@
 //! | macro | a custom macro variable, percent | the variable |
 //! | direct | G012, inverted | G012, after the ladder had its scans |
 //!
-//! The mailbox is laid out in [`server::ladder`](super::server::ladder), with the rungs that a machine's maker needs.
+//! Where the address names the byte with the operator's dial, what is in force is what the control obeys: G012, with the
+//! second override its product with G013. Feed hold and stop go through a byte of their own, see
+//! `asking`. Mailbox and requests are laid out in [`server::ladder`](super::server::ladder), with the
+//! rungs that a machine's maker needs.
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
 //! that the ladder left it there.
 
 use super::answer::Answer;
+use super::asking::Asking;
+use super::dial::Dial;
 use super::feed_override;
 use super::item::{Area, Item, Stretch, Write};
-use super::line::Line;
+use super::line::{Asked, Line};
+use super::poll::signal;
 use super::server::ladder::ENABLED;
-use crate::address::WriteMethod;
+use crate::address::{FanucOptions, WriteMethod};
 use crate::clock::{Clock, TimeNs};
-use crate::driver::{Actuator, SourceError};
+use crate::driver::{Actuator, LadderRequest, LadderRule, SourceError};
 use crate::units::OverridePct;
 use std::time::Duration;
 
@@ -30,7 +36,10 @@ const HEARTBEAT_LOST: i32 = 2;
 pub struct FanucActuator {
     name: String,
     line: Line,
+    path: u8,
     method: WriteMethod,
+    dial: Option<Dial>,
+    asking: Option<Asking>,
     settle_ns: i64,
     heartbeat: u8,
     written: Option<(OverridePct, TimeNs)>,
@@ -39,9 +48,11 @@ pub struct FanucActuator {
 impl FanucActuator {
     /// `None` when the address names no way of writing.
     #[must_use]
-    pub fn new(name: &str, line: Line, method: WriteMethod, settle: Duration) -> Option<Self> {
-        let settle_ns = i64::try_from(settle.as_nanos()).unwrap_or(i64::MAX);
-        let actuator = Self { name: name.to_owned(), line, method, settle_ns, heartbeat: 0, written: None };
+    pub fn new(name: &str, line: Line, path: u8, options: &FanucOptions) -> Option<Self> {
+        let settle_ns = i64::try_from(options.settle.as_nanos()).unwrap_or(i64::MAX);
+        let asking = options.request.map(|at| Asking::new(name, line.clone(), at, settle_ns));
+        let (name, method, dial) = (name.to_owned(), options.write, options.dial);
+        let actuator = Self { name, line, path, method, dial, asking, settle_ns, heartbeat: 0, written: None };
         (method != WriteMethod::None).then_some(actuator)
     }
 
@@ -62,7 +73,9 @@ impl FanucActuator {
                 return Err(self.refused(what, "Stop the feed with feed hold, on the machine"));
             }
             WriteMethod::Macro { variable } => Write::Macro { number: variable, mantissa: percent, places: 0 },
-            WriteMethod::Direct => bytes(Area::G, feed_override::AT, vec![i32::from(feed_override::encode(wanted))]),
+            WriteMethod::Direct => {
+                bytes(Area::G, signal(feed_override::AT, self.path), vec![i32::from(feed_override::encode(wanted))])
+            }
             WriteMethod::None => return Err(self.refused("no way of writing", "Write write=mailbox in the address")),
         })
     }
@@ -70,10 +83,42 @@ impl FanucActuator {
     fn item(&self) -> Item {
         match self.method {
             WriteMethod::Mailbox { area, at } => Item::Pmc(Stretch::bytes(area, at, 5)),
-            WriteMethod::SecondOverride { .. } => Item::Pmc(Stretch::bytes(Area::G, feed_override::SECOND_AT, 1)),
+            WriteMethod::SecondOverride { .. } => self.signal(feed_override::SECOND_AT),
             WriteMethod::Macro { variable } => Item::Macro(variable),
-            WriteMethod::Direct | WriteMethod::None => Item::Pmc(Stretch::bytes(Area::G, feed_override::AT, 1)),
+            WriteMethod::Direct | WriteMethod::None => self.signal(feed_override::AT),
         }
+    }
+
+    /// A byte of override signals of this path.
+    fn signal(&self, at: u16) -> Item {
+        Item::Pmc(Stretch::bytes(Area::G, signal(at, self.path), 1))
+    }
+
+    /// What the way of writing itself says.
+    fn told(&self, asked: &Asked, item: Item) -> Result<OverridePct, SourceError> {
+        match (asked.of(item), self.method) {
+            (Some(Ok(Answer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
+            (Some(Ok(Answer::Memory(_))), WriteMethod::SecondOverride { .. }) => self.override_of(asked, item),
+            (Some(Ok(Answer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
+            // A vacant variable asks for nothing.
+            (Some(Ok(Answer::Number(None))), _) => Ok(OverridePct::FULL),
+            (Some(Ok(Answer::Number(Some(value)))), _) => self.percent(*value),
+            (Some(Err(error)), _) => Err(self.refused(&format!("it cannot be read back: {error:?}"), "See doctor")),
+            _ => Err(self.decode("another kind of answer")),
+        }
+    }
+
+    fn bytes<'a>(&self, asked: &'a Asked, item: Item) -> Result<&'a [i32], SourceError> {
+        match asked.of(item) {
+            Some(Ok(Answer::Memory(bytes))) => Ok(bytes),
+            other => Err(self.refused(&format!("it cannot be read back: {other:?}"), "See doctor")),
+        }
+    }
+
+    /// An inverted byte.
+    fn override_of(&self, asked: &Asked, item: Item) -> Result<OverridePct, SourceError> {
+        let byte = self.bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
+        byte.map(feed_override::decode).ok_or_else(|| self.decode("an override signal is a byte"))
     }
 
     fn refused(&self, what: &str, next: &str) -> SourceError {
@@ -146,25 +191,43 @@ impl Actuator for FanucActuator {
         if let Some((_, at_ns)) = self.written {
             clock.sleep_until(at_ns.saturating_add(self.settle_ns));
         }
-        let item = self.item();
-        let asked = self.line.ask(clock, &[item])?;
-        match (asked.of(item), self.method) {
-            (Some(Ok(Answer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
-            (Some(Ok(Answer::Memory(bytes))), WriteMethod::SecondOverride { .. }) => {
-                let byte = bytes.first().and_then(|byte| u8::try_from(*byte).ok());
-                byte.map(feed_override::decode).ok_or_else(|| self.decode("G013 is a byte"))
+        let (own, obeyed) = (self.item(), self.signal(feed_override::AT));
+        let items = [own, obeyed];
+        let asked = self.line.ask(clock, if self.dial.is_some() { &items } else { &items[..1] })?;
+        let told = self.told(&asked, own)?;
+        match (self.dial, self.method) {
+            (None, _) | (Some(_), WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None) => Ok(told),
+            (Some(_), WriteMethod::Mailbox { .. }) => self.override_of(&asked, obeyed),
+            (Some(_), WriteMethod::SecondOverride { .. }) => {
+                Ok(LadderRule::Product.combine(self.override_of(&asked, obeyed)?, told))
             }
-            (Some(Ok(Answer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
-            // A vacant variable asks for nothing.
-            (Some(Ok(Answer::Number(None))), _) => Ok(OverridePct::FULL),
-            (Some(Ok(Answer::Number(Some(value)))), _) => self.percent(*value),
-            (Some(Err(error)), _) => Err(self.refused(&format!("it cannot be read back: {error:?}"), "See doctor")),
-            _ => Err(self.decode("another kind of answer")),
+        }
+    }
+
+    fn read_dial(&mut self, clock: &dyn Clock) -> Result<Option<OverridePct>, SourceError> {
+        let Some(dial) = self.dial else { return Ok(None) };
+        let item = Item::Pmc(dial.stretch());
+        let asked = self.line.ask(clock, &[item])?;
+        dial.read(self.bytes(&asked, item)?).map(Some).ok_or_else(|| self.decode("the byte of the dial is no override"))
+    }
+
+    fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
+        match &mut self.asking {
+            Some(asking) => asking.ask(clock, request),
+            None => Err(SourceError::Refused {
+                source_name: self.name.clone(),
+                request: request.word().to_owned(),
+                what: "the address names no byte for it".to_owned(),
+                next: "Let the machine's maker add the rungs and write request=R905 in the address".to_owned(),
+            }),
         }
     }
 
     /// The mailbox says that nobody asks, the second override's byte that there is no wish; the others get 100 %.
     fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        if let Some(asking) = &mut self.asking {
+            asking.withdraw(clock)?;
+        }
         let write = match self.method {
             WriteMethod::Mailbox { area, at } => {
                 self.heartbeat = self.heartbeat.wrapping_add(1);

@@ -1,7 +1,7 @@
 //! What the adapter needs of a controller, however it is talked to.
 
 use super::answer::{ItemResult, Refusal};
-use super::item::{Item, Write};
+use super::item::{Question, Write};
 use super::opening::Opening;
 use std::time::Duration;
 use thiserror::Error;
@@ -12,14 +12,14 @@ pub trait Focas: Send {
     /// What the controller said when the connection was opened.
     fn opening(&self) -> &Opening;
 
-    /// Asks for all items, in as few round trips as this way of talking allows, and appends one result per item to
-    /// `out`, in the same order.
+    /// Asks all questions, of whatever paths, in as few round trips as this way of talking allows, and appends one
+    /// result per question to `out`, in the same order.
     ///
     /// # Errors
     /// The connection as a whole failed; it is not usable any more and `out` holds nothing new.
-    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError>;
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError>;
 
-    /// Writes.
+    /// Writes, on the path that the connection was made for.
     ///
     /// # Errors
     /// [`FocasError::Refused`] when the controller says no, after which the connection is still good; any other error

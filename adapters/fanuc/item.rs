@@ -269,6 +269,23 @@ pub enum Item {
     PanelSignals(u16),
 }
 
+/// An item of one path of the control. PMC memory belongs to no path: it is the same whichever path asks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Question {
+    /// Path from 1.
+    pub path: u8,
+    /// What is asked.
+    pub item: Item,
+}
+
+impl Item {
+    /// The question for it on a path from 1.
+    #[must_use]
+    pub fn on(self, path: u8) -> Question {
+        Question { path, item: self }
+    }
+}
+
 /// One thing to be written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Write {

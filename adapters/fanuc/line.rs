@@ -6,7 +6,7 @@ use super::allow::AllowList;
 use super::answer::{Answer, ItemError, ItemResult, System};
 use super::code::Consequence;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Write};
+use super::item::{Item, Question, Write};
 use super::opening::Opening;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
@@ -32,8 +32,18 @@ pub struct Facts {
     pub system: Option<System>,
     /// Names of the axes, in the order of every answer about axes.
     pub axes: Vec<String>,
+    /// Names of the axes of each further path that is read.
+    pub further: Vec<(u8, Vec<String>)>,
     /// Does the machine measure in inches?
     pub inch: bool,
+}
+
+impl Facts {
+    /// Names of the axes of a path.
+    #[must_use]
+    pub fn axes_of(&self, path: u8) -> &[String] {
+        self.further.iter().find(|(further, _)| *further == path).map_or(&self.axes, |(_, axes)| axes)
+    }
 }
 
 /// How a line has been doing.
@@ -52,8 +62,10 @@ struct Inner {
     connect: Connect,
     focas: Option<Box<dyn Focas>>,
     facts: Option<Arc<Facts>>,
-    /// Items that this control does not have, found out once per connection.
-    unsupported: HashSet<Item>,
+    /// The path that is written to and whose items are meant when no path is named; then the further ones.
+    paths: (u8, Vec<u8>),
+    /// What this control does not have, found out once per connection.
+    unsupported: HashSet<Question>,
     allow: AllowList,
     duty_pct: u8,
     not_before_ns: TimeNs,
@@ -73,9 +85,11 @@ pub struct Line {
 pub struct Asked {
     /// The facts of the connection.
     pub facts: Arc<Facts>,
-    /// The items.
-    pub items: Vec<Item>,
-    /// One result per item.
+    /// The path that is meant when none is named.
+    pub path: u8,
+    /// What was asked.
+    pub questions: Vec<Question>,
+    /// One result per question.
     pub results: Vec<ItemResult>,
     /// When it began, on the gateway's clock.
     pub began_ns: TimeNs,
@@ -84,23 +98,31 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// What became of an item.
+    /// What became of an item of the line's own path.
     #[must_use]
     pub fn of(&self, item: Item) -> Option<&ItemResult> {
-        let at = self.items.iter().position(|asked| *asked == item)?;
+        self.on(item.on(self.path))
+    }
+
+    /// What became of a question.
+    #[must_use]
+    pub fn on(&self, question: Question) -> Option<&ItemResult> {
+        let at = self.questions.iter().position(|asked| *asked == question)?;
         self.results.get(at)
     }
 }
 
 impl Line {
-    /// A line that is opened when it is first needed. `name` is the address.
+    /// A line that is opened when it is first needed. `name` is the address; of `paths` the first is written to and
+    /// the others are read besides.
     #[must_use]
-    pub fn new(name: &str, connect: Connect, allow: AllowList, duty_pct: u8) -> Self {
+    pub fn new(name: &str, connect: Connect, paths: (u8, Vec<u8>), allow: AllowList, duty_pct: u8) -> Self {
         let inner = Inner {
             name: name.to_owned(),
             connect,
             focas: None,
             facts: None,
+            paths,
             unsupported: HashSet::new(),
             allow,
             duty_pct: duty_pct.clamp(1, 100),
@@ -116,12 +138,23 @@ impl Line {
         act(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Asks for all items; what this control does not have is not asked for again.
+    /// Asks for all items of the line's own path; see [`Line::ask_on`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn ask(&self, clock: &dyn Clock, items: &[Item]) -> Result<Asked, SourceError> {
+        self.locked(|inner| {
+            let path = inner.paths.0;
+            inner.ask(clock, items.iter().map(|item| item.on(path)).collect())
+        })
+    }
+
+    /// Asks all questions; what this control does not have is not asked for again.
     ///
     /// # Errors
     /// The poll as a whole failed; the next one opens a new connection.
-    pub fn ask(&self, clock: &dyn Clock, items: &[Item]) -> Result<Asked, SourceError> {
-        self.locked(|inner| inner.ask(clock, items))
+    pub fn ask_on(&self, clock: &dyn Clock, questions: &[Question]) -> Result<Asked, SourceError> {
+        self.locked(|inner| inner.ask(clock, questions.to_vec()))
     }
 
     /// Writes, if the address is allowed.
@@ -138,36 +171,36 @@ impl Line {
         self.locked(|inner| inner.counts)
     }
 
-    /// Items that this control does not have.
+    /// What this control does not have.
     #[must_use]
-    pub fn unsupported(&self) -> Vec<Item> {
+    pub fn unsupported(&self) -> Vec<Question> {
         self.locked(|inner| inner.unsupported.iter().copied().collect())
     }
 }
 
 impl Inner {
-    fn ask(&mut self, clock: &dyn Clock, items: &[Item]) -> Result<Asked, SourceError> {
+    fn ask(&mut self, clock: &dyn Clock, questions: Vec<Question>) -> Result<Asked, SourceError> {
         let facts = self.connected(clock)?;
-        let wanted: Vec<Item> = items.iter().copied().filter(|item| !self.unsupported.contains(item)).collect();
+        let known = |question: &Question| !self.unsupported.contains(question);
+        let wanted: Vec<Question> = questions.iter().copied().filter(known).collect();
         let (began_ns, found) = self.round(clock, &wanted)?;
         self.learn(&wanted, &found);
-        let mut found = wanted.iter().zip(found);
-        let results = items.iter().map(|item| {
-            let asked = !self.unsupported.contains(item) || wanted.contains(item);
-            let own = if asked { found.next().map(|(_, result)| result) } else { None };
-            own.unwrap_or(Err(ItemError::NotOffered))
-        });
-        let results = results.collect();
-        Ok(Asked { facts, items: items.to_vec(), results, began_ns, ended_ns: clock.now_ns() })
+        let mut found = wanted.iter().zip(found).peekable();
+        let answer = |question: &Question| {
+            let own = found.next_if(|(asked, _)| *asked == question);
+            own.map_or(Err(ItemError::NotOffered), |(_, result)| result)
+        };
+        let results = questions.iter().map(answer).collect();
+        Ok(Asked { facts, path: self.paths.0, questions, results, began_ns, ended_ns: clock.now_ns() })
     }
 
     /// One round of questions on an open connection, not before the duty cycle allows it.
-    fn round(&mut self, clock: &dyn Clock, items: &[Item]) -> Result<(TimeNs, Vec<ItemResult>), SourceError> {
+    fn round(&mut self, clock: &dyn Clock, questions: &[Question]) -> Result<(TimeNs, Vec<ItemResult>), SourceError> {
         self.rest(clock);
         let began_ns = clock.now_ns();
-        let mut found = Vec::with_capacity(items.len());
+        let mut found = Vec::with_capacity(questions.len());
         let outcome = match &mut self.focas {
-            Some(focas) => focas.ask(items, &mut found),
+            Some(focas) => focas.ask(questions, &mut found),
             None => Err(FocasError::Broken("there is no connection".to_owned())),
         };
         self.busy(began_ns, clock.now_ns());
@@ -193,14 +226,14 @@ impl Inner {
         self.not_before_ns = ended_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
     }
 
-    fn learn(&mut self, items: &[Item], results: &[ItemResult]) {
+    fn learn(&mut self, questions: &[Question], results: &[ItemResult]) {
         let missing = |result: &ItemResult| match result {
             Err(ItemError::Refused(refusal)) => refusal.code.consequence() == Consequence::NotSupported,
             Err(ItemError::NotOffered) => true,
             _ => false,
         };
-        let absent = items.iter().zip(results).filter(|(_, result)| missing(result));
-        self.unsupported.extend(absent.map(|(item, _)| *item));
+        let absent = questions.iter().zip(results).filter(|(_, result)| missing(result));
+        self.unsupported.extend(absent.map(|(question, _)| *question));
     }
 
     fn connected(&mut self, clock: &dyn Clock) -> Result<Arc<Facts>, SourceError> {
@@ -209,16 +242,34 @@ impl Inner {
         }
         let focas = (self.connect)().map_err(|error| self.not_opened(&error, clock.now_ns()))?;
         let opening = *focas.opening();
+        self.paths_exist(&opening)?;
         self.focas = Some(focas);
         self.unsupported.clear();
-        let items = [Item::System, Item::AxisNames, INCH_MACHINE];
-        let (_, found) = self.round(clock, &items)?;
-        let facts = Arc::new(facts(opening, &found));
+        let (own, further) = self.paths.clone();
+        let names = further.iter().map(|path| Item::AxisNames.on(*path));
+        let questions: Vec<Question> =
+            [Item::System, INCH_MACHINE, Item::AxisNames].map(|item| item.on(own)).into_iter().chain(names).collect();
+        let (_, found) = self.round(clock, &questions)?;
+        let facts = Arc::new(facts(opening, &questions, &found, own));
         self.facts = Some(facts.clone());
         self.counts.connections += 1;
         self.lost_ns = None;
         self.known = true;
         Ok(facts)
+    }
+
+    /// A control that says how many paths it has must have all that are named.
+    fn paths_exist(&self, opening: &Opening) -> Result<(), SourceError> {
+        let greatest = self.paths.1.iter().copied().max().unwrap_or(0);
+        if opening.paths == 0 || u16::from(greatest) <= opening.paths {
+            return Ok(());
+        }
+        Err(SourceError::Refused {
+            source_name: self.name.clone(),
+            request: format!("path {greatest}"),
+            what: format!("the controller has {} path(s)", opening.paths),
+            next: "Correct paths= in the address".to_owned(),
+        })
     }
 
     fn write(&mut self, clock: &dyn Clock, write: &Write) -> Result<(), SourceError> {
@@ -292,13 +343,15 @@ pub fn source_error(name: &str, error: &FocasError, request: &str) -> SourceErro
     }
 }
 
-fn facts(opening: Opening, found: &[ItemResult]) -> Facts {
-    let mut facts = Facts { opening, system: None, axes: Vec::new(), inch: false };
-    for answer in found.iter().flatten() {
+fn facts(opening: Opening, questions: &[Question], found: &[ItemResult], own: u8) -> Facts {
+    let mut facts = Facts { opening, system: None, axes: Vec::new(), further: Vec::new(), inch: false };
+    for (question, answer) in questions.iter().zip(found) {
         match answer {
-            Answer::System(system) => facts.system = Some(system.clone()),
-            Answer::Names(names) => facts.axes.clone_from(names),
-            Answer::Data { values, .. } => {
+            Ok(Answer::System(system)) => facts.system = Some(system.clone()),
+            Ok(Answer::Names(names)) if question.path == own => facts.axes.clone_from(names),
+            Ok(Answer::Names(names)) => facts.further.push((question.path, names.clone())),
+            Err(_) if question.path != own => facts.further.push((question.path, Vec::new())),
+            Ok(Answer::Data { values, .. }) => {
                 let bits = values.first().copied().flatten().unwrap_or(0.0);
                 facts.inch = bits.rem_euclid(2.0) >= 1.0;
             }

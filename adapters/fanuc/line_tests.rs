@@ -4,7 +4,7 @@ use super::allow::AllowList;
 use super::answer::{Answer, ItemError, ItemResult, Refusal};
 use super::code::ReturnCode;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Stretch, Write};
+use super::item::{Item, Question, Stretch, Write};
 use super::line::{Connect, Line};
 use super::opening::{Generation, Opening};
 use crate::clock::{Clock, SECOND_NS, TimeNs};
@@ -31,14 +31,16 @@ impl Focas for Mock {
         &self.1
     }
 
-    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
         self.0.now_ns.fetch_add(self.0.takes_ns.load(Ordering::SeqCst), Ordering::SeqCst);
-        self.0.asked.fetch_add(items.len() as u64, Ordering::SeqCst);
+        self.0.asked.fetch_add(questions.len() as u64, Ordering::SeqCst);
         if let Some(error) = self.0.fail.lock().expect("sound").take() {
             return Err(error);
         }
         let results = self.0.results.lock().expect("sound");
-        out.extend(items.iter().map(|item| results.get(item).cloned().unwrap_or(Ok(Answer::Whole(1)))));
+        out.extend(
+            questions.iter().map(|question| results.get(&question.item).cloned().unwrap_or(Ok(Answer::Whole(1)))),
+        );
         Ok(())
     }
 
@@ -76,7 +78,7 @@ fn line(duty_pct: u8) -> (Line, Arc<Told>, Standing) {
         Some(error) => Err(error),
         None => Ok(Box::new(Mock(own.clone(), opening))),
     });
-    (Line::new("fanuc://mock", connect, AllowList::default(), duty_pct), told.clone(), Standing(told))
+    (Line::new("fanuc://mock", connect, (1, Vec::new()), AllowList::default(), duty_pct), told.clone(), Standing(told))
 }
 
 fn refused(code: i16) -> ItemResult {
@@ -100,7 +102,7 @@ fn what_is_missing_is_asked_once_per_connection() {
     let items = [Item::Sequence, Item::Feed, Item::BlockCount];
     let asked = line.ask(&clock, &items).expect("well");
     assert_eq!(asked.of(Item::Feed), Some(&refused(6)));
-    assert_eq!(line.unsupported(), [Item::Feed]);
+    assert_eq!(line.unsupported(), [Item::Feed.on(1)]);
     let before = told.asked.load(Ordering::SeqCst);
     let asked = line.ask(&clock, &items).expect("well");
     assert_eq!(told.asked.load(Ordering::SeqCst) - before, 2);

@@ -25,10 +25,18 @@
 //! | `states`, `readings` | status words and signals as states, answers as channels; pure |
 //! | `feed_override` | the inverted byte, and nothing else |
 //! | `allow` | what may be written |
+//! | `dial` | where the operator's dial stands |
 //! | `actuator` | the feed override: mailbox, second override, macro variable, direct |
+//! | `asking` | feed hold and stop, latched once by the ladder |
 //! | `work_offset` | the external work offset between programs |
 //! | `open` | from an address to all of this |
 //! | `server` | the other side of the wire |
+//!
+//! **Several paths** (`paths=1,2`, up to 3) share the connection: every block of a frame names its path, so the quick
+//! group of all of them is one round trip where the control's longest answer holds it (two paths do on every
+//! generation). Path 1 keeps the plain channel names, the channels of path N begin with `pathN_`; signals of path
+//! N stand 1000 (N - 1) bytes further. Parts, gear stage, drive currents and temperature are read of path 1, and only
+//! path 1 is written to. A single other path (`path=2`) has the plain names.
 //!
 //! Where the facts come from: frames and layouts were fixed by watching the vendor's own client talk to a server of
 //! ours and agree with two independent open clients; the manuals named beside the constants give the rest. No real
@@ -40,8 +48,10 @@
 pub mod actuator;
 pub mod allow;
 pub mod answer;
+mod asking;
 pub mod code;
 pub mod decode;
+pub mod dial;
 pub mod feed_override;
 pub mod focas;
 pub mod item;

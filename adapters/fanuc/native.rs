@@ -9,7 +9,7 @@ use super::answer::{ItemError, ItemResult, Refusal};
 use super::code::ReturnCode;
 use super::decode;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Write};
+use super::item::{Item, Question, Write};
 use super::opening::{Generation, Opening};
 use super::request;
 use super::statistics::Statistics;
@@ -33,8 +33,8 @@ const FOR_QUESTIONS: [u8; 2] = [0, 2];
 pub struct NativeSettings {
     /// Where the controller is.
     pub at: Endpoint,
-    /// Path from 1.
-    pub path: u16,
+    /// Path from 1 that is written to; every path can be asked.
+    pub path: u8,
     /// Longest time for connecting, and for one exchange.
     pub timeout: Duration,
 }
@@ -61,12 +61,12 @@ impl Native {
         send(&mut stream, &frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
         let answer = receive(&mut stream, deadline, settings.timeout)?;
         let opening = match answer.kind {
-            FrameKind::Opened => Opening::read(Generation::of(answer.version), &answer.body, settings.path),
+            FrameKind::Opened => Opening::read(Generation::of(answer.version), &answer.body, u16::from(settings.path)),
             FrameKind::OpenRefused => return Err(FocasError::NoSession),
             other => return Err(FocasError::Protocol(format!("{other:?} in answer to the opening"))),
         };
         let opening = opening.map_err(|error| protocol(&error))?;
-        if settings.path > opening.paths.max(1) {
+        if u16::from(settings.path) > opening.paths.max(1) {
             return Err(FocasError::Refused(Refusal { code: ReturnCode::PATH, detail: 0 }));
         }
         Ok(Self { stream, settings, opening, statistics: Statistics::default() })
@@ -88,20 +88,23 @@ impl Native {
         checked(&answer, self.opening.generation, requests, &mut take)
     }
 
-    /// How many of the items fit into one frame in both directions; at least one.
-    fn fitting(&self, items: &[Item]) -> usize {
+    /// How many of the questions fit into one frame in both directions; at least one.
+    fn fitting(&self, questions: &[Question]) -> usize {
         let (mut asked, mut answered) = (2, 2);
-        let fits = |item: &&Item| {
-            asked += request::reading(**item, self.opening.generation).wire_len();
-            answered += request::answer_len(**item, &self.opening);
+        let fits = |question: &&Question| {
+            asked += request::reading(question.item, self.opening.generation).wire_len();
+            answered += request::answer_len(question.item, &self.opening);
             asked <= REQUEST_MAX && answered <= self.opening.generation.answer_max()
         };
-        items.iter().take_while(fits).count().max(1)
+        questions.iter().take_while(fits).count().max(1)
     }
 
-    fn blocks(&self, items: &[Item]) -> Vec<Request> {
-        let block = |item: &Item| request::reading(*item, self.opening.generation).on_path(self.settings.path);
-        items.iter().map(block).collect()
+    /// Every block carries its own path, so that one frame asks several.
+    fn blocks(&self, questions: &[Question]) -> Vec<Request> {
+        let block = |question: &Question| {
+            request::reading(question.item, self.opening.generation).on_path(u16::from(question.path))
+        };
+        questions.iter().map(block).collect()
     }
 }
 
@@ -135,13 +138,13 @@ impl Focas for Native {
         &self.opening
     }
 
-    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
         let before = out.len();
-        let mut rest = items;
+        let mut rest = questions;
         while !rest.is_empty() {
             let (now, later) = rest.split_at(self.fitting(rest));
             let (generation, requests) = (self.opening.generation, self.blocks(now));
-            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index], generation, reply)));
+            let asked = self.exchange(&requests, |index, reply| out.push(result(now[index].item, generation, reply)));
             asked.inspect_err(|_| out.truncate(before))?;
             rest = later;
         }
@@ -149,7 +152,7 @@ impl Focas for Native {
     }
 
     fn write(&mut self, write: &Write) -> Result<(), FocasError> {
-        let request = request::writing(write, self.opening.generation).on_path(self.settings.path);
+        let request = request::writing(write, self.opening.generation).on_path(u16::from(self.settings.path));
         let mut refusal = None;
         self.exchange(std::slice::from_ref(&request), |_, reply| refusal = refused(reply))?;
         refusal.map_or(Ok(()), |refusal| Err(FocasError::Refused(refusal)))

@@ -2,8 +2,11 @@
 
 use super::actuator::FanucActuator;
 use super::allow::{AllowList, Allowed};
+use super::feed_override;
+use super::item::Area;
 use super::line::{Connect, Line};
 use super::native::{Native, NativeSettings};
+use super::poll;
 use super::readings::Manner;
 use super::source::FanucSource;
 use super::vendor::{Vendor, VendorSettings};
@@ -24,7 +27,7 @@ pub struct OpenedFanuc {
 /// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
 #[must_use]
 pub fn native(name: &str, at: &Endpoint, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let settings = NativeSettings { at: at.clone(), path: u16::from(path), timeout: options.timeout };
+    let settings = NativeSettings { at: at.clone(), path, timeout: options.timeout };
     let connect: Connect = Box::new(move || Ok(Box::new(Native::connect(settings.clone())?)));
     opened(name, connect, path, options)
 }
@@ -35,7 +38,7 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
     let settings = VendorSettings {
         vendor_library: library.to_owned(),
         at: at.clone(),
-        path: u16::from(path),
+        path,
         timeout: options.timeout,
         deadline: None,
         program: None,
@@ -48,29 +51,31 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
 /// Opens a controller through any way of talking to it.
 #[must_use]
 pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let line = Line::new(name, connect, allowed(options), options.duty_pct);
+    let line = Line::new(name, connect, (path, options.further.clone()), allowed(options, path), options.duty_pct);
     let manner = Manner {
         path,
         second_override: matches!(options.write, WriteMethod::SecondOverride { .. }),
         power_diagnosis: options.power_diagnosis,
+        dial: options.dial,
     };
     let sources: Vec<Box<dyn Source>> = vec![
         Box::new(FanucSource::fast(name, line.clone(), manner, options)),
         Box::new(FanucSource::slow(name, line.clone(), manner, options)),
     ];
-    let actuator = FanucActuator::new(name, line.clone(), options.write, options.settle);
+    let actuator = FanucActuator::new(name, line.clone(), path, options);
     OpenedFanuc { sources, actuator: actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>), line }
 }
 
 /// What the way of writing needs, and what the address allows besides.
-fn allowed(options: &FanucOptions) -> AllowList {
+fn allowed(options: &FanucOptions, path: u8) -> AllowList {
     let own = match options.write {
         WriteMethod::None => return AllowList::default(),
         WriteMethod::Mailbox { area, at } => Allowed::bytes(area, at, 3),
         WriteMethod::SecondOverride { area, at } => Allowed::bytes(area, at, 1),
         WriteMethod::Macro { variable } => Allowed::Macros { from: variable, to: variable },
-        WriteMethod::Direct => Allowed::bytes(super::item::Area::G, super::feed_override::AT, 1),
+        WriteMethod::Direct => Allowed::bytes(Area::G, poll::signal(feed_override::AT, path), 1),
     };
+    let request = options.request.map(|(area, at)| Allowed::bytes(area, at, 1));
     let more = options.allow.iter().filter_map(|text| Allowed::read(text));
-    AllowList(std::iter::once(own).chain(more).collect())
+    AllowList(std::iter::once(own).chain(request).chain(more).collect())
 }

@@ -82,30 +82,37 @@ impl Opening {
         Ok(Self { generation, family: head[1], axes_max, spindles_max, paths, axes, spindles })
     }
 
-    /// The body of the answer for a controller with one path.
+    /// The body of the answer for a controller whose paths all have as many axes and spindles.
     #[must_use]
     pub fn body(&self) -> Vec<u8> {
+        self.body_with(|_| (self.axes, self.spindles))
+    }
+
+    /// The body of the answer; `of` says how many axes and spindles a path from 1 has.
+    #[must_use]
+    pub fn body_with(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u8> {
         let words = match self.generation {
-            Generation::Older(_) => self.older(),
-            Generation::Newer(_) => self.newer(),
+            Generation::Older(_) => self.older(of),
+            Generation::Newer(_) => self.newer(of),
         };
         words.iter().flat_map(|word| word.to_be_bytes()).collect()
     }
 
-    fn older(&self) -> Vec<u16> {
+    fn older(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
         let mut words = vec![7, self.family, self.axes_max, self.spindles_max, self.paths, self.paths, 0, 0];
-        (1..=self.paths).for_each(|path| words.extend([SYSTEM, path, self.axes, self.spindles]));
+        (1..=self.paths).for_each(|path| words.extend([SYSTEM, path, of(path).0, of(path).1]));
         words
     }
 
-    fn newer(&self) -> Vec<u16> {
+    fn newer(&self, of: impl Fn(u16) -> (u16, u16)) -> Vec<u16> {
         let mut words = vec![0; 20 + 10 * 16];
         let head = [6, self.family, 1, self.axes_max, self.spindles_max, 10, 3, 3, self.axes, self.axes];
         words[..10].copy_from_slice(&head);
         words[10..15].copy_from_slice(&[self.spindles, self.paths, 1, 0, 1]);
         for path in 1..=self.paths.min(10) {
             let at = 20 + 16 * usize::from(path - 1);
-            words[at..at + 8].copy_from_slice(&[SYSTEM, path, 0, self.axes, self.axes, self.spindles, 1, 1]);
+            let (axes, spindles) = of(path);
+            words[at..at + 8].copy_from_slice(&[SYSTEM, path, 0, axes, axes, spindles, 1, 1]);
         }
         words
     }

@@ -1,20 +1,27 @@
-//! What is asked for, group by group. Every group is a source with its own period; both share one connection.
+//! What is asked for, group by group. Every group is a source with its own period; both share one connection. The
+//! questions of all paths travel together.
 
-use super::item::{Area, Item, Position, Servo, Spindle, Stretch};
+use super::item::{Area, Item, Position, Question, Servo, Spindle, Stretch};
 
 /// Signals of one path lie this many bytes after those of the one before.
 const PATH_STEP: u16 = 1000;
 
+/// Where a signal of path 1 stands for another path: G012 is G1012 for path 2.
+#[must_use]
+pub fn signal(at: u16, path: u8) -> u16 {
+    at + PATH_STEP * u16::from(path.clamp(1, 10) - 1)
+}
+
 /// From the control to the ladder: F000 to F004.
 #[must_use]
 pub fn control_signals(path: u8) -> Stretch {
-    Stretch::bytes(Area::F, PATH_STEP * u16::from(path.saturating_sub(1)), 5)
+    Stretch::bytes(Area::F, signal(0, path), 5)
 }
 
 /// From the ladder to the control: G006 to G030, with the overrides.
 #[must_use]
 pub fn ladder_signals(path: u8) -> Stretch {
-    Stretch::bytes(Area::G, PATH_STEP * u16::from(path.saturating_sub(1)) + FIRST_LADDER_BYTE, 25)
+    Stretch::bytes(Area::G, signal(FIRST_LADDER_BYTE, path), 25)
 }
 
 /// Where [`ladder_signals`] begins.
@@ -35,17 +42,16 @@ pub const FEED_UNIT_OLDER: Item = Item::SpeedUnit(0);
 /// The alarms, asked for only when the status says that there are some.
 pub const ALARMS: Item = Item::Alarms(8);
 
-/// What changes quickly: one frame.
-#[must_use]
-pub fn fast(path: u8) -> Vec<Item> {
-    vec![
+/// What changes quickly on every path.
+fn quick(path: u8) -> [Item; 15] {
+    [
         Item::Status,
+        // Before what the vendor's call for the positions answers besides.
+        Item::Position(Position::Machine, -1),
         Item::Feed,
         Item::SpindleSpeed,
         Item::Spindles(Spindle::Load),
         Item::Servos(Servo::Load),
-        Item::Servos(Servo::Current),
-        Item::Position(Position::Machine, -1),
         Item::ProgramName,
         Item::Program,
         Item::Sequence,
@@ -53,10 +59,22 @@ pub fn fast(path: u8) -> Vec<Item> {
         MODAL_S,
         MODAL_T,
         FEED_UNIT,
-        MOTOR_TEMPERATURE,
         Item::Pmc(control_signals(path)),
         Item::Pmc(ladder_signals(path)),
     ]
+}
+
+/// What changes quickly: one frame.
+#[must_use]
+pub fn fast(path: u8) -> Vec<Question> {
+    let own = [Item::Servos(Servo::Current), MOTOR_TEMPERATURE];
+    quick(path).into_iter().chain(own).map(|item| item.on(path)).collect()
+}
+
+/// The same of a path that is read besides.
+#[must_use]
+pub fn further(path: u8) -> Vec<Question> {
+    quick(path).map(|item| item.on(path)).to_vec()
 }
 
 /// Parameter of the number of parts.
@@ -74,6 +92,6 @@ pub fn power(diagnosis: u16) -> Item {
 
 /// What changes slowly.
 #[must_use]
-pub fn slow() -> Vec<Item> {
-    vec![PART_COUNT, GEAR]
+pub fn slow(path: u8) -> Vec<Question> {
+    [PART_COUNT, GEAR].map(|item| item.on(path)).to_vec()
 }

@@ -2,16 +2,18 @@
 
 use super::answer::{Answer, ItemError, Status};
 use super::code::Consequence;
+use super::dial::Dial;
 use super::item::{Item, Position, Servo, Spindle};
 use super::line::Asked;
 use super::poll;
 use super::states::{self, Signals};
-use crate::channel::ChannelId;
+use crate::channel::{ChannelId, on_path};
 use crate::reading::{Absence, Reading, Stamp, Value};
 use std::sync::Arc;
 
-/// Channels of the quick group, in the order of [`fast`].
-pub const FAST: [&str; 26] = [
+/// Channels of the quick group, in the order of [`fast`]. A further path has those of them that the table of channels
+/// has for it.
+pub const FAST: [&str; 29] = [
     "spindle_programmed_rpm",
     "feed_programmed_mm_min",
     "spindle_speed_rpm",
@@ -38,6 +40,9 @@ pub const FAST: [&str; 26] = [
     "alarm",
     "motion",
     "motor_temperature_c",
+    "single_block",
+    "dry_run",
+    "feed_override_dial_pct",
 ];
 
 /// The channel of threads: present only while one is cut, so that a recipe can name the operation otherwise.
@@ -60,6 +65,13 @@ pub fn ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
     names.into_iter().filter_map(ChannelId::of).collect()
 }
 
+/// Channels at their places in [`fast`], under the names of this path; `None` where the table has none. `names` come
+/// besides [`FAST`].
+#[must_use]
+pub fn columns<'a>(path: u8, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
+    FAST.into_iter().chain([OPERATION]).chain(names).map(|name| ChannelId::of(&on_path(name, path))).collect()
+}
+
 /// A look at the results of one poll.
 struct View<'a> {
     asked: &'a Asked,
@@ -79,7 +91,7 @@ fn absence(error: &ItemError) -> Absence {
 
 impl View<'_> {
     fn answer(&self, item: Item) -> Found<&Answer> {
-        match self.asked.of(item) {
+        match self.asked.on(item.on(self.path)) {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(error)) => Err(absence(error)),
             None => Err(Absence::NotSupported),
@@ -112,9 +124,18 @@ impl View<'_> {
         Signals::new(bytes(poll::control_signals(self.path)), bytes(poll::ladder_signals(self.path)))
     }
 
+    /// The operator's dial, %, where the address says in which byte it stands.
+    fn dial(&self, dial: Option<Dial>) -> Found<f64> {
+        let dial = dial.ok_or(Absence::NotSupported)?;
+        match self.answer(Item::Pmc(dial.stretch()))? {
+            Answer::Memory(bytes) => dial.read(bytes).map(|pct| f64::from(pct.percent())).ok_or(Absence::OutOfRange),
+            _ => Err(Absence::OutOfRange),
+        }
+    }
+
     /// A quantity of the axis of this letter.
     fn axis(&self, item: Item, letter: &str) -> Found<f64> {
-        let at = self.asked.facts.axes.iter().position(|name| name.eq_ignore_ascii_case(letter));
+        let at = self.asked.facts.axes_of(self.path).iter().position(|name| name.eq_ignore_ascii_case(letter));
         let at = at.ok_or(Absence::NotSupported)?;
         match self.answer(item)? {
             Answer::Numbers(numbers) => numbers.get(at).copied().flatten().ok_or(Absence::NotSupported),
@@ -171,10 +192,10 @@ fn text(found: Found<String>) -> Found<Value> {
     found.map(|text| Value::Text(Arc::from(text)))
 }
 
-/// Does the answer say that alarms have to be asked for?
+/// Does the answer say that alarms of this path have to be asked for?
 #[must_use]
-pub fn alarmed(asked: &Asked) -> bool {
-    matches!(asked.of(Item::Status), Some(Ok(Answer::Status(status))) if states::alarmed(status))
+pub fn alarmed(asked: &Asked, path: u8) -> bool {
+    matches!(asked.on(Item::Status.on(path)), Some(Ok(Answer::Status(status))) if states::alarmed(status))
 }
 
 /// How answers are read besides what they say.
@@ -186,10 +207,28 @@ pub struct Manner {
     pub second_override: bool,
     /// Diagnosis number of the power of the spindle drive.
     pub power_diagnosis: Option<u16>,
+    /// Where the operator's dial stands.
+    pub dial: Option<Dial>,
 }
 
-/// The readings of the quick group. `alarms` are the results of asking for alarms, when they were.
-pub fn fast(channels: &[ChannelId], asked: &Asked, alarms: Option<&Asked>, manner: Manner, out: &mut Vec<Reading>) {
+impl Manner {
+    /// For a path that is read besides: what the address says of the second override, power and dial is
+    /// said of the first.
+    #[must_use]
+    pub fn of_further(self, path: u8) -> Self {
+        Self { path, second_override: false, power_diagnosis: None, dial: None }
+    }
+}
+
+/// The readings of the quick group of one path, at the places of [`columns`]. `alarms` are the results of asking for
+/// alarms, when they were.
+pub fn fast(
+    columns: &[Option<ChannelId>],
+    asked: &Asked,
+    alarms: Option<&Asked>,
+    manner: Manner,
+    out: &mut Vec<Reading>,
+) {
     let view = View { asked, path: manner.path };
     let signals = view.signals();
     let pct = signals.feed_override(manner.second_override);
@@ -216,31 +255,33 @@ pub fn fast(channels: &[ChannelId], asked: &Asked, alarms: Option<&Asked>, manne
         text(view.program()),
         text(view.number(Item::Sequence).map(|number| format!("N{number}"))),
         text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
-        text(status.map(|status| alarm_text(&status, asked, alarms))),
+        text(status.map(|status| alarm_text(&status, &view, alarms))),
         word(status.map(|status| states::motion(&status))),
         number(view.number(poll::MOTOR_TEMPERATURE)),
+        flag(signals.single_block()),
+        flag(signals.dry_run()),
+        number(view.dial(manner.dial)),
     ];
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
     let operation = signals.operation().map(Arc::from).map(Value::Text).ok_or(Absence::NotSupported);
     let power = number(manner.power_diagnosis.ok_or(Absence::NotSupported).and_then(|at| view.number(poll::power(at))));
-    out.extend(
-        channels.iter().zip(all.chain([operation, power])).map(|(channel, value)| reading(*channel, stamp, value)),
-    );
+    let named = columns.iter().zip(all.chain([operation, power]));
+    out.extend(named.filter_map(|(channel, value)| channel.map(|channel| reading(channel, stamp, value))));
 }
 
-fn alarm_text(status: &Status, asked: &Asked, alarms: Option<&Asked>) -> String {
-    let found = alarms.and_then(|alarms| alarms.of(poll::ALARMS));
+fn alarm_text(status: &Status, view: &View<'_>, alarms: Option<&Asked>) -> String {
+    let found = alarms.and_then(|alarms| alarms.on(poll::ALARMS.on(view.path)));
     let alarms = match found {
         Some(Ok(Answer::Alarms(alarms))) => alarms.as_slice(),
         _ => &[],
     };
-    states::alarm(status, alarms, &asked.facts.axes)
+    states::alarm(status, alarms, view.asked.facts.axes_of(view.path))
 }
 
 /// The readings of the slow group.
 pub fn slow(channels: &[ChannelId], asked: &Asked, out: &mut Vec<Reading>) {
-    let view = View { asked, path: 1 };
+    let view = View { asked, path: asked.path };
     let values = [poll::PART_COUNT, poll::GEAR].map(|item| number(view.number(item)));
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     out.extend(channels.iter().zip(values).map(|(channel, value)| reading(*channel, stamp, value)));

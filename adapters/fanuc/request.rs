@@ -235,7 +235,9 @@ pub fn answer_len(item: Item, opening: &Opening) -> usize {
         Item::ProgramPath | Item::MainProgram => 256,
         Item::ProgramName | Item::PanelSignals(_) => 40,
         Item::Pmc(stretch) => stretch.len(),
-        _ => 28,
+        Item::System | Item::StatusLong => 22,
+        Item::Status => 14,
+        _ => Number::LEN,
     };
     16 + data
 }

@@ -1,10 +1,11 @@
 //! The groups of a controller as sources.
 
-use super::line::{Facts, Line};
+use super::item::{Item, Question};
+use super::line::{Asked, Facts, Line};
 use super::poll;
 use super::readings::{self, Manner};
 use crate::address::FanucOptions;
-use crate::channel::ChannelId;
+use crate::channel::{ChannelId, on_path};
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError};
 use crate::reading::Reading;
@@ -18,53 +19,61 @@ enum Group {
     Slow,
 }
 
-/// One group of a controller.
+/// One group of a controller, of all paths that are read.
 pub struct FanucSource {
     name: String,
     line: Line,
     group: Group,
-    manner: Manner,
-    items: Vec<super::item::Item>,
+    questions: Vec<Question>,
+    /// Each path with its channels at the places of [`readings::columns`]; the slow group has them in its order.
+    paths: Vec<(Manner, Vec<Option<ChannelId>>)>,
     channels: Vec<ChannelId>,
     period: Duration,
     facts: Option<Arc<Facts>>,
 }
 
 impl FanucSource {
-    /// What changes quickly: motion, loads, states, program. One frame per poll, and a second one while there is an
-    /// alarm.
+    /// What changes quickly: motion, loads, states, program. One frame per poll where it holds all paths, and another
+    /// one while there is an alarm.
     #[must_use]
     pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
         let power = manner.power_diagnosis;
-        let names = readings::FAST.into_iter().chain([readings::OPERATION]).chain(power.map(|_| readings::POWER));
-        let mut items = poll::fast(manner.path);
-        items.extend(power.map(poll::power));
-        Self {
-            name: name.to_owned(),
-            line,
-            group: Group::Fast,
-            manner,
-            items,
-            channels: readings::ids(names),
-            period: options.period,
-            facts: None,
-        }
+        // Whatever its number, the first path has the plain names.
+        let own = readings::columns(1, power.map(|_| readings::POWER));
+        let further = options.further.iter().map(|path| (manner.of_further(*path), readings::columns(*path, [])));
+        let paths: Vec<_> = std::iter::once((manner, own)).chain(further).collect();
+        let mut questions = poll::fast(manner.path);
+        questions.extend(power.map(|number| poll::power(number).on(manner.path)));
+        questions.extend(manner.dial.map(|dial| Item::Pmc(dial.stretch()).on(manner.path)));
+        questions.extend(options.further.iter().flat_map(|path| poll::further(*path)));
+        let channels = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten()).collect();
+        let (name, period) = (name.to_owned(), options.period);
+        Self { name, line, group: Group::Fast, questions, paths, channels, period, facts: None }
     }
 
-    /// What changes slowly and holds in between: parts, gear stage.
+    /// What changes slowly and holds in between: parts, gear stage. Of the first path only.
     #[must_use]
     pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
         let joint = if name.contains('?') { '&' } else { '?' };
+        let channels = readings::ids(readings::SLOW);
         Self {
             name: format!("{name}{joint}group=slow"),
             line,
             group: Group::Slow,
-            manner,
-            items: poll::slow(),
-            channels: readings::ids(readings::SLOW),
+            questions: poll::slow(manner.path),
+            paths: Vec::new(),
+            channels,
             period: options.slow,
             facts: None,
         }
+    }
+
+    /// The alarms of the paths that say that they have some; one more frame.
+    fn alarms(&self, clock: &dyn Clock, asked: &Asked) -> Result<Option<Asked>, SourceError> {
+        let paths = self.paths.iter().map(|(manner, _)| manner.path);
+        let questions: Vec<Question> =
+            paths.filter(|path| readings::alarmed(asked, *path)).map(|path| poll::ALARMS.on(path)).collect();
+        if questions.is_empty() { Ok(None) } else { self.line.ask_on(clock, &questions).map(Some) }
     }
 }
 
@@ -82,15 +91,16 @@ impl Source for FanucSource {
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
-        let asked = self.line.ask(clock, &self.items)?;
+        let asked = self.line.ask_on(clock, &self.questions)?;
         self.facts = Some(asked.facts.clone());
         if self.group == Group::Slow {
             readings::slow(&self.channels, &asked, out);
             return Ok(());
         }
-        let alarmed = readings::alarmed(&asked);
-        let alarms = if alarmed { Some(self.line.ask(clock, &[poll::ALARMS])?) } else { None };
-        readings::fast(&self.channels, &asked, alarms.as_ref(), self.manner, out);
+        let alarms = self.alarms(clock, &asked)?;
+        for (manner, columns) in &self.paths {
+            readings::fast(columns, &asked, alarms.as_ref(), *manner, out);
+        }
         Ok(())
     }
 
@@ -112,7 +122,11 @@ fn identity(facts: &Facts) -> Vec<Fact> {
         known.push(Fact::text("version", system.version.clone()));
     }
     known.push(Fact::text("generation", opening.generation.version().to_string()));
+    if opening.paths > 1 {
+        known.push(Fact::number("paths", f64::from(opening.paths)));
+    }
     known.push(Fact::text("axes", facts.axes.join(" ")));
+    known.extend(facts.further.iter().map(|(path, axes)| Fact::text(on_path("axes", *path), axes.join(" "))));
     known.push(Fact::text("unit", if facts.inch { "inch" } else { "mm" }));
     known
 }

@@ -60,6 +60,12 @@ impl Signals {
         self.f(2, 1)
     }
 
+    /// F002.7 MDRN: dry run is on.
+    #[must_use]
+    pub fn dry_run(&self) -> Option<bool> {
+        self.f(2, 7)
+    }
+
     /// F002.3 THRD: a thread is cut.
     #[must_use]
     pub fn threading(&self) -> Option<bool> {

@@ -7,7 +7,7 @@ use super::server::{Controller, Served, Server, ServerSettings, SimulatedControl
 use super::work_offset::{ExternalOffset, ShiftLimits};
 use crate::address::{Address, Target};
 use crate::clock::{Clock, ScaledClock, SystemClock};
-use crate::driver::{Actuator, SourceError};
+use crate::driver::{Actuator, LadderRequest, SourceError};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::units::OverridePct;
 use std::net::TcpListener;
@@ -20,10 +20,21 @@ fn serve(served: Box<dyn Served>) -> Server {
 
 /// A simulated lathe in the middle of its morning, 20 times as fast as real.
 fn lathe() -> Server {
-    let clock = Arc::new(ScaledClock::new(20.0));
+    lathe_with(20.0, |control| control).0
+}
+
+fn lathe_with(times: f64, with: impl FnOnce(SimulatedControl) -> SimulatedControl) -> (Server, Simulated) {
+    let clock = Arc::new(ScaledClock::new(times));
     let origin_ns = clock.now_ns() - 1800 * crate::clock::SECOND_NS;
     let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
-    serve(Box::new(SimulatedControl::new(machine, clock, 4)))
+    (serve(Box::new(with(SimulatedControl::new(machine.clone(), clock, 4)))), machine)
+}
+
+fn dial_at(percent: u8) -> impl FnOnce(SimulatedControl) -> SimulatedControl {
+    move |mut control| {
+        control.turn_dial(pct(percent));
+        control
+    }
 }
 
 fn opened(server: &Server, keys: &str) -> OpenedFanuc {
@@ -66,6 +77,87 @@ fn the_ladder_takes_what_comes_through_the_mailbox() {
     actuator.release(&SystemClock::new()).expect("given back");
     std::thread::sleep(std::time::Duration::from_millis(30));
     assert_eq!(g12(), Some(super::feed_override::encode(OverridePct::FULL)));
+}
+
+#[test]
+fn a_known_dial_is_told_apart_from_what_is_in_force() {
+    let (server, _) = lathe_with(20.0, dial_at(80));
+    let clock = SystemClock::new();
+    let mut actuator = actuator(&server, "write=mailbox&dial=R907");
+    assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)), "the dial alone");
+    assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))));
+    assert_eq!(write(actuator.as_mut(), 110), Ok(pct(80)), "never above the dial");
+    assert_eq!(write(actuator.as_mut(), 60), Ok(pct(60)));
+    assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))), "nobody has turned it");
+    actuator.release(&clock).expect("given back");
+    std::thread::sleep(std::time::Duration::from_millis(30));
+    assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)));
+}
+
+#[test]
+fn a_product_goes_above_the_dial_where_the_maker_lets_it() {
+    let (server, _) = lathe_with(20.0, |control| dial_at(80)(control.with_rule(crate::LadderRule::Product)));
+    let mut mailbox = actuator(&server, "write=mailbox&dial=R907");
+    assert_eq!(write(mailbox.as_mut(), 120), Ok(pct(96)));
+    mailbox.release(&SystemClock::new()).expect("given back");
+    let mut second = actuator(&server, "write=second_override&dial=G12");
+    assert_eq!(write(second.as_mut(), 50), Ok(pct(40)), "80 % of the dial and 50 % of the gateway");
+    assert_eq!(second.read_dial(&SystemClock::new()), Ok(Some(pct(80))));
+}
+
+#[test]
+fn a_feed_hold_is_asked_once_and_the_operator_ends_it() {
+    let (server, machine) = lathe_with(60.0, |control| control);
+    let clock = SystemClock::new();
+    let mut actuator = actuator(&server, "write=mailbox&request=R905");
+    let byte = |area, at| server.with(|control| control.expect("on").memory.byte(area, at));
+    for _ in 0..3 {
+        actuator.ask(&clock, LadderRequest::FeedHold).expect("latched");
+    }
+    assert_eq!((byte(Area::R, 905), byte(Area::R, 906), byte(Area::G, 8) & 0x20), (0, 1, 0), "*SP is off");
+    let run = || server.with(|control| control.expect("on").status.run);
+    wait_for("the axes stand", || run() == 2);
+    assert_eq!(machine.written().feed_holds, 1, "asked three times, told once");
+    wait_for("the operator has acknowledged", || byte(Area::R, 906) == 0);
+    assert_eq!(byte(Area::G, 8) & 0x20, 0x20);
+    actuator.ask(&clock, LadderRequest::FeedHold).expect("latched again");
+    wait_for("the axes stand again", || run() == 2 && machine.written().feed_holds == 2);
+}
+
+#[test]
+fn a_stop_lets_the_part_end() {
+    let (server, machine) = lathe_with(60.0, |control| control);
+    let mut actuator = actuator(&server, "write=mailbox&request=R905");
+    actuator.ask(&SystemClock::new(), LadderRequest::Stop).expect("latched");
+    let (run, parts) = (
+        || server.with(|control| control.expect("on").status.run),
+        || server.with(|control| control.expect("on").parameters[&6711].values[0].mantissa),
+    );
+    assert_ne!(run(), 1, "not in the middle of a part");
+    let before = parts();
+    wait_for("the program stands", || run() == 1);
+    assert!(parts() > before, "the part was ended");
+    assert_eq!(machine.written().stops, 1);
+}
+
+#[test]
+fn a_request_that_no_rung_latches_is_refused_and_withdrawn() {
+    let server = serve(Box::new(Controller::new(4, &['X'])));
+    let mut silent = actuator(&server, "write=mailbox&request=D20");
+    let error = silent.ask(&SystemClock::new(), LadderRequest::Stop).expect_err("nobody there").to_string();
+    assert!(error.contains("no rung latches the bit of D20 in D21"), "{error}");
+    assert_eq!(server.with(|control| control.expect("on").memory.byte(Area::D, 20)), 0, "nothing is left on");
+    let error = actuator(&server, "write=mailbox").ask(&SystemClock::new(), LadderRequest::Stop).expect_err("no byte");
+    assert!(error.to_string().contains("request=R905"), "{error}");
+}
+
+/// At most a minute, which is an hour of this machine's.
+fn wait_for(what: &str, mut holds: impl FnMut() -> bool) {
+    let until = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    while !holds() {
+        assert!(std::time::Instant::now() < until, "not within a minute: {what}");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
 }
 
 #[test]

@@ -4,11 +4,13 @@ use super::answer::{Answer, ItemError, ItemResult, ReturnCode};
 use super::decode::text_of;
 use super::ffi::Functions;
 use super::item::{Item, Width};
+use super::line::DEAD_LINK;
 use super::message::{Ask, Tell};
 use super::sampling::{Columns, POINTS_MAX, SAMPLED_MAX, SampledItem};
 use crate::child::{Guarded, Missing, serve_words};
 use std::ffi::CString;
 use std::path::Path;
+use std::time::Instant;
 
 /// Room for any single value: the longest text of the library is 64 bytes.
 const VALUE_LEN: usize = 256;
@@ -29,8 +31,12 @@ const LEVEL_ERROR: i32 = 0;
 /// # Errors
 /// The line to the parent failed.
 pub fn child() -> std::io::Result<()> {
-    let mut session = None;
-    serve_words(|ask: Result<Ask, String>| ask.map_or_else(Tell::Confused, |ask| answer(&mut session, ask)))
+    let mut session: Option<Session> = None;
+    serve_words(|ask: Result<Ask, String>, tell| match (ask, &session) {
+        (Ok(Ask::Read(items)), Some(session)) => session.read_each(&items, tell),
+        (Ok(ask), _) => tell(&answer(&mut session, ask)),
+        (Err(confused), _) => tell(&Tell::Confused(confused)),
+    })
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
@@ -49,11 +55,10 @@ fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
     let Some(session) = session else { return Tell::Confused("there is no connection".to_owned()) };
     match ask {
         Ask::Alive => session.alive(),
-        Ask::Read(item) => Tell::Read(session.read(item)),
         Ask::Write(kind, index, value, bytes) => session.write(kind, index, value, bytes),
         Ask::Sample(items) => session.sample(&items),
         Ask::Sampled => session.sampled(),
-        Ask::Open { .. } => Tell::Confused("already open".to_owned()),
+        Ask::Open { .. } | Ask::Read(_) => Tell::Confused("not on this connection".to_owned()),
     }
 }
 
@@ -139,6 +144,22 @@ impl Session {
             let (net, up, down) = NET_EVENT;
             self.connected += u64::from((word(0), word(2)) == (net, up));
             self.lost += u64::from((word(0), word(2)) == (net, down));
+        }
+    }
+
+    /// Reads until an answer cannot be trusted or the link is dead.
+    fn read_each(&self, items: &[Item], tell: &mut dyn FnMut(&Tell)) {
+        for item in items {
+            let began = Instant::now();
+            let result = self.read(*item);
+            if began.elapsed() > DEAD_LINK {
+                return tell(&Tell::DeadLink(u64::try_from(began.elapsed().as_millis()).unwrap_or(u64::MAX)));
+            }
+            let malformed = matches!(result, Err(ItemError::Malformed(_)));
+            tell(&Tell::Read(result));
+            if malformed {
+                return;
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use super::item::{Item, register_type};
 use super::message::{Ask, Tell};
 use super::sampling::{Columns, SampledItem};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Client};
+use crate::child::{ChildCounts, ChildError, ChildSettings, Client, Taken};
 use crate::driver::SourceError;
 use crate::nclink::mailbox::Register;
 use std::net::UdpSocket;
@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A call that takes longer has met a dead link: the library waits for 3 s then.
-const DEAD_LINK: Duration = Duration::from_millis(2500);
+pub(super) const DEAD_LINK: Duration = Duration::from_millis(2500);
 
 /// How the library is used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -105,31 +105,29 @@ impl Line {
         }
     }
 
-    /// Reads one item. A child that dies of it costs this item only; one that has died of it twice is not asked again.
+    /// Reads one item; see [`Line::read_each`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read(&self, item: Item) -> Result<ItemResult, SourceError> {
+        self.read_each(&[item]).map(|mut results| results.pop().unwrap_or(Err(ItemError::NotOffered)))
+    }
+
+    /// Reads items in one request to the child. One that the child dies of costs this item only; one that it has died of
+    /// twice is not asked again.
     ///
     /// # Errors
     /// [`SourceError::Timeout`] on a dead link, [`SourceError::Line`] when the library cannot be loaded or connected.
-    pub fn read(&self, item: Item) -> Result<ItemResult, SourceError> {
+    pub fn read_each(&self, items: &[Item]) -> Result<Vec<ItemResult>, SourceError> {
         let mut inner = self.locked();
-        if inner.child.is_left_alone(item) {
-            return Ok(Err(ItemError::NotOffered));
-        }
-        inner.open()?;
-        let began = Instant::now();
-        match inner.child.told(&Ask::Read(item)) {
-            Ok(Tell::Read(_)) if began.elapsed() > DEAD_LINK => Err(inner.dead_link(began.elapsed())),
-            Ok(Tell::Read(result)) => {
-                if matches!(&result, Err(ItemError::Malformed(_))) {
-                    inner.child.blame(item);
-                }
-                Ok(result)
-            }
-            Ok(other) => Err(inner.nonsense("an item", &other)),
-            Err(error) => {
-                inner.child.blame(item);
-                Ok(Err(ItemError::Malformed(error.to_string())))
+        let mut results = Vec::with_capacity(items.len());
+        while let Some(rest) = items.get(results.len()..).filter(|rest| !rest.is_empty()) {
+            match inner.child.survived(rest) {
+                0 => results.push(Err(ItemError::NotOffered)),
+                count => inner.read_some(&rest[..count], &mut results)?,
             }
         }
+        Ok(results)
     }
 
     /// Writes registers one after the other.
@@ -191,6 +189,35 @@ impl Line {
 }
 
 impl Inner {
+    /// Reads as many as one child survives, at least one.
+    fn read_some(&mut self, items: &[Item], results: &mut Vec<ItemResult>) -> Result<(), SourceError> {
+        self.open()?;
+        let mut dead = None;
+        let take = |told| match told {
+            Tell::Read(result) => {
+                let malformed = matches!(result, Err(ItemError::Malformed(_)));
+                results.push(result);
+                if malformed { Taken::Suspect } else { Taken::Good }
+            }
+            Tell::DeadLink(took_ms) => {
+                dead = Some(Duration::from_millis(took_ms));
+                Taken::Last
+            }
+            other => {
+                results.push(Err(ItemError::Malformed(format!("{other:?}"))));
+                Taken::Suspect
+            }
+        };
+        let outcome = self.child.told_each(items, &Ask::Read(items.to_vec()), take);
+        if let Some(took) = dead {
+            return Err(self.dead_link(took));
+        }
+        if let Err((_, error)) = outcome {
+            results.push(Err(ItemError::Malformed(error.to_string())));
+        }
+        Ok(())
+    }
+
     /// A question whose failure ends the poll.
     fn ask(&mut self, ask: &Ask, request: &str) -> Result<Tell, SourceError> {
         self.open()?;

@@ -26,8 +26,9 @@ pub(super) enum Ask {
     },
     /// Is the connection alive, and what has happened since?
     Alive,
-    /// Read one item.
-    Read(Item),
+    /// Read these, one answer for each as soon as it is there. After an answer that cannot be trusted, or a link that is
+    /// dead, no other comes.
+    Read(Vec<Item>),
     /// Write one register: type, index, value, bytes.
     Write(i32, i32, i64, usize),
     /// Begin to sample.
@@ -56,6 +57,8 @@ pub(super) enum Tell {
     },
     /// One item.
     Read(ItemResult),
+    /// A call took so long, ms, that the link must be dead.
+    DeadLink(u64),
     /// Written, or sampling.
     Done,
     /// Samples.

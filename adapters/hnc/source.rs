@@ -266,10 +266,9 @@ impl Source for HncSource {
         self.alive = self.line.alive()?;
         self.look(self.alive.generation)?;
         let began_ns = clock.now_ns();
-        let mut answers = HashMap::new();
-        for item in self.items() {
-            answers.insert(item, self.line.read(item)?);
-        }
+        let items = self.items();
+        let results = self.line.read_each(&items)?;
+        let answers: HashMap<Item, ItemResult> = items.into_iter().zip(results).collect();
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
         self.readings(&Poll(answers), stamp, out);
         self.take_samples(clock)

@@ -22,10 +22,22 @@ if has(spindle_load_pct) && has(rapid) && rapid == 0.0 && spindle_load_pct > 8.0
 memory.pct = pct;
 ";
 
+/// Less feed than the dial, and a feed hold when that has been so for two seconds.
+const HOLDING: &str = "
+let slow = memory.slow ?? 0;
+memory.slow = if has(feed_override_pct) && feed_override_pct <= 61.0 { slow + 1 } else { 0 };
+if has(rapid) && rapid == 0.0 { request_feed_override(60.0, \"gently\"); }
+if memory.slow > 20 { request_feed_hold(\"look at the tool\"); }
+";
+
 fn prepared(directory: &Path, address: &str) -> PathBuf {
+    prepared_with(directory, address, SCRIPT)
+}
+
+fn prepared_with(directory: &Path, address: &str, script: &str) -> PathBuf {
     let scripts = directory.join("data/scripts");
     std::fs::create_dir_all(&scripts).expect("a directory");
-    std::fs::write(scripts.join("load.rhai"), SCRIPT).expect("a script");
+    std::fs::write(scripts.join("load.rhai"), script).expect("a script");
     let config = directory.join("cnc-gateway.toml");
     let written = format!(
         "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n\
@@ -85,6 +97,33 @@ fn the_load_is_held_through_the_mailbox_of_a_served_machine() {
     });
     println!("at {} % of the feed the load is {} %", held.0, held.1);
     gateway.stop();
+}
+
+#[test]
+fn the_dial_is_known_and_a_feed_hold_is_latched_by_the_ladder() {
+    let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125", "--dial", "80"]);
+    let directory = tempfile::tempdir().expect("a directory");
+    let keys = "write=mailbox&dial=R907&request=R905&power_diagnosis=4902";
+    let config = prepared_with(directory.path(), &format!("{}?{keys}", serving.address), HOLDING);
+    let (gateway, address) = started(&config);
+    wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
+    armed(&config);
+    let of = |name: &str| {
+        let status = get(&address, "/api/v1/status").json();
+        let channels = status["channels"].as_array().cloned().unwrap_or_default();
+        channels.into_iter().find(|row| row["name"] == name).map(|row| row["value"].clone())
+    };
+    let dial = wait_for("the gateway's override below the dial", Duration::from_secs(150), || {
+        let now = shown(&address);
+        assert!(now.gate["disarmed"].is_null() || now.gate["disarmed"] == "not armed since the start", "{}", now.gate);
+        (now.override_pct? <= 61.0).then(|| of("feed_override_dial_pct"))
+    });
+    assert_eq!(dial, Some(Value::from(80.0)), "the dial is told apart from what is in force");
+    wait_for("the axes stand", Duration::from_secs(60), || of("execution").filter(|word| word == "FEED_HOLD"));
+    gateway.stop();
+    let database = directory.path().join("data/history.db");
+    let told = stdout(&run(&["history", "audit", "--json", "--history", text(&database)]));
+    assert!(told.contains("feed_hold"), "{told}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 /* A library with the vendor's functions and none of its code: fixed values of a lathe that cuts, and faults on purpose.
- * The file named by FAKE_LIBRARY_FAULT holds "KIND FUNCTION [CODE]"; KIND is hang, abort, overrun or code.
+ * The file named by FAKE_LIBRARY_FAULT holds "KIND FUNCTION [CODE]"; KIND is hang, abort, overrun or code. "wait any MS"
+ * makes every call that a real library sends take so long. The second path cuts at half the speed of the first.
  * Compiled by the tests with the system's compiler. */
 #include <pthread.h>
 #include <stdint.h>
@@ -9,6 +10,7 @@
 #include <unistd.h>
 
 static int started;
+static int16_t path_now = 1;
 static pthread_t owner;
 static int32_t macro_value = 254;
 static int16_t macro_places = 1;
@@ -23,6 +25,7 @@ static int fault(const char *function, void *out, size_t size, int16_t *code) {
     if (!file) return 0;
     int fields = fscanf(file, "%31s %63s %d", kind, name, &wanted);
     fclose(file);
+    if (fields == 3 && !strcmp(kind, "wait")) usleep(1000 * (useconds_t)wanted);
     if (fields < 2 || strcmp(name, function) != 0) return 0;
     if (!strcmp(kind, "hang")) for (;;) pause();
     if (!strcmp(kind, "abort")) abort();
@@ -69,7 +72,19 @@ int16_t cnc_allclibhndl3(const char *host, uint16_t port, int32_t timeout, uint1
 }
 
 int16_t cnc_freelibhndl(uint16_t handle) { return handle == 32769 ? 0 : -8; }
-int16_t cnc_setpath(uint16_t handle, int16_t path) { (void)handle; return path > 1 ? 11 : 0; }
+int16_t cnc_setpath(uint16_t handle, int16_t path) {
+    (void)handle;
+    if (path < 1 || path > 2) return 11;
+    path_now = path;
+    return 0;
+}
+
+int16_t cnc_getpath(uint16_t h, int16_t *path, int16_t *paths) {
+    (void)h;
+    *path = path_now;
+    *paths = 2;
+    return 0;
+}
 
 int16_t cnc_sysinfo(uint16_t h, void *out) {
     static const struct { int16_t add, axes_max; char text[14]; } values = {0x0402, 32, "31 TG42127.002"};
@@ -90,14 +105,14 @@ int16_t cnc_statinfo(uint16_t h, int16_t *out) {
 int16_t cnc_actf(uint16_t h, int32_t *out) {
     (void)h;
     CHECKED(out, 8);
-    out[1] = 240;
+    out[1] = 240 / path_now;
     return 0;
 }
 
 int16_t cnc_acts(uint16_t h, int32_t *out) {
     (void)h;
     CHECKED(out, 8);
-    out[1] = 1200;
+    out[1] = 1200 / path_now;
     return 0;
 }
 
@@ -129,10 +144,10 @@ int16_t cnc_rdsvmeter(uint16_t h, int16_t *count, struct element *out) {
 #endif
 
 int16_t cnc_exeprgname(uint16_t h, char *out) {
-    int32_t number = 1001;
+    int32_t number = 1000 * path_now + 1;
     (void)h;
     CHECKED(out, 40);
-    strcpy(out, "O1001");
+    strcpy(out, path_now == 1 ? "O1001" : "O2001");
     memcpy(out + 36, &number, 4);
     return 0;
 }
@@ -155,6 +170,10 @@ int16_t cnc_rddynamic2(uint16_t h, int16_t axis, int16_t length, int32_t *out) {
     (void)h, (void)axis;
     CHECKED(out, 540);
     if (length != 540) return 2;
+    out[2] = out[3] = 1000 * path_now + 1;
+    out[4] = 120;
+    out[5] = 240 / path_now;
+    out[6] = 1200 / path_now;
     out[7 + 32] = 79000;
     out[7 + 33] = -12345;
     return 0;
@@ -163,7 +182,7 @@ int16_t cnc_rddynamic2(uint16_t h, int16_t axis, int16_t length, int32_t *out) {
 int16_t cnc_modal(uint16_t h, int16_t kind, int16_t block, int32_t *out) {
     (void)h, (void)block;
     CHECKED(out, 260);
-    out[1] = kind == 103 ? 250 : kind == 107 ? 1200 : kind == 108 ? 303 : 0;
+    out[1] = kind == 103 ? 250 / path_now : kind == 107 ? 1200 / path_now : kind == 108 ? 303 : 0;
     return 0;
 }
 
@@ -197,8 +216,8 @@ int16_t pmc_rdpmcrng(uint16_t h, int16_t area, int16_t width, uint16_t from, uin
     if (to < from || length != 8 + to - from + 1) return 2;
     for (uint16_t at = from; at <= to; at++) {
         uint8_t value = 0;
-        if (area == 0) value = at == 12 ? 0xAF : at == 30 ? 100 : 0;
-        if (area == 1) value = at == 0 ? 0x60 : 0;
+        if (area == 0) value = at % 1000 == 12 ? 0xAF : at % 1000 == 30 ? 100 : 0;
+        if (area == 1) value = at % 1000 == 0 ? 0x60 : 0;
         if (area == 5 && at < sizeof memory_r) value = memory_r[at];
         out[8 + at - from] = value;
     }

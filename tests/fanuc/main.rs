@@ -6,6 +6,7 @@ mod faults;
 mod flapping;
 #[path = "../support/library.rs"]
 mod library;
+mod paths;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;

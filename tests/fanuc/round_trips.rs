@@ -15,7 +15,7 @@ fn median(mut times: Vec<Duration>) -> (Duration, Duration) {
 }
 
 fn polls(focas: &mut dyn Focas, count: usize) -> Vec<Duration> {
-    let items = [poll::fast(1), poll::slow()].concat();
+    let items = [poll::fast(1), poll::slow(1)].concat();
     let one = |_| {
         let (began, mut out) = (Instant::now(), Vec::new());
         focas.ask(&items, &mut out).expect("answers");
@@ -62,4 +62,9 @@ fn the_whole_poll_set_through_a_library_in_its_child() {
         most.as_micros()
     );
     assert_eq!(vendor.counts().starts, 1);
+    // As over a wire to a control that needs 10 ms for every call.
+    library.fault("wait any 10");
+    let (half, _) = median(polls(&mut vendor, 5));
+    println!("with 10 ms for every call of the library: {} ms for the whole poll", half.as_millis());
+    library.well();
 }

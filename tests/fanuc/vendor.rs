@@ -2,7 +2,7 @@
 
 use crate::library::{Library, nothing_is_left, poll_survives};
 use crate::support::{CUT, controller, number, poll, serve, text, value};
-use adapters::address::{Endpoint, FanucOptions};
+use adapters::address::{Address, Endpoint, FanucOptions, Target};
 use adapters::clock::SystemClock;
 use adapters::fanuc::focas::Focas;
 use adapters::fanuc::item::{Area, Item, Stretch, Write};
@@ -30,9 +30,17 @@ pub(crate) fn settings(library: &Library) -> VendorSettings {
 }
 
 fn opened(library: &Library) -> OpenedFanuc {
+    opened_with(library, "fanuc://fake")
+}
+
+/// With the keys of this address.
+pub(crate) fn opened_with(library: &Library, address: &str) -> OpenedFanuc {
     let settings = settings(library);
     let connect: Connect = Box::new(move || Ok(Box::new(Vendor::connect(settings.clone())?)));
-    open::opened("fanuc://fake", connect, 1, &FanucOptions { duty_pct: 100, ..FanucOptions::default() })
+    let address: Address = address.parse().expect("usable");
+    let Target::Fanuc { path, options, .. } = address.target() else { panic!("{address}") };
+    let options = FanucOptions { duty_pct: 100, ..(**options).clone() };
+    open::opened(address.text(), connect, *path, &options)
 }
 
 fn cut(readings: &[Reading]) {
@@ -67,6 +75,22 @@ fn the_library_gives_the_values_that_the_wire_gives() {
 }
 
 #[test]
+fn one_call_answers_several_questions_and_each_alone_where_it_is_missing() {
+    let library = library(&[]);
+    let mut opened = opened(&library);
+    let source = opened.sources[0].as_mut();
+    poll(source).expect("answers");
+    library.fault("code cnc_acts 1");
+    assert_eq!(number(&poll(source).expect("answers"), "spindle_speed_rpm"), 1200.0, "it came with the positions");
+    library.fault("code cnc_rddynamic2 6");
+    let readings = poll(source).expect("answers");
+    cut(&readings);
+    assert_eq!(value(&readings, "x_axis_position_mm"), Err(Absence::NotSupported), "only what comes with nothing else");
+    library.fault("abort cnc_rddynamic2");
+    cut(&poll(source).expect("not asked any more"));
+}
+
+#[test]
 fn a_library_without_a_function_lacks_its_channels_only() {
     let library = library(&["-DWITHOUT_SERVO_METER"]);
     let mut opened = opened(&library);
@@ -82,12 +106,12 @@ fn a_code_other_than_zero_never_shows_what_was_scribbled() {
     let mut opened = opened(&library);
     let cases = [(-1, Absence::Refused), (6, Absence::NotSupported)];
     for (code, expected) in cases {
-        library.fault(&format!("code cnc_acts {code}"));
+        library.fault(&format!("code cnc_rdspmeter {code}"));
         let readings = poll(opened.sources[0].as_mut()).expect("the others flow");
-        assert_eq!(value(&readings, "spindle_speed_rpm"), Err(expected), "code {code}");
+        assert_eq!(value(&readings, "spindle_load_pct"), Err(expected), "code {code}");
         assert_eq!(number(&readings, "feed_mm_min"), 240.0);
     }
-    library.fault("code cnc_actf -16");
+    library.fault("code cnc_statinfo -16");
     assert!(poll(opened.sources[0].as_mut()).is_err(), "the connection is dead");
     library.well();
     cut(&poll(opened.sources[0].as_mut()).expect("a new connection"));
@@ -158,7 +182,7 @@ fn what_is_written_is_read_back_through_the_library() {
     vendor.write(&Write::Pmc { stretch, values: vec![0xA5, 80, 7] }).expect("written");
     vendor.write(&Write::Macro { number: 500, mantissa: -25, places: 1 }).expect("written");
     let mut out = Vec::new();
-    vendor.ask(&[Item::Pmc(stretch), Item::Macro(500)], &mut out).expect("answers");
+    vendor.ask(&[Item::Pmc(stretch).on(1), Item::Macro(500).on(1)], &mut out).expect("answers");
     let expected = [
         adapters::fanuc::answer::Answer::Memory(vec![0xA5, 80, 7]),
         adapters::fanuc::answer::Answer::Number(Some(-2.5)),
@@ -169,13 +193,18 @@ fn what_is_written_is_read_back_through_the_library() {
 fn cycles(count: usize) {
     let library = library(&[]);
     let clock = SystemClock::new();
-    nothing_is_left(&library, count, ["abort cnc_acts", "overrun cnc_statinfo", "code cnc_actf -16"], || {
-        let mut opened = opened(&library);
-        let mut out = Vec::new();
-        let _typed = opened.sources[0].read(&clock, &mut out);
-        library.well();
-        assert_eq!(number(&poll(opened.sources[0].as_mut()).expect("well again"), "spindle_load_pct"), 41.0);
-    });
+    nothing_is_left(
+        &library,
+        count,
+        ["abort cnc_exeprgname", "overrun cnc_statinfo", "code cnc_rddynamic2 -16"],
+        || {
+            let mut opened = opened(&library);
+            let mut out = Vec::new();
+            let _typed = opened.sources[0].read(&clock, &mut out);
+            library.well();
+            assert_eq!(number(&poll(opened.sources[0].as_mut()).expect("well again"), "spindle_load_pct"), 41.0);
+        },
+    );
 }
 
 #[test]

@@ -16,6 +16,8 @@ pub(super) const FUNC: i16 = 1;
 pub(super) const LENGTH: i16 = 2;
 pub(super) const NUMBER: i16 = 3;
 pub(super) const ATTRIB: i16 = 4;
+/// No such path.
+const PATH: i16 = 11;
 
 /// Answers every question of a frame, in order.
 #[must_use]
@@ -30,10 +32,10 @@ fn answer(controller: &mut Controller, request: &Request) -> ReplyBlock {
     if let Some(refusal) = controller.refusals.get(&request.function) {
         return refused(*refusal);
     }
-    if request.path > controller.opening.paths {
-        return refused((11, 0));
-    }
-    match data(controller, request) {
+    // PMC memory is the first path's, whatever the block says.
+    let path = if request.device == Device::Pmc { 1 } else { request.path };
+    let Some(own) = controller.path(path) else { return refused((PATH, 0)) };
+    match data(own, request) {
         Ok(data) => ReplyBlock { code: 0, detail: 0, data },
         Err(code) => refused((code, 0)),
     }

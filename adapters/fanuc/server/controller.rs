@@ -101,6 +101,8 @@ pub struct Controller {
     pub panel: [i16; 16],
     /// Functions that are refused, with code and detail.
     pub refusals: BTreeMap<u16, (i16, i16)>,
+    /// Paths from 2 on, each with what a path has for itself. PMC memory is one: that of the first path counts.
+    pub further: Vec<Controller>,
     /// How many writes were taken.
     pub writes: u64,
 }
@@ -142,8 +144,34 @@ impl Controller {
             timers: [(0, 0); 4],
             panel: [0; 16],
             refusals: BTreeMap::new(),
+            further: Vec::new(),
             writes: 0,
         }
+    }
+
+    /// One path more, with these axes and a spindle of its own.
+    #[must_use]
+    pub fn with_path(mut self, axes: &[char]) -> Self {
+        self.further.push(Self::new(self.opening.generation.version(), axes));
+        self.opening.paths = u16::try_from(self.further.len() + 1).unwrap_or(u16::MAX);
+        self
+    }
+
+    /// What a path from 1 has for itself.
+    pub(super) fn path(&mut self, path: u16) -> Option<&mut Self> {
+        match usize::from(path).checked_sub(2) {
+            Some(further) => self.further.get_mut(further),
+            None => Some(self),
+        }
+    }
+
+    /// The body of the answer to an opening.
+    pub(super) fn opened(&self) -> Vec<u8> {
+        let further = |path: u16| self.further.get(usize::from(path).checked_sub(2)?);
+        self.opening.body_with(|path| {
+            let own = further(path).map_or(&self.opening, |path| &path.opening);
+            (own.axes, own.spindles)
+        })
     }
 
     /// Puts a parameter without axes there.

@@ -11,12 +11,26 @@
 //! | +4 | ladder | 0 not asked, 1 taken, 2 heartbeat lost, 3 taken within the ladder's own limits |
 //!
 //! Every scan: the wanted override counts while byte +0 says so and the heartbeat has changed within the last 1.5 s,
-//! and never outside the ladder's own limits (50 to 120 %). It multiplies the operator's dial, which stays sovereign at
-//! 0 %. The result goes to G012 in every scan, whatever anybody else wrote there. A second byte (R910 by default) goes,
-//! inverted, to the second override G013; 0 there is no wish.
+//! and never outside the ladder's own limits (50 to 120 %). With the operator's dial it becomes one override by the
+//! [`LadderRule`]: the lesser of the two, or their product where the machine's maker lets the gateway go above the dial;
+//! a dial at 0 % stays sovereign either way. The result goes to G012 in every scan, whatever anybody else wrote there. A
+//! second byte (R910 by default) goes, inverted, to the second override G013; 0 there is no wish.
+//!
+//! Requests, two bytes from another configurable byte on (R905 by default), and the dial behind them:
+//!
+//! | byte | written by | what |
+//! |---|---|---|
+//! | +0 | gateway | bit 0 feed hold, bit 1 stop after this part; on for a few scans, then off again |
+//! | +1 | ladder | the same bits, latched when a bit comes on, until the operator acknowledges |
+//! | +2 | ladder | the operator's dial, %, before the gateway's override |
+//!
+//! A bit that is on when the ladder starts is a leftover and latches nothing. While feed hold is latched, *SP (G008.5)
+//! is off and the axes stand. While a stop is latched, the ladder lets the running part end and no cycle start through.
+//! The gateway can neither end what it has asked for nor ask for the same a second time before it was acknowledged.
 
 use super::Memory;
 use crate::clock::TimeNs;
+use crate::driver::{LadderRequest, LadderRule};
 use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
 use crate::units::OverridePct;
@@ -32,6 +46,20 @@ const SILENT_NS: i64 = 1_500_000_000;
 
 /// The ladder's own limits, %.
 const LIMITS_PCT: (u8, u8) = (50, 120);
+
+/// The bit of a request.
+#[must_use]
+pub fn request_bit(request: LadderRequest) -> u8 {
+    match request {
+        LadderRequest::FeedHold => 1,
+        LadderRequest::Stop => 2,
+    }
+}
+
+/// *IT, *ESP and *SP of G008: off means interlock, emergency stop and feed hold.
+const RUNNING: u8 = 0x31;
+const FEED_HOLD: u8 = 0x20;
+const INTERLOCKS_AT: u16 = 8;
 
 /// What byte +4 says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,14 +81,30 @@ pub struct Ladder {
     pub mailbox: (Area, u16),
     /// Area and byte of the second override.
     pub second: (Area, u16),
+    /// Area and first byte of the requests.
+    pub requests: (Area, u16),
     /// The operator's dial, %.
     pub dial: OverridePct,
+    /// What dial and mailbox make.
+    pub rule: LadderRule,
+    /// Bits of the last scan; `None` before the first one.
+    asked: Option<u8>,
+    latched: u8,
     beat: Option<(u8, TimeNs)>,
 }
 
 impl Default for Ladder {
     fn default() -> Self {
-        Self { mailbox: (Area::R, 900), second: (Area::R, 910), dial: OverridePct::FULL, beat: None }
+        Self {
+            mailbox: (Area::R, 900),
+            second: (Area::R, 910),
+            requests: (Area::R, 905),
+            dial: OverridePct::FULL,
+            rule: LadderRule::default(),
+            asked: None,
+            latched: 0,
+            beat: None,
+        }
     }
 }
 
@@ -71,15 +115,46 @@ impl Ladder {
         let (taken, state) = self.taken(memory, now_ns);
         memory.set(area, at + 3, taken);
         memory.set(area, at + 4, state as u8);
-        memory.set(Area::G, feed_override::AT, feed_override::encode(product(self.dial, taken)));
+        memory.set(Area::G, feed_override::AT, feed_override::encode(self.in_force(taken, state)));
         let wanted = memory.byte(self.second.0, self.second.1);
         let second = OverridePct::new(if wanted == 0 { 100 } else { limited(wanted) }).unwrap_or(OverridePct::FULL);
         memory.set(Area::G, feed_override::SECOND_AT, feed_override::encode(second));
+        self.latch(memory);
+    }
+
+    /// Without a request of the gateway the dial alone counts.
+    fn in_force(&self, taken: u8, state: MailboxState) -> OverridePct {
+        match (state, OverridePct::new(taken)) {
+            (MailboxState::Taken | MailboxState::Limited, Some(taken)) => self.rule.combine(self.dial, taken),
+            _ => self.dial,
+        }
+    }
+
+    fn latch(&mut self, memory: &mut Memory) {
+        let (area, at) = self.requests;
+        let asked = memory.byte(area, at);
+        self.latched |= asked & !self.asked.unwrap_or(asked) & (1 | 2);
+        self.asked = Some(asked);
+        memory.set(area, at + 1, self.latched);
+        memory.set(area, at + 2, self.dial.percent());
+        let interlocks = if self.is_latched(LadderRequest::FeedHold) { RUNNING & !FEED_HOLD } else { RUNNING };
+        memory.set(Area::G, INTERLOCKS_AT, interlocks);
+    }
+
+    /// Does the machine have to stand because of this?
+    #[must_use]
+    pub fn is_latched(&self, request: LadderRequest) -> bool {
+        self.latched & request_bit(request) != 0
+    }
+
+    /// The operator has seen to it.
+    pub fn acknowledge(&mut self, request: LadderRequest) {
+        self.latched &= !request_bit(request);
     }
 
     /// Forgets what the power-on clears.
     pub fn power_off(&mut self) {
-        self.beat = None;
+        (self.beat, self.asked, self.latched) = (None, None, 0);
     }
 
     fn taken(&mut self, memory: &Memory, now_ns: TimeNs) -> (u8, MailboxState) {
@@ -105,11 +180,6 @@ impl Ladder {
 
 fn limited(percent: u8) -> u8 {
     percent.clamp(LIMITS_PCT.0, LIMITS_PCT.1)
-}
-
-fn product(dial: OverridePct, percent: u8) -> OverridePct {
-    let product = u16::from(dial.percent()) * u16::from(percent) / 100;
-    u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(OverridePct::FULL)
 }
 
 #[cfg(test)]
@@ -146,13 +216,47 @@ mod tests {
 
     #[test]
     fn the_dial_multiplies_and_is_sovereign_at_zero() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let rule = LadderRule::Product;
+        let (mut ladder, mut memory) = (Ladder { rule, ..Ladder::default() }, Memory::default());
         scans(&mut ladder, &mut memory, 0, 10);
         ask(&mut memory, 120, 1);
         ladder.dial = OverridePct::new(50).expect("exists");
         assert_eq!(scans(&mut ladder, &mut memory, 20, 40), 60);
         ladder.dial = OverridePct::new(0).expect("exists");
         assert_eq!(scans(&mut ladder, &mut memory, 40, 60), 0);
+    }
+
+    #[test]
+    fn nothing_is_above_the_dial_unless_the_maker_says_so() {
+        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        scans(&mut ladder, &mut memory, 0, 10);
+        ladder.dial = OverridePct::new(80).expect("exists");
+        assert_eq!(scans(&mut ladder, &mut memory, 20, 40), 80, "the dial alone");
+        for (wanted, expected) in [(120, 80), (60, 60)] {
+            ask(&mut memory, wanted, wanted);
+            assert_eq!(scans(&mut ladder, &mut memory, 60, 80), expected, "asked {wanted} %");
+        }
+        assert_eq!(memory.byte(Area::R, 907), 80, "the dial is told apart from what is in force");
+    }
+
+    #[test]
+    fn a_request_is_latched_once_until_it_is_acknowledged() {
+        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        memory.set(Area::R, 905, 1);
+        scans(&mut ladder, &mut memory, 0, 20);
+        assert_eq!(memory.byte(Area::R, 906), 0, "a leftover latches nothing");
+        let mut bits = |bits: u8, ladder: &mut Ladder| {
+            memory.set(Area::R, 905, bits);
+            scans(ladder, &mut memory, 20, 40);
+            (memory.byte(Area::R, 906), memory.byte(Area::G, 8))
+        };
+        assert_eq!(bits(0, &mut ladder), (0, 0x31));
+        assert_eq!(bits(1, &mut ladder), (1, 0x11), "*SP is off");
+        assert_eq!(bits(0, &mut ladder), (1, 0x11), "and stays off");
+        assert_eq!(bits(2, &mut ladder), (3, 0x11));
+        ladder.acknowledge(LadderRequest::FeedHold);
+        assert_eq!(bits(2, &mut ladder), (2, 0x31), "a bit that stays on asks once");
+        assert_eq!(bits(0xFC, &mut ladder).0, 2, "other bits are nobody's");
     }
 
     #[test]

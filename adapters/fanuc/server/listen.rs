@@ -227,7 +227,7 @@ impl Session {
         match request.kind {
             FrameKind::Open => {
                 let free = self.counted || self.take_place();
-                let body = if free { controller.opening.body() } else { Vec::new() };
+                let body = if free { controller.opened() } else { Vec::new() };
                 Ok(frame(version, if free { FrameKind::Opened } else { FrameKind::OpenRefused }, &body))
             }
             FrameKind::Close => Ok(frame(version, FrameKind::Closed, &[])),

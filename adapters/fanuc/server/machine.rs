@@ -3,8 +3,10 @@
 use super::controller::{Controller, Data};
 use super::ladder::{Ladder, SCAN_NS};
 use super::listen::Served;
+use super::second_path;
 use crate::address::SimulatedMachine;
 use crate::clock::{Clock, TimeNs};
+use crate::driver::{Actuator, LadderRequest, LadderRule};
 use crate::fanuc::answer::{Alarm, Status};
 use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
@@ -25,6 +27,17 @@ pub struct SimulatedControl {
     ladder: Ladder,
     scanned_ns: TimeNs,
     written: OverridePct,
+    requests: [Requested; 2],
+}
+
+/// A request on its way through the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Requested {
+    request: LadderRequest,
+    /// Was the machine told?
+    told: bool,
+    /// Has the machine been seen to stand because of it?
+    stood: bool,
 }
 
 impl SimulatedControl {
@@ -40,7 +53,27 @@ impl SimulatedControl {
         [3106, 3107, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
         let scanned_ns = clock.now_ns();
         let (ladder, written) = (Ladder::default(), OverridePct::FULL);
-        Self { machine, clock, controller, ladder, scanned_ns, written }
+        let requests = LadderRequest::ALL.map(|request| Requested { request, told: false, stood: false });
+        Self { machine, clock, controller, ladder, scanned_ns, written, requests }
+    }
+
+    /// The same machine with a second turret, which works at the back of the part on a path of its own.
+    #[must_use]
+    pub fn with_path(mut self) -> Self {
+        self.controller = self.controller.with_path(&['X', 'Z']);
+        self
+    }
+
+    /// How the ladder combines the operator's dial and the mailbox.
+    #[must_use]
+    pub fn with_rule(mut self, rule: LadderRule) -> Self {
+        self.ladder.rule = rule;
+        self
+    }
+
+    /// The operator turns the dial of the feed override.
+    pub fn turn_dial(&mut self, dial: OverridePct) {
+        self.ladder.dial = dial;
     }
 
     /// Every scan since the last look, and what they mean for the machine.
@@ -59,6 +92,25 @@ impl SimulatedControl {
             self.written = wanted;
         }
     }
+
+    /// Tells the machine what the ladder has latched; the operator acknowledges at the machine.
+    fn requests(&mut self, panel: &Panel) {
+        for asked in &mut self.requests {
+            let stands = match asked.request {
+                LadderRequest::FeedHold => panel.execution == execution::FEED_HOLD,
+                LadderRequest::Stop => panel.execution == execution::STOPPED && panel.alarm.is_empty(),
+            };
+            if !self.ladder.is_latched(asked.request) {
+                (asked.told, asked.stood) = (false, false);
+            } else if !asked.told {
+                // A machine that is off at this moment is told at the next look.
+                asked.told = self.machine.feed_override().ask(&*self.clock, asked.request).is_ok();
+            } else if asked.stood && !stands {
+                self.ladder.acknowledge(asked.request);
+            }
+            asked.stood |= asked.told && stands;
+        }
+    }
 }
 
 impl Served for SimulatedControl {
@@ -72,7 +124,11 @@ impl Served for SimulatedControl {
             return None;
         }
         self.scan(now_ns);
+        self.requests(&moment.panel);
         show(&mut self.controller, &moment);
+        for (path, control) in (2..).zip(&mut self.controller.further) {
+            second_path::show(control, &mut self.controller.memory, path, &moment);
+        }
         Some(&mut self.controller)
     }
 }
@@ -104,13 +160,13 @@ fn show(control: &mut Controller, moment: &Moment) {
     signals(control, panel);
 }
 
-fn whole(value: f64) -> Number {
+pub(super) fn whole(value: f64) -> Number {
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is what a display does")]
     let mantissa = value.round() as i32;
     Number::decimal(mantissa, 0)
 }
 
-fn status(panel: &Panel) -> Status {
+pub(super) fn status(panel: &Panel) -> Status {
     let automatic = match panel.mode {
         mode::MANUAL_DATA_INPUT => 0,
         mode::EDIT => 3,

@@ -3,10 +3,10 @@
 use crate::fanuc::item::{Area, Stretch, Width};
 use std::collections::BTreeMap;
 
-/// Bytes of each area.
+/// Bytes of each area. The signals of path 2 begin at G1000 and F1000, those of path 3 at 2000.
 const SIZES: [(Area, usize); 11] = [
-    (Area::G, 768),
-    (Area::F, 768),
+    (Area::G, 2768),
+    (Area::F, 2768),
     (Area::Y, 128),
     (Area::X, 128),
     (Area::A, 250),

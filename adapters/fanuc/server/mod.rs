@@ -11,6 +11,7 @@
 //! | `fault` | faults on purpose |
 //! | `ladder` | the ladder of the sample machine: who decides about the feed override |
 //! | `machine` | the simulated machine behind a control |
+//! | `second_path` | what its second turret shows |
 
 mod answer;
 mod controller;
@@ -19,6 +20,7 @@ pub mod ladder;
 mod listen;
 mod machine;
 mod memory;
+mod second_path;
 mod write;
 
 pub use answer::answer_body;

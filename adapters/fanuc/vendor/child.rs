@@ -1,16 +1,17 @@
 //! The child's side: items to calls, structures to answers.
 
+use super::dynamic;
 use super::ffi::Functions;
 use super::layout::{
-    LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbDy2, OdbExePrg, OdbM, OdbPro, OdbSeq,
+    LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbExePrg, OdbM, OdbPro, OdbSeq,
     OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, ZOFS_LEN,
 };
 use super::message::{Ask, Tell};
-use super::structure::{Bytes, checked, decimal, filled};
+use super::structure::{Bytes, POSITION_PLACES, checked, decimal, filled};
 use crate::child::{Guarded, Missing, serve_words};
 use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Status, System};
-use crate::fanuc::code::ReturnCode;
-use crate::fanuc::item::{Item, Position, Servo, Spindle, Stretch, Width, Write};
+use crate::fanuc::code::{Consequence, ReturnCode};
+use crate::fanuc::item::{Item, Question, Servo, Spindle, Stretch, Width, Write};
 use crate::fanuc::opening::{Generation, Opening};
 use std::ffi::CString;
 use std::mem::{offset_of, size_of};
@@ -18,9 +19,6 @@ use std::path::Path;
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.
 const COUNT_MAX: u16 = 64;
-
-/// Decimals of positions that the library gives without them (increment system IS-B, millimetres).
-const POSITION_PLACES: i16 = 3;
 
 /// The modal words by their number on the wire, and as the library numbers them.
 const MODAL_WORDS: [(i16, i16); 4] = [(5, 103), (11, 106), (20, 107), (22, 108)];
@@ -34,8 +32,12 @@ const BIT_PARAMETERS: [u16; 1] = [1001];
 /// # Errors
 /// The line to the parent failed.
 pub fn child() -> std::io::Result<()> {
-    let mut session = None;
-    serve_words(|ask: Result<Ask, String>| ask.map_or_else(Tell::Confused, |ask| answer(&mut session, ask)))
+    let mut session: Option<Session> = None;
+    serve_words(|ask: Result<Ask, String>, tell| match (ask, &mut session) {
+        (Ok(Ask::Read(questions)), Some(session)) => session.read_each(&questions, tell),
+        (Ok(ask), _) => tell(&answer(&mut session, ask)),
+        (Err(confused), _) => tell(&Tell::Confused(confused)),
+    })
 }
 
 fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
@@ -51,9 +53,8 @@ fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
     }
     let Some(session) = session else { return Tell::Confused("there is no connection".to_owned()) };
     match ask {
-        Ask::Read(item) => Tell::Read(session.read(item)),
         Ask::Write(write) => session.write(&write),
-        Ask::Open { .. } => Tell::Confused("already open".to_owned()),
+        Ask::Open { .. } | Ask::Read(_) => Tell::Confused("not on this connection".to_owned()),
     }
 }
 
@@ -65,6 +66,14 @@ fn without(name: &str) -> Box<Tell> {
 struct Session {
     functions: Functions,
     handle: u16,
+    /// The path that the connection was made for and that is written to.
+    own: u8,
+    /// The path that the library's questions carry now.
+    path: u8,
+    /// Places for axes in what the library fills in.
+    axes_max: usize,
+    /// The call for the positions, which has answered other questions of this poll too.
+    dynamic: Option<Bytes>,
 }
 
 impl Drop for Session {
@@ -79,7 +88,7 @@ fn count(found: i16, most: usize) -> usize {
 }
 
 impl Session {
-    fn open(library: &Path, host: &str, port: u16, path: u16, timeout_s: i32) -> Result<(Self, Opening), Box<Tell>> {
+    fn open(library: &Path, host: &str, port: u16, path: u8, timeout_s: i32) -> Result<(Self, Opening), Box<Tell>> {
         let unloadable = |error: libloading::Error| Box::new(Tell::Unloadable(error.to_string()));
         let functions = Functions::load(library).map_err(unloadable)?;
         let host = CString::new(host).map_err(|error| Box::new(Tell::Unloadable(error.to_string())))?;
@@ -94,17 +103,27 @@ impl Session {
             Ok(code) => return Err(Box::new(Tell::Code(ReturnCode(code)))),
             Err(Missing(name)) => return Err(without(name)),
         }
-        let session = Self { functions, handle };
-        if path > 1 {
-            let number = i16::try_from(path).unwrap_or(i16::MAX);
-            match session.functions.cnc_setpath(session.handle, number) {
-                Ok(0) => {}
-                Ok(code) => return Err(Box::new(Tell::Code(ReturnCode(code)))),
-                Err(Missing(name)) => return Err(without(name)),
-            }
+        let mut session = Self { functions, handle, own: path, path: 1, axes_max: 0, dynamic: None };
+        match session.turn_to(path) {
+            Ok(0) => {}
+            Ok(code) => return Err(Box::new(Tell::Code(ReturnCode(code)))),
+            Err(Missing(name)) => return Err(without(name)),
         }
         let opening = session.opening();
+        session.axes_max = usize::from(opening.axes_max).min(MAX_AXIS);
         Ok((session, opening))
+    }
+
+    /// The library writes this path into its questions from now on; nothing is sent.
+    fn turn_to(&mut self, path: u8) -> Result<i16, Missing> {
+        if path == self.path {
+            return Ok(0);
+        }
+        let code = self.functions.cnc_setpath(self.handle, i16::from(path))?;
+        if code == 0 {
+            (self.path, self.dynamic) = (path, None);
+        }
+        Ok(code)
     }
 
     /// The library tells no version word; what is known comes from the series.
@@ -113,8 +132,38 @@ impl Session {
         let of = |text: Option<&str>| text.and_then(|text| text.trim().parse::<u16>().ok()).unwrap_or(0);
         let axes_max = system.as_ref().and_then(|system| u16::try_from(system.axes_max).ok()).unwrap_or(0);
         let axes = of(system.as_ref().map(|system| system.axes.as_str()));
+        let (mut path, mut paths) = (0, 0);
+        let told = self.functions.cnc_getpath(self.handle, &mut path, &mut paths);
+        let paths = if told == Ok(0) { u16::try_from(paths).unwrap_or(0) } else { 0 };
         let generation = Generation::Newer(0);
-        Opening { generation, family: 0, axes_max, spindles_max: 0, paths: 0, axes, spindles: 0 }
+        Opening { generation, family: 0, axes_max, spindles_max: 0, paths, axes, spindles: 0 }
+    }
+
+    /// Reads until an answer cannot be trusted. A connection that is dead answers nothing any more.
+    fn read_each(&mut self, questions: &[Question], tell: &mut dyn FnMut(&Tell)) {
+        self.dynamic = None;
+        let mut dead: Option<ItemError> = None;
+        for question in questions {
+            let result = match &dead {
+                Some(error) => Err(error.clone()),
+                None => self.read_on(*question),
+            };
+            let malformed = matches!(result, Err(ItemError::Malformed(_)));
+            dead = result.as_ref().err().filter(|error| is_dead(error)).cloned().or(dead);
+            tell(&Tell::Read(result));
+            if malformed {
+                return;
+            }
+        }
+    }
+
+    fn read_on(&mut self, question: Question) -> ItemResult {
+        checked(self.turn_to(question.path))?;
+        if matches!(question.item, Item::Position(_, -1)) && self.dynamic.is_none() {
+            self.dynamic = Some(self.every_axis()?);
+        }
+        let known = self.dynamic.as_ref().and_then(|dynamic| dynamic::of(question.item, dynamic, self.axes_max));
+        known.map_or_else(|| self.read(question.item), Ok)
     }
 
     fn read(&self, item: Item) -> ItemResult {
@@ -122,8 +171,8 @@ impl Session {
         match item {
             Item::System => self.system().map(Answer::System),
             Item::Status => self.status().map(Answer::Status),
-            Item::Feed => act(filled(size_of::<OdbAct>(), |out| f.cnc_actf(h, out))?),
-            Item::SpindleSpeed => act(filled(size_of::<OdbAct>(), |out| f.cnc_acts(h, out))?),
+            Item::Feed => filled(size_of::<OdbAct>(), |out| f.cnc_actf(h, out)).map(|bytes| act(&bytes)),
+            Item::SpindleSpeed => filled(size_of::<OdbAct>(), |out| f.cnc_acts(h, out)).map(|bytes| act(&bytes)),
             Item::Spindles(Spindle::Load) => self.spindle_meter(0, 0),
             Item::Spindles(Spindle::MotorSpeed) => self.spindle_meter(1, size_of::<LoadElm>()),
             Item::Spindles(Spindle::Gear) => {
@@ -157,7 +206,6 @@ impl Session {
             }
             Item::Alarms(most) => self.alarms(most.min(COUNT_MAX)),
             Item::ModalWord(word) => self.modal(word),
-            Item::Position(what, -1) => self.positions(what),
             Item::Macro(number) => self.variable(number),
             Item::Parameter(number, 0) => self.parameter(number),
             Item::Pmc(stretch) => self.memory(stretch),
@@ -252,18 +300,9 @@ impl Session {
         Ok(Answer::Modal { value: bytes.i32(4), flags: [first, second] })
     }
 
-    fn positions(&self, what: Position) -> ItemResult {
+    fn every_axis(&self) -> Result<Bytes, ItemError> {
         let length = i16::try_from(ODBDY2_ALL_LEN).unwrap_or(540);
-        let bytes = filled(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))?;
-        let stride = count(self.system()?.axes_max, MAX_AXIS);
-        let place = match what {
-            Position::Absolute => 0,
-            Position::Machine => 1,
-            Position::Relative => 2,
-            Position::ToGo => 3,
-        };
-        let at = |axis: usize| size_of::<OdbDy2>() + 4 * (place * stride + axis);
-        Ok(Answer::Numbers((0..stride).map(|axis| decimal(bytes.i32(at(axis)), POSITION_PLACES)).collect()))
+        filled(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))
     }
 
     fn variable(&self, number: u16) -> ItemResult {
@@ -301,8 +340,9 @@ impl Session {
         Ok(Answer::Memory((PMC_HEAD_LEN..total).step_by(step).map(element).collect()))
     }
 
-    fn write(&self, write: &Write) -> Tell {
-        match self.written(write) {
+    fn write(&mut self, write: &Write) -> Tell {
+        let turned = self.turn_to(self.own);
+        match turned.and_then(|code| if code == 0 { self.written(write) } else { Ok(code) }) {
             Ok(0) => Tell::Written,
             Ok(code) => Tell::Code(ReturnCode(code)),
             Err(Missing(name)) => Tell::Confused(format!("the library has no {name}")),
@@ -337,8 +377,12 @@ impl Session {
     }
 }
 
-fn act(bytes: Bytes) -> ItemResult {
-    Ok(Answer::Number(Some(f64::from(bytes.i32(offset_of!(OdbAct, data))))))
+fn act(bytes: &Bytes) -> Answer {
+    Answer::Number(Some(f64::from(bytes.i32(offset_of!(OdbAct, data)))))
+}
+
+fn is_dead(error: &ItemError) -> bool {
+    matches!(error, ItemError::Refused(refusal) if refusal.code.consequence() == Consequence::Reconnect)
 }
 
 fn pmc_words(stretch: Stretch) -> (i16, i16) {

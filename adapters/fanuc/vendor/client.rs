@@ -3,11 +3,11 @@
 use super::KIND;
 use super::message::{Ask, Tell};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Client};
+use crate::child::{ChildCounts, ChildError, ChildSettings, Client, Taken};
 use crate::fanuc::answer::{ItemError, ItemResult, Refusal};
 use crate::fanuc::code::{Consequence, ReturnCode};
 use crate::fanuc::focas::{Focas, FocasError};
-use crate::fanuc::item::{Item, Write};
+use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -23,7 +23,7 @@ pub struct VendorSettings {
     /// Where the controller is.
     pub at: Endpoint,
     /// Path from 1.
-    pub path: u16,
+    pub path: u8,
     /// The library's patience with the controller; whole seconds, at least one.
     pub timeout: Duration,
     /// Longest wait for the child; `None` follows from `timeout`.
@@ -36,7 +36,7 @@ pub struct VendorSettings {
 
 /// A controller through the vendor's library.
 pub struct Vendor {
-    child: Client<Item>,
+    child: Client<Question>,
     settings: VendorSettings,
     opening: Opening,
 }
@@ -77,23 +77,23 @@ impl Vendor {
         Ok(self.child.told(ask))
     }
 
-    fn read(&mut self, item: Item) -> Result<ItemResult, FocasError> {
-        if self.child.is_left_alone(item) {
-            return Ok(Err(ItemError::NotOffered));
+    /// Reads as many of the questions as one child survives; the answers, in order, at least one.
+    fn read(&mut self, questions: &[Question]) -> Result<Vec<ItemResult>, FocasError> {
+        if !self.child.is_running() {
+            self.opening = open(&mut self.child, &self.settings)?;
         }
-        Ok(match self.request(&Ask::Read(item))? {
-            Ok(Tell::Read(result)) => {
-                if matches!(result, Err(ItemError::Malformed(_))) {
-                    self.child.blame(item);
-                }
-                result
-            }
-            Ok(other) => Err(ItemError::Malformed(format!("{other:?}"))),
-            Err(error) => {
-                self.child.blame(item);
-                Err(ItemError::Malformed(format!("the library failed in {item:?}: {error}")))
-            }
-        })
+        let mut answers = Vec::with_capacity(questions.len());
+        let take = |told| {
+            answers.push(match told {
+                Tell::Read(result) => result,
+                other => Err(ItemError::Malformed(format!("{other:?}"))),
+            });
+            if matches!(answers.last(), Some(Err(ItemError::Malformed(_)))) { Taken::Suspect } else { Taken::Good }
+        };
+        if let Err((fatal, error)) = self.child.told_each(questions, &Ask::Read(questions.to_vec()), take) {
+            answers.push(Err(ItemError::Malformed(format!("the library failed in {fatal:?}: {error}"))));
+        }
+        Ok(answers)
     }
 }
 
@@ -102,7 +102,7 @@ fn seconds(timeout: Duration) -> i32 {
     i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
 }
 
-fn open(child: &mut Client<Item>, settings: &VendorSettings) -> Result<Opening, FocasError> {
+fn open(child: &mut Client<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
     let ask = Ask::Open {
         vendor_library: settings.vendor_library.clone(),
         host: settings.at.host.clone(),
@@ -127,11 +127,16 @@ impl Focas for Vendor {
         &self.opening
     }
 
-    fn ask(&mut self, items: &[Item], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
         let before = out.len();
-        for item in items {
-            let result = self.read(*item).inspect_err(|_| out.truncate(before))?;
-            out.push(result);
+        let mut rest = questions;
+        while !rest.is_empty() {
+            let answers = match self.child.survived(rest) {
+                0 => vec![Err(ItemError::NotOffered)],
+                count => self.read(&rest[..count]).inspect_err(|_| out.truncate(before))?,
+            };
+            rest = rest.get(answers.len()..).unwrap_or_default();
+            out.extend(answers);
         }
         Ok(())
     }

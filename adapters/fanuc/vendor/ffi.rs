@@ -11,6 +11,7 @@ functions! {
     cnc_allclibhndl3(host: &CStr => *const c_char, port: u16 => u16, timeout_s: i32 => i32, handle: &mut u16 => *mut u16) -> i16;
     cnc_freelibhndl(handle: u16 => u16) -> i16;
     cnc_setpath(handle: u16 => u16, path: i16 => i16) -> i16;
+    cnc_getpath(handle: u16 => u16, path: &mut i16 => *mut i16, paths: &mut i16 => *mut i16) -> i16;
     cnc_sysinfo(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_statinfo(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_actf(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;

@@ -2,7 +2,7 @@
 
 use crate::fanuc::answer::ItemResult;
 use crate::fanuc::code::ReturnCode;
-use crate::fanuc::item::{Item, Write};
+use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -19,12 +19,12 @@ pub(super) enum Ask {
         /// Its port.
         port: u16,
         /// Path from 1.
-        path: u16,
+        path: u8,
         /// The library's own patience, s.
         timeout_s: i32,
     },
-    /// Read one item.
-    Read(Item),
+    /// Read these, one answer for each as soon as it is there. After an answer that cannot be trusted no other comes.
+    Read(Vec<Question>),
     /// Write.
     Write(Write),
 }

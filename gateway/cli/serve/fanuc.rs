@@ -2,7 +2,11 @@
 
 use super::{Common, Running, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
+use adapters::LadderRule;
+use adapters::clock::Clock;
 use adapters::fanuc::server::{Server, ServerSettings, SimulatedControl};
+use adapters::simulated::Simulated;
+use adapters::units::OverridePct;
 use clap::{Args, ValueEnum};
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -23,6 +27,24 @@ pub(in crate::cli) struct FanucArguments {
     /// Connections at a time; the vendor's library takes two for one client.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     connections: u16,
+    /// Paths of the control: 2 adds a second turret with a program, an axis pair and a spindle of its own.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    paths: u8,
+    /// What the ladder makes of the operator's dial and the gateway's override.
+    #[arg(long, value_enum, default_value_t = Rule::Least)]
+    ladder: Rule,
+    /// Where the operator's dial of the feed override stands, %.
+    #[arg(long, value_name = "PCT", default_value_t = 100, value_parser = clap::value_parser!(u8).range(0..=254))]
+    dial: u8,
+}
+
+/// How the ladder combines dial and mailbox.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Rule {
+    /// The lesser one: never above the dial.
+    Least,
+    /// One of the other.
+    Product,
 }
 
 /// Generations of controls.
@@ -49,18 +71,29 @@ impl Generation {
     }
 }
 
+fn control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>) -> SimulatedControl {
+    let rule = match arguments.ladder {
+        Rule::Least => LadderRule::Least,
+        Rule::Product => LadderRule::Product,
+    };
+    let mut control = SimulatedControl::new(machine, clock, arguments.generation.version()).with_rule(rule);
+    control.turn_dial(OverridePct::new(arguments.dial).unwrap_or(OverridePct::FULL));
+    if arguments.paths > 1 { control.with_path() } else { control }
+}
+
 /// Serves until told to stop.
 pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
     let at = arguments.common.listen(8193);
     let next = "stop the other program, or choose another port with --listen";
     let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
     let Running { machine, clock } = arguments.common.machine()?;
-    let control = SimulatedControl::new(machine, clock, arguments.generation.version());
+    let control = control(arguments, machine, clock);
     let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
     let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
     let server = Server::start(listener, Box::new(control), settings).map_err(no_threads)?;
     print(&format!(
-        "fanuc://{} answers; the ladder's mailbox is at R900, its second override at R910\n",
+        "fanuc://{} answers; the ladder's mailbox is at R900, requests at R905, the dial at R907, its second override \
+         at R910\n",
         server.address()
     ));
     let stop = Arc::new(AtomicBool::new(false));

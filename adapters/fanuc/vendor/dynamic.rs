@@ -1,0 +1,33 @@
+//! The call for the positions of every axis, and what it says besides.
+
+use super::layout::OdbDy2;
+use super::structure::{Bytes, POSITION_PLACES, decimal};
+use crate::fanuc::answer::Answer;
+use crate::fanuc::item::{Item, Position};
+use std::mem::{offset_of, size_of};
+
+/// What the call for the positions of every axis says besides: it asks for all of this in one frame.
+pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize) -> Option<Answer> {
+    let whole = |at| dynamic.i32(at);
+    let number = |at| Answer::Number(Some(f64::from(whole(at))));
+    Some(match item {
+        Item::Feed => number(offset_of!(OdbDy2, actf)),
+        Item::SpindleSpeed => number(offset_of!(OdbDy2, acts)),
+        Item::Sequence => Answer::Whole(whole(offset_of!(OdbDy2, seqnum))),
+        Item::AlarmBits => Answer::Whole(whole(offset_of!(OdbDy2, alarm))),
+        Item::Program => {
+            Answer::Program { running: whole(offset_of!(OdbDy2, prgnum)), main: whole(offset_of!(OdbDy2, prgmnum)) }
+        }
+        Item::Position(what, -1) => {
+            let place = match what {
+                Position::Absolute => 0,
+                Position::Machine => 1,
+                Position::Relative => 2,
+                Position::ToGo => 3,
+            };
+            let at = |axis: usize| size_of::<OdbDy2>() + 4 * (place * axes_max + axis);
+            Answer::Numbers((0..axes_max).map(|axis| decimal(whole(at(axis)), POSITION_PLACES)).collect())
+        }
+        _ => return None,
+    })
+}
