@@ -1,6 +1,10 @@
 //! One address examined: opened, named, read twice, timed, and everything that is wrong told with what to do next.
 //! Contract: sources of the project, section on `doctor`.
 
+mod compare;
+
+pub use compare::{Comparison, Difference, compare};
+
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
@@ -59,10 +63,14 @@ pub struct Report {
 /// # Errors
 /// The text is no usable address, in words.
 pub fn examine(text: &str) -> Result<Report, String> {
+    begin(text, &SystemClock::new()).map(|(report, _)| report)
+}
+
+/// Examines an address and leaves open what works.
+fn begin(text: &str, clock: &SystemClock) -> Result<(Report, Vec<Box<dyn Source>>), String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
-    let clock = SystemClock::new();
     let began = Instant::now();
-    let mut opened = opened(&address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let opened = opened(&address, clock.now_ns()).map_err(|error| error.to_string())?;
     let mut report = Report {
         address: address.text().to_owned(),
         reachable: false,
@@ -72,15 +80,14 @@ pub fn examine(text: &str) -> Result<Report, String> {
         read_ms: 0.0,
         problems: Vec::new(),
     };
-    let working: Vec<bool> = opened.sources.iter_mut().map(|source| report.first(source.as_mut(), &clock)).collect();
+    let mut sources = opened.sources;
+    sources.retain_mut(|source| report.first(source.as_mut(), clock));
     report.open_ms = milliseconds(began);
     let began = Instant::now();
-    for (source, _) in opened.sources.iter_mut().zip(working).filter(|(_, works)| *works) {
-        report.again(source.as_mut(), &clock);
-    }
+    sources.iter_mut().for_each(|source| report.again(source.as_mut(), clock));
     report.read_ms = milliseconds(began);
     report.judge();
-    Ok(report)
+    Ok((report, sources))
 }
 
 fn milliseconds(since: Instant) -> f64 {
@@ -191,63 +198,4 @@ fn trouble(error: &SourceError) -> Trouble {
         SourceError::End { .. } => ("the recording is over".to_owned(), "Give a longer one".to_owned()),
     };
     Trouble { what, next }
-}
-
-/// A channel on which two ways of talking to the same machine do not agree.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Difference {
-    /// Which channel.
-    pub channel: ChannelId,
-    /// What we read by ourselves.
-    pub native: Value,
-    /// What the vendor's library reads.
-    pub vendor: Value,
-}
-
-/// Numbers of a running machine that are this close agree: two percent, or one of the unit.
-fn agree(native: &Value, vendor: &Value) -> bool {
-    match (native, vendor) {
-        (Value::Number(a), Value::Number(b)) => (a - b).abs() <= (0.02 * a.abs().max(b.abs())).max(1.0),
-        (a, b) => a == b,
-    }
-}
-
-/// Reads a FANUC controller by ourselves and through the vendor's library, one after the other, and lists the channels
-/// on which they differ. A channel that only one of them has is no difference.
-///
-/// # Errors
-/// The address is no FANUC controller that we talk to by ourselves, in words.
-pub fn compare(text: &str, library: &std::path::Path) -> Result<(Report, Report, Vec<Difference>), String> {
-    let address: Address = text.parse().map_err(|error| format!("{error}"))?;
-    let native = matches!(
-        address.target(),
-        adapters::address::Target::Fanuc { backend: adapters::address::FanucBackend::Native, .. }
-    );
-    if !native {
-        return Err(format!("{text}: give a fanuc:// address without backend= to compare with a library"));
-    }
-    let joint = if text.contains('?') { '&' } else { '?' };
-    let escaped = library.display().to_string().replace('%', "%25").replace('&', "%26").replace('?', "%3F");
-    let ours = examine(text)?;
-    let theirs = examine(&format!("{text}{joint}backend=vendor&library={escaped}"))?;
-    let differences = ours.readings.iter().filter_map(|(channel, native)| {
-        let native = native.as_ref().ok()?;
-        let vendor = theirs.readings.iter().find(|(other, _)| other == channel)?.1.as_ref().ok()?;
-        let difference = Difference { channel: *channel, native: native.1.clone(), vendor: vendor.1.clone() };
-        (!agree(&native.1, &vendor.1)).then_some(difference)
-    });
-    let differences = differences.collect();
-    Ok((ours, theirs, differences))
-}
-
-impl Difference {
-    /// For `doctor --json`.
-    #[must_use]
-    pub fn json(&self) -> serde_json::Value {
-        let value = |value: &Value| match value {
-            Value::Number(number) => json!(number),
-            Value::Text(text) => json!(&**text),
-        };
-        json!({"channel": self.channel.name(), "native": value(&self.native), "vendor": value(&self.vendor)})
-    }
 }

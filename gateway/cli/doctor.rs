@@ -1,7 +1,7 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::doctor::{self, Difference, Report};
+use crate::doctor::{self, Report};
 use adapters::driver::FactValue;
 use clap::Args;
 use std::fmt::Write;
@@ -32,17 +32,14 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         }
         return Ok(outcome(report.problems.is_empty()));
     };
-    let (ours, theirs, differences) = doctor::compare(&arguments.address, library).map_err(unusable)?;
+    let comparison = doctor::compare(&arguments.address, library).map_err(unusable)?;
     if arguments.json {
-        let mut document = ours.json();
-        document["vendor"] = theirs.json();
-        document["differences"] = differences.iter().map(Difference::json).collect();
-        print_json(&document);
+        print_json(&comparison.json());
     } else {
-        print(&format!("{}{}", text(&ours), text(&theirs)));
-        differences.iter().for_each(|one| print(&format!("  differs: {:#}\n", one.json())));
+        let lines = comparison.lines().join("\n");
+        print(&format!("{}{}comparison\n{lines}\n", text(&comparison.ours), text(&comparison.theirs)));
     }
-    Ok(outcome(ours.problems.is_empty() && theirs.problems.is_empty() && differences.is_empty()))
+    Ok(outcome(comparison.is_well()))
 }
 
 fn outcome(well: bool) -> Outcome {

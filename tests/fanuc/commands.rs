@@ -121,10 +121,33 @@ fn doctor_compares_our_own_words_with_the_librarys() {
     let channels: Vec<&str> =
         differences.as_array().expect("a list").iter().filter_map(|one| one["channel"].as_str()).collect();
     assert_eq!(channels, ["z_axis_load_pct"], "the library loses the sign of the load");
-    assert_eq!(code, Some(1));
+    assert!(differences[0]["known"].as_str().is_some_and(|why| why.contains("no sign")));
+    assert_eq!(code, Some(0), "nothing differs that is not explained");
     server.with(|control| control.expect("on").sequence = 130);
-    let (_, differences) = compare("another block");
+    let (code, differences) = compare("another block");
+    assert_eq!(code, Some(1));
     let block =
         differences.as_array().and_then(|all| all.iter().find(|one| one["channel"] == "block")).expect("differs");
     assert_eq!((block["native"].as_str(), block["vendor"].as_str()), (Some("N130"), Some("N120")));
+}
+
+#[test]
+fn doctor_compares_for_people_and_says_when_there_is_nothing_to_compare() {
+    let library = library(&[]);
+    let server = serve(controller(4), ServerSettings::default());
+    let address = format!("fanuc://{}?backend=native", server.address());
+    let shown = |file: &str| {
+        let output = gateway().args(["doctor", &address, "--compare", file]).output().expect("runs");
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (code, text) = shown(&library.file.display().to_string());
+    assert_eq!(code, Some(0), "{text}");
+    for part in ["channels compared in 3 rounds, 1 differ", "native -17 %", "library 17 %   (the library's load meter"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(text.contains("only native has: ") && text.contains("x_axis_current_a"), "{text}");
+    let (code, text) = shown("/does/not/exist.so");
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("nothing could be compared") && text.contains("/does/not/exist.so"), "{text}");
 }
