@@ -43,7 +43,12 @@ pub struct FanucActuator {
     settle_ns: i64,
     heartbeat: u8,
     written: Option<(OverridePct, TimeNs)>,
+    /// The dial that came in the same frame as the last override.
+    beside: Option<(OverridePct, TimeNs)>,
 }
+
+/// A dial that came with an override stands for a look at the dial this long.
+const BESIDE_NS: i64 = 100_000_000;
 
 impl FanucActuator {
     /// `None` when the address names no way of writing.
@@ -52,7 +57,8 @@ impl FanucActuator {
         let settle_ns = i64::try_from(options.settle.as_nanos()).unwrap_or(i64::MAX);
         let asking = options.request.map(|at| Asking::new(name, line.clone(), at, settle_ns));
         let (name, method, dial) = (name.to_owned(), options.write, options.dial);
-        let actuator = Self { name, line, path, method, dial, asking, settle_ns, heartbeat: 0, written: None };
+        let (heartbeat, written, beside) = (0, None, None);
+        let actuator = Self { name, line, path, method, dial, asking, settle_ns, heartbeat, written, beside };
         (method != WriteMethod::None).then_some(actuator)
     }
 
@@ -113,6 +119,13 @@ impl FanucActuator {
             Some(Ok(Answer::Memory(bytes))) => Ok(bytes),
             other => Err(self.refused(&format!("it cannot be read back: {other:?}"), "See doctor")),
         }
+    }
+
+    /// The dial, where it was asked for.
+    fn dial_of(&self, asked: &Asked) -> Result<OverridePct, SourceError> {
+        let none = || self.decode("the byte of the dial is no override");
+        let dial = self.dial.ok_or_else(none)?;
+        dial.read(self.bytes(asked, Item::Pmc(dial.stretch()))?).ok_or_else(none)
     }
 
     /// An inverted byte.
@@ -192,9 +205,11 @@ impl Actuator for FanucActuator {
             clock.sleep_until(at_ns.saturating_add(self.settle_ns));
         }
         let (own, obeyed) = (self.item(), self.signal(feed_override::AT));
-        let items = [own, obeyed];
-        let asked = self.line.ask(clock, if self.dial.is_some() { &items } else { &items[..1] })?;
+        let dial = self.dial.map(|dial| Item::Pmc(dial.stretch()));
+        let items: Vec<Item> = [own].into_iter().chain(dial.into_iter().flat_map(|dial| [obeyed, dial])).collect();
+        let asked = self.line.ask(clock, &items)?;
         let told = self.told(&asked, own)?;
+        self.beside = self.dial_of(&asked).ok().zip(Some(asked.ended_ns));
         match (self.dial, self.method) {
             (None, _) | (Some(_), WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None) => Ok(told),
             (Some(_), WriteMethod::Mailbox { .. }) => self.override_of(&asked, obeyed),
@@ -206,9 +221,13 @@ impl Actuator for FanucActuator {
 
     fn read_dial(&mut self, clock: &dyn Clock) -> Result<Option<OverridePct>, SourceError> {
         let Some(dial) = self.dial else { return Ok(None) };
-        let item = Item::Pmc(dial.stretch());
-        let asked = self.line.ask(clock, &[item])?;
-        dial.read(self.bytes(&asked, item)?).map(Some).ok_or_else(|| self.decode("the byte of the dial is no override"))
+        if let Some((beside, at_ns)) = self.beside.take()
+            && clock.now_ns() - at_ns <= BESIDE_NS
+        {
+            return Ok(Some(beside));
+        }
+        let asked = self.line.ask(clock, &[Item::Pmc(dial.stretch())])?;
+        self.dial_of(&asked).map(Some)
     }
 
     fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {

@@ -87,6 +87,9 @@ fn a_known_dial_is_told_apart_from_what_is_in_force() {
     assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)), "the dial alone");
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))));
     assert_eq!(write(actuator.as_mut(), 110), Ok(pct(80)), "never above the dial");
+    let before = server.frames();
+    actuator.read_feed_override(&clock).expect("answers");
+    assert_eq!((actuator.read_dial(&clock), server.frames() - before), (Ok(Some(pct(80))), 1), "in one frame");
     assert_eq!(write(actuator.as_mut(), 60), Ok(pct(60)));
     assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(80))), "nobody has turned it");
     actuator.release(&clock).expect("given back");
