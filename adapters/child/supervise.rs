@@ -73,7 +73,9 @@ pub struct ChildCounts {
     pub hung: u64,
     /// Kills because of an answer that was none.
     pub no_answer: u64,
-    /// Answers.
+    /// Requests that were sent.
+    pub requests: u64,
+    /// Answers; one request may have several.
     pub answers: u64,
 }
 
@@ -187,6 +189,7 @@ impl Supervised {
             None => self.start()?,
         };
         let patience = self.settings.deadline;
+        self.counts.requests += 1;
         let mut taken = 0;
         let mut exchange = || {
             running.stream.set_write_timeout(Some(patience))?;

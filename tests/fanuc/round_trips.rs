@@ -54,10 +54,11 @@ fn the_whole_poll_set_through_a_library_in_its_child() {
     let library = library(&[]);
     let mut vendor = Vendor::connect(settings(&library)).expect("connects");
     let (half, most) = median(polls(&mut vendor, 100));
-    let answers = vendor.counts().answers;
+    let counts = vendor.counts();
     println!(
-        "through the child (a library without a wire): {} requests per poll; p50 {} us, p99 {} us",
-        answers / 100,
+        "through the child (a library without a wire): {} answers to {} request per poll; p50 {} us, p99 {} us",
+        counts.answers / 100,
+        counts.requests / 100,
         half.as_micros(),
         most.as_micros()
     );
