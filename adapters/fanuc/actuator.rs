@@ -8,7 +8,7 @@
 //! | direct | G012, inverted | G012, after the ladder had its scans |
 //!
 //! Where the address names the byte with the operator's dial, what is in force is what the control obeys: G012, with the
-//! second override its product with G013. Feed hold and stop go through a byte of their own, see
+//! second override or a macro variable its product with that. Feed hold and stop go through a byte of their own, see
 //! `asking`. Mailbox and requests are laid out in [`server::ladder`](super::server::ladder), with the
 //! rungs that a machine's maker needs.
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
@@ -98,6 +98,23 @@ impl FanucActuator {
     /// A byte of override signals of this path.
     fn signal(&self, at: u16) -> Item {
         Item::Pmc(Stretch::bytes(Area::G, signal(at, self.path), 1))
+    }
+
+    fn give_back(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
+        let write = match self.method {
+            WriteMethod::Mailbox { area, at } => {
+                self.heartbeat = self.heartbeat.wrapping_add(1);
+                let values = vec![0, i32::from(OverridePct::FULL.percent()), i32::from(self.heartbeat)];
+                Write::Pmc { stretch: Stretch::bytes(area, at, 3), values }
+            }
+            WriteMethod::SecondOverride { area, at } => {
+                Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
+            }
+            _ => return self.write_feed_override(clock, OverridePct::FULL),
+        };
+        self.line.write(clock, &write)?;
+        self.written = None;
+        Ok(())
     }
 
     /// What the way of writing itself says.
@@ -211,9 +228,9 @@ impl Actuator for FanucActuator {
         let told = self.told(&asked, own)?;
         self.beside = self.dial_of(&asked).ok().zip(Some(asked.ended_ns));
         match (self.dial, self.method) {
-            (None, _) | (Some(_), WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None) => Ok(told),
+            (None, _) | (Some(_), WriteMethod::Direct | WriteMethod::None) => Ok(told),
             (Some(_), WriteMethod::Mailbox { .. }) => self.override_of(&asked, obeyed),
-            (Some(_), WriteMethod::SecondOverride { .. }) => {
+            (Some(_), WriteMethod::SecondOverride { .. } | WriteMethod::Macro { .. }) => {
                 Ok(LadderRule::Product.combine(self.override_of(&asked, obeyed)?, told))
             }
         }
@@ -244,23 +261,9 @@ impl Actuator for FanucActuator {
 
     /// The mailbox says that nobody asks, the second override's byte that there is no wish; the others get 100 %.
     fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        if let Some(asking) = &mut self.asking {
-            asking.withdraw(clock)?;
-        }
-        let write = match self.method {
-            WriteMethod::Mailbox { area, at } => {
-                self.heartbeat = self.heartbeat.wrapping_add(1);
-                let values = vec![0, i32::from(OverridePct::FULL.percent()), i32::from(self.heartbeat)];
-                Write::Pmc { stretch: Stretch::bytes(area, at, 3), values }
-            }
-            WriteMethod::SecondOverride { area, at } => {
-                Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
-            }
-            _ => return self.write_feed_override(clock, OverridePct::FULL),
-        };
-        self.line.write(clock, &write)?;
-        self.written = None;
-        Ok(())
+        let released = self.give_back(clock);
+        let withdrawn = self.asking.as_mut().map_or(Ok(()), |asking| asking.withdraw(clock));
+        released.and(withdrawn)
     }
 
     fn settles_within(&self) -> Duration {
