@@ -18,12 +18,13 @@
 //! | `actuator` | the [`Actuator`](crate::Actuator): letters into the mailbox, the override in force read back |
 //! | `device` | the other role: the simulated machine as an NC-Link device |
 //!
-//! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query for
-//! all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data, uploaded
-//! each 200 ms) and events arrive in between: they are followed by `track`, which counts missing milliseconds, and whole
-//! blocks go to whoever asked for them with [`NcLinkSource::on_block`]: with `sample=yes` the box makes a feature of the spindle's
-//! load current out of them. They make no readings here; the values at a tick are those of the query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an
-//! answer without sense are four different errors. After a broken line the next poll connects anew.
+//! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query
+//! for all of them; the answer is stamped with the middle of the request. Messages of sample channels (1 ms data,
+//! uploaded each 200 ms) and events arrive in between: they are followed by `track`, which counts missing milliseconds,
+//! and whole blocks go to whoever asked for them with [`NcLinkSource::on_block`]: with `sample=yes` the box makes a
+//! feature of the spindle's load current out of them. They make no readings here; the values at a tick are those of the
+//! query. A question that is not answered in time, a broker that is gone, a device that says `NG` and an answer without
+//! sense are four different errors. After a broken line the next poll connects anew.
 //!
 //! **Dialects.** Read as they come: `setable` and `settable`, `datatype` and `dataType`, `WARNING` and `WARNNING`; items
 //! named by node number (`010302`) or by path, with or without a leading `/` and the device's type; numbers in quotes;
