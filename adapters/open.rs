@@ -5,6 +5,7 @@ use crate::clock::TimeNs;
 use crate::driver::{Actuator, Pull, Source};
 use crate::eda9033a::Eda9033a;
 use crate::modbus::ModbusMeter;
+use crate::offset::OffsetSink;
 use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
 use crate::simulated::{Simulated, SimulatedSettings};
@@ -49,6 +50,8 @@ pub struct Opened {
     pub sources: Vec<Box<dyn Source>>,
     /// The way to the feed override, where there is one. Only the gate may hold it.
     pub actuator: Option<Box<dyn Actuator>>,
+    /// The way to the external work offsets, where there is one. Only the gate may hold it.
+    pub offsets: Option<Box<dyn OffsetSink>>,
     /// The built-in machine, for serving it and for scoring.
     pub simulated: Option<Simulated>,
     /// Refused rows of a recording.
@@ -61,6 +64,8 @@ pub struct OpenedPull {
     pub sources: Vec<Box<dyn Pull>>,
     /// The way to the feed override, where there is one.
     pub actuator: Option<Box<dyn Actuator>>,
+    /// The way to the external work offsets, where there is one.
+    pub offsets: Option<Box<dyn OffsetSink>>,
     /// The built-in machine, for scoring.
     pub simulated: Option<Simulated>,
     /// Refused rows of a recording.
@@ -96,8 +101,8 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
                     crate::fanuc::open::vendor(address.text(), library, at, *path, options)
                 }
             };
-            let refused = Refused::default();
-            Ok(Opened { sources: opened.sources, actuator: opened.actuator, simulated: None, refused })
+            let (sources, actuator, offsets) = (opened.sources, opened.actuator, opened.offsets);
+            Ok(Opened { sources, actuator, offsets, simulated: None, refused: Refused::default() })
         }
         Target::NcLink(target) => crate::nclink::open(address, target),
         Target::HncNet(target) => Ok(crate::hnc::open(address, target)),
@@ -113,7 +118,7 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
 fn read_only<S: Source + 'static>(address: &Address, source: Result<S, String>) -> Result<Opened, OpenError> {
     let refused = |what| OpenError::Refused { address: address.text().to_owned(), what };
     let sources: Vec<Box<dyn Source>> = vec![Box::new(source.map_err(refused)?)];
-    Ok(Opened { sources, actuator: None, simulated: None, refused: Refused::default() })
+    Ok(Opened { sources, actuator: None, offsets: None, simulated: None, refused: Refused::default() })
 }
 
 /// Opens an address for a run as fast as possible, where a recording without dates and the built-in machine begin at
@@ -128,7 +133,7 @@ pub fn open_pull(address: &Address, origin_ns: TimeNs) -> Result<OpenedPull, Ope
             let (replay, refused) = read(address, target, origin_ns)?;
             let (rows, ignored) = (u64::try_from(replay.rows()).unwrap_or(u64::MAX), replay.ignored().to_vec());
             let sources: Vec<Box<dyn Pull>> = vec![Box::new(replay)];
-            Ok(OpenedPull { sources, actuator: None, simulated: None, refused, rows, ignored })
+            Ok(OpenedPull { sources, actuator: None, offsets: None, simulated: None, refused, rows, ignored })
         }
         other => Err(not_built(address, other)),
     }
@@ -143,8 +148,8 @@ fn simulated(address: &Address, target: &SimulatedTarget, now_ns: TimeNs) -> Ope
     if target.device != SimulatedDevice::Controller {
         sources.push(Box::new(machine.meter()));
     }
-    let actuator = actuator(&machine, target);
-    Opened { sources, actuator, simulated: Some(machine), refused: Refused::default() }
+    let (actuator, offsets) = (actuator(&machine, target), offsets(&machine, target));
+    Opened { sources, actuator, offsets, simulated: Some(machine), refused: Refused::default() }
 }
 
 /// When the machine's day began.
@@ -166,6 +171,7 @@ fn simulated_pull(address: &Address, target: &SimulatedTarget, origin_ns: TimeNs
     OpenedPull {
         sources,
         actuator: actuator(&machine, target),
+        offsets: offsets(&machine, target),
         simulated: Some(machine),
         refused: Refused::default(),
         rows: 0,
@@ -177,6 +183,10 @@ fn actuator(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn Act
     (target.device != SimulatedDevice::Meter).then(|| Box::new(machine.feed_override()) as Box<dyn Actuator>)
 }
 
+fn offsets(machine: &Simulated, target: &SimulatedTarget) -> Option<Box<dyn OffsetSink>> {
+    (target.device != SimulatedDevice::Meter).then(|| Box::new(machine.offsets()) as Box<dyn OffsetSink>)
+}
+
 fn replay(address: &Address, target: &ReplayTarget, now_ns: TimeNs) -> Result<Opened, OpenError> {
     let Speed::Times(speed) = target.speed else {
         let what = "speed=max needs the replay command; give a factor here, for example speed=10";
@@ -184,7 +194,7 @@ fn replay(address: &Address, target: &ReplayTarget, now_ns: TimeNs) -> Result<Op
     };
     let (replay, refused) = read(address, target, now_ns)?;
     let sources: Vec<Box<dyn Source>> = vec![Box::new(LiveReplay::new(replay, speed))];
-    Ok(Opened { sources, actuator: None, simulated: None, refused })
+    Ok(Opened { sources, actuator: None, offsets: None, simulated: None, refused })
 }
 
 fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(Replay, Refused), RecordingError> {

@@ -78,7 +78,12 @@ fn summary(name: &str, config: &Config) -> String {
         config::GateMode::Shadow => "the gate decides and records, and writes nothing",
         config::GateMode::Armed => "the gate may be armed on the box",
     };
-    format!("{name}: reads {} at {} ticks per second; {gate}", sources.join(", "), config.gateway.tick_hz)
+    let offsets = match config.gate.offset.mode {
+        config::GateMode::Off => "",
+        config::GateMode::Shadow => "; thermal offsets are decided about and not written",
+        config::GateMode::Armed => "; thermal offsets may be armed on the box",
+    };
+    format!("{name}: reads {} at {} ticks per second; {gate}{offsets}", sources.join(", "), config.gateway.tick_hz)
 }
 
 /// A page that others than this box can reach has no password.

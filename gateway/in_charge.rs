@@ -21,10 +21,7 @@ pub fn path(data_dir: &Path) -> PathBuf {
 pub fn keep(data_dir: &Path, files: &[ScriptFile]) -> std::io::Result<()> {
     let scripts: Map<String, Value> = files.iter().map(|file| (file.name.clone(), json!(file.text))).collect();
     let text = json!({ "schema": "scripts_in_charge/1", "scripts": scripts }).to_string();
-    std::fs::create_dir_all(data_dir)?;
-    let (path, fresh) = (path(data_dir), path(data_dir).with_extension("new"));
-    std::fs::write(&fresh, text)?;
-    std::fs::rename(fresh, path)
+    crate::files::replace(&path(data_dir), &text)
 }
 
 /// The texts that were kept; `None` where there are none.

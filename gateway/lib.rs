@@ -8,6 +8,7 @@ pub mod cli;
 pub mod config;
 pub mod control;
 pub mod doctor;
+pub mod files;
 pub mod gate;
 pub mod history;
 pub mod http;

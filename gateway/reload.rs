@@ -1,21 +1,12 @@
 //! The scripts on disk: written there on the first start, watched, compiled and tried beside the tick, swapped only when all
 //! of them compile and all their trials pass.
-//!
-//! [`Reloader`] looks at the directory once a second on a thread of its own, so that a slow disk never delays a tick. A
-//! change is taken when it has stood still for one look, so that a file is not read while an editor is writing it.
 
+use crate::files::{Lookout, Mark, Rest, mark, read_text, replace};
 use adapters::channel::nearest;
 use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, shipped};
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::time::{Duration, SystemTime};
 
-/// Time between two looks at the directory.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// The list of what was delivered, so that a script that the user has deleted stays deleted.
 const DELIVERED: &str = ".shipped";
 
@@ -58,12 +49,8 @@ pub fn furnish(directory: &Path) -> std::io::Result<Furnished> {
     Ok(furnished)
 }
 
-/// A whole file in one step: written beside, then renamed.
 fn write(path: &Path, file: &ScriptFile, done: &mut Vec<String>) -> std::io::Result<()> {
-    let mut fresh = path.as_os_str().to_owned();
-    fresh.push(".writing");
-    std::fs::write(&fresh, &file.text)?;
-    std::fs::rename(&fresh, path)?;
+    replace(path, &file.text)?;
     done.push(path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default());
     Ok(())
 }
@@ -119,12 +106,9 @@ fn paths(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Reads no more than a script may be long, and one byte to see that it is longer.
 fn read_script(path: &Path) -> std::io::Result<ScriptFile> {
-    let mut text = String::new();
-    std::fs::File::open(path)?.take(TEXT_MAX as u64 + 1).read_to_string(&mut text)?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(ScriptFile { name, text })
+    Ok(ScriptFile { name, text: read_text(path, TEXT_MAX)? })
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
@@ -153,15 +137,11 @@ fn misspelt(path: &Path) -> String {
     }
 }
 
-/// What a file is recognised by without reading it.
-type Mark = (PathBuf, Option<SystemTime>, u64);
-
 /// Notices changes of a directory of scripts. Reads files only when their names, times or lengths have changed.
 #[derive(Debug)]
 pub struct Watch {
     directory: PathBuf,
-    marks: Option<Vec<Mark>>,
-    taken: Option<Vec<Mark>>,
+    rest: Rest<Vec<Mark>>,
     content: Option<Result<Vec<ScriptFile>, Vec<Problem>>>,
 }
 
@@ -169,33 +149,20 @@ impl Watch {
     /// Nothing has been seen; the first look takes everything.
     #[must_use]
     pub fn new(directory: &Path) -> Self {
-        Self { directory: directory.to_owned(), marks: None, taken: None, content: None }
+        Self { directory: directory.to_owned(), rest: Rest::new(), content: None }
     }
 
     /// Everything, when it has changed and then stood still since the look before; at the first look, and with `now`,
     /// at once and whether it has changed or not.
     pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<Problem>>> {
-        let marks = self.marks();
-        let still = self.marks.replace(marks.clone()).is_none_or(|before| before == marks);
-        let changed = self.taken.as_ref() != Some(&marks);
-        if !(now || still && changed) {
+        let marks = paths(&self.directory).unwrap_or_default().iter().map(|path| mark(path)).collect();
+        if !(self.rest.look(marks, now) || now) {
             return None;
         }
-        self.taken = Some(marks);
         let content = read_directory(&self.directory);
         let same = self.content.as_ref() == Some(&content);
         let content = self.content.insert(content);
         (now || !same).then_some(content)
-    }
-
-    fn marks(&self) -> Vec<Mark> {
-        let paths = paths(&self.directory).unwrap_or_default();
-        let mark = |path: PathBuf| {
-            let metadata = std::fs::metadata(&path).ok();
-            let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
-            (path, modified, metadata.map_or(0, |metadata| metadata.len()))
-        };
-        paths.into_iter().map(mark).collect()
     }
 }
 
@@ -203,12 +170,7 @@ impl Watch {
 pub type Loaded = Result<ScriptSet, Vec<Problem>>;
 
 /// Watches and compiles on a thread of its own.
-#[derive(Debug)]
-pub struct Reloader {
-    newest: Receiver<Loaded>,
-    asked: SyncSender<()>,
-    stop: Arc<AtomicBool>,
-}
+pub struct Reloader(Lookout<Loaded>);
 
 impl Reloader {
     /// Starts to watch. Without `poll` only [`Reloader::ask`] makes it look. The first look is not repeated: load the
@@ -217,59 +179,20 @@ impl Reloader {
     /// # Errors
     /// No thread could be started.
     pub fn start(directory: &Path, poll: bool) -> std::io::Result<Self> {
-        let (send, newest) = sync_channel(1);
-        let (asked, asks) = sync_channel(1);
-        let stop = Arc::new(AtomicBool::new(false));
-        let (directory, stopped) = (directory.to_owned(), stop.clone());
-        let work = move || watch(Watch::new(&directory), poll, &asks, &send, &stopped);
-        std::thread::Builder::new().name("scripts".to_owned()).spawn(work)?;
-        Ok(Self { newest, asked, stop })
+        let mut watch = Watch::new(directory);
+        watch.look(false);
+        let look = move |asked| watch.look(asked).cloned().map(|found| found.and_then(|files| prepare(&files)));
+        Lookout::start("scripts", poll, look).map(Self)
     }
 
     /// Looks now, and compiles even when nothing has changed. Returns at once.
     pub fn ask(&self) {
-        // A full queue means that it has been asked already.
-        let _asked_before = self.asked.try_send(());
-    }
-
-    /// What was found since the last call, if anything was.
-    pub fn take(&self) -> Option<Loaded> {
-        self.newest.try_recv().ok()
+        self.0.ask();
     }
 
     /// Puts newly found scripts in charge, or lets the host say why they are refused. Tells what happened, if anything.
     pub fn step(&self, host: &mut Host) -> Option<Result<usize, Vec<Problem>>> {
-        Some(put_in_charge(self.take()?, host))
-    }
-}
-
-impl Drop for Reloader {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        self.ask();
-    }
-}
-
-fn watch(mut watch: Watch, poll: bool, asks: &Receiver<()>, send: &SyncSender<Loaded>, stop: &AtomicBool) {
-    watch.look(false);
-    loop {
-        let asked = match asks.recv_timeout(LOOK_EVERY) {
-            Ok(()) => true,
-            Err(RecvTimeoutError::Timeout) => false,
-            Err(RecvTimeoutError::Disconnected) => return,
-        };
-        if stop.load(Ordering::SeqCst) {
-            return;
-        }
-        if !asked && !poll {
-            continue;
-        }
-        let found = watch.look(asked).cloned();
-        if let Some(found) = found
-            && send.send(found.and_then(|files| prepare(&files))).is_err()
-        {
-            return;
-        }
+        Some(put_in_charge(self.0.take()?, host))
     }
 }
 

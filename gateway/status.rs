@@ -117,8 +117,31 @@ pub struct GateStatus {
     pub armed_until_ms: Option<i64>,
     /// Why it is not armed.
     pub disarmed: Option<String>,
+    /// Thermal offsets, where they are decided about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<OffsetStatus>,
     /// The latest changes, newest first.
     pub recent: Vec<DecisionStatus>,
+}
+
+/// Thermal offsets on their way to the control.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OffsetStatus {
+    /// `shadow` (decide and record, write nothing) or `armed`.
+    pub mode: &'static str,
+    /// The axes that may be shifted.
+    pub axes: Vec<AxisShift>,
+}
+
+/// One axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxisShift {
+    /// `x`, `y` or `z`.
+    pub axis: &'static str,
+    /// What the scripts propose, um.
+    pub wanted_um: Option<f64>,
+    /// What is shifted in the control, um.
+    pub shift_um: f64,
 }
 
 /// What a source knows of itself.

@@ -10,8 +10,10 @@ use super::poll;
 use super::readings::Manner;
 use super::source::FanucSource;
 use super::vendor::{Vendor, VendorSettings};
+use super::work_offset::ExternalOffsets;
 use crate::address::{Endpoint, FanucOptions, WriteMethod};
 use crate::driver::{Actuator, Source};
+use crate::offset::OffsetSink;
 use std::path::Path;
 
 /// What an address opens.
@@ -20,6 +22,8 @@ pub struct OpenedFanuc {
     pub sources: Vec<Box<dyn Source>>,
     /// The way to the feed override, where the address names one.
     pub actuator: Option<Box<dyn Actuator>>,
+    /// The way to the external work offsets, where the address allows `EXT`.
+    pub offsets: Option<Box<dyn OffsetSink>>,
     /// The connection they share.
     pub line: Line,
 }
@@ -63,19 +67,26 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
         Box::new(FanucSource::slow(name, line.clone(), manner, options)),
     ];
     let actuator = FanucActuator::new(name, line.clone(), path, options);
-    OpenedFanuc { sources, actuator: actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>), line }
+    let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);
+    let shiftable = options.allow.iter().any(|text| Allowed::read(text) == Some(Allowed::ExternalOffset));
+    let offsets = shiftable.then(|| Box::new(ExternalOffsets::new(name, line.clone())) as Box<dyn OffsetSink>);
+    OpenedFanuc { sources, actuator, offsets, line }
 }
 
-/// What the way of writing needs, and what the address allows besides.
+/// What the way of writing needs, and what the address allows besides. Without a way of writing the feed override there is
+/// nothing but the external offset.
 fn allowed(options: &FanucOptions, path: u8) -> AllowList {
     let own = match options.write {
-        WriteMethod::None => return AllowList::default(),
+        WriteMethod::None => return AllowList(extra(options).filter(|it| *it == Allowed::ExternalOffset).collect()),
         WriteMethod::Mailbox { area, at } => Allowed::bytes(area, at, 3),
         WriteMethod::SecondOverride { area, at } => Allowed::bytes(area, at, 1),
         WriteMethod::Macro { variable } => Allowed::Macros { from: variable, to: variable },
         WriteMethod::Direct => Allowed::bytes(Area::G, poll::signal(feed_override::AT, path), 1),
     };
     let request = options.request.map(|(area, at)| Allowed::bytes(area, at, 1));
-    let more = options.allow.iter().filter_map(|text| Allowed::read(text));
-    AllowList(std::iter::once(own).chain(request).chain(more).collect())
+    AllowList(std::iter::once(own).chain(request).chain(extra(options)).collect())
+}
+
+fn extra(options: &FanucOptions) -> impl Iterator<Item = Allowed> {
+    options.allow.iter().filter_map(|text| Allowed::read(text))
 }

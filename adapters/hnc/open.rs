@@ -37,5 +37,5 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
         source.on_block(sink);
     }
     let actuator = target.mailbox.map(|first| Box::new(HncActuator::new(line, first)) as Box<dyn Actuator>);
-    Opened { sources: vec![Box::new(source)], actuator, simulated: None, refused: Refused::default() }
+    Opened { sources: vec![Box::new(source)], actuator, offsets: None, simulated: None, refused: Refused::default() }
 }

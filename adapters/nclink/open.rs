@@ -33,7 +33,13 @@ pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<Block
         source.on_block(sink);
     }
     let actuator = target.mailbox.map(|first| Box::new(NcLinkActuator::new(link, first)) as Box<dyn Actuator>);
-    Ok(Opened { sources: vec![Box::new(source)], actuator, simulated: None, refused: Refused::default() })
+    Ok(Opened {
+        sources: vec![Box::new(source)],
+        actuator,
+        offsets: None,
+        simulated: None,
+        refused: Refused::default(),
+    })
 }
 
 fn login(target: &NcLinkTarget) -> Result<Option<(String, String)>, OpenError> {

@@ -55,6 +55,8 @@ pub struct LadderCounts {
     pub feed_holds: u64,
     /// Requests for a stop.
     pub stops: u64,
+    /// Writes of an external work offset, which the ladder passes on to the control.
+    pub offsets: u64,
     /// Times that the sign of life failed while an override was in force.
     pub heartbeats_lost: u64,
 }
@@ -63,7 +65,7 @@ impl LadderCounts {
     /// Everything that was ever written to the controller.
     #[must_use]
     pub fn writes(&self) -> u64 {
-        self.overrides + self.releases + self.feed_holds + self.stops
+        self.overrides + self.releases + self.feed_holds + self.stops + self.offsets
     }
 }
 
@@ -188,6 +190,11 @@ impl Ladder {
             self.stop = None;
         }
         attended
+    }
+
+    /// An offset was written; it is the control's, and only counted here.
+    pub(super) fn count_offset(&mut self) {
+        self.counts.offsets += 1;
     }
 
     pub(super) fn counts(&self) -> LadderCounts {

@@ -9,6 +9,7 @@ use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
 use super::settings::{CutLevel, SimulatedSettings};
 use crate::address::SimulatedMachine;
 use crate::clock::{SECOND_NS, TimeNs};
+use crate::offset::Axis;
 use crate::units::OverridePct;
 use crate::words::{execution, mode};
 use rand::SeedableRng;
@@ -36,6 +37,9 @@ pub(super) struct Machine {
     plant: Plant,
     control: Control,
     ladder: Ladder,
+    /// External work offsets of X, Y, Z, um; locked by the operator.
+    offsets_um: [f64; 3],
+    offsets_protected: bool,
     cut: Cut,
     diameter_mm: f64,
     engaged: f64,
@@ -65,6 +69,8 @@ impl Machine {
             plant: Plant::new(frame, settings.tau_s, settings.start_peak_w, rng(2)),
             control: Control::new(planner, rng(3), frame, settings.wear_mm),
             ladder: Ladder::new(settings.ladder),
+            offsets_um: [0.0; 3],
+            offsets_protected: false,
             cut: Cut::default(),
             diameter_mm: 0.0,
             engaged: 0.0,
@@ -81,6 +87,27 @@ impl Machine {
     /// The ladder takes a letter at `at_ns`, or at once when the machine is already further.
     pub(super) fn post(&mut self, at_ns: TimeNs, letter: Letter) {
         self.ladder.post(at_ns, letter);
+    }
+
+    pub(super) fn offset_um(&self, axis: Axis) -> f64 {
+        self.offsets_um[axis.index()]
+    }
+
+    /// The operator sets an offset.
+    pub(super) fn set_offset(&mut self, axis: Axis, offset_um: f64) {
+        self.offsets_um[axis.index()] = offset_um;
+    }
+
+    pub(super) fn protect_offsets(&mut self, protected: bool) {
+        self.offsets_protected = protected;
+    }
+
+    /// The gateway writes an offset.
+    pub(super) fn write_offset(&mut self, axis: Axis, offset_um: f64) {
+        self.ladder.count_offset();
+        if !self.offsets_protected {
+            self.set_offset(axis, offset_um);
+        }
     }
 
     pub(super) fn ladder_counts(&self) -> LadderCounts {

@@ -21,6 +21,7 @@ mod machine;
 mod meter;
 mod moment;
 mod noise;
+mod offsets;
 mod plant;
 mod program;
 mod settings;
@@ -33,10 +34,12 @@ pub use controller::SimulatedController;
 pub use ladder::{LadderCounts, LadderSettings};
 pub use meter::{MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
+pub use offsets::SimulatedOffsets;
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
 pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSettings, SimulatedSettings};
 
 use crate::clock::TimeNs;
+use crate::offset::Axis;
 use crate::units::OverridePct;
 use ladder::Letter;
 use machine::Machine;
@@ -99,6 +102,29 @@ impl Simulated {
     #[must_use]
     pub fn feed_override(&self) -> SimulatedOverride {
         SimulatedOverride::new(self.device_name("controller"), self.clone())
+    }
+
+    /// The way to its external work offsets.
+    #[must_use]
+    pub fn offsets(&self) -> SimulatedOffsets {
+        SimulatedOffsets::new(self.device_name("controller"), self.clone())
+    }
+
+    /// The external work offset of this axis, um.
+    #[must_use]
+    pub fn offset_um(&self, axis: Axis) -> f64 {
+        self.locked().offset_um(axis)
+    }
+
+    /// The operator sets the external work offset of this axis, um.
+    pub fn set_offset(&self, axis: Axis, offset_um: f64) {
+        self.locked().set_offset(axis, offset_um);
+    }
+
+    /// The operator locks the offsets against changes by programs and network, or unlocks them: a write is acknowledged
+    /// and changes nothing.
+    pub fn protect_offsets(&self, protected: bool) {
+        self.locked().protect_offsets(protected);
     }
 
     /// The operator turns the dial of the feed override at `at_ns`.

@@ -3,7 +3,7 @@
 
 use super::history::cannot;
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::history::{AuditCheck, AuditEntry, Reader};
+use crate::history::{AuditCheck, AuditEntry, Reader, audit_document};
 use crate::moment;
 use clap::Args;
 use serde_json::json;
@@ -43,7 +43,7 @@ pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResu
     let (from_ns, to_ns) = (moment(&arguments.from, i64::MIN)?, moment(&arguments.to, i64::MAX)?);
     let rows = reader.audit(from_ns, to_ns, arguments.limit).map_err(|error| cannot(&error))?;
     match arguments.json {
-        true => print_json(&json!({ "schema": "audit/1", "rows": rows })),
+        true => print_json(&audit_document(&rows)),
         false => rows.iter().for_each(|row| print(&line(row))),
     }
     Ok(Outcome::Fine)

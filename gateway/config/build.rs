@@ -3,9 +3,11 @@
 use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
 use super::{
-    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Http, Log, Operations, Scripts, Source, Twin,
+    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Http, Log, Offset, Operations, Scripts, Source,
+    Twin,
 };
 use crate::log::LogFormat;
+use adapters::Axis;
 use adapters::channel::nearest;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
@@ -86,7 +88,30 @@ fn gate(reading: &Reading<'_>) -> Option<Gate> {
         heartbeat: seconds(reading, "gate", "heartbeat_s")?,
         stale: seconds(reading, "gate", "stale_s")?,
         armed_for: seconds(reading, "gate", "armed_for_s")?,
+        offset: offset(reading)?,
     })
+}
+
+fn offset(reading: &Reading<'_>) -> Option<Offset> {
+    const SECTION: &str = "gate.offset";
+    Some(Offset {
+        mode: mode(&text(reading, SECTION, "mode")?),
+        source: text(reading, SECTION, "source").or_else(|| text(reading, "gate", "source")),
+        axes: axes(&text(reading, SECTION, "axes").unwrap_or_default()).unwrap_or_default(),
+        step_um: number(reading, SECTION, "step_um")?,
+        total_um: number(reading, SECTION, "total_um")?,
+        min_interval: seconds(reading, SECTION, "min_interval_s")?,
+        restore: text(reading, SECTION, "on_disarm")? == "restore",
+    })
+}
+
+/// `x z` or `x,z`, each once.
+fn axes(text: &str) -> Result<Vec<Axis>, String> {
+    let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+    let mut axes = words.map(|word| Axis::of(word).ok_or(word.to_owned())).collect::<Result<Vec<_>, _>>()?;
+    axes.sort_unstable();
+    axes.dedup();
+    Ok(axes)
 }
 
 fn mode(word: &str) -> GateMode {
@@ -145,6 +170,7 @@ fn origin_of_name(values: &Values) -> Origin {
 
 /// What is armed has somewhere to write to.
 fn check_gate(reading: &mut Reading<'_>) {
+    check_offsets(reading);
     let armed = text(reading, "gate", "mode").as_deref() == Some("armed");
     let origin = |key: &str| reading.get("gate", key).map_or(Origin::Default, |found| found.origin.clone());
     let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
@@ -153,15 +179,49 @@ fn check_gate(reading: &mut Reading<'_>) {
             let (at, next) = (origin("mode"), format!("write source = ... under [gate]; there is {}", quoted(&names)));
             reading.problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
         }
-        Some(name) if !names.contains(&name) && !names.is_empty() => {
-            let next = match nearest(&name, names.iter().map(String::as_str)) {
-                Some(near) => format!("did you mean {near:?}?"),
-                None => format!("there is {}", quoted(&names)),
-            };
-            let at = origin("source");
-            reading.problem(&at, format!("no source is named {name:?}"), next);
+        Some(name) => check_source(reading, &names, &name, &origin("source")),
+        None => {}
+    }
+}
+
+/// There is a source of this name.
+fn check_source(reading: &mut Reading<'_>, names: &[String], name: &str, at: &Origin) {
+    if names.iter().any(|known| known == name) || names.is_empty() {
+        return;
+    }
+    let next = match nearest(name, names.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean {near:?}?"),
+        None => format!("there is {}", quoted(names)),
+    };
+    reading.problem(at, format!("no source is named {name:?}"), next);
+}
+
+/// What may shift an axis says which one, and where.
+fn check_offsets(reading: &mut Reading<'_>) {
+    const SECTION: &str = "gate.offset";
+    let origin = |reading: &Reading<'_>, key: &str| {
+        reading.get(SECTION, key).map_or(Origin::Default, |found| found.origin.clone())
+    };
+    let on = text(reading, SECTION, "mode").is_some_and(|mode| mode != "off");
+    let (at_mode, at_axes) = (origin(reading, "mode"), origin(reading, "axes"));
+    match axes(&text(reading, SECTION, "axes").unwrap_or_default()) {
+        Err(word) => {
+            let next = "write \"x\", \"y\", \"z\", or several: \"x z\"";
+            reading.problem(&at_axes, format!("`axes` names {word:?}, which is no axis"), next);
         }
-        _ => {}
+        Ok(axes) if axes.is_empty() && on => {
+            let next = "write axes = \"z\" under [gate.offset]";
+            reading.problem(&at_mode, "offsets are to be decided about, but `axes` names none", next);
+        }
+        Ok(_) => {}
+    }
+    let names: Vec<String> = reading.sources.iter().filter_map(source_name).collect();
+    let at = origin(reading, "source");
+    if let Some(name) = text(reading, SECTION, "source") {
+        check_source(reading, &names, &name, &at);
+    } else if text(reading, SECTION, "mode").as_deref() == Some("armed") && text(reading, "gate", "source").is_none() {
+        let next = format!("write source = ... under [gate.offset]; there is {}", quoted(&names));
+        reading.problem(&at_mode, "offsets may be written, but `source` does not say where to", next);
     }
 }
 

@@ -1,5 +1,7 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
+pub use super::shown::{example, table};
+
 /// What a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
@@ -70,6 +72,7 @@ pub const SECTIONS: &[Section] = &[
     section("scripts", "the rules that the integrator edits"),
     section("operations", "how each stretch of an NC program cuts, which no controller can be asked for"),
     section("gate", "what may be written to the machine"),
+    section("gate.offset", "thermal offsets that scripts propose, written between programs; needs the same arming"),
     section("history", "what is remembered"),
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
@@ -255,6 +258,55 @@ pub const KEYS: &[Key] = &[
         "允许写入的有效时间（秒）",
     ),
     key(
+        ("gate.offset", "mode"),
+        OneOf(&["off", "shadow", "armed"]),
+        Default("\"off\""),
+        "off: proposals are recorded only. shadow: decide and record. armed: written while the gate is armed on the box",
+        "热误差补偿量：关闭、影子、允许写入",
+    ),
+    key(
+        ("gate.offset", "source"),
+        Text,
+        Optional,
+        "Name of the source whose offsets may be written; default: that of [gate]",
+        "可写入补偿量的数据源",
+    ),
+    key(
+        ("gate.offset", "axes"),
+        Text,
+        Optional,
+        "Axes that may be shifted, for example \"z\" or \"x z\"",
+        "允许补偿的轴",
+    ),
+    key(
+        ("gate.offset", "step_um"),
+        Number(1.0, 100.0),
+        Default("5.0"),
+        "Greatest change of an offset at a time",
+        "单次最大修改量（微米）",
+    ),
+    key(
+        ("gate.offset", "total_um"),
+        Number(1.0, 500.0),
+        Default("50.0"),
+        "Greatest shift from what the operator has set",
+        "最大总补偿量（微米）",
+    ),
+    key(
+        ("gate.offset", "min_interval_s"),
+        Number(1.0, 86400.0),
+        Default("60.0"),
+        "Least time between two writes of offsets",
+        "两次写入的最短间隔（秒）",
+    ),
+    key(
+        ("gate.offset", "on_disarm"),
+        OneOf(&["restore", "keep"]),
+        Default("\"restore\""),
+        "After disarming and at the end: give back what the operator had set, as soon as no program runs, or leave the shift",
+        "解除后：恢复操作者设定值，或保持补偿",
+    ),
+    key(
         ("history", "path"),
         Path,
         Default("\"history.db\""),
@@ -324,72 +376,10 @@ pub fn find_section(name: &str) -> Option<&'static Section> {
     SECTIONS.iter().find(|section| section.name == name)
 }
 
-impl Kind {
-    /// What is accepted, as a reader of the table needs it.
-    #[must_use]
-    pub fn range(&self) -> String {
-        match self {
-            Text => "text".to_string(),
-            OneOf(words) => words.join(", "),
-            Number(min, max) => format!("{min} to {max}"),
-            Flag => "true, false".to_string(),
-            Path => "path".to_string(),
-            Listen => "HOST:PORT".to_string(),
-            Address => "address".to_string(),
-        }
-    }
-}
-
-impl Absent {
-    fn text(self) -> &'static str {
-        match self {
-            Required => "required",
-            Optional => "-",
-            Default(value) => value,
-        }
-    }
-}
-
-/// The table as Markdown, one row per key: what `check --keys` prints.
-#[must_use]
-pub fn table() -> String {
-    let mut text = String::from("| key | default | accepts | what |\n|---|---|---|---|\n");
-    for key in KEYS {
-        let section = find_section(key.section).filter(|section| section.repeated);
-        let path = if section.is_some() { format!("[[{}]] {}", key.section, key.name) } else { key.path() };
-        text += &format!("| `{path}` | {} | {} | {} |\n", key.absent.text(), key.kind.range(), key.en);
-    }
-    text
-}
-
 impl Key {
     /// `section.name`.
     #[must_use]
     pub fn path(&self) -> String {
         format!("{}.{}", self.section, self.name)
     }
-}
-
-/// A complete commented file with every default: what `check --example` prints.
-#[must_use]
-pub fn example() -> String {
-    let mut text =
-        String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
-    for section in SECTIONS {
-        let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
-        text += &format!("\n{open}{}{close}{}# {}\n", section.name, " ", section.en);
-        for key in keys_of(section.name) {
-            text += &example_line(key);
-        }
-    }
-    text
-}
-
-fn example_line(key: &Key) -> String {
-    let written = match key.absent {
-        Required => format!("{} = \"simulated://lathe\"", key.name),
-        Optional => format!("# {} = ...", key.name),
-        Default(value) => format!("# {} = {value}", key.name),
-    };
-    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
 }

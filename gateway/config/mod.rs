@@ -10,11 +10,12 @@ mod check_value;
 pub mod keys;
 mod problem;
 mod read;
+mod shown;
 
 pub use problem::Problem;
 
 use crate::log::LogFormat;
-use adapters::Address;
+use adapters::{Address, Axis};
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -179,6 +180,35 @@ pub struct Gate {
     pub stale: Duration,
     /// Arming ends by itself after this.
     pub armed_for: Duration,
+    /// Thermal offsets.
+    pub offset: Offset,
+}
+
+impl Gate {
+    /// The furthest that overrides or offsets may go: what arming needs.
+    #[must_use]
+    pub fn greatest_mode(&self) -> GateMode {
+        if self.offset.mode == GateMode::Armed { GateMode::Armed } else { self.mode }
+    }
+}
+
+/// `[gate.offset]`: the limits of thermal offsets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Offset {
+    /// How far it goes.
+    pub mode: GateMode,
+    /// Name of the source that is written to.
+    pub source: Option<String>,
+    /// Axes that may be shifted.
+    pub axes: Vec<Axis>,
+    /// Greatest change at a time, um.
+    pub step_um: f64,
+    /// Greatest shift from what the operator has set, um.
+    pub total_um: f64,
+    /// Least time between two writes.
+    pub min_interval: Duration,
+    /// Give back what the operator had set when nobody writes any more.
+    pub restore: bool,
 }
 
 /// `[history]`.

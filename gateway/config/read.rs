@@ -124,6 +124,12 @@ impl<'a> Reading<'a> {
     fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> Values {
         let mut values = Values { offset: Some(offset), ..Values::default() };
         for (name, value) in table.iter() {
+            let within = find_section(&format!("{}.{}", section.name, name.get_ref()));
+            if let (Some(within), DeValue::Table(inner)) = (within, value.get_ref()) {
+                let found = self.values(within, inner, name.span().start);
+                self.single.insert(within.name, found);
+                continue;
+            }
             let Some(key) = find(section.name, name.get_ref()) else {
                 let at = Origin::File(name.span().start);
                 self.problem(
@@ -147,8 +153,10 @@ impl<'a> Reading<'a> {
         let origin = Origin::Variable(name.to_owned());
         let path = name[prefix.len()..].to_lowercase();
         let parts: Vec<&str> = path.split("__").collect();
+        let within = parts.get(..2).map(|outer| outer.join(".")).filter(|name| find_section(name).is_some());
         let (section, index, key_name) = match parts[..] {
             [section, key] => (section, None, key),
+            [.., key] if within.is_some() && parts.len() == 3 => (within.as_deref().unwrap_or_default(), None, key),
             [section, index, key] => (section, index.parse::<usize>().ok(), key),
             _ => return self.problem(&origin, "this variable names no key", variable_form(prefix)),
         };

@@ -28,6 +28,8 @@ pub enum Disarmed {
     Expired,
     /// What was read back was not what had been written.
     ReadBack,
+    /// The control shows another offset than the one that was written.
+    Offset,
     /// The machine could not be written to or read back.
     Line,
     /// The clock jumped back.
@@ -47,6 +49,7 @@ impl Disarmed {
             Self::Person => "person",
             Self::Expired => "expired",
             Self::ReadBack => "read_back",
+            Self::Offset => "offset",
             Self::Line => "line",
             Self::Clock => "clock",
             Self::Silent => "silent",
@@ -62,6 +65,7 @@ impl fmt::Display for Disarmed {
             Self::Person => "disarmed on the box",
             Self::Expired => "the time of arming is over",
             Self::ReadBack => "the machine did not take the override that was written",
+            Self::Offset => "the control did not take the offset that was written",
             Self::Line => "the machine could not be reached",
             Self::Clock => "the clock jumped back",
             Self::NoAudit => "the history takes nothing, so nothing can be accounted for",

@@ -34,6 +34,8 @@ pub enum Hold {
     FeedHold,
     /// No program runs.
     NotRunning,
+    /// A program runs or stands in the middle, which matters to offsets only.
+    Running,
     /// Rapid traverse.
     Rapid,
     /// A thread is cut: the feed follows the spindle.
@@ -59,6 +61,7 @@ impl Hold {
             Self::NotAutomatic => "not_automatic",
             Self::FeedHold => "feed_hold",
             Self::NotRunning => "not_running",
+            Self::Running => "running",
             Self::Rapid => "rapid",
             Self::Threading => "threading",
             Self::Tapping => "tapping",
@@ -81,6 +84,7 @@ impl Hold {
             Self::NotAutomatic => "非自动方式",
             Self::FeedHold => "进给保持",
             Self::NotRunning => "程序未运行",
+            Self::Running => "程序运行中",
             Self::Rapid => "快速移动",
             Self::Threading => "螺纹切削",
             Self::Tapping => "攻丝",
@@ -104,6 +108,7 @@ impl fmt::Display for Hold {
             Self::NotAutomatic => "the controller is not in automatic",
             Self::FeedHold => "feed hold",
             Self::NotRunning => "no program runs",
+            Self::Running => "a program runs or stands in the middle",
             Self::Rapid => "rapid traverse",
             Self::Threading => "a thread is being cut",
             Self::Tapping => "a thread is being tapped",
@@ -197,18 +202,42 @@ impl Interlocks {
         }
     }
 
-    fn controller(&self, sample: &Sample) -> Option<Hold> {
+    /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::look`].
+    pub(super) fn between_programs(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+        let needed = [self.mode, self.execution].into_iter().flatten();
+        let missing = needed.chain(self.alarm).find_map(|id| self.absence(sample, id).map(|why| (id, why)));
+        if let Some((id, why)) = missing {
+            return Some(Hold::Missing(id, why));
+        }
+        let rests = [execution::READY, execution::PROGRAM_COMPLETED];
+        self.automatic(sample).or_else(|| match self.execution.and_then(|id| sample.text(id)).unwrap_or_default() {
+            _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
+            word if rests.contains(&word) => None,
+            execution::FEED_HOLD => Some(Hold::FeedHold),
+            _ => Some(Hold::Running),
+        })
+    }
+
+    /// No alarm, and automatic.
+    fn automatic(&self, sample: &Sample) -> Option<Hold> {
         let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
         if !text(self.alarm).is_empty() {
             return Some(Hold::Alarm);
         }
         match text(self.mode) {
-            mode::AUTOMATIC => {}
-            mode::SEMI_AUTOMATIC => return Some(Hold::SingleBlock),
-            mode::MANUAL_DATA_INPUT => return Some(Hold::Mdi),
-            mode::MANUAL => return Some(Hold::Manual),
-            _ => return Some(Hold::NotAutomatic),
+            mode::AUTOMATIC => None,
+            mode::SEMI_AUTOMATIC => Some(Hold::SingleBlock),
+            mode::MANUAL_DATA_INPUT => Some(Hold::Mdi),
+            mode::MANUAL => Some(Hold::Manual),
+            _ => Some(Hold::NotAutomatic),
         }
+    }
+
+    fn controller(&self, sample: &Sample) -> Option<Hold> {
+        if let Some(hold) = self.automatic(sample) {
+            return Some(hold);
+        }
+        let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
         let on = |id: Option<ChannelId>| id.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
         if let Some((_, hold)) = self.switches.iter().find(|(id, _)| on(*id)) {
             return Some(*hold);

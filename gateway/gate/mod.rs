@@ -18,12 +18,14 @@
 //! | `ask` | feed hold and stop: once, and then not before somebody has seen to it |
 //! | `arming` | who let it write, and until when |
 //! | `write` | writing, reading back, restoring |
+//! | `offset` | thermal offsets: the same for shifts of an axis, between programs |
 //! | `trail` | what of it goes into the audit |
 
 mod arming;
 mod ask;
 mod hold;
 mod limit;
+pub mod offset;
 mod thread_cycle;
 pub mod trail;
 mod verdict;
@@ -33,6 +35,7 @@ pub use arming::{ArmError, Armed, Disarmed};
 pub use ask::{Ask, AskOutcome};
 pub use hold::Hold;
 pub use limit::Bound;
+pub use offset::{OffsetVerdict, Offsets};
 pub use verdict::{Outcome, Verdict};
 pub use write::{Fault, Occasion, Reaction, Writer, Written};
 
@@ -43,8 +46,9 @@ use arming::Arming;
 use ask::Asks;
 use hold::Interlocks;
 use limit::{Aim, Slew};
+use offset::Circumstances;
 use rules::estimators::Estimates;
-use rules::script::OverrideRequest;
+use rules::script::{OffsetProposal, OverrideRequest};
 use std::time::Duration;
 
 /// Decides about feed overrides. One per machine; remembers the last decision, for the slew limit, and the arming.
@@ -57,6 +61,7 @@ pub struct Gate {
     slew: Slew,
     arming: Arming,
     asks: Asks,
+    offsets: Offsets,
 }
 
 impl Gate {
@@ -69,8 +74,9 @@ impl Gate {
             dial: channel("feed_override_dial_pct"),
             aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
-            arming: Arming::new(limits.mode, limits.armed_for),
+            arming: Arming::new(limits.greatest_mode(), limits.armed_for),
             asks: Asks::new(),
+            offsets: Offsets::new(limits.offset.clone()),
             limits,
         }
     }
@@ -130,14 +136,48 @@ impl Gate {
         };
         let slewing = hold.is_none() && bound.is_none() && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { Outcome::Limited(Bound::Slew) } else { outcome };
-        Verdict { at_ns, wanted_pct, permitted, outcome, armed: self.arming.state().is_ok() }
+        Verdict { at_ns, wanted_pct, permitted, outcome, armed: self.writes_override() }
     }
 
     /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide`]: each request passes once, and then not
     /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
     pub fn ask(&mut self, asks: &[Ask], sample: &Sample) -> Vec<(Ask, AskOutcome)> {
-        let armed = self.arming.state().is_ok();
+        let armed = self.writes_override();
         self.asks.judge(asks, sample, armed)
+    }
+
+    /// Armed, and for overrides: the arming may be there for offsets only.
+    fn writes_override(&self) -> bool {
+        self.limits.mode == GateMode::Armed && self.arming.state().is_ok()
+    }
+
+    /// Judges the offsets that are proposed at this tick, after [`Gate::decide`]. Nothing while `[gate.offset]` is off.
+    pub fn shift(
+        &mut self,
+        proposals: &[OffsetProposal],
+        sample: &Sample,
+        estimates: &Estimates,
+    ) -> Vec<OffsetVerdict> {
+        if !self.offsets.is_concerned(proposals) {
+            return Vec::new();
+        }
+        let now = Circumstances {
+            at_ns: sample.at_ns,
+            hold: self.interlocks.between_programs(sample, estimates),
+            armed: self.limits.offset.mode == GateMode::Armed && self.arming.state().is_ok(),
+        };
+        self.offsets.decide(proposals, now)
+    }
+
+    /// The offsets, for what is in force.
+    #[must_use]
+    pub fn offsets(&self) -> &Offsets {
+        &self.offsets
+    }
+
+    /// The offsets, for what the control answers.
+    pub fn offsets_mut(&mut self) -> &mut Offsets {
+        &mut self.offsets
     }
 
     /// Somebody has seen to what the ladder was asked for.

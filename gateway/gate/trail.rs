@@ -28,17 +28,39 @@ struct Told {
 }
 
 /// See the [module](self).
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Trail {
     told: Option<Told>,
+    pace: Pace,
+}
+
+/// How many rows of requests there may be.
+#[derive(Debug)]
+pub(super) struct Pace {
     tokens: f64,
     at_ns: TimeNs,
     left_out: u64,
 }
 
-impl Default for Trail {
+impl Default for Pace {
     fn default() -> Self {
-        Self { told: None, tokens: ROWS_AT_ONCE, at_ns: 0, left_out: 0 }
+        Self { tokens: ROWS_AT_ONCE, at_ns: 0, left_out: 0 }
+    }
+}
+
+impl Pace {
+    /// May there be a row now? Then the text says how many before it were left out.
+    pub(super) fn may_tell(&mut self, at_ns: TimeNs) -> Option<String> {
+        let elapsed_s = (at_ns - self.at_ns).max(0) as f64 / SECOND_NS as f64;
+        self.at_ns = at_ns;
+        self.tokens = (self.tokens + elapsed_s * ROWS_PER_S).min(ROWS_AT_ONCE);
+        if self.tokens < 1.0 {
+            self.left_out += 1;
+            return None;
+        }
+        self.tokens -= 1.0;
+        let left_out = std::mem::take(&mut self.left_out);
+        Some(if left_out > 0 { format!("; {left_out} requests before it were left out") } else { String::new() })
     }
 }
 
@@ -58,12 +80,7 @@ impl Trail {
             return None;
         }
         self.told = Some(told);
-        if !self.may_tell(verdict.at_ns) {
-            self.left_out += 1;
-            return None;
-        }
-        let left_out = std::mem::take(&mut self.left_out);
-        let also = if left_out > 0 { format!("; {left_out} requests before it were left out") } else { String::new() };
+        let also = self.pace.may_tell(verdict.at_ns)?;
         let wish = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
         Some(Audit {
             outcome: outcome(verdict).to_owned(),
@@ -74,15 +91,6 @@ impl Trail {
             script_version: request.map_or(String::new(), |request| format!("{:016x}", request.version)),
             ..of("request", verdict.at_ns)
         })
-    }
-
-    fn may_tell(&mut self, at_ns: TimeNs) -> bool {
-        let elapsed_s = (at_ns - self.at_ns).max(0) as f64 / SECOND_NS as f64;
-        self.at_ns = at_ns;
-        self.tokens = (self.tokens + elapsed_s * ROWS_PER_S).min(ROWS_AT_ONCE);
-        let may = self.tokens >= 1.0;
-        self.tokens -= if may { 1.0 } else { 0.0 };
-        may
     }
 }
 
@@ -100,7 +108,7 @@ fn of(kind: &str, at_ns: TimeNs) -> Audit {
     Audit { at_ns, kind: kind.to_owned(), unit: "%".to_owned(), ..Audit::default() }
 }
 
-fn words(text: &str) -> String {
+pub(super) fn words(text: &str) -> String {
     text.chars().take(WORDS_MAX).collect()
 }
 
@@ -113,11 +121,20 @@ fn percent(pct: OverridePct) -> f64 {
 pub fn started(limits: &config::Gate, at_ns: TimeNs) -> Audit {
     let config::Gate { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } = limits;
     let target = limits.source.as_deref().unwrap_or("no source");
-    let reason = format!(
-        "disarmed; {target}, {min_pct} to {max_pct} %, +{up} and -{down} %/s{}",
-        if *above_dial { ", may exceed the dial" } else { "" }
-    );
+    let dial = if *above_dial { ", may exceed the dial" } else { "" };
+    let offsets = offsets(&limits.offset);
+    let reason = format!("disarmed; {target}, {min_pct} to {max_pct} %, +{up} and -{down} %/s{dial}{offsets}");
     Audit { outcome: limits.mode.word().to_owned(), reason, ..of("started", at_ns) }
+}
+
+/// What may be shifted, if anything.
+fn offsets(limits: &config::Offset) -> String {
+    if limits.mode == config::GateMode::Off {
+        return String::new();
+    }
+    let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.word()).collect();
+    let config::Offset { step_um, total_um, .. } = limits;
+    format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.word())
 }
 
 /// A write; a sign of life is no news unless it failed.

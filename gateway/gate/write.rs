@@ -10,7 +10,7 @@ use super::verdict::{Outcome, Verdict};
 use crate::config;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
-use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
+use adapters::{Actuator, Axis, LadderRequest, LadderRule, SourceError};
 use std::collections::VecDeque;
 use std::fmt;
 
@@ -81,6 +81,17 @@ pub enum Fault {
     },
     /// Writing or reading back failed.
     Line(SourceError),
+    /// The control shows another offset than the one that was written.
+    Offset {
+        /// Which axis.
+        axis: Axis,
+        /// Written, um.
+        asked_um: f64,
+        /// Read back, um.
+        found_um: f64,
+    },
+    /// An offset could not be written or read back.
+    OffsetLine(SourceError),
 }
 
 impl Fault {
@@ -89,7 +100,19 @@ impl Fault {
     pub fn disarmed(&self) -> Disarmed {
         match self {
             Self::ReadBack { .. } => Disarmed::ReadBack,
-            Self::Line(_) => Disarmed::Line,
+            Self::Offset { .. } => Disarmed::Offset,
+            Self::Line(_) | Self::OffsetLine(_) => Disarmed::Line,
+        }
+    }
+
+    /// The alarm in Chinese.
+    #[must_use]
+    pub fn zh(&self) -> &'static str {
+        match self {
+            Self::ReadBack { .. } | Self::Line(_) => "写入的进给倍率未生效，闸门已解除；请检查梯形图与面板倍率",
+            Self::Offset { .. } | Self::OffsetLine(_) => {
+                "写入的工件零点偏移未生效，闸门已解除；请检查数控系统的偏移保护"
+            }
         }
     }
 }
@@ -103,6 +126,15 @@ impl fmt::Display for Fault {
                  Look whether the ladder passes the gateway's override on, and whether the dial limits it"
             ),
             Self::Line(error) => write!(f, "the feed override could not be written; the gate is disarmed. {error}"),
+            Self::Offset { axis, asked_um, found_um } => write!(
+                f,
+                "offset {asked_um:.0} um of {} was written and the control shows {found_um:.0} um; the gate is disarmed. Look \
+                 whether the offsets are protected, and who else writes them",
+                axis.word()
+            ),
+            Self::OffsetLine(error) => {
+                write!(f, "the offset could not be written or read back; the gate is disarmed. {error}")
+            }
         }
     }
 }

@@ -180,6 +180,12 @@ impl Chain {
     }
 }
 
+/// Rows as `audit/1`: what `history audit --json` prints and `/api/v1/audit` answers. `last` is the number to go on after.
+#[must_use]
+pub fn audit_document(rows: &[AuditEntry]) -> serde_json::Value {
+    serde_json::json!({ "schema": "audit/1", "rows": rows, "last": rows.last().map(|row| row.number) })
+}
+
 impl Reader {
     /// Does the file have the table? One of an older version that nobody has written since does not.
     fn has_audit(&self) -> Result<bool, HistoryError> {
@@ -205,6 +211,20 @@ impl Reader {
         let mut rows: Vec<AuditEntry> = rows.and_then(Iterator::collect).doing("reading the audit")?;
         rows.reverse();
         Ok(rows)
+    }
+
+    /// The `limit` rows that follow the one of this number, oldest first.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn audit_after(&self, number: i64, limit: u32) -> Result<Vec<AuditEntry>, HistoryError> {
+        if !self.has_audit()? {
+            return Ok(Vec::new());
+        }
+        let select = format!("SELECT {COLUMNS} FROM audit WHERE number > ?1 ORDER BY number LIMIT ?2");
+        let mut statement = self.db.prepare(&select).doing("reading the audit")?;
+        let rows = statement.query_map(params![number, limit], entry);
+        rows.and_then(Iterator::collect).doing("reading the audit")
     }
 
     /// Checks the whole chain from the oldest row on, and its end against the head that was noted with it.

@@ -76,7 +76,7 @@ mod walk;
 mod wear_models;
 mod writer;
 
-pub use audit::{AuditCheck, AuditEntry, Break};
+pub use audit::{AuditCheck, AuditEntry, Break, audit_document};
 pub use block::{Cells, NumberCells, Summary, WordCells};
 pub use error::HistoryError;
 pub use export::Format;

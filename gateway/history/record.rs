@@ -165,7 +165,8 @@ pub struct Diagnosis {
 pub struct Audit {
     /// When.
     pub at_ns: TimeNs,
-    /// `started`, `request`, `write`, `reaction`, `feed_hold`, `stop`, `armed`, `disarmed`, `acknowledged`.
+    /// `started`, `request`, `write`, `reaction`, `feed_hold`, `stop`, `armed`, `disarmed`, `acknowledged`;
+    /// of offsets `z_offset_request`, `z_offset_write`, `z_offset_restore`, and so for `x` and `y`.
     pub kind: String,
     /// What became of it, in one word.
     pub outcome: String,

@@ -5,7 +5,7 @@ use super::record::{
     Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
 };
 use adapters::clock::{SECOND_NS, TimeNs};
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, Params, params};
 
 /// Longest interval that is spread over `state_hours`: beyond a year the clock was set, not the machine used.
 const SPREAD_HOURS_MAX: i64 = 9_000;
@@ -14,6 +14,11 @@ const HOUR_NS: i64 = 3_600 * SECOND_NS;
 /// Empty text as NULL.
 fn some(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
+}
+
+/// One change of a table, by a statement that is prepared once.
+fn put(db: &Connection, sql: &str, values: impl Params) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(sql)?.execute(values).map(drop)
 }
 
 /// Stores one record.
@@ -34,33 +39,37 @@ pub(crate) fn store(db: &Connection, record: &Record) -> Result<(), rusqlite::Er
 }
 
 fn store_event(db: &Connection, event: &Event) -> Result<(), rusqlite::Error> {
-    db.prepare_cached("INSERT INTO events (at_ns, kind, source, text, detail) VALUES (?1, ?2, ?3, ?4, ?5)")?
-        .execute(params![event.at_ns, event.kind, event.source, event.text, some(&event.detail)])
-        .map(drop)
+    put(
+        db,
+        "INSERT INTO events (at_ns, kind, source, text, detail) VALUES (?1, ?2, ?3, ?4, ?5)",
+        params![event.at_ns, event.kind, event.source, event.text, some(&event.detail)],
+    )
 }
 
 fn raise(db: &Connection, alarm: &Alarm) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
+    put(
+        db,
         "INSERT INTO alarms (code, source, severity, raised_ns, count, en, zh) VALUES (?1, ?2, ?3, ?4, 1, ?5, ?6)
          ON CONFLICT (source, code) WHERE cleared_ns IS NULL DO UPDATE SET count = count + 1",
-    )?
-    .execute(params![alarm.code, alarm.source, alarm.severity, alarm.at_ns, alarm.en, alarm.zh])
-    .map(drop)
+        params![alarm.code, alarm.source, alarm.severity, alarm.at_ns, alarm.en, alarm.zh],
+    )
 }
 
 fn clear_alarm(db: &Connection, clear: &AlarmClear) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
+    put(
+        db,
         "UPDATE alarms SET cleared_ns = max(?1, raised_ns) WHERE source = ?2 AND code = ?3 AND cleared_ns IS NULL",
-    )?
-    .execute(params![clear.at_ns, clear.source, clear.code])
-    .map(drop)
+        params![clear.at_ns, clear.source, clear.code],
+    )
 }
 
 fn change_state(db: &Connection, change: &StateChange) -> Result<(), rusqlite::Error> {
     close_state(db, change.at_ns, "change")?;
-    db.prepare_cached("INSERT INTO states (state, since_ns, program, tool) VALUES (?1, ?2, ?3, ?4)")?
-        .execute(params![change.state, change.at_ns, some(&change.program), some(&change.tool)])
-        .map(drop)
+    put(
+        db,
+        "INSERT INTO states (state, since_ns, program, tool) VALUES (?1, ?2, ?3, ?4)",
+        params![change.state, change.at_ns, some(&change.program), some(&change.tool)],
+    )
 }
 
 /// Ends the state the machine is in, if any, and counts its time by the hour.
@@ -71,8 +80,7 @@ pub(crate) fn close_state(db: &Connection, until_ns: TimeNs, ended_by: &str) -> 
         .optional()?;
     let Some((id, state, since_ns)) = open else { return Ok(()) };
     let until_ns = until_ns.max(since_ns);
-    db.prepare_cached("UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3")?
-        .execute(params![until_ns, ended_by, id])?;
+    put(db, "UPDATE states SET until_ns = ?1, ended_by = ?2 WHERE id = ?3", params![until_ns, ended_by, id])?;
     spread(db, &state, since_ns, until_ns)
 }
 
@@ -94,98 +102,103 @@ fn spread(db: &Connection, state: &str, since_ns: TimeNs, until_ns: TimeNs) -> R
 }
 
 fn store_part(db: &Connection, part: &Part) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
+    put(
+        db,
         "INSERT INTO parts (began_ns, ended_ns, part, program, count, cutting_s, energy_j, detail)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-    )?
-    .execute(params![
-        part.began_ns,
-        part.ended_ns,
-        some(&part.part),
-        some(&part.program),
-        part.count,
-        part.cutting_s,
-        part.energy_j,
-        some(&part.detail)
-    ])
-    .map(drop)
+        params![
+            part.began_ns,
+            part.ended_ns,
+            some(&part.part),
+            some(&part.program),
+            part.count,
+            part.cutting_s,
+            part.energy_j,
+            some(&part.detail)
+        ],
+    )
 }
 
 fn store_decision(db: &Connection, decision: &Decision) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
-        "INSERT INTO decisions (at_ns, script, script_version, wanted, value, unit, reason, outcome, outcome_reason)
+    put(
+        db,
+        "INSERT INTO decisions (at_ns, script, script_version, wanted, value, unit,
+         reason, outcome, outcome_reason)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
-    )?
-    .execute(params![
-        decision.at_ns,
-        decision.script,
-        decision.script_version,
-        decision.wanted,
-        decision.value,
-        decision.unit,
-        decision.reason,
-        decision.outcome,
-        decision.outcome_reason
-    ])
-    .map(drop)
+        params![
+            decision.at_ns,
+            decision.script,
+            decision.script_version,
+            decision.wanted,
+            decision.value,
+            decision.unit,
+            decision.reason,
+            decision.outcome,
+            decision.outcome_reason
+        ],
+    )
 }
 
 fn store_command(db: &Connection, command: &Command) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
-        "INSERT INTO commands (at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version)
+    put(
+        db,
+        "INSERT INTO commands (at_ns, command, target, before, asked, after, unit,
+         outcome, reason, script, script_version)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
-    )?
-    .execute(params![
-        command.at_ns,
-        command.command,
-        command.target,
-        command.before,
-        command.asked,
-        command.after,
-        command.unit,
-        command.outcome,
-        command.reason,
-        some(&command.script),
-        some(&command.script_version)
-    ])
-    .map(drop)
+        params![
+            command.at_ns,
+            command.command,
+            command.target,
+            command.before,
+            command.asked,
+            command.after,
+            command.unit,
+            command.outcome,
+            command.reason,
+            some(&command.script),
+            some(&command.script_version)
+        ],
+    )
 }
 
 fn store_model(db: &Connection, model: &Model) -> Result<(), rusqlite::Error> {
-    db.prepare_cached("INSERT INTO models (at_ns, name, origin, toml) VALUES (?1, ?2, ?3, ?4)")?
-        .execute(params![model.at_ns, model.name, model.origin, model.toml])
-        .map(drop)
+    put(
+        db,
+        "INSERT INTO models (at_ns, name, origin, toml) VALUES (?1, ?2, ?3, ?4)",
+        params![model.at_ns, model.name, model.origin, model.toml],
+    )
 }
 
 fn store_diagnosis(db: &Connection, diagnosis: &Diagnosis) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
+    put(
+        db,
         "INSERT INTO diagnoses (at_ns, from_ns, to_ns, verdict, summary, json) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-    )?
-    .execute(params![
-        diagnosis.at_ns,
-        diagnosis.from_ns,
-        diagnosis.to_ns,
-        diagnosis.verdict,
-        diagnosis.summary,
-        diagnosis.json
-    ])
-    .map(drop)
+        params![
+            diagnosis.at_ns,
+            diagnosis.from_ns,
+            diagnosis.to_ns,
+            diagnosis.verdict,
+            diagnosis.summary,
+            diagnosis.json
+        ],
+    )
 }
 
 fn store_reaction(db: &Connection, reaction: &ReactionTime) -> Result<(), rusqlite::Error> {
-    db.prepare_cached(
-        "INSERT INTO reactions (at_ns, asked_pct, found_pct, sample_to_write_ms, write_to_seen_ms, program, block, tool)
+    put(
+        db,
+        "INSERT INTO reactions (at_ns, asked_pct, found_pct, sample_to_write_ms, write_to_seen_ms,
+         program, block, tool)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-    )?
-    .execute(params![
-        reaction.at_ns,
-        reaction.asked_pct,
-        reaction.found_pct,
-        reaction.sample_to_write_ms,
-        reaction.write_to_seen_ms,
-        reaction.program,
-        reaction.block,
-        reaction.tool
-    ])
-    .map(drop)
+        params![
+            reaction.at_ns,
+            reaction.asked_pct,
+            reaction.found_pct,
+            reaction.sample_to_write_ms,
+            reaction.write_to_seen_ms,
+            reaction.program,
+            reaction.block,
+            reaction.tool
+        ],
+    )
 }

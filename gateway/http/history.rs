@@ -3,7 +3,7 @@
 use super::Shared;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
-use crate::history::{HistoryError, Query, Reader};
+use crate::history::{HistoryError, Query, Reader, audit_document};
 use crate::moment;
 use crate::records::{RecordKind, RecordQuery, document, records};
 use crate::samples;
@@ -97,6 +97,21 @@ pub(super) async fn events(State(shared): State<Shared>, Pairs(pairs): Given) ->
 /// `GET /api/v1/parts`
 pub(super) async fn parts(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     rows(shared, RecordKind::Parts, pairs).await
+}
+
+/// `GET /api/v1/audit`: `history audit --json`, by pages. Without `since` the newest rows; with it those after that number.
+pub(super) async fn audit(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    let keys = QueryKeys::of(pairs, &["since", "limit"])?;
+    let limit = keys.number("limit", 1, 10_000)?.unwrap_or(1000);
+    let since = keys.number("since", 0, i64::MAX)?;
+    reading(shared, move |reader, _| {
+        let rows = match since {
+            Some(number) => reader.audit_after(number, limit),
+            None => reader.audit(i64::MIN, i64::MAX, limit),
+        };
+        rows.map(|rows| audit_document(&rows)).map_err(|error| trouble(&error))
+    })
+    .await
 }
 
 /// `GET /api/v1/samples`

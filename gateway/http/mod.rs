@@ -71,7 +71,7 @@ impl Shared {
 type Route = (&'static str, fn() -> MethodRouter<Shared>);
 
 /// Everything that is served.
-pub const ROUTES: [Route; 15] = [
+pub const ROUTES: [Route; 16] = [
     ("/", || get(page::page)),
     ("/web/{file}", || get(page::web)),
     ("/healthz", || get(healthz)),
@@ -86,6 +86,7 @@ pub const ROUTES: [Route; 15] = [
     ("/api/v1/decisions", || get(history::decisions)),
     ("/api/v1/events", || get(history::events)),
     ("/api/v1/parts", || get(history::parts)),
+    ("/api/v1/audit", || get(history::audit)),
     ("/api/v1/twin", || get(twin::twin)),
 ];
 

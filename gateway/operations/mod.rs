@@ -5,13 +5,14 @@
 
 mod watch;
 
+use crate::files::Lookout;
 use crate::log::{Notice, Severity};
 use crate::status;
 use adapters::Sample;
 use rules::operations::{Completion, Lookup, Recipe};
 use rules::script::Problem;
 use std::path::{Path, PathBuf};
-use watch::Watcher;
+use watch::Found;
 
 pub use watch::read;
 
@@ -34,7 +35,7 @@ pub struct Operations {
     completion: Completion,
     in_charge: Option<Loaded>,
     refused: Vec<Problem>,
-    watcher: Option<Watcher>,
+    watcher: Option<Lookout<Found>>,
     told: Vec<Notice>,
     /// Name of the operation in force, or why there is none.
     in_force: Option<Result<String, &'static str>>,
@@ -54,7 +55,7 @@ impl Operations {
             in_force: None,
         };
         operations.take(read(path));
-        match Watcher::start(path) {
+        match watch::watch(path) {
             Ok(watcher) => operations.watcher = Some(watcher),
             Err(error) => {
                 let text =
@@ -65,7 +66,7 @@ impl Operations {
         operations
     }
 
-    fn take(&mut self, found: Result<Loaded, Vec<Problem>>) {
+    fn take(&mut self, found: Found) {
         match found {
             Ok(loaded) => {
                 let (count, version) = (loaded.recipe.operations().len(), loaded.recipe.version());

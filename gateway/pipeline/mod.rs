@@ -18,7 +18,7 @@ pub use journal::Journal;
 pub use parts::Parts;
 pub use tally::Tally;
 
-use crate::gate::{Gate, Verdict};
+use crate::gate::{Gate, OffsetVerdict, Verdict};
 use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::{self, Estimated, Estimates};
@@ -153,6 +153,11 @@ impl Pipeline {
     /// The gate, for orders of a person and for what the machine says.
     pub fn gate_mut(&mut self) -> &mut Gate {
         &mut self.gate
+    }
+
+    /// What the gate makes of the offsets that were proposed at this tick; after [`Pipeline::decide`].
+    pub fn shift(&mut self, sample: &Sample) -> Vec<OffsetVerdict> {
+        self.gate.shift(&self.scripts.decision().offsets, sample, &self.estimates)
     }
 
     /// What the gate made of the last request.

@@ -4,7 +4,10 @@
 use super::hand::{Hand, Said};
 use super::health::Health;
 use super::report::milliseconds;
-use crate::control::{Order, Posted, Reply};
+use super::shifting::{self, Shifting};
+use crate::config::{self, GateMode};
+use crate::control::{self, Posted, Reply};
+use crate::gate::offset::{self, Moved, Order};
 use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Written, trail};
 use crate::history::{Alarm, AlarmClear, Command, ReactionTime};
 use crate::log::{Notice, Severity};
@@ -22,6 +25,7 @@ const CODE: &str = "gate_disarmed";
 /// See the [module](self).
 pub struct Commands {
     hand: Hand,
+    shifting: Shifting,
     /// Name of the source that is written to.
     target: String,
     orders: Receiver<Posted>,
@@ -38,9 +42,10 @@ pub struct Commands {
 impl Commands {
     /// Writes through this hand to the source of this name.
     #[must_use]
-    pub fn new(hand: Hand, target: String, orders: Receiver<Posted>) -> Self {
+    pub fn new(hand: Hand, shifting: Shifting, target: String, orders: Receiver<Posted>) -> Self {
         Self {
             hand,
+            shifting,
             target,
             orders,
             trail: trail::Trail::default(),
@@ -68,10 +73,10 @@ impl Commands {
         }
     }
 
-    fn order(&mut self, order: &Order, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
+    fn order(&mut self, order: &control::Order, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
         match order {
-            Order::Arm { by, for_s } => self.arm(by, *for_s, gate, at_ns, health),
-            Order::Disarm { by } => {
+            control::Order::Arm { by, for_s } => self.arm(by, *for_s, gate, at_ns, health),
+            control::Order::Disarm { by } => {
                 let was = gate.armed().is_ok();
                 gate.disarm(Disarmed::Person);
                 self.by.clone_from(by);
@@ -80,7 +85,7 @@ impl Commands {
                 }
                 Reply::done(if was { "disarmed; the machine is given back to its dial" } else { "it was not armed" })
             }
-            Order::Acknowledge { by } => {
+            control::Order::Acknowledge { by } => {
                 gate.acknowledge();
                 self.keep(
                     trail::order("acknowledged", "done", "a feed hold or stop was seen to", by, at_ns),
@@ -103,7 +108,7 @@ impl Commands {
                 self.by = by.to_owned();
                 self.keep(trail::armed(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
-                let text = told(&armed, &self.target);
+                let text = told(&armed, &self.target, gate.limits());
                 health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
                 Reply::done(text)
             }
@@ -147,7 +152,34 @@ impl Commands {
         self.hand.step(&verdict, &sent, now_ns, |it| said.push(it));
         self.hand.listen(|it| said.push(it));
         said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
-        self.follow_arming(gate, sample.at_ns, health);
+        self.shift(pipeline, sample, now_ns, health);
+        self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
+    }
+
+    /// Offsets: into the audit first, then to the machine.
+    fn shift(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
+        let verdicts = pipeline.shift(sample);
+        if verdicts.is_empty() {
+            return;
+        }
+        let rows = self.shifting.rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
+        let gate = pipeline.gate_mut();
+        rows.into_iter().for_each(|row| self.keep(row, gate, health));
+        let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).collect();
+        let mut said = Vec::new();
+        self.hand.shift(&orders, now_ns, |it| said.push(it));
+        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+    }
+
+    fn moved(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        offset::moved(moved).into_iter().for_each(|row| self.keep(row, gate, health));
+        shifting::command(moved, &self.target_of_offsets(gate)).into_iter().for_each(|row| health.keep(row.into()));
+        self.shifting.answered(moved, gate, health);
+        moved.fault().into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
+    }
+
+    fn target_of_offsets(&self, gate: &Gate) -> String {
+        gate.limits().offset.source.clone().unwrap_or_else(|| self.target.clone())
     }
 
     fn heard(&mut self, said: Said, sample: &Sample, gate: &mut Gate, health: &mut Health) {
@@ -167,6 +199,7 @@ impl Commands {
                 health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
             }
             Said::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
+            Said::Moved(moved) => self.moved(&moved, sample, gate, health),
             Said::Asked(ask, failed) => {
                 self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
                 if let Some(failed) = failed {
@@ -197,7 +230,7 @@ impl Commands {
         let en = fault.to_string();
         if self.alarm.is_none() {
             let (code, source, severity) = (CODE.to_owned(), SOURCE.to_owned(), "critical".to_owned());
-            let zh = "写入的进给倍率未生效，闸门已解除；请检查梯形图与面板倍率".to_owned();
+            let zh = fault.zh().to_owned();
             health.keep(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
             Notice::new(Severity::Error, CODE, en.clone()).say();
             self.alarm = Some((at_ns, en));
@@ -224,6 +257,7 @@ impl Commands {
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();
+        self.hand.shift(&gate.offsets().farewell(), sample.at_ns, |it| said.push(it));
         self.hand.close(|it| said.push(it));
         said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
     }
@@ -245,15 +279,19 @@ impl Commands {
     }
 
     /// What is wrong with the way to the machine.
-    #[must_use]
-    pub fn problem(&self) -> Option<Problem> {
-        let (_, text) = self.alarm.as_ref()?;
+    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
-        Some(Problem { what: text.clone(), next })
+        let alarm = self.alarm.as_ref().map(|(_, text)| Problem { what: text.clone(), next });
+        alarm.into_iter().chain(self.shifting.problem(gate))
     }
 }
 
-fn told(armed: &Armed, target: &str) -> String {
+fn told(armed: &Armed, target: &str, limits: &config::Gate) -> String {
+    let what = match (limits.mode, limits.offset.mode) {
+        (GateMode::Armed, GateMode::Armed) => "overrides and offsets are",
+        (_, GateMode::Armed) => "offsets are",
+        _ => "overrides are",
+    };
     let seconds = (armed.until_ns - armed.since_ns) / SECOND_NS;
-    format!("the gate is armed by {} for {seconds} s: overrides are written to {target}", armed.by)
+    format!("the gate is armed by {} for {seconds} s: {what} written to {target}", armed.by)
 }

@@ -5,13 +5,14 @@ use super::clock::{BoxClock, ClockStep};
 use super::feed::Feed;
 use super::keep::Kept;
 use crate::alignment::{self, Alignment};
+use crate::files::replace;
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
 use crate::status::{HistoryStatus, Problem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -221,14 +222,6 @@ impl Health {
 }
 
 /// A length of time in words.
-/// A whole file in one step.
-fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-    let fresh = path.with_extension("new");
-    std::fs::write(&fresh, text)?;
-    std::fs::rename(&fresh, path)
-}
-
 fn span(ns: i64) -> String {
     let seconds = (ns + SECOND_NS / 2) / SECOND_NS;
     match seconds {

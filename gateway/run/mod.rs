@@ -2,14 +2,17 @@
 
 pub mod clock;
 pub mod command;
+pub mod deadline;
 pub mod feed;
 pub mod hand;
 pub mod health;
 pub mod keep;
 pub mod open;
 pub mod pace;
+pub mod priority;
 pub mod report;
 pub mod rules;
+pub mod shifting;
 pub mod tick;
 pub mod twin;
 pub mod wear;
@@ -25,14 +28,15 @@ use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
 use ::rules::estimators;
-use adapters::Actuator;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use clock::BoxClock;
 use command::Commands;
-use hand::Hand;
+use deadline::{RUN_MAX, RunLimit};
+use hand::{Hand, Tools};
 use health::Health;
 use keep::Kept;
-use open::{MachineSpeed, Sources};
+use open::{MachineSpeed, Sources, Way};
+use shifting::Shifting;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -118,8 +122,11 @@ fn ticker(
     let data_dir = &config.gateway.data_dir;
     let twin = Twin::of(config);
     let memory = data_dir.join("estimators.json");
-    let (scripts, watched) = rules::load(config);
-    let pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
+    let (mut scripts, watched) = rules::load(config);
+    if plan.speed == MachineSpeed::Real {
+        scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
+    }
+    let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let beside = [pipeline.series(), alignment::series(), beside].concat();
     let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
@@ -127,9 +134,9 @@ fn ticker(
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &kept, clock.now_ns());
     let opened = open::sources(config, plan.speed, &clock, start_ns);
-    let Sources { feed, pace, simulated, actuators, machines } =
+    let Sources { feed, pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
-    let commands = commands(plan, actuators, orders, &clock)?;
+    let commands = commands(plan, ways, orders, &clock, pipeline.gate_mut())?;
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,
@@ -170,30 +177,52 @@ fn ticker(
     ))
 }
 
-/// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all.
+/// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all, and no sink
+/// of offsets.
 fn commands(
     plan: &Plan,
-    actuators: Vec<(String, Box<dyn Actuator>)>,
+    mut ways: Vec<Way>,
     orders: Orders,
     clock: &Arc<dyn Clock>,
+    gate: &mut Gate,
 ) -> Result<Commands, CannotRun> {
-    let gate: &config::Gate = &plan.config.gate;
-    let target = gate.source.clone().unwrap_or_default();
-    if gate.mode != GateMode::Armed {
-        return Ok(Commands::new(Hand::None, target, orders));
+    let limits: &config::Gate = &plan.config.gate;
+    let data_dir = &plan.config.gateway.data_dir;
+    let target = limits.source.clone().unwrap_or_default();
+    if limits.greatest_mode() != GateMode::Armed {
+        return Ok(Commands::new(Hand::None, Shifting::idle(data_dir), target, orders));
     }
-    let found = actuators.into_iter().find(|(name, _)| *name == target);
-    let missing = || {
-        let what = format!("[gate] source = {target:?} has no feed override that could be written");
-        CannotRun::new(what, "name the controller there, or write mode = \"shadow\"")
+    let mut tools = tools(limits, &mut ways)?;
+    let shifting = match &mut tools.offsets {
+        Some(sink) => Shifting::resume(data_dir, sink.as_mut(), gate),
+        None => Shifting::idle(data_dir),
     };
-    let (_, actuator) = found.ok_or_else(missing)?;
     let hand = match plan.speed {
-        MachineSpeed::Real => Hand::start(actuator, gate, clock.clone())
+        MachineSpeed::Real => Hand::start(tools, limits, clock.clone())
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
-        MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(actuator, gate),
+        MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(tools, limits),
     };
-    Ok(Commands::new(hand, target, orders))
+    Ok(Commands::new(hand, shifting, target, orders))
+}
+
+/// What may be written, and nothing else.
+fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Tools, CannotRun> {
+    let mut tools = Tools::default();
+    if limits.mode == GateMode::Armed {
+        let target = limits.source.as_deref().unwrap_or_default();
+        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.actuator.take());
+        let what = format!("[gate] source = {target:?} has no feed override that could be written");
+        tools.actuator =
+            Some(way.ok_or_else(|| CannotRun::new(what, "name the controller there, or write mode = \"shadow\""))?);
+    }
+    if limits.offset.mode == GateMode::Armed {
+        let target = limits.offset.source.as_deref().unwrap_or_default();
+        let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.offsets.take());
+        let what = format!("[gate.offset] source = {target:?} has no external offset that could be written");
+        let next = "name the controller there (fanuc:// needs allow=EXT), or write mode = \"shadow\"";
+        tools.offsets = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
+    }
+    Ok(tools)
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

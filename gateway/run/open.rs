@@ -10,7 +10,7 @@ use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
 use adapters::open::{OpenError, Opened, open, open_pull};
 use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
-use adapters::{Actuator, Address, Pull, Source};
+use adapters::{Actuator, Address, OffsetSink, Pull, Source};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -43,12 +43,22 @@ pub struct Sources {
     pub feed: Feed,
     /// When they are taken.
     pub pace: Pace,
-    /// Ways to the feed override, each with the name of its source.
-    pub actuators: Vec<(String, Box<dyn Actuator>)>,
+    /// Ways to the machines.
+    pub ways: Vec<Way>,
     /// The simulated machines among them, which count what is written to them.
     pub machines: Vec<Simulated>,
     /// Is every source simulated?
     pub simulated: bool,
+}
+
+/// What can be written at one source. Only the gate may hold it.
+pub struct Way {
+    /// Name of the source.
+    pub name: String,
+    /// The way to the feed override.
+    pub actuator: Option<Box<dyn Actuator>>,
+    /// The way to the offsets.
+    pub offsets: Option<Box<dyn OffsetSink>>,
 }
 
 /// Opens every source of the configuration. An accelerated machine begins at `start_ns`.
@@ -76,7 +86,7 @@ fn simulated(config: &Config) -> bool {
 }
 
 fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
-    let (mut found, mut actuators, mut problems) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut found, mut ways, mut problems) = (Vec::new(), Vec::new(), Vec::new());
     let mut machines = Vec::new();
     for source in &config.sources {
         match opened(&source.address, clock.now_ns()) {
@@ -84,7 +94,8 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
                 let (deadline, period) = (source.deadline, source.period);
                 let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
                 found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
-                actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+                let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
+                ways.push(Way { name, actuator, offsets });
                 machines.extend(opened.simulated);
             }
             Err(error) => problems.push(error.to_string()),
@@ -96,7 +107,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     let feed =
         threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = Pace::on_clock(clock.clone(), period(config));
-    Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
+    Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }
 
 /// As [`open`], and streams that only become a channel in the box.
@@ -124,13 +135,14 @@ fn threads(
 }
 
 fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
-    let (mut found, mut actuators, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
+    let (mut found, mut ways, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
     let mut machines = Vec::new();
     for source in &config.sources {
         match open_pull(&source.address, start_ns) {
             Ok(opened) => {
                 found.extend(opened.sources);
-                actuators.extend(opened.actuator.map(|actuator| (source.name.clone(), actuator)));
+                let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
+                ways.push(Way { name, actuator, offsets });
                 machines.extend(opened.simulated);
             }
             Err(error) => problems.push(accelerated(&error)),
@@ -144,7 +156,7 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
     let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
     let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
     let pace = Pace::stepped(speed.factor(), start_ns, period(config));
-    Ok(Sources { feed, pace, actuators, machines, simulated: simulated(config) })
+    Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }
 
 fn accelerated(error: &OpenError) -> String {

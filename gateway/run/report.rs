@@ -4,10 +4,11 @@ use crate::config::GateMode;
 use crate::gate::{Gate, Outcome, Verdict};
 use crate::pipeline::Pipeline;
 use crate::status::{
-    AlarmStatus, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, ScriptStatus, Shown, StateStatus,
+    AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, OffsetStatus, ScriptStatus,
+    Shown, StateStatus,
 };
 use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{Sample, Slot, Value};
+use adapters::{Axis, Sample, Slot, Value};
 use rules::estimators::{Estimated, Estimates};
 
 /// Half the 95 % interval of a normal distribution, in standard deviations.
@@ -109,18 +110,35 @@ pub fn gate(pipeline: &Pipeline, written_pct: Option<f64>) -> GateStatus {
         armed_by: armed.ok().map(|armed| armed.by.clone()),
         armed_until_ms: armed.ok().map(|armed| milliseconds(armed.until_ns)),
         disarmed: armed.err().map(|why| why.to_string()),
+        offset: offset(pipeline),
         recent: recent
             .map(|change| DecisionStatus { at_ms: milliseconds(change.at_ns), text: change.text.clone() })
             .collect(),
     }
 }
 
+fn offset(pipeline: &Pipeline) -> Option<OffsetStatus> {
+    let gate = pipeline.gate();
+    let mode = match (gate.limits().offset.mode, gate.armed()) {
+        (GateMode::Off, _) => return None,
+        (GateMode::Armed, Ok(_)) => "armed",
+        _ => "shadow",
+    };
+    let proposed =
+        |axis| pipeline.scripts().decision().offsets.iter().find(|it| it.axis == axis).map(|it| it.offset_um);
+    let one = |(axis, shift_um): (Axis, f64)| {
+        let wanted_um = proposed(axis).filter(|um| um.is_finite());
+        AxisShift { axis: axis.word(), wanted_um, shift_um }
+    };
+    Some(OffsetStatus { mode, axes: gate.offsets().shifts().map(one).collect() })
+}
+
 /// Armed is what is armed on the box, not what the configuration allows.
 fn mode(gate: &Gate) -> &'static str {
     match (gate.limits().mode, gate.armed()) {
         (GateMode::Off, _) => "off",
-        (_, Ok(_)) => "armed",
-        (GateMode::Shadow | GateMode::Armed, Err(_)) => "shadow",
+        (GateMode::Armed, Ok(_)) => "armed",
+        (GateMode::Shadow | GateMode::Armed, _) => "shadow",
     }
 }
 

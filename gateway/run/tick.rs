@@ -4,6 +4,7 @@ use super::command::Commands;
 use super::feed::Feed;
 use super::health::Health;
 use super::pace::Pace;
+use super::priority;
 use super::report;
 use super::rules::Watched;
 use super::twin::Twin;
@@ -86,11 +87,13 @@ impl Ticker {
         let mut published = None;
         let mut sample = Sample::empty(0);
         let mut first_ns = None;
+        if self.identity.speed == Some(1.0) {
+            priority::ask().tell();
+        }
         while let Some(now_ns) = self.pace.next_tick(&self.wishes.stop) {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.complete(&mut sample, now_ns);
-            self.health.look(&self.pipeline, &self.feed, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
             let inferred = *self.pipeline.infer(&sample);
@@ -100,9 +103,11 @@ impl Ticker {
             self.pipeline.decide(&sample, &mut self.health);
             let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
+            // What can wait comes after what is written to the machine.
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }
+            self.health.look(&self.pipeline, &self.feed, now_ns);
             let over = !alive || self.stop_after_ns.is_some_and(|limit_ns| now_ns - began_ns >= limit_ns);
             if over || published.is_none_or(|at: Instant| at.elapsed() >= PUBLISH_EVERY) {
                 published = Some(Instant::now());
@@ -186,6 +191,6 @@ impl Ticker {
 
     fn problems(&self) -> Vec<Problem> {
         let recipe = self.operations.as_ref().and_then(Operations::problem);
-        self.health.problems().into_iter().chain(recipe).chain(self.commands.problem()).collect()
+        self.health.problems().into_iter().chain(recipe).chain(self.commands.problems(self.pipeline.gate())).collect()
     }
 }

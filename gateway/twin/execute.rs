@@ -94,6 +94,7 @@ fn step(plan: &Recording, row: usize) -> ExperimentStep {
         feed_mm_min: number("feed_programmed_mm_min").unwrap_or(0.0),
         depth_mm: number("depth_of_cut_mm").unwrap_or(1.0),
         diameter_mm: number("diameter_mm").unwrap_or(60.0),
+        onward: false,
     });
     let axis = number("axis_velocity_mm_min").or_else(|| number("z_axis_velocity_mm_min"));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what the register holds")]

@@ -101,13 +101,10 @@ pub fn put(path: &Path, text: &str) -> Result<(), String> {
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         return written.map_err(|error| format!("standard output: {error}"));
     }
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
     let say = |error: std::io::Error| format!("{}: {error}", path.display());
     if path.exists() && !path.is_file() {
         // A pipe or a device is written into, never replaced.
         return std::fs::write(path, text).map_err(say);
     }
-    std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).map_err(say)
+    crate::files::replace(path, text).map_err(say)
 }

@@ -2,15 +2,14 @@
 //! only with the processor time that nobody else wants.
 
 use super::{outputs, stretch};
+use crate::files::{LOOK_EVERY, Mark, Rest, mark};
 use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
 use rules::twin::{self, Model, parse_model, report};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
-/// Time between two looks at the model file.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// So long the newest samples may take to become durable before a diagnosis goes on without them.
 const WAIT_MAX: Duration = Duration::from_secs(10);
 /// A tenth of the claim to the processor that everything else has; with less, a busy box would never finish.
@@ -101,7 +100,7 @@ impl Worker {
     pub fn start(places: Places, known: String) -> std::io::Result<Self> {
         let (requests, asked) = sync_channel(1);
         let (send, reports) = sync_channel(8);
-        let file = FileWatch { path: places.model.clone(), mark: None, known };
+        let file = FileWatch { path: places.model.clone(), rest: Rest::new(), known };
         std::thread::Builder::new().name("twin".to_owned()).spawn(move || work(file, &places, &asked, &send))?;
         Ok(Self { requests, reports })
     }
@@ -132,19 +131,16 @@ fn work(mut file: FileWatch, places: &Places, asked: &Receiver<Request>, send: &
     }
 }
 
-/// Notices another text of the model file. A change is read when it has stood still for one look.
+/// Notices another text of the model file.
 struct FileWatch {
     path: PathBuf,
-    mark: Option<(Option<SystemTime>, u64)>,
+    rest: Rest<Mark>,
     known: String,
 }
 
 impl FileWatch {
     fn look(&mut self) -> Option<Report> {
-        let metadata = std::fs::metadata(&self.path).ok()?;
-        let mark = (metadata.modified().ok(), metadata.len());
-        let still = self.mark.replace(mark) == Some(mark);
-        if !still {
+        if !self.rest.look(mark(&self.path), false) {
             return None;
         }
         let text = std::fs::read_to_string(&self.path).ok()?;

@@ -41,7 +41,13 @@ const BLOCKS_MAX: usize = 512;
 pub fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
     let Target::Waveform { at, keep } = address.target() else { return sampled::opened(address) };
     let source: Box<dyn Source> = Box::new(SpindleCurrent::new(address.text(), at, keep.as_ref()));
-    Some(Ok(Opened { sources: vec![source], actuator: None, simulated: None, refused: Refused::default() }))
+    Some(Ok(Opened {
+        sources: vec![source],
+        actuator: None,
+        offsets: None,
+        simulated: None,
+        refused: Refused::default(),
+    }))
 }
 
 /// A stream of spindle current as a source.

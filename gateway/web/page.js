@@ -105,6 +105,11 @@ function showCards() {
   const percent = (value) => (value === null ? text("nothing") : `${value} %`);
   const gateRows = [row(text("wanted"), percent(gate.wanted_pct), gate.reason), row(text("permitted"), percent(gate.permitted_pct), gate.held),
     row(text("written"), percent(gate.written_pct), text(gate.mode))];
+  for (const axis of gate.offset?.axes ?? []) {
+    const um = (value) => (value === null ? text("nothing") : `${number(value)} µm`);
+    gateRows.push(row(`${text("offset")} ${axis.axis.toUpperCase()}`, `${um(axis.wanted_um)} → ${um(axis.shift_um)}`, text(gate.offset.mode)));
+  }
+  if (gate.armed_by) gateRows.push(row(text("armedBy"), gate.armed_by, `${text("until")} ${clock(gate.armed_until_ms)}`));
   if (gate.recent.length > 0) gateRows.push(recent(gate.recent));
   filled("gate", gateRows, "");
   filled("sources", status.sources.map((source) => {
@@ -164,6 +169,18 @@ function recent(changes) {
   const box = make("div", "recent");
   for (const change of changes) box.append(make("span", "", change.text), make("time", "", clock(change.at_ms)));
   return box;
+}
+
+/** The newest rows of the audit, as the gate wrote them. */
+async function showAudit() {
+  const answer = await fetch("/api/v1/audit?limit=6").catch(() => null);
+  if (!answer?.ok) return;
+  const { rows } = await answer.json();
+  const value = (x) => (x === null ? "–" : number(x));
+  filled("audit", rows.reverse().map((entry) => {
+    const figures = entry.unit ? `${value(entry.before)} → ${value(entry.asked)} → ${value(entry.after)} ${entry.unit}` : entry.person;
+    return row(`${clock(entry.at_ns / 1e6)} ${entry.kind} · ${entry.outcome}`, figures, entry.reason, { bad: entry.outcome === "failed" });
+  }), text("noAudit"));
 }
 
 function showHistory() {
@@ -285,4 +302,6 @@ connected(false);
 vocabulary = await (await fetch("/api/v1/channels")).json();
 switchLanguage(current());
 listen();
+showAudit();
 setInterval(readPast, 5000);
+setInterval(showAudit, 5000);

@@ -17,6 +17,7 @@ const TEXTS = {
     twin: "Simulation beside the machine", expected: "Expected", residual: "Recorded minus expected", learning: "learning what is usual", watching: "watched, usual", differing: "differs",
     regime_standby: "Standstill", regime_idle: "Idling", regime_cutting: "Cutting", regime_moving: "Moving", diagnosing: "Diagnosis under way", diagnosis: "Diagnosis",
     none: "–", meterLag: "Lag of the meter", window: "averages over", drift: "drift", putBack: "readings put back by", lag: "delay", running: "in charge", waiting: "in charge, waiting for a value", reverted: "failed: the version before it is in charge", suspended: "failed: asks for nothing until it is changed", refused: "refused", because: "because", missing: "no value", decisions: "Latest decisions",
+    offset: "Thermal offset", armedBy: "Armed by", until: "until", audit: "Audit", noAudit: "Nothing was asked for or written yet.",
   },
   zh: {
     state: "机床状态", for: "已持续", power: "功率", alarms: "报警", gate: "进给倍率", sources: "数据源",
@@ -34,6 +35,7 @@ const TEXTS = {
     twin: "仿真对照", expected: "仿真值", residual: "实测减仿真", learning: "正在学习正常范围", watching: "监视中，正常范围", differing: "出现偏差",
     regime_standby: "静止", regime_idle: "空转", regime_cutting: "切削", regime_moving: "轴运动", diagnosing: "正在诊断", diagnosis: "诊断结果",
     none: "–", meterLag: "功率计滞后", window: "平均时间", drift: "漂移", putBack: "已校正", lag: "延迟", running: "生效中", waiting: "生效中，等待数值", reverted: "运行出错：仍由上一版本控制", suspended: "运行出错：修改前不再请求", refused: "未被接受", because: "原因", missing: "无数值", decisions: "最近的决定",
+    offset: "热补偿量", armedBy: "允许者", until: "至", audit: "审计记录", noAudit: "尚无请求或写入。",
   },
 };
 

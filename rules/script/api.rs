@@ -81,7 +81,7 @@ mod tests {
             assert!(!method.en.is_empty() && !method.zh.is_empty() && !method.returns.is_empty());
             assert!(method.parameters.iter().all(|parameter| !parameter.unit.is_empty()));
         }
-        let host = FUNCTIONS.iter().filter_map(|it| it.signature.split_once('(')).map(|(name, _)| name);
+        let host = FUNCTIONS.iter().filter_map(crate::script::Function::name);
         let taken: BTreeSet<&str> = words().iter().map(|it| it.name).chain(host).collect();
         let names: BTreeSet<&str> = methods().map(|it| it.name).collect();
         assert!(names.is_disjoint(&taken) && names.len() == methods().count());

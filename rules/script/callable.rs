@@ -1,6 +1,6 @@
 //! The functions of the host, as a reader finds them: the registration is in `outcomes`.
 
-/// A function a script can call, besides those of the language.
+/// A function that a script, or a trial, can call besides those of the language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Function {
     /// How it is written.
@@ -11,8 +11,15 @@ pub struct Function {
     pub zh: &'static str,
 }
 
-const fn function(signature: &'static str, en: &'static str, zh: &'static str) -> Function {
+pub(super) const fn function(signature: &'static str, en: &'static str, zh: &'static str) -> Function {
     Function { signature, en, zh }
+}
+
+impl Function {
+    /// Its name, which stands before the bracket.
+    pub(super) fn name(&self) -> Option<&str> {
+        self.signature.split_once('(').map(|(name, _)| name)
+    }
 }
 
 /// The functions of the host.

@@ -4,6 +4,8 @@ use super::problem::Problem;
 use adapters::clock::TimeNs;
 use std::sync::Arc;
 
+pub use adapters::Axis;
+
 /// What the scripts want. Alarms and notes are changes: an unchanged tick has none. Requests and proposals are what is
 /// wanted now: they are repeated at every tick for as long as the script asks.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -68,38 +70,6 @@ pub struct StopRequest {
     pub script: Arc<str>,
     /// Which version of it.
     pub version: u64,
-}
-
-/// An axis whose offset a script can propose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Axis {
-    /// X.
-    X,
-    /// Y.
-    Y,
-    /// Z.
-    Z,
-}
-
-impl Axis {
-    /// Every axis.
-    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
-
-    /// The letter, in lower case.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-        }
-    }
-
-    /// The axis of this letter, upper or lower case.
-    #[must_use]
-    pub fn of(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|axis| axis.word().eq_ignore_ascii_case(word))
-    }
 }
 
 /// An offset that would compensate the thermal error of an axis. Nothing has been checked: the number may be anything,

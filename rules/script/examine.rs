@@ -2,9 +2,10 @@
 //!
 //! A misspelt function in a branch that is taken once a month is found here, not in that night.
 
+use super::callable::{FUNCTIONS, Function};
 use super::fields::{self, Field, Record};
 use super::problem::Problem;
-use super::trials::{TRIAL_FUNCTIONS, TrialFunction};
+use super::trials::TRIAL_FUNCTIONS;
 use super::vocabulary::{Word, find, words};
 use adapters::channel::nearest;
 use rhai::{AST, ASTNode, BinaryExpr, Expr, FnCallExpr, ImmutableString, Position, Stmt};
@@ -120,7 +121,7 @@ impl<'a> Walk<'a> {
             let next = "it runs at every tick; held_s(name, condition) tells how long something has lasted";
             return self.problem(at, "a script may not sleep".to_owned(), next);
         }
-        let trials = TRIAL_FUNCTIONS.iter().filter_map(|it| it.signature.split('(').next());
+        let trials = TRIAL_FUNCTIONS.iter().filter_map(Function::name);
         let trials = trials.filter(|_| matches!(place, Place::Trial(_)));
         let names = self.callable.iter().chain(&self.own).map(|it| it.0.as_str()).chain(trials);
         let names = names.filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
@@ -128,9 +129,9 @@ impl<'a> Walk<'a> {
         self.problem(at, format!("there is no function `{name}`"), next);
     }
 
-    fn trial_call(&mut self, function: &TrialFunction, arguments: usize, at: Position, place: Place<'_>) {
+    fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: Place<'_>) {
         let wanted = parameters(function.signature);
-        let name = function.signature.split('(').next().unwrap_or_default();
+        let name = function.name().unwrap_or_default();
         if !matches!(place, Place::Trial(_)) {
             let next = "write it into a function whose name begins with trial_";
             self.problem(at, format!("only a trial can call `{name}`"), next);
@@ -242,8 +243,8 @@ impl<'a> Walk<'a> {
     }
 }
 
-fn of_trials(name: &str) -> Option<&'static TrialFunction> {
-    TRIAL_FUNCTIONS.iter().find(|function| function.signature.split('(').next() == Some(name))
+fn of_trials(name: &str) -> Option<&'static Function> {
+    TRIAL_FUNCTIONS.iter().find(|function| function.name() == Some(name))
 }
 
 /// How many parameters a signature has.
@@ -272,7 +273,7 @@ fn suggestion(near: Option<&str>) -> String {
 }
 
 fn usage(name: &str) -> String {
-    let own = super::callable::FUNCTIONS.iter().find(|it| it.signature.split('(').next() == Some(name));
+    let own = FUNCTIONS.iter().find(|it| it.name() == Some(name));
     let method = || super::functions::methods().find(|it| it.name == name).map(|it| it.signature());
     let signature = own.map(|it| it.signature.to_owned()).or_else(method);
     signature.map(|signature| format!("write {signature}")).unwrap_or_default()

@@ -1,6 +1,7 @@
 //! Runs the scripts, one tick at a time.
 
 use super::compile::{ScriptFile, ScriptSet, compile};
+use super::deadline::{self, Deadline};
 use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
 use super::engine::{Shared, engine};
 use super::events::Happenings;
@@ -35,6 +36,7 @@ pub struct Host {
     files: Arc<[ScriptFile]>,
     generation: u64,
     happenings: Happenings,
+    deadline: Option<Arc<dyn Deadline>>,
     /// What scripts remembered in an earlier process, until they come into charge.
     remembered: BTreeMap<String, Value>,
 }
@@ -62,8 +64,16 @@ impl Host {
             files: Arc::default(),
             generation: 0,
             happenings: Happenings::default(),
+            deadline: None,
             remembered: BTreeMap::new(),
         }
+    }
+
+    /// From now on no run lasts longer than this allows, besides the limit on its operations. For live runs only: with a
+    /// clock the same samples need not give the same decisions.
+    pub fn watch(&mut self, deadline: Arc<dyn Deadline>) {
+        deadline::watch(&mut self.engine, deadline.clone());
+        self.deadline = Some(deadline);
     }
 
     /// Compiles the files and puts them in charge; when anything is wrong, everything stays as it is.
@@ -146,6 +156,9 @@ impl Host {
         let moment = Moment { sample, estimates, events };
         let mut replaced = false;
         for slot in &mut self.slots {
+            if let Some(deadline) = &self.deadline {
+                deadline.begin();
+            }
             replaced |= slot.tick(&self.engine, &self.shared, &moment, &mut outputs);
         }
         self.gather();

@@ -18,7 +18,7 @@
 //! | file | what |
 //! |---|---|
 //! | `vocabulary`, `fields`, `events`, `callable` | what a script sees, handles and can call |
-//! | `engine` | the interpreter and its limits |
+//! | `engine`, `deadline` | the interpreter and its limits |
 //! | `outcomes` | the functions through which a script leaves its effects |
 //! | `functions` | the methods that scripts call by name, one table per subject |
 //! | `api` | everything of it as a document |
@@ -33,6 +33,7 @@ mod api;
 mod callable;
 mod collect;
 mod compile;
+mod deadline;
 mod decision;
 mod engine;
 mod events;
@@ -58,6 +59,7 @@ mod vocabulary;
 pub use api::{api, api_json};
 pub use callable::{FUNCTIONS, Function};
 pub use compile::{ScriptFile, ScriptSet, compile, prepare};
+pub use deadline::Deadline;
 pub use decision::{
     Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
     StopRequest,
@@ -69,5 +71,5 @@ pub use host::Host;
 pub use problem::Problem;
 pub use shipped::shipped;
 pub use status::{Condition, ScriptStatus, Status};
-pub use trials::{TRIAL_FUNCTIONS, TrialFunction, TrialResult, prove, trials};
+pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove, trials};
 pub use vocabulary::{Word, WordKind, vocabulary, words};

@@ -79,6 +79,11 @@ pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> Prob
             format!("the script did not come to an end within {operations} operations and was stopped"),
             "look for a loop that never ends, or do less at each run".to_owned(),
         ),
+        EvalAltResult::ErrorTerminated(..) => (
+            "the run lasted too long by the clock and was stopped".to_owned(),
+            "do less at each run; if the text is short, the box is overloaded: see the load of its processor"
+                .to_owned(),
+        ),
         EvalAltResult::ErrorStackOverflow(_) => (
             "functions call each other too deeply".to_owned(),
             "a function that calls itself needs a condition that ends it".to_owned(),

@@ -2,6 +2,7 @@
 
 use super::collect::{Collected, Outcome};
 use super::compile::Script;
+use super::deadline::{LATE_MAX, is_late};
 use super::decision::{
     Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
 };
@@ -67,6 +68,8 @@ pub(super) struct Slot {
     runs: u64,
     good_since_ns: Option<TimeNs>,
     ran_ns: Option<TimeNs>,
+    /// Runs in a row that the clock has stopped.
+    late: u8,
 }
 
 impl Slot {
@@ -106,6 +109,7 @@ impl Slot {
             runs: 0,
             good_since_ns: None,
             ran_ns: None,
+            late: 0,
         }
     }
 
@@ -184,6 +188,7 @@ impl Slot {
             Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
                 self.wait(&error, &view, &collected);
             }
+            Err(error) if is_late(&error) && self.late + 1 < LATE_MAX => self.leave_out(&error, outputs),
             Err(error) => return self.fail(&error, outputs),
         }
         false
@@ -237,6 +242,7 @@ impl Slot {
     }
 
     fn succeed(&mut self, collected: &mut Collected, due: bool, outputs: &mut Outputs<'_>) {
+        self.late = 0;
         if matches!(self.condition, Condition::Waiting(_)) {
             self.condition = Condition::Running;
         }
@@ -344,6 +350,14 @@ impl Slot {
         let absent: Vec<String> = why_absent(&self.script, view).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
+    }
+
+    /// The clock has stopped this run: it asks for nothing, and the next one begins anew.
+    fn leave_out(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) {
+        self.withdraw();
+        self.values.fill(None);
+        self.late += 1;
+        outputs.decision.problems.push(problem::of_run(&self.script.file, error, OPERATIONS_MAX));
     }
 
     /// The script failed. True when an older version has come into charge.

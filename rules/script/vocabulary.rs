@@ -253,6 +253,11 @@ pub(super) fn find(name: &str) -> Option<&'static Word> {
     WORDS.iter().find(|word| word.name == name)
 }
 
+fn table(first: &str, second: &str, rows: impl Iterator<Item = (&'static str, &'static str)>) -> String {
+    let rows: String = rows.map(|(code, what)| format!("| `{code}` | {what} |\n")).collect();
+    format!("| {first} | {second} |\n|---|---|\n{rows}")
+}
+
 /// The whole vocabulary as Markdown, in English or Chinese: what `check --vocabulary` prints.
 #[must_use]
 pub fn vocabulary(chinese: bool) -> String {
@@ -261,24 +266,17 @@ pub fn vocabulary(chinese: bool) -> String {
     for word in words() {
         text += &format!("| `{}` | {} | {} |\n", word.name, word.unit, pick(word.en, word.zh));
     }
-    text += "\n## Records\n\n| name | what |\n|---|---|\n";
-    for record in RECORDS {
-        text += &format!("| `{}` | {} |\n", record.example, pick(record.en, record.zh));
-    }
+    text += "\n## Records\n\n";
+    text += &table("name", "what", RECORDS.iter().map(|it| (it.example, pick(it.en, it.zh))));
     text += "\n## Handlers\n\nFunctions that are called when something happens; they see constants, variables and `memory`.\n\n";
     text += "| function | when |\n|---|---|\n";
     for handler in HANDLERS {
         text += &format!("| `fn {}` | {} |\n", handler.signature, pick(handler.en, handler.zh));
     }
-    text += "\n## Functions\n\n| function | what |\n|---|---|\n";
-    for function in FUNCTIONS {
-        text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
-    }
+    text += "\n## Functions\n\n";
+    text += &table("function", "what", FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
     text += "\n## Trials\n\nFunctions named `trial_...` in the file of the script; `cnc-gateway rules test` runs them. They call:\n\n";
-    text += "| function | what |\n|---|---|\n";
-    for function in TRIAL_FUNCTIONS {
-        text += &format!("| `{}` | {} |\n", function.signature, pick(function.en, function.zh));
-    }
+    text += &table("function", "what", TRIAL_FUNCTIONS.iter().map(|it| (it.signature, pick(it.en, it.zh))));
     text += "\n`cnc-gateway rules api` lists the methods besides: power separation, curves, compensation, wear.\n";
     text +=
         "\n## Settings\n\nReturned by `fn settings() { #{ name: value } }`, read once when the script is loaded.\n\n";

@@ -5,8 +5,10 @@ mod cut;
 mod day;
 mod decisions;
 mod killed;
+mod offsets;
 mod outputs;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;
 mod running;
+mod shifting;

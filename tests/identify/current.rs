@@ -117,7 +117,7 @@ fn turning(seed: u64) -> crate::machine::Recorded {
     }
     (1..steps.len()).rev().for_each(|at| steps.swap(at, dice.random_range(0..=at)));
     let step = |(depth_mm, feed_mm_min): (f64, f64)| {
-        cut(8.0, 900.0, 1, ExperimentCut { feed_mm_min, depth_mm, diameter_mm: 60.0 })
+        cut(8.0, 900.0, 1, ExperimentCut { feed_mm_min, depth_mm, diameter_mm: 60.0, onward: false })
     };
     let mut settings = lathe(seed);
     settings.wear_mm = 0.1;

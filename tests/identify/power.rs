@@ -161,7 +161,7 @@ fn cuts(seed: u64, stage: u8, rpm: f64, depths_mm: [f64; 5]) -> Recorded {
     (1..depths.len()).rev().for_each(|at| depths.swap(at, dice.random_range(0..=at)));
     let feed_mm_min = 0.2 * rpm;
     let pass = |depth_mm: f64| {
-        let cut = cut(10.0, rpm, stage, ExperimentCut { feed_mm_min, depth_mm, diameter_mm: 60.0 });
+        let cut = cut(10.0, rpm, stage, ExperimentCut { feed_mm_min, depth_mm, diameter_mm: 60.0, onward: false });
         [idle(12.0, rpm, stage), cut]
     };
     let steps: Vec<ExperimentStep> = depths.into_iter().flat_map(pass).collect();

@@ -39,6 +39,7 @@ fn step(cut: &Conditions) -> ExperimentStep {
         feed_mm_min: cut.feed_per_rev_mm * rpm,
         depth_mm: cut.depth_of_cut_mm,
         diameter_mm: DIAMETER_MM,
+        onward: false,
     };
     ExperimentStep { cut: Some(planned), ..idle(CUT_S, rpm, 1) }
 }

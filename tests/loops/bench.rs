@@ -5,9 +5,10 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
 use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
+use gateway::gate::offset::{Moved, Order};
 use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
 use gateway::pipeline::{NoStore, Pipeline};
-use gateway::run::hand::{Hand, Said};
+use gateway::run::hand::{Hand, Said, Tools};
 use rules::estimators;
 use rules::script::{Host, ScriptFile};
 use std::path::Path;
@@ -43,8 +44,12 @@ pub(crate) struct Bench {
     hand: Hand,
     sample: Sample,
     now_ns: TimeNs,
+    /// Time between two ticks.
+    pub(crate) period_ns: i64,
     /// Steps seen in force.
     pub(crate) reactions: Vec<Reaction>,
+    /// Offsets that were shifted, or could not be.
+    pub(crate) moves: Vec<Moved>,
     /// What went wrong on the way to the machine.
     pub(crate) faults: Vec<String>,
 }
@@ -75,11 +80,13 @@ impl Bench {
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
-            hand: Hand::inline(actuator, limits),
+            hand: Hand::inline(Tools { actuator: Some(actuator), offsets: Some(Box::new(machine.offsets())) }, limits),
             machine,
             sample: Sample::empty(0),
             now_ns: 0,
+            period_ns: TICK_NS,
             reactions: Vec::new(),
+            moves: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -91,7 +98,7 @@ impl Bench {
 
     /// One tick; gives the sample.
     pub(crate) fn tick(&mut self) -> &Sample {
-        self.now_ns += TICK_NS;
+        self.now_ns += self.period_ns;
         self.lockstep.sample_into(&mut self.sample, self.now_ns);
         self.pipeline.step(&self.sample, &mut NoStore);
         let verdict = *self.pipeline.verdict().expect("decided");
@@ -101,6 +108,9 @@ impl Bench {
         let sent: Vec<Ask> = judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
         let mut said = Vec::new();
         self.hand.step(&verdict, &sent, self.now_ns, |it| said.push(it));
+        let orders: Vec<Order> = self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
+        self.hand.shift(&orders, self.now_ns, |it| said.push(it));
+        let gate = self.pipeline.gate_mut();
         for it in said {
             let fault = match it {
                 Said::Written(written) => written.fault,
@@ -108,6 +118,13 @@ impl Bench {
                 Said::Seen(reaction) => {
                     self.reactions.push(reaction);
                     None
+                }
+                Said::Moved(moved) => {
+                    gate.offsets_mut()
+                        .answered(moved.order.axis(), moved.result.as_ref().ok().and_then(Option::as_ref));
+                    let fault = moved.fault();
+                    self.moves.push(*moved);
+                    fault
                 }
                 Said::Asked(_, failed) => {
                     self.faults.extend(failed);
@@ -128,7 +145,7 @@ impl Bench {
 
     /// The machine at every look of the last tick.
     pub(crate) fn looks(&self) -> impl Iterator<Item = Moment> + '_ {
-        let from_ns = self.now_ns - TICK_NS;
-        (0..TICK_NS / LOOK_NS).map(move |look| self.machine.moment(from_ns + look * LOOK_NS))
+        let from_ns = self.now_ns - self.period_ns;
+        (0..self.period_ns / LOOK_NS).map(move |look| self.machine.moment(from_ns + look * LOOK_NS))
     }
 }

@@ -27,5 +27,12 @@ pub(crate) fn air_cut(seconds: f64, feed_mm_min: f64) -> ExperimentStep {
 
 /// Turning at this depth for so many seconds of the programmed feed.
 pub(crate) fn cut(seconds: f64, feed_mm_min: f64, depth_mm: f64) -> ExperimentStep {
-    ExperimentStep { cut: Some(ExperimentCut { feed_mm_min, depth_mm, diameter_mm: DIAMETER_MM }), ..air(seconds) }
+    let cut = ExperimentCut { feed_mm_min, depth_mm, diameter_mm: DIAMETER_MM, onward: false };
+    ExperimentStep { cut: Some(cut), ..air(seconds) }
+}
+
+/// The same without a retract: the depth changes under the tool.
+pub(crate) fn onward(seconds: f64, feed_mm_min: f64, depth_mm: f64) -> ExperimentStep {
+    let step = cut(seconds, feed_mm_min, depth_mm);
+    ExperimentStep { cut: step.cut.map(|cut| ExperimentCut { onward: true, ..cut }), ..step }
 }

@@ -4,16 +4,21 @@
 //! The law is identified from another day (another seed) with a gauge that is noisy; the machine's true error (bearing,
 //! housing and air, three time constants) is no function of the three temperatures that are measured.
 
+use super::bench::{Bench, limits, script};
 use adapters::recording::{Cells, Numbers};
 use adapters::simulated::{Simulated, SimulatedSettings};
-use adapters::{Absence, Recording};
+use adapters::words::execution;
+use adapters::{Absence, Axis as MachineAxis, Recording};
+use gateway::config::{self, GateMode};
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::thermal::{
-    AxisSituation, CompensationSettings, Compensator, Decoder, EDGES_PER_PULSE, Lines, Predictor, PulseInserter,
-    SelectionSettings, collect, learn,
+    AxisSituation, CompensationSettings, Compensator, Decoder, EDGES_PER_PULSE, Lines, Path, Predictor, PulseInserter,
+    SelectionSettings, ThermalLaw, collect, learn,
 };
+use rules::script::ScriptFile;
+use std::time::Duration;
 
 const SECOND_NS: i64 = 1_000_000_000;
 const STEP_S: i64 = 5;
@@ -89,10 +94,86 @@ impl Axis {
     }
 }
 
+/// The shipped script with this law, as an integrator would write it from what `identify thermal` prints.
+fn shipped(law: &ThermalLaw) -> ScriptFile {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/rules/scripts/thermal.rhai");
+    let mut text = std::fs::read_to_string(path).expect("the shipped script");
+    let sensors = ["motor_temperature_c", "bearing_temperature_c", "ambient_temperature_c"];
+    let per_k = |path: Path| {
+        let sums = sensors.map(|sensor| {
+            let terms = law.terms.iter().filter(|term| term.sensor == sensor && term.path == path);
+            terms.map(|term| term.um_per_k).sum::<f64>()
+        });
+        format!("{sums:?}")
+    };
+    let constants = [
+        ("INTERCEPT_UM", format!("{:?}", law.intercept_um)),
+        ("UM_PER_K", per_k(Path::Direct)),
+        ("LATE_UM_PER_K", per_k(Path::Lagged)),
+        ("TAU_S", format!("{:?}", law.tau_s.unwrap_or(0.0))),
+        ("LIMIT_UM", "150.0".to_owned()),
+    ];
+    for (constant, value) in constants {
+        let begin = text.find(&format!("const {constant} = ")).expect("a constant of the script");
+        let end = begin + text[begin..].find(';').expect("it ends");
+        text.replace_range(begin..end, &format!("const {constant} = {value}"));
+    }
+    script("thermal.rhai", text)
+}
+
+/// Offsets alone: ten micrometres at a time, once a minute.
+fn offset_limits() -> config::Gate {
+    let before = limits(50.0, 120.0);
+    let offset = config::Offset {
+        mode: GateMode::Armed,
+        axes: vec![MachineAxis::Z],
+        step_um: 10.0,
+        total_um: 150.0,
+        min_interval: Duration::from_secs(60),
+        ..before.offset.clone()
+    };
+    config::Gate { mode: GateMode::Shadow, armed_for: Duration::from_secs(86_400), offset, ..before }
+}
+
+/// The whole loop: sensors, merge, shipped script, gate, control. What is true is asked of the machine while it cuts.
+fn through_the_gate(law: &ThermalLaw, hours: i64) {
+    let settings = SimulatedSettings { seed: 12, ..SimulatedSettings::default() };
+    let mut bench = Bench::at_work(settings, &[shipped(law)], &offset_limits());
+    bench.period_ns = SECOND_NS;
+    let (mut before, mut after, mut changes_in_programs, mut in_force) = (Vec::new(), Vec::new(), 0, 0.0);
+    for at_s in 1..=hours * 3600 {
+        bench.tick();
+        let moment = bench.machine.moment(at_s * SECOND_NS);
+        if moment.panel.booted && bench.pipeline.gate().armed().is_err() {
+            bench.arm();
+        }
+        let offset_um = bench.machine.offset_um(MachineAxis::Z);
+        let runs = moment.panel.execution == execution::ACTIVE;
+        let changed = std::mem::replace(&mut in_force, offset_um) != offset_um;
+        changes_in_programs += usize::from(runs && changed);
+        if moment.truth.engaged > 0.99 {
+            before.push(moment.truth.thermal_error_um);
+            after.push(moment.truth.thermal_error_um + offset_um);
+        }
+    }
+    let ((b, b_max), (a, a_max)) = (size(&before), size(&after));
+    let counts = bench.machine.written();
+    println!(
+        "through the gate over {hours} h, while cutting: before RMS {b:.1} um, greatest {b_max:.1} um; after RMS {a:.2} um, greatest \
+         {a_max:.1} um; {} writes of the offset counted by the machine, {} in a program",
+        counts.offsets, changes_in_programs
+    );
+    assert!(bench.faults.is_empty(), "{:?}", bench.faults);
+    assert_eq!(counts.writes(), counts.offsets, "nothing else is written");
+    assert_eq!(changes_in_programs, 0, "between programs only");
+    assert!(counts.offsets > 3 && a < 0.3 * b && a_max < b_max, "{b} {a}");
+}
+
 fn day(hours: i64) {
     let collected = collect(&recorded(11, hours)).expect("usable");
     let learned = learn(&collected.course, SelectionSettings::default(), None).expect("a law");
     let law = learned.best().fit.law.clone();
+    through_the_gate(&law, hours);
     println!("law: {} terms, late {:?} s, residual {:.2} um", law.terms.len(), law.tau_s, law.residual_sd_um);
     let settings = CompensationSettings { pulse_um: 1.0, limit_um: 150.0, ..CompensationSettings::default() };
     let (mut offset, mut inserted) =

@@ -43,7 +43,7 @@ fn design(wear_mm: f64, seed: u64) -> Vec<Cut> {
     ];
     let mut steps = vec![air(15.0)];
     for (rpm, feed_mm_min, depth_mm) in plan {
-        let turn = ExperimentCut { feed_mm_min, depth_mm, diameter_mm: DIAMETER_MM };
+        let turn = ExperimentCut { feed_mm_min, depth_mm, diameter_mm: DIAMETER_MM, onward: false };
         steps.push(ExperimentStep { spindle_rpm: rpm, ..air(10.0) });
         steps.push(ExperimentStep { spindle_rpm: rpm, cut: Some(turn), ..air(14.0) });
     }

@@ -128,3 +128,45 @@ proptest::proptest! {
         }
     }
 }
+
+/// Somebody whose clock says from the `over`-th question on that it is over.
+struct Impatient {
+    asked: std::sync::atomic::AtomicU32,
+    over: u32,
+}
+
+impl rules::script::Deadline for Impatient {
+    fn begin(&self) {
+        self.asked.store(0, std::sync::atomic::Ordering::SeqCst);
+    }
+
+    fn is_over(&self) -> bool {
+        self.asked.fetch_add(1, std::sync::atomic::Ordering::SeqCst) >= self.over
+    }
+}
+
+const LONG: &str = "request_feed_override(80, \"long\"); let i = 0; while i < 100 { i += 1; }";
+
+#[test]
+fn a_run_that_lasts_too_long_by_the_clock_is_left_out_and_only_the_third_in_a_row_fails() {
+    let mut host = host(LONG);
+    assert_eq!(request(&mut host, 0.0, &[]), Some(80.0), "without a clock only operations count");
+    host.watch(std::sync::Arc::new(Impatient { asked: 0.into(), over: 5 }));
+    for tick in 1..=3 {
+        let at_s = f64::from(tick) / 10.0;
+        let decision = host.tick(&sample(at_s, &[]), &Estimates::none(0)).clone();
+        assert!(told(&decision.problems).contains("lasted too long by the clock"), "{}", told(&decision.problems));
+        assert_eq!(decision.request, None, "a stopped run asks for nothing");
+        assert_eq!(host.status().well(), tick < 3, "two may be bad luck");
+    }
+}
+
+#[test]
+fn the_clock_of_the_gateway_stops_what_operations_would_allow() {
+    let mut host = host(LONG);
+    host.watch(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::ZERO)));
+    let decision = host.tick(&sample(0.0, &[]), &Estimates::none(0)).clone();
+    assert_eq!((decision.problems.len(), decision.request), (1, None));
+    host.watch(std::sync::Arc::new(gateway::run::deadline::RunLimit::new(Duration::from_secs(60))));
+    assert_eq!(request(&mut host, 0.1, &[]), Some(80.0), "the next run begins anew");
+}

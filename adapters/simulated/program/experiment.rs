@@ -18,6 +18,8 @@ pub struct ExperimentCut {
     pub depth_mm: f64,
     /// Diameter of the work, mm.
     pub diameter_mm: f64,
+    /// Goes on from where the cut before it ended: the tool is not retracted.
+    pub onward: bool,
 }
 
 /// What is commanded over a stretch of time. A change of the spindle speed takes its time on top.
@@ -82,7 +84,7 @@ fn write_step(out: &mut Writer<'_>, step: &ExperimentStep, place: &mut Place) {
         out.same(Action::Spindle(step.spindle_rpm, wanted));
     }
     match step.cut {
-        Some(cut) => place.z_mm = write_cut(out, &cut, step),
+        Some(cut) => place.z_mm = write_cut(out, &cut, step, place.z_mm),
         None if step.axis_mm_min != 0.0 => {
             let rate = Rate::PerMinute(step.axis_mm_min.abs());
             place.z_mm += step.axis_mm_min / 60.0 * step.seconds;
@@ -94,10 +96,13 @@ fn write_step(out: &mut Writer<'_>, step: &ExperimentStep, place: &mut Place) {
     }
 }
 
-/// Writes a cut along Z from zero; where it ends.
-fn write_cut(out: &mut Writer<'_>, cut: &ExperimentCut, step: &ExperimentStep) -> f64 {
+/// Writes a cut along Z, from zero or from where the tool is; where it ends.
+fn write_cut(out: &mut Writer<'_>, cut: &ExperimentCut, step: &ExperimentStep, z_mm: f64) -> f64 {
     let length_mm = cut.feed_mm_min * f64::from(step.override_pct) / 100.0 * step.seconds / 60.0;
-    out.same(Action::Rapid([cut.diameter_mm, 0.0, 0.0]));
+    let begins_mm = if cut.onward { z_mm } else { 0.0 };
+    if !cut.onward {
+        out.same(Action::Rapid([cut.diameter_mm, 0.0, 0.0]));
+    }
     let planned = Cut {
         depth_mm: cut.depth_mm,
         diameter_from_mm: cut.diameter_mm,
@@ -105,6 +110,7 @@ fn write_cut(out: &mut Writer<'_>, cut: &ExperimentCut, step: &ExperimentStep) -
         ..Cut::default()
     };
     let rate = Rate::PerMinute(cut.feed_mm_min);
-    out.same(Action::Feed { to: [cut.diameter_mm, 0.0, -length_mm], rate, cut: Some(planned), locked: false });
-    -length_mm
+    let ends_mm = begins_mm - length_mm;
+    out.same(Action::Feed { to: [cut.diameter_mm, 0.0, ends_mm], rate, cut: Some(planned), locked: false });
+    ends_mm
 }

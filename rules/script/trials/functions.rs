@@ -1,52 +1,50 @@
 //! What a trial can call.
 
 use super::stage::{Stage, Theatre};
+use crate::script::callable::{Function, function};
 use crate::script::collect::Outcome;
 use crate::script::decision::{Axis, Stop};
 use rhai::{Dynamic, Engine, ImmutableString, Map};
 
-/// A function that only trials can call.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TrialFunction {
-    /// How it is written.
-    pub signature: &'static str,
-    /// What it does, in English.
-    pub en: &'static str,
-    /// What it does, in Chinese.
-    pub zh: &'static str,
-}
-
-const fn row(signature: &'static str, en: &'static str, zh: &'static str) -> TrialFunction {
-    TrialFunction { signature, en, zh }
-}
-
 /// Every function of trials.
-pub const TRIAL_FUNCTIONS: &[TrialFunction] = &[
-    row(
+pub const TRIAL_FUNCTIONS: &[Function] = &[
+    function(
         "given(#{ name: value })",
         "From now on the script sees these channels, estimates and `state`; () for no value; what was given before stays",
         "设定脚本看到的通道、估计量和状态",
     ),
-    row("after_s(seconds)", "Lets time pass: the script runs at every tick of it", "经过若干秒"),
-    row("pace_s(seconds)", "Ticks come this far apart from now on; 0.1 s unless said", "设定周期"),
-    row("expect_override(least, greatest)", "A feed override in this range is asked for, %", "期望倍率请求在此范围"),
-    row("expect_no_override()", "No feed override is asked for", "期望无倍率请求"),
-    row("expect_alarm(name)", "The alarm stands", "期望报警有效"),
-    row("expect_no_alarm(name)", "The alarm does not stand", "期望报警无效"),
-    row("expect_no_alarms()", "No alarm stands", "期望无任何报警"),
-    row("expect_feed_hold()", "A feed hold was asked for while time last passed", "期望请求进给保持"),
-    row("expect_no_feed_hold()", "None was", "期望无进给保持请求"),
-    row("expect_tool_change()", "A tool change was asked for while time last passed", "期望请求换刀"),
-    row("expect_no_tool_change()", "None was", "期望无换刀请求"),
-    row("expect_offset_um(axis, least, greatest)", "An offset in this range is proposed, um", "期望补偿量在此范围"),
-    row("expect_no_offset(axis)", "No offset is proposed for the axis", "期望无补偿建议"),
-    row(
+    function("after_s(seconds)", "Lets time pass: the script runs at every tick of it", "经过若干秒"),
+    function("pace_s(seconds)", "Ticks come this far apart from now on; 0.1 s unless said", "设定周期"),
+    function(
+        "expect_override(least, greatest)",
+        "A feed override in this range is asked for, %",
+        "期望倍率请求在此范围",
+    ),
+    function("expect_no_override()", "No feed override is asked for", "期望无倍率请求"),
+    function("expect_alarm(name)", "The alarm stands", "期望报警有效"),
+    function("expect_no_alarm(name)", "The alarm does not stand", "期望报警无效"),
+    function("expect_no_alarms()", "No alarm stands", "期望无任何报警"),
+    function("expect_feed_hold()", "A feed hold was asked for while time last passed", "期望请求进给保持"),
+    function("expect_no_feed_hold()", "None was", "期望无进给保持请求"),
+    function("expect_tool_change()", "A tool change was asked for while time last passed", "期望请求换刀"),
+    function("expect_no_tool_change()", "None was", "期望无换刀请求"),
+    function(
+        "expect_offset_um(axis, least, greatest)",
+        "An offset in this range is proposed, um",
+        "期望补偿量在此范围",
+    ),
+    function("expect_no_offset(axis)", "No offset is proposed for the axis", "期望无补偿建议"),
+    function(
         "expect_published(name, least, greatest)",
         "The channel of the script's own is in this range",
         "期望自定义通道在此范围",
     ),
-    row("expect_setting(name, least, greatest)", "A setting of the estimators is in this range", "期望设定值在此范围"),
-    row("expect_note(part)", "A note with these words was written", "期望写入包含此文字的记录"),
+    function(
+        "expect_setting(name, least, greatest)",
+        "A setting of the estimators is in this range",
+        "期望设定值在此范围",
+    ),
+    function("expect_note(part)", "A note with these words was written", "期望写入包含此文字的记录"),
 ];
 
 type Text = ImmutableString;

@@ -20,7 +20,7 @@
 mod functions;
 mod stage;
 
-pub use functions::{TRIAL_FUNCTIONS, TrialFunction};
+pub use functions::TRIAL_FUNCTIONS;
 
 use super::compile::{Script, ScriptSet};
 use super::engine::{OPERATIONS_MAX, Shared, engine};

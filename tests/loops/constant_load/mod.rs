@@ -5,15 +5,15 @@
 //! and exit (nothing for half a second after the tool has met the work), air (power below every curve: the programmed feed),
 //! overload (power above every curve: the least feed), nothing without a fresh power.
 
-use super::bench::{Bench, limits, script};
+mod law;
+mod scenarios;
+
+use super::bench::{Bench, limits};
 use super::steps::{SPEED_RPM, air, air_cut, cut};
-use adapters::channel::Kind;
-use adapters::recording::{Cells, Numbers, Words};
+use adapters::ChannelId;
 use adapters::simulated::{ExperimentStep, LaterChange, SimulatedSettings};
-use adapters::{ChannelId, Recording, Sample, Value};
-use rules::estimators::spindle_current::{FeedCurves, identify_feed_curve};
+use law::{by_curves, by_exponent, curves, law};
 use rules::script::ScriptFile;
-use std::fmt::Write as _;
 
 /// The programmed feed, chosen for the deepest cut of the part.
 const FEED_MM_MIN: f64 = 180.0;
@@ -44,95 +44,9 @@ fn part() -> Vec<ExperimentStep> {
     steps
 }
 
-/// Sweeps at every depth, recorded through the same line as the control will be.
-fn curves() -> FeedCurves {
-    let mut steps = vec![air(15.0)];
-    for depth in DEPTHS_MM {
-        for feed in [80.0, 120.0, 160.0, 210.0, 260.0, 310.0, 370.0] {
-            steps.push(cut(7.0, feed, depth));
-        }
-    }
-    let quiet = [script("nothing.rhai", "const EVERY_S = 10.0;")];
-    let mut bench = Bench::new(settings(99), &steps, &quiet, &limits(MIN_PCT, MAX_PCT));
-    let mut samples = Vec::new();
-    while !over(&bench) {
-        let sample = bench.tick().clone();
-        samples.push(sample);
-    }
-    identify_feed_curve(&table(&samples), "feed_mm_min", "spindle_power_w").expect("curves")
-}
-
 fn over(bench: &Bench) -> bool {
     let panel = bench.machine.moment((bench.now_s() * 1e9) as i64).panel;
     bench.now_s() > 40.0 && panel.program == 0
-}
-
-fn table(samples: &[Sample]) -> Recording {
-    let time_s = (0..samples.len()).map(|row| row as f64 / 10.0).collect();
-    let mut recording = Recording::new("sweeps", time_s, None);
-    for id in ChannelId::all() {
-        let values = || samples.iter().map(|sample| sample.slot(id).value.as_ref().ok());
-        if values().flatten().next().is_none() {
-            continue;
-        }
-        let cells = match id.channel().kind {
-            Kind::Text => Cells::Words(values().map(|it| it.and_then(Value::as_text).unwrap_or("")).collect::<Words>()),
-            _ => Cells::Numbers(values().map(|it| it.and_then(Value::as_number)).collect::<Numbers>()),
-        };
-        recording.set_column(id.name(), cells);
-    }
-    recording
-}
-
-/// The law of the module, with these curves and this target.
-fn law(learned: &FeedCurves, target_w: f64) -> ScriptFile {
-    let family = learned.family(SPEED_RPM).expect("curves that do not cross");
-    let mut rows = String::new();
-    for it in family.curves() {
-        let [c0, c1, c2, c3] = it.curve.coefficients;
-        let _ = writeln!(
-            rows,
-            "[{:.4}, {:.4}, {:.4}, {c0:.6}, {c1:.6}, {c2:.10}, {c3:.12}, {:.4}],",
-            it.depth_mm, it.curve.feed_min, it.curve.feed_max, it.sd
-        );
-    }
-    let text = format!(
-        r#"
-const CURVES = [{rows}];
-const TARGET_W = {target_w:.1};
-const MIN_PCT = {MIN_PCT:.1};
-const MAX_PCT = {MAX_PCT:.1};
-// Longer than meter and controller lag behind each other. 切入后等待
-const SETTLE_S = 0.5;
-
-let pct = 100.0;
-let known = has(spindle_power_w) && has(feed_mm_min) && has(feed_programmed_mm_min);
-if state == "cutting" && state_s >= SETTLE_S && known && feed_mm_min > 10.0 && feed_programmed_mm_min > 10.0 {{
-    // Smoothed over a few ticks: the meter is noisy, and feed and power are not of quite the same moment. 平滑
-    let power_w = memory.power_w ?? spindle_power_w;
-    let feed = memory.feed ?? feed_mm_min;
-    power_w += 0.5 * (spindle_power_w - power_w);
-    feed += 0.5 * (feed_mm_min - feed);
-    memory.power_w = power_w;
-    memory.feed = feed;
-    let depth_mm = feed_curve_depth_mm(CURVES, feed, power_w);
-    if has(depth_mm) {{
-        let wanted = feed_curve_feed(CURVES, depth_mm, TARGET_W);
-        // No feed of the curves gives the target: then the nearest that they have. 曲线范围内无解
-        let wanted = if has(wanted) {{ wanted }} else if power_w > TARGET_W {{ 0.0 }} else {{ 1e6 }};
-        pct = clamp(100.0 * wanted / feed_programmed_mm_min, MIN_PCT, MAX_PCT);
-    }} else if power_w > TARGET_W {{
-        // Above every curve: worn, hard, or deeper than anything tried. 超出曲线上限
-        pct = MIN_PCT;
-    }}
-    request_feed_override(pct, "constant load");
-}} else {{
-    memory.power_w = ();
-    memory.feed = ();
-}}
-"#
-    );
-    script("constant_load.rhai", text)
 }
 
 /// What was true while the tool was wholly in the work.
@@ -148,6 +62,9 @@ struct Outcome {
     reactions_ms: Vec<f64>,
     least_pct: u8,
     greatest_pct: u8,
+    /// Furthest from 100 % while the meter had been silent for a second, and how long it was.
+    silent_pct: u8,
+    silent_s: f64,
 }
 
 impl Outcome {
@@ -187,14 +104,19 @@ fn mean(values: &[f64]) -> f64 {
 fn run(settings: SimulatedSettings, steps: &[ExperimentStep], scripts: &[ScriptFile], armed: bool) -> Outcome {
     let mut bench = Bench::new(settings, steps, scripts, &limits(MIN_PCT, MAX_PCT));
     let mut outcome = Outcome { least_pct: 100, greatest_pct: 100, ..Outcome::default() };
-    let (mut begun, mut engaged_s, mut over_s) = (false, 0.0, 0.0);
+    let (mut begun, mut engaged_s, mut over_s, mut silent_s) = (false, 0.0, 0.0, 0.0);
+    let power = ChannelId::of("spindle_power_w").expect("a channel");
     while !over(&bench) {
-        bench.tick();
+        silent_s = if bench.tick().number(power).is_err() && bench.now_s() > 30.0 { silent_s + 0.1 } else { 0.0 };
         if armed && !begun && bench.now_s() > 30.0 {
             bench.arm();
             begun = true;
         }
         for moment in bench.looks() {
+            if silent_s > 1.0 {
+                outcome.silent_s += 0.02;
+                outcome.silent_pct = outcome.silent_pct.max(moment.panel.feed_override_pct.abs_diff(100));
+            }
             outcome.program_s += f64::from(u8::from(moment.panel.program != 0)) * 0.02;
             engaged_s = if moment.truth.engaged > 0.99 { engaged_s + 0.02 } else { 0.0 };
             over_s = if moment.truth.cutting_power_w > 1.15 * ALLOWED_W { over_s + 0.02 } else { 0.0 };
@@ -231,6 +153,15 @@ fn a_part_with_varying_depth_takes_an_even_power_and_less_time() {
     let plain = run(settings(1), &part(), &law, false);
     let steady = run(settings(1), &part(), &law, true);
     println!("{}\n{}", plain.told("plain feed"), steady.told("constant load"));
+    let shipped = [("shipped, exponent", by_exponent(ALLOWED_W)), ("shipped, curves", by_curves(&learned, target_w))];
+    for (name, script) in shipped {
+        let outcome = run(settings(1), &part(), &[script], true);
+        println!("{}", outcome.told(name));
+        let [spread, settled_spread] = outcome.spread();
+        let [plain_spread, plain_settled] = plain.spread();
+        assert!(spread < 0.85 * plain_spread && settled_spread < 0.6 * plain_settled, "{name}: {spread}");
+        assert!(outcome.program_s < 0.95 * plain.program_s && outcome.over_s < 2.0, "{name}: {} s", outcome.over_s);
+    }
     let (p50, p99) = (percentile(&steady.reactions_ms, 0.5), percentile(&steady.reactions_ms, 0.99));
     println!(
         "{} steps of the override; from the sample to the step in force p50 {p50:.0} ms, p99 {p99:.0} ms (machine time, seen at \

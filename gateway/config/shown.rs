@@ -1,0 +1,66 @@
+//! The table of keys as a reader sees it: what `check --keys` and `check --example` print.
+
+use super::keys::Absent::{self, Default, Optional, Required};
+use super::keys::{KEYS, Key, Kind, SECTIONS, find_section, keys_of};
+
+impl Kind {
+    /// What is accepted, as a reader of the table needs it.
+    #[must_use]
+    pub fn range(&self) -> String {
+        match self {
+            Self::Text => "text".to_string(),
+            Self::OneOf(words) => words.join(", "),
+            Self::Number(min, max) => format!("{min} to {max}"),
+            Self::Flag => "true, false".to_string(),
+            Self::Path => "path".to_string(),
+            Self::Listen => "HOST:PORT".to_string(),
+            Self::Address => "address".to_string(),
+        }
+    }
+}
+
+impl Absent {
+    fn text(self) -> &'static str {
+        match self {
+            Required => "required",
+            Optional => "-",
+            Default(value) => value,
+        }
+    }
+}
+
+/// The table as Markdown, one row per key: what `check --keys` prints.
+#[must_use]
+pub fn table() -> String {
+    let mut text = String::from("| key | default | accepts | what |\n|---|---|---|---|\n");
+    for key in KEYS {
+        let section = find_section(key.section).filter(|section| section.repeated);
+        let path = if section.is_some() { format!("[[{}]] {}", key.section, key.name) } else { key.path() };
+        text += &format!("| `{path}` | {} | {} | {} |\n", key.absent.text(), key.kind.range(), key.en);
+    }
+    text
+}
+
+/// A complete commented file with every default: what `check --example` prints.
+#[must_use]
+pub fn example() -> String {
+    let mut text =
+        String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
+    for section in SECTIONS {
+        let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
+        text += &format!("\n{open}{}{close}{}# {}\n", section.name, " ", section.en);
+        for key in keys_of(section.name) {
+            text += &example_line(key);
+        }
+    }
+    text
+}
+
+fn example_line(key: &Key) -> String {
+    let written = match key.absent {
+        Required => format!("{} = \"simulated://lathe\"", key.name),
+        Optional => format!("# {} = ...", key.name),
+        Default(value) => format!("# {} = {value}", key.name),
+    };
+    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
+}

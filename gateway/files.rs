@@ -1,0 +1,164 @@
+//! Files that people edit while the box runs, and files of its own: noticed, read, replaced.
+//!
+//! One mechanism for the scripts, the operations recipe and the twin's model. A thread looks once a second, so that a slow
+//! disk never delays a tick; a change is taken when it has stood still for one look, so that no file is read while an editor
+//! is writing it. What the box writes itself takes its place in one step, so that nobody ever finds half a file.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, SystemTime};
+
+/// Time between two looks.
+pub const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// What a file is recognised by without reading it: its path, when it was written, its length. Nothing where it is not there.
+pub type Mark = (PathBuf, Option<(Option<SystemTime>, u64)>);
+
+/// The mark of this file as it is now.
+#[must_use]
+pub fn mark(path: &Path) -> Mark {
+    let metadata = std::fs::metadata(path).ok();
+    (path.to_owned(), metadata.map(|metadata| (metadata.modified().ok(), metadata.len())))
+}
+
+/// Tells when marks that change have come to rest.
+#[derive(Debug)]
+pub struct Rest<M> {
+    seen: Option<M>,
+    taken: Option<M>,
+}
+
+impl<M: PartialEq + Clone> Rest<M> {
+    /// Nothing has been seen; the first look finds everything at rest.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { seen: None, taken: None }
+    }
+
+    /// What is like this has been read already.
+    #[must_use]
+    pub fn known(mark: M) -> Self {
+        Self { seen: Some(mark.clone()), taken: Some(mark) }
+    }
+
+    /// Is what is marked so to be read now? When it has changed and is as it was at the look before; when `asked`, as soon as
+    /// it has changed.
+    pub fn look(&mut self, now: M, asked: bool) -> bool {
+        let still = self.seen.replace(now.clone()).is_none_or(|before| before == now);
+        if self.taken.as_ref() == Some(&now) || !(still || asked) {
+            return false;
+        }
+        self.taken = Some(now);
+        true
+    }
+}
+
+impl<M: PartialEq + Clone> Default for Rest<M> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Looks about once a second on a thread of its own; ends when it is dropped.
+#[derive(Debug)]
+pub struct Lookout<T> {
+    newest: Receiver<T>,
+    asked: SyncSender<()>,
+}
+
+impl<T: Send + 'static> Lookout<T> {
+    /// Starts a thread of this name. `look` is told whether somebody asked, and gives what it found. Without `poll` it looks
+    /// only when it is asked.
+    ///
+    /// # Errors
+    /// No thread could be started.
+    pub fn start(
+        name: &str,
+        poll: bool,
+        mut look: impl FnMut(bool) -> Option<T> + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let (send, newest) = sync_channel(1);
+        let (asked, asks) = sync_channel(1);
+        let work = move || {
+            while let Some(asked) = wait(&asks, poll) {
+                if look(asked).is_some_and(|found| send.send(found).is_err()) {
+                    return;
+                }
+            }
+        };
+        std::thread::Builder::new().name(name.to_owned()).spawn(work)?;
+        Ok(Self { newest, asked })
+    }
+
+    /// Makes it look now. Returns at once.
+    pub fn ask(&self) {
+        // A full queue means that it has been asked already.
+        let _asked_before = self.asked.try_send(());
+    }
+
+    /// What was found since the last call, if anything was.
+    pub fn take(&self) -> Option<T> {
+        self.newest.try_recv().ok()
+    }
+}
+
+/// Waits for the next look; tells whether somebody asked for it. `None` when nobody is there any more.
+fn wait(asks: &Receiver<()>, poll: bool) -> Option<bool> {
+    loop {
+        match asks.recv_timeout(LOOK_EVERY) {
+            Ok(()) => return Some(true),
+            Err(RecvTimeoutError::Timeout) if poll => return Some(false),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return None,
+        }
+    }
+}
+
+/// The text of a file, but of a longer one only `limit` bytes and one more, by which its reader sees that it is longer.
+///
+/// # Errors
+/// It cannot be read, or it is no UTF-8.
+pub fn read_text(path: &Path, limit: usize) -> std::io::Result<String> {
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(limit as u64 + 1).read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// A whole file in one step: written beside its place, then renamed. Its directory is made if need be.
+///
+/// # Errors
+/// The file or its directory cannot be written; what was there before stays.
+pub fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+    let mut fresh = path.as_os_str().to_owned();
+    fresh.push(".writing");
+    std::fs::write(&fresh, text)?;
+    std::fs::rename(&fresh, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_is_taken_once_when_it_has_come_to_rest() {
+        let mut rest = Rest::known(1);
+        assert!(!rest.look(1, false) && !rest.look(1, true), "known");
+        assert!(!rest.look(2, false) && !rest.look(3, false), "still being written");
+        assert!(rest.look(3, false) && !rest.look(3, false));
+        assert!(rest.look(4, true) && !rest.look(4, false), "asked, it does not wait");
+        assert!(Rest::new().look(1, false), "the first look finds everything at rest");
+    }
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole_and_read_no_further_than_the_limit() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("deeper").join("file.toml");
+        let before = mark(&path);
+        replace(&path, "12345").expect("written");
+        assert_ne!(mark(&path), before);
+        assert_eq!(read_text(&path, 3).expect("read"), "1234");
+        assert_eq!(std::fs::read_dir(directory.path().join("deeper")).expect("there").count(), 1, "nothing is left");
+    }
+}

@@ -1,0 +1,233 @@
+//! Thermal offsets: what a script proposes becomes a shift of an axis, or it does not, with the reason.
+//!
+//! Off unless `[gate.offset]` says otherwise, and decided like an override: in `shadow` everything is recorded and nothing
+//! written; `armed` needs the same arming on the box. A shift is written
+//!
+//! - for axes that the configuration names, never more than `total_um` from what the operator has set, by at most `step_um`
+//!   at a time and at most once per `min_interval_s`;
+//! - between two programs only: automatic, nothing running, no alarm, fresh values, a known state. The driver looks once
+//!   more at the control before it writes, and refuses a control that measures in inches.
+//!
+//! Without a proposal the shift goes back to what the operator has set, by the same steps. A number that is none moves
+//! nothing. A control that shows something else than was written ends the arming and raises an alarm.
+//!
+//! A work offset has no sign of life: nothing takes it back when the gateway dies. Therefore what is left in the control is
+//! kept in a file beside the history, and `on_disarm = "restore"`, which is the default, gives it back in one step as soon
+//! as no program runs: after disarming, at the end of the gateway, and after a start that finds something left. One large
+//! step between two programs is better than an offset that nobody follows up while the machine cools. `"keep"` is for shops
+//! that arm anew in the middle of a batch and would rather have no step in it.
+
+mod order;
+mod trail;
+
+pub use order::{Moved, Order, carry_out};
+pub use trail::{OffsetTrail, moved};
+
+use super::hold::Hold;
+use crate::config::{self, GateMode};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::offset::{Axis, Shifted};
+use rules::script::OffsetProposal;
+
+/// What became of a proposal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OffsetOutcome {
+    /// As proposed, now or at the next time that something may be written.
+    Permitted,
+    /// Only so far, because of this.
+    Limited(OffsetBound),
+    /// Nothing is moved now, because of this.
+    Held(Hold),
+    /// The configuration does not name this axis.
+    NotAllowed,
+    /// Not a number of micrometres.
+    Refused,
+}
+
+/// What keeps a shift smaller than proposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OffsetBound {
+    /// The greatest change at a time; the rest follows.
+    Step,
+    /// The greatest shift from what the operator has set.
+    Total,
+}
+
+/// The decision about one axis at one tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetVerdict {
+    /// The tick.
+    pub at_ns: TimeNs,
+    /// Which axis.
+    pub axis: Axis,
+    /// What is proposed, as it was; may be no number.
+    pub wanted_um: Option<f64>,
+    /// The shift in force, by the gateway's account.
+    pub shift_um: f64,
+    /// The shift that would be written now.
+    pub permitted_um: f64,
+    /// How the one became the other.
+    pub outcome: OffsetOutcome,
+    /// May it be written?
+    pub armed: bool,
+    /// What is to be written now.
+    pub order: Option<Order>,
+}
+
+/// One axis that may be shifted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Slide {
+    axis: Axis,
+    shift_um: f64,
+    /// Something was ordered and has not been answered.
+    waiting: bool,
+    /// When it was last proposed for.
+    proposed_ns: Option<TimeNs>,
+}
+
+/// A proposal may be missing for this long before the shift goes back: a value may be absent for a moment.
+const MISSING_NS: i64 = 10 * SECOND_NS;
+
+/// What is known at a tick besides the proposals.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Circumstances {
+    pub(super) at_ns: TimeNs,
+    pub(super) hold: Option<Hold>,
+    pub(super) armed: bool,
+}
+
+/// Decides about offsets. One per machine.
+#[derive(Debug)]
+pub struct Offsets {
+    limits: config::Offset,
+    slides: Vec<Slide>,
+    ordered_ns: Option<TimeNs>,
+}
+
+impl Offsets {
+    /// Nothing is shifted, as far as is known.
+    pub(super) fn new(limits: config::Offset) -> Self {
+        let slides = limits
+            .axes
+            .iter()
+            .map(|axis| Slide { axis: *axis, shift_um: 0.0, waiting: false, proposed_ns: None })
+            .collect();
+        Self { limits, slides, ordered_ns: None }
+    }
+
+    /// An earlier run has left this shift.
+    pub fn resume(&mut self, axis: Axis, shift_um: f64) {
+        self.slides.iter_mut().filter(|slide| slide.axis == axis).for_each(|slide| slide.shift_um = shift_um);
+    }
+
+    /// Is there anything to decide about?
+    pub(super) fn is_concerned(&self, proposals: &[OffsetProposal]) -> bool {
+        self.limits.mode != GateMode::Off && (!proposals.is_empty() || self.is_shifted())
+    }
+
+    /// Is any axis shifted?
+    #[must_use]
+    pub fn is_shifted(&self) -> bool {
+        self.slides.iter().any(|slide| slide.shift_um != 0.0)
+    }
+
+    /// Each axis with the shift in force.
+    pub fn shifts(&self) -> impl Iterator<Item = (Axis, f64)> {
+        self.slides.iter().map(|slide| (slide.axis, slide.shift_um))
+    }
+
+    /// Decides about every axis that is proposed for or shifted.
+    pub(super) fn decide(&mut self, proposals: &[OffsetProposal], now: Circumstances) -> Vec<OffsetVerdict> {
+        let strange = proposals.iter().filter(|it| !self.slides.iter().any(|slide| slide.axis == it.axis));
+        let mut verdicts: Vec<OffsetVerdict> = strange.map(|it| not_allowed(it, now)).collect();
+        let rested = self.ordered_ns.is_none_or(|ordered_ns| {
+            !(0..i64::try_from(self.limits.min_interval.as_nanos()).unwrap_or(i64::MAX))
+                .contains(&(now.at_ns - ordered_ns))
+        });
+        for slide in &mut self.slides {
+            let wanted_um = proposals.iter().find(|it| it.axis == slide.axis).map(|it| it.offset_um);
+            if slide.rests(wanted_um.is_some(), now.at_ns) {
+                continue;
+            }
+            let mut verdict = slide.judge(wanted_um, &self.limits, now);
+            if rested && now.hold.is_none() && !slide.waiting && self.limits.mode == GateMode::Armed {
+                verdict.order = slide.order(&verdict, &self.limits);
+                slide.waiting = verdict.order.is_some();
+            }
+            if verdict.order.is_some() {
+                self.ordered_ns = Some(now.at_ns);
+            }
+            verdicts.push(verdict);
+        }
+        verdicts
+    }
+
+    /// The answer to an order: what is in force now, where that is known.
+    pub fn answered(&mut self, axis: Axis, shifted: Option<&Shifted>) {
+        for slide in self.slides.iter_mut().filter(|slide| slide.axis == axis) {
+            slide.waiting = false;
+            slide.shift_um = shifted.map_or(slide.shift_um, Shifted::shift_um);
+        }
+    }
+
+    /// What is to be given back at the end.
+    #[must_use]
+    pub fn farewell(&self) -> Vec<Order> {
+        let restore = self.limits.restore && self.limits.mode == GateMode::Armed;
+        let shifted = self.slides.iter().filter(|slide| restore && slide.shift_um != 0.0);
+        shifted.map(|slide| Order::Restore(slide.axis)).collect()
+    }
+}
+
+fn not_allowed(proposal: &OffsetProposal, now: Circumstances) -> OffsetVerdict {
+    OffsetVerdict {
+        at_ns: now.at_ns,
+        axis: proposal.axis,
+        wanted_um: Some(proposal.offset_um),
+        shift_um: 0.0,
+        permitted_um: 0.0,
+        outcome: OffsetOutcome::NotAllowed,
+        armed: now.armed,
+        order: None,
+    }
+}
+
+impl Slide {
+    /// Nothing is proposed, and nothing to be given back yet.
+    fn rests(&mut self, proposed: bool, at_ns: TimeNs) -> bool {
+        if proposed {
+            self.proposed_ns = Some(at_ns);
+            return false;
+        }
+        let since_ns = at_ns - *self.proposed_ns.get_or_insert(at_ns);
+        self.shift_um == 0.0 || (0..MISSING_NS).contains(&since_ns)
+    }
+
+    fn judge(&self, wanted_um: Option<f64>, limits: &config::Offset, now: Circumstances) -> OffsetVerdict {
+        let finite = wanted_um.is_none_or(f64::is_finite);
+        // Controls count in whole micrometres.
+        let target_um =
+            wanted_um.filter(|um| um.is_finite()).map_or(if finite { 0.0 } else { self.shift_um }, f64::round);
+        let within_um = target_um.clamp(-limits.total_um.floor(), limits.total_um.floor());
+        let step_um = limits.step_um.floor().max(1.0);
+        let permitted_um = self.shift_um + (within_um - self.shift_um).clamp(-step_um, step_um);
+        let outcome = match now.hold {
+            Some(hold) => OffsetOutcome::Held(hold),
+            None if !finite => OffsetOutcome::Refused,
+            None if within_um != target_um => OffsetOutcome::Limited(OffsetBound::Total),
+            None if permitted_um != within_um => OffsetOutcome::Limited(OffsetBound::Step),
+            None => OffsetOutcome::Permitted,
+        };
+        let (at_ns, axis, shift_um, armed) = (now.at_ns, self.axis, self.shift_um, now.armed);
+        OffsetVerdict { at_ns, axis, wanted_um, shift_um, permitted_um, outcome, armed, order: None }
+    }
+
+    /// What is to be written: a step while armed; afterwards everything back, where that is configured.
+    fn order(&self, verdict: &OffsetVerdict, limits: &config::Offset) -> Option<Order> {
+        if verdict.armed {
+            let step = Order::Shift { axis: self.axis, wanted_um: verdict.permitted_um };
+            return (verdict.permitted_um != self.shift_um).then_some(step);
+        }
+        (limits.restore && self.shift_um != 0.0).then_some(Order::Restore(self.axis))
+    }
+}
