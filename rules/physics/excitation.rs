@@ -92,6 +92,30 @@ pub(crate) fn since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> {
     Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
 }
 
+/// One in the rows of a stretch of runs, `first to last`, zero elsewhere; `None` when there are no such runs.
+pub(crate) fn within_runs(scene: &Scene, stretch: &str) -> Option<Vec<f64>> {
+    let (first, last) = runs_of(scene, stretch)?;
+    let rows = scene.runs()[first].start..scene.runs()[last].end;
+    Some((0..scene.rows()).map(|row| if rows.contains(&row) { 1.0 } else { 0.0 }).collect())
+}
+
+/// The first and the last run of a stretch that is written `first to last`.
+fn runs_of(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
+    let (first, last) = stretch.split_once(RUN_TO_RUN)?;
+    let place = |name: &str| scene.run_names().iter().position(|run| run == name);
+    let (first, last) = (place(first)?, place(last)?);
+    (first <= last).then_some((first, last))
+}
+
+/// A stretch of runs as a word.
+pub(crate) fn stretch_of_runs(scene: &Scene, first: usize, last: usize) -> String {
+    let names = scene.run_names();
+    format!("{}{RUN_TO_RUN}{}", names[first], names[last])
+}
+
+/// Between the first and the last run of a stretch.
+const RUN_TO_RUN: &str = " to ";
+
 /// One form per word of a text column, where it has `2..=most` words.
 pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
     let Some(words) = scene.words(column) else { return Vec::new() };

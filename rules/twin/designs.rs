@@ -2,6 +2,7 @@
 
 use super::frame::Frame;
 use super::model::{Body, Model, Parameter, Part};
+use super::noise::Arma;
 use super::term::Term;
 use crate::physics::{CATALOGUE, Effect, Form, Role, Scene};
 
@@ -47,6 +48,8 @@ pub struct Design {
     pub ln_choices: f64,
     /// Price beyond the parameters and the choice, in units of information.
     pub reluctance: f64,
+    /// The noise beside it, where that is known: what hides in slow noise is not seen from there.
+    pub noise: Option<Arma>,
 }
 
 /// Every hypothesis that this scene, with the load and output simulated by the baseline, can tell anything about.
@@ -119,6 +122,7 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
         freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() },
         ln_choices: form.ln_choices,
         reluctance: reluctance(effect.doc().kind),
+        noise: None,
         part,
         columns,
         ranges,
@@ -143,6 +147,7 @@ fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
         freedom: columns.len(),
         ln_choices: 0.0,
         reluctance: 0.0,
+        noise: None,
         columns,
         ranges,
     })

@@ -66,6 +66,8 @@ pub struct Case<'a> {
     pub ripple: Option<super::ripple::Ripple>,
     /// A hidden switch that was followed, where there is one.
     pub switching: Option<super::latent::Switching>,
+    /// A cause without a name that explains as much as the named ones, where there is one.
+    pub nameless: Option<super::unknown::Nameless>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -98,8 +100,22 @@ impl<'a> Case<'a> {
         let frame = Frame::new(&scene, &units, size, |unit| !held.contains(&unit));
         let held_frame = Frame::new(&scene, &units, size, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        let (ripple, switching, whole) = (None, None, None);
-        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, whole }
+        let (ripple, switching, nameless, whole) = (None, None, None, None);
+        Self {
+            model,
+            scene,
+            parts,
+            units,
+            held,
+            frame,
+            held_frame,
+            recorded,
+            faults,
+            ripple,
+            switching,
+            nameless,
+            whole,
+        }
     }
 
     /// The diagnosis found from an excerpt and told over the whole, and the whole again.
@@ -124,6 +140,7 @@ impl<'a> Case<'a> {
         let (mut found, designs) = self.search(&base, seed);
         let base = self.settle(base, &mut found);
         let unknown = self.unknown(&base, &found, seed);
+        self.nameless = if unknown.is_none() { self.nameless(&base, &found, &designs) } else { None };
         let found = if unknown.is_none() { self.worth_claiming(found, &base) } else { found };
         self.show_hidden(&base);
         let outcome = Outcome::new(self, base, found, designs, unknown);
@@ -201,6 +218,7 @@ impl<'a> Case<'a> {
             // What creeps over hours is in the levels of the tools; within one tool's life it is but a bend.
             designs.retain(|design| !CREEPING.contains(&design.kind.as_str()));
         }
+        designs.extend(self.hidden_lots(base));
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
         let frame = self.frame.clone();

@@ -27,7 +27,7 @@ pub enum Factor {
 pub enum Shape {
     /// A line that bends at these values, increasing.
     Bent(Vec<f64>),
-    /// A peak at one value, of this half width; whatever resonates stands out at one speed.
+    /// A peak at one value, of this half width: the power that a resonance takes over the speed that excites it.
     Peak(f64, f64),
     /// What is there at first and fades over this distance.
     Fading(f64),
@@ -70,6 +70,23 @@ impl Empirical {
         !matches!(self.shape, Shape::Bent(_))
     }
 
+    /// The same form with its place, width or time constant moved by this share of itself; nothing for a bent line.
+    #[must_use]
+    pub(super) fn neighbours(&self, step: f64) -> Vec<Self> {
+        let (up, down) = (1.0 + step, 1.0 / (1.0 + step));
+        let shapes = match self.shape {
+            Shape::Bent(_) => Vec::new(),
+            Shape::Peak(centre, width) => vec![
+                Shape::Peak(centre + step * width.max(0.2 * centre), width),
+                Shape::Peak(centre - step * width.max(0.2 * centre), width),
+                Shape::Peak(centre, up * width),
+                Shape::Peak(centre, down * width),
+            ],
+            Shape::Fading(over) => vec![Shape::Fading(up * over), Shape::Fading(down * over)],
+        };
+        shapes.into_iter().map(|shape| Self { shape, ..self.clone() }).collect()
+    }
+
     /// One column per coefficient: level, slope and hinges.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
@@ -82,7 +99,7 @@ impl Empirical {
             Shape::Bent(knots) => knots,
             Shape::Peak(centre, width) => {
                 let (centre, width) = (along(*centre), width / self.scale);
-                return Some(vec![("level".to_owned(), column(&|x| (-0.5 * ((x - centre) / width).powi(2)).exp()))]);
+                return Some(vec![("level".to_owned(), column(&|x| 1.0 / (1.0 + ((x - centre) / width).powi(2))))]);
             }
             Shape::Fading(over) => {
                 let over = over / self.scale;
@@ -139,7 +156,7 @@ impl Empirical {
         let knots = match &self.shape {
             Shape::Bent(knots) => knots,
             Shape::Peak(centre, width) => {
-                return format!("level * exp(-0.5 * (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
+                return format!("level / (1.0 + (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
             }
             Shape::Fading(over) => return format!("level * exp(-{x} / {:?})", over / self.scale),
         };
@@ -215,7 +232,7 @@ pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Des
     // What always drifts has a name.
     let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
     let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
-    forms.flatten().filter(unnamed).filter_map(|form| design(form, scene, frame)).collect()
+    forms.flatten().filter(unnamed).filter_map(|form| as_design(form, scene, frame)).collect()
 }
 
 /// Measured outputs beside the simulated one must not explain it.
@@ -263,9 +280,13 @@ fn peaks(scene: &Scene) -> Vec<Empirical> {
         factor,
     };
     let of = |centre: &f64| [0.06, 0.12, 0.25].map(|share| (*centre, share));
-    let all: Vec<(f64, f64)> = centres.iter().flat_map(of).collect();
+    let visited: Vec<(f64, f64)> = centres.iter().flat_map(of).collect();
+    // What resonates need not stand at a speed that the work asks for.
+    let between: Vec<f64> = centres.windows(2).map(|pair| (pair[0] * pair[1]).sqrt()).collect();
+    let between = between.iter().flat_map(of).map(|(centre, share)| one(centre, share, Factor::Turning));
     let factors = [Factor::Turning, Factor::InTheCut, Factor::WithTheCut];
-    all.iter().flat_map(|(centre, share)| factors.map(|factor| one(*centre, *share, factor))).collect()
+    let at_visited = visited.iter().flat_map(|(centre, share)| factors.map(|factor| one(*centre, *share, factor)));
+    at_visited.chain(between).collect()
 }
 
 /// What each pass begins with and loses over seconds.
@@ -278,11 +299,12 @@ fn fading(scene: &Scene) -> Vec<Empirical> {
         scale: 1.0,
         factor,
     };
-    let times = [3.0, 6.0, 12.0, 24.0].into_iter().filter(told);
+    let times = [3.0, 4.5, 6.0, 9.0, 12.0, 18.0, 24.0].into_iter().filter(told);
     times.flat_map(|over_s| [Factor::InTheCut, Factor::WithTheCut].map(|factor| one(over_s, factor))).collect()
 }
 
-fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
+/// A form as a hypothesis over these rows; `None` without its channel.
+pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
     let columns = form.columns(scene)?;
     let any = (f64::NEG_INFINITY, f64::INFINITY);
     // Where a peak stands and how wide it is has been chosen, as has how fast something fades.
@@ -313,6 +335,7 @@ fn design(form: Empirical, scene: &Scene, frame: &Frame) -> Option<Design> {
         freedom: columns.len() + chosen,
         ln_choices: 0.0,
         reluctance: 0.0,
+        noise: None,
         part,
         columns,
     })

@@ -104,6 +104,13 @@ impl Frame {
         white
     }
 
+    /// What the innovation of this group is multiplied by.
+    #[must_use]
+    pub fn weight(&self, group: usize) -> f64 {
+        let of = |weights: &[f64]| weights.get(group).copied().unwrap_or(1.0);
+        of(&self.weights) * of(&self.quiet)
+    }
+
     /// Logarithm of the likelihood, up to a constant, of innovations of this noise with this sum of squares.
     #[must_use]
     pub fn log_likelihood(&self, rss: f64, noise: Arma) -> f64 {

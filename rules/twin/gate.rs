@@ -22,9 +22,8 @@ const BLOCK_ROWS: usize = 40;
 /// `runs_too` the greater of two, the other from whole runs that flip.
 #[must_use]
 pub fn p_value(bank: &Bank<'_>, base: &Fit, best: &Fit, ln_rows: f64, seed: u64, runs_too: bool) -> f64 {
-    let setting = bank.nearest(best);
-    let stage = bank.stage(base, setting);
-    let innovations = bank.innovations(best, setting);
+    let stage = bank.through(base, best.noise);
+    let innovations = best.innovations(bank.frame());
     let observed = best_score(bank, &stage, &stage.residual, ln_rows);
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut share_as_good = |blocks: Blocks| {
@@ -54,7 +53,7 @@ enum Blocks {
     Units,
 }
 
-fn best_score(bank: &Bank<'_>, stage: &Stage, target: &[f64], ln_rows: f64) -> f64 {
+fn best_score(bank: &Bank<'_>, stage: &Stage<'_>, target: &[f64], ln_rows: f64) -> f64 {
     let rss = dot(target, target);
     let rows = count(target.len());
     let score = |index: usize| {

@@ -12,6 +12,10 @@ use crate::physics::{Form, OutputKind, Role};
 use crate::statistics::{count, median};
 use std::ops::Range;
 
+/// A switching so near to a change of pace is at it, s and in fitted rows: a spindle takes its time, and so does a meter.
+const AT_A_CHANGE_S: f64 = 3.0;
+/// See [`AT_A_CHANGE_S`].
+const AT_A_CHANGE_GROUPS: usize = 2;
 /// Rows of a spell in the cut from which a frequency can be read.
 const SPELL_ROWS_MIN: usize = 8;
 
@@ -19,26 +23,56 @@ impl Case<'_> {
     /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
     pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
         let effect = crate::physics::effect("auxiliary_switch")?;
-        // Consumers draw power; they do not move the tool against the work.
-        if self.scene.output_kind() == OutputKind::Displacement || !super::designs::wanted(effect, self.model) {
+        if !self.electric() || !super::designs::wanted(effect, self.model) {
             return None;
         }
-        let found = latent::find(&base.residual, &self.frame.stretches)?;
+        let found = latent::find(&base.residual, &self.frame, base.noise)?;
+        let (change, cut) = self.pace_of_groups();
+        let acts =
+            found.stays() && found.by_itself(&change, &cut) && latent::jumps(&found, &base.residual, &self.frame);
+        if !acts {
+            return None;
+        }
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
         self.switching = Some(found.clone());
         let form = Form { name: "latent", ln_choices: 0.5 * latent::price(&found), ..Form::default() };
-        super::designs::design(effect, &form, &self.scene, &self.frame)
+        let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
+        Some(Design { noise: Some(found.noise), ..design })
+    }
+
+    /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else.
+    fn electric(&self) -> bool {
+        self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a")
+    }
+
+    /// Of each group that is fitted: does the machine change its pace there or nearby, and does it cut?
+    fn pace_of_groups(&self) -> (Vec<bool>, Vec<bool>) {
+        let row = |group: usize| self.frame.rows(group).start;
+        let paces = [self.scene.role(Role::Speed), self.scene.column("feed_mm_min"), self.scene.role(Role::Engaged)];
+        let paces: Vec<&[f64]> = paces.into_iter().flatten().collect();
+        let differ = |a: f64, b: f64| (a - b).abs() > 0.02 * a.abs().max(b.abs());
+        let group_s = self.scene.period_s() * count(self.frame.rows(0).len());
+        let nearby = AT_A_CHANGE_GROUPS.max((AT_A_CHANGE_S / group_s).ceil().min(1e6) as usize);
+        let mut change = vec![false; self.frame.len()];
+        for group in 1..self.frame.len() {
+            if paces.iter().any(|pace| differ(pace[row(group - 1)], pace[row(group)])) {
+                let last = (group + nearby).min(self.frame.len() - 1);
+                change[group.saturating_sub(nearby)..=last].fill(true);
+            }
+        }
+        let engaged = self.scene.role(Role::Engaged);
+        let cut = |group: usize| engaged.is_some_and(|engaged| engaged[row(group)] > 0.5);
+        (change, (0..self.frame.len()).map(cut).collect())
     }
 
     /// The ripple of the mains folded by sampling, as a hypothesis, where what the baseline leaves has a wandering line.
     pub(super) fn hidden_ripple(&mut self, base: &Fit) -> Option<Design> {
         let effect = crate::physics::effect("ripple_alias")?;
-        let electric = self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a");
         // Averaged rows have no phase any more.
         let sampled =
             self.frame.len() == (0..self.frame.len()).map(|group| self.frame.rows(group).len()).sum::<usize>();
-        if !electric || !sampled || !super::designs::wanted(effect, self.model) {
+        if !self.electric() || !sampled || !super::designs::wanted(effect, self.model) {
             return None;
         }
         let found = ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
@@ -72,7 +106,7 @@ impl Case<'_> {
         let simulated = whole.frame.reduce(whole.scene.simulated().unwrap_or_default());
         let residual: Vec<f64> = whole.recorded.iter().zip(&simulated).map(|(x, simulated)| x - simulated).collect();
         if let Some(found) = &self.switching {
-            let found = latent::again(&residual, &whole.frame.stretches, found);
+            let found = latent::again(&residual, &whole.frame, found);
             let state = whole.switch_per_row(&found);
             whole.scene.set_latent("auxiliary_switch", state);
         }
@@ -146,11 +180,13 @@ impl Case<'_> {
         let mut state = self.frame.spread(&found.state, self.scene.rows());
         let simulated = self.scene.simulated().unwrap_or_default();
         let on = found.state.iter().sum::<f64>() / count(found.state.len());
-        for rows in self.held.iter().map(|unit| self.units[*unit].rows.clone()) {
-            let residual: Vec<f64> = rows.clone().map(|row| self.scene.recorded()[row] - simulated[row]).collect();
-            let deviation = 0.5 * found.level.abs();
-            let followed = latent::follow(&residual, found, deviation, on);
-            rows.zip(followed).for_each(|(row, on)| state[row] = on);
+        for groups in &self.held_frame.stretches {
+            let rows = |group: usize| self.held_frame.rows(group);
+            let left = |row: usize| self.scene.recorded()[row] - simulated[row];
+            let residual = |group: usize| rows(group).map(left).sum::<f64>() / count(rows(group).len());
+            let residual: Vec<f64> = groups.clone().map(residual).collect();
+            let followed = latent::follow(&residual, found, on);
+            groups.clone().zip(followed).for_each(|(group, on)| rows(group).for_each(|row| state[row] = on));
         }
         state
     }

@@ -46,11 +46,13 @@ pub struct Noise {
     pub deviation: f64,
 }
 
-/// Steps since a run: whether a held-out run beside the step lies before or after it must be followed.
+/// Steps and stretches of runs: whether a held-out run beside an edge lies before or after it must be followed.
 fn follows_state(part: &Part) -> bool {
     match &part.body {
         Body::Effect(effect, form) => {
-            effect.has_hidden_state() && form.place.as_ref().is_some_and(|(column, _)| column == "run")
+            effect.has_hidden_state()
+                && form.name != "stretches"
+                && form.place.as_ref().is_some_and(|(column, _)| column == "run")
         }
         _ => false,
     }
@@ -66,12 +68,13 @@ fn follow(
     prediction: &mut Prediction,
 ) {
     let Some(column) = unit_contribution(scene, &parts[index]) else { return };
-    let step = prediction.contributions[index].iter().position(|x| *x != 0.0).unwrap_or(scene.rows());
+    let present: Vec<bool> =
+        units.iter().map(|unit| unit.rows.clone().any(|row| prediction.contributions[index][row] != 0.0)).collect();
     let beside = |unit: usize| {
-        let at = units.iter().position(|unit| unit.rows.contains(&step)).unwrap_or(0);
-        // Held-out runs between the last training run before the step and the first after it.
-        let low = (0..at).rev().find(|unit| !held.contains(unit)).unwrap_or(0);
-        held.contains(&unit) && unit > low && unit <= at
+        // A held-out run between a training run with the state and one without it.
+        let before = (0..unit).rev().find(|unit| !held.contains(unit));
+        let after = (unit + 1..units.len()).find(|unit| !held.contains(unit));
+        held.contains(&unit) && before.zip(after).is_some_and(|(before, after)| present[before] != present[after])
     };
     for unit in (0..units.len()).filter(|unit| beside(*unit)) {
         follow_unit(scene, &column, index, units[unit].rows.clone(), noise, prediction);

@@ -1,20 +1,47 @@
-//! A consumer that goes on and off unseen: its two levels and when it switches are read from what a fit leaves over.
+//! A consumer that goes on and off unseen: its level and when it switches are read from what a fit leaves over.
 //!
-//! The most likely sequence of two levels (Viterbi) with a price per switching; levels and sequence are found in turn.
-//! A drift is no switch: both levels must be far apart for their scatter, and it must have switched often enough.
+//! The most likely sequence of on and off in the presence of slow noise: a switching is a jump, and slow noise makes none,
+//! so that a consumer half as strong as the noise still shows. Viterbi's algorithm, in which each of the two survivors
+//! carries its own innovation (per-survivor processing: Raheli, Polydoros, Tzou, IEEE Trans. Communications 43 (1995)),
+//! with a price per switching; sequence, level and noise are found in turn. What makes it a consumer of its own and not
+//! something of the process: it is on for a good part of the time, on and off as often in the cut as out of it, and it
+//! does not switch only when the machine changes its pace.
 
+use super::frame::Frame;
+use super::linear::dot;
+use super::noise::{Arma, fit_near};
 use crate::statistics::{count, median};
 use std::ops::Range;
 
-/// Switchings that must be seen, counted over all runs.
+/// Switchings that must be seen, those between runs included.
 const SWITCHINGS_MIN: usize = 4;
-/// Distance of the levels over the scatter of the means of their spells (Ashman's D) below which there are not two: a
-/// drift or a slow process has spells at any level.
-const SEPARATION_MIN: f64 = 3.0;
-/// Spells that each level must have.
-const SPELLS_MIN: usize = 3;
-/// Rounds of levels and sequence in turn.
-const ROUNDS: usize = 6;
+/// Share of the rows that each of the two levels must have.
+const SHARE_MIN: f64 = 0.15;
+/// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
+/// doing.
+const OWN_DOING: f64 = 0.7;
+/// By how much its share of the cut and that of the rest may differ.
+const SHARES_APART_MAX: f64 = 0.35;
+/// Rows of a spell that is no flicker, and the share of spells that may be shorter.
+const SPELL_ROWS_MIN: usize = 4;
+/// See [`SPELL_ROWS_MIN`].
+const SHORT_SPELLS_MAX: f64 = 0.25;
+/// Switchings that must be seen within a run, and their share of all.
+const JUMPS_MIN: usize = 2;
+/// See [`JUMPS_MIN`].
+const JUMPS_SHARE_MIN: f64 = 0.3;
+/// What the middle one of these must jump by, in levels: noise makes it seem more, an edge between two rows less.
+const JUMP: std::ops::RangeInclusive<f64> = 0.5..=2.2;
+/// Levels to start from, in deviations of the innovations.
+const STARTS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// Rounds of sequence and level to choose a start, and of sequence, level and noise after it.
+const ROUNDS: (usize, usize) = (2, 4);
+/// The best starts from which it is followed to the end.
+const SETTLED: usize = 3;
+/// Square of an innovation, in variances, beyond which a row says no more.
+const SURPRISE_MAX: f64 = 25.0;
+/// Chance that a switch stays as it is from one row to the next, where it is followed.
+const STAYS: f64 = 0.99;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,33 +54,134 @@ pub struct Switching {
     pub off: f64,
     /// What it adds when on.
     pub level: f64,
+    /// The noise beside it, and the standard deviation of its innovations.
+    pub noise: Arma,
+    /// See `noise`.
+    pub deviation: f64,
 }
 
-/// Finds the switch in a residual with these unbroken stretches, if there is one.
+/// Finds the switch in a residual of this noise, if there is one that explains more than its price.
 #[must_use]
-pub fn find(residual: &[f64], stretches: &[Range<usize>]) -> Option<Switching> {
-    let scatter = local_scatter(residual, stretches)?;
-    let (mut low, mut high) = first_levels(residual, stretches)?;
-    let mut state = Vec::new();
-    for _ in 0..ROUNDS {
-        state = sequence(residual, stretches, (low, high), scatter);
-        let mean = |wanted: f64| {
-            let chosen = || residual.iter().zip(&state).filter(|(_, state)| **state == wanted).map(|(x, _)| *x);
-            let rows = chosen().count();
-            (rows > 0).then(|| chosen().sum::<f64>() / count(rows))
-        };
-        (low, high) = (mean(0.0)?, mean(1.0)?);
+pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
+    let likelihood = |noise: Arma, residual: &[f64]| {
+        let e = frame.whiten(residual, noise);
+        frame.log_likelihood(dot(&e, &e), noise)
+    };
+    let before = likelihood(noise, residual);
+    let gain = |found: &Switching| 2.0 * (likelihood(found.noise, &found.left(residual)) - before) - price(found);
+    let starts = [noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
+    let begun = starts.iter().flat_map(|noise| STARTS.map(|size| begin(residual, frame, *noise, size)));
+    let mut begun: Vec<(f64, Switching)> =
+        begun.flatten().filter(Switching::lasts).map(|found| (gain(&found), found)).collect();
+    begun.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let settled = begun.into_iter().take(SETTLED).filter_map(|(_, found)| found.settled(residual, frame));
+    let best = settled.map(|found| (gain(&found), found)).max_by(|a, b| a.0.total_cmp(&b.0))?.1;
+    (gain(&best) > 0.0 && best.switchings >= SWITCHINGS_MIN && best.lasts()).then_some(best)
+}
+
+/// From a level of so many innovations, with this noise.
+fn begin(residual: &[f64], frame: &Frame, noise: Arma, size: f64) -> Option<Switching> {
+    let deviation = deviation(&frame.whiten(residual, noise))?;
+    let level = size * deviation;
+    let mut found = Switching { state: Vec::new(), switchings: 0, off: -0.3 * level, level, noise, deviation };
+    for _ in 0..ROUNDS.0 {
+        found = found.improved(residual, frame)?;
     }
-    let switchings = stretches.iter().map(|rows| state[rows.clone()].windows(2).filter(|p| p[0] != p[1]).count()).sum();
-    let found = Switching { off: low, level: high - low, switchings, state };
-    (switchings >= SWITCHINGS_MIN && separated(residual, stretches, &found)).then_some(found)
+    Some(found)
 }
 
-/// The same switch in another residual.
+impl Switching {
+    /// What it leaves of a residual.
+    fn left(&self, residual: &[f64]) -> Vec<f64> {
+        residual.iter().zip(&self.state).map(|(x, on)| x - self.off - self.level * on).collect()
+    }
+
+    /// A new sequence, then new levels; `None` when one of them is gone.
+    fn improved(mut self, residual: &[f64], frame: &Frame) -> Option<Self> {
+        self.state = sequence(residual, frame, &self);
+        self.switchings = self.state.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let one = frame.whiten(&vec![1.0; residual.len()], self.noise);
+        let on = frame.whiten(&self.state, self.noise);
+        let all = frame.whiten(residual, self.noise);
+        let (aa, ab, bb) = (dot(&one, &one), dot(&one, &on), dot(&on, &on));
+        let (ay, by) = (dot(&one, &all), dot(&on, &all));
+        let determinant = aa * bb - ab * ab;
+        if determinant <= 1e-9 * aa * bb || determinant.is_nan() {
+            return None;
+        }
+        self.off = (bb * ay - ab * by) / determinant;
+        self.level = (aa * by - ab * ay) / determinant;
+        if self.level < 0.0 {
+            self.off += self.level;
+            self.level = -self.level;
+            self.state.iter_mut().for_each(|on| *on = 1.0 - *on);
+        }
+        self.deviation = deviation(&frame.whiten(&self.left(residual), self.noise))?;
+        Some(self)
+    }
+
+    /// Sequence, level and noise in turn.
+    fn settled(mut self, residual: &[f64], frame: &Frame) -> Option<Self> {
+        for _ in 0..ROUNDS.1 {
+            self.noise = fit_near(&self.left(residual), frame, self.noise).1;
+            self = self.improved(residual, frame)?;
+        }
+        Some(self)
+    }
+
+    /// Is each of the two levels there for a good part of the time?
+    fn lasts(&self) -> bool {
+        let on = self.state.iter().sum::<f64>() / count(self.state.len());
+        (SHARE_MIN..=1.0 - SHARE_MIN).contains(&on)
+    }
+
+    /// Does it stay as it is for a while? What flickers from row to row is noise with two faces.
+    #[must_use]
+    pub fn stays(&self) -> bool {
+        let spells: Vec<usize> = self.state.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+        let short = spells.iter().filter(|rows| **rows < SPELL_ROWS_MIN).count();
+        count(short) <= SHORT_SPELLS_MAX * count(spells.len())
+    }
+
+    /// Does it switch by itself? Not where it switches with the pace only, nor where it is on in the cut and off out of
+    /// it or the other way round. `change` says of each row whether the pace changes there or nearby, `cut` whether it is
+    /// cut.
+    #[must_use]
+    pub fn by_itself(&self, change: &[bool], cut: &[bool]) -> bool {
+        let switchings = || (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]);
+        let all = count(switchings().count());
+        let together = count(switchings().filter(|row| change[*row]).count());
+        // As often as by chance is no sign.
+        let by_chance = count((0..change.len()).filter(|row| change[*row]).count()) / count(change.len());
+        let own_doing = all * (1.0 - by_chance) > 3.0 && together / all - by_chance > OWN_DOING * (1.0 - by_chance);
+        let share = |wanted: bool| {
+            let of: Vec<f64> =
+                self.state.iter().zip(cut).filter(|(_, cut)| **cut == wanted).map(|(on, _)| *on).collect();
+            (!of.is_empty()).then(|| of.iter().sum::<f64>() / count(of.len()))
+        };
+        let apart = share(true).zip(share(false)).map_or(0.0, |(cut, rest)| (cut - rest).abs());
+        !own_doing && apart <= SHARES_APART_MAX
+    }
+}
+
+/// Does the residual jump by the level where it switches? A consumer does, from one row to the next; what wanders does
+/// not, nor does what is one level in one run and another in the next.
 #[must_use]
-pub fn again(residual: &[f64], stretches: &[Range<usize>], found: &Switching) -> Switching {
-    let scatter = local_scatter(residual, stretches).unwrap_or(found.level.abs());
-    Switching { state: sequence(residual, stretches, (found.off, found.off + found.level), scatter), ..found.clone() }
+pub fn jumps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
+    let within = frame.stretches.iter().flat_map(|rows| rows.start + 1..rows.end);
+    let jump = |row: usize| (found.state[row] - found.state[row - 1]) * (residual[row] - residual[row - 1]);
+    let jumps: Vec<f64> = within.filter(|row| found.state[*row] != found.state[*row - 1]).map(jump).collect();
+    let seen = jumps.len();
+    seen >= JUMPS_MIN
+        && count(seen) >= JUMPS_SHARE_MIN * count(found.switchings)
+        && median(jumps).is_some_and(|jump| JUMP.contains(&(jump / found.level)))
+}
+
+/// The same switch in another residual, with the noise that is there.
+#[must_use]
+pub fn again(residual: &[f64], frame: &Frame, found: &Switching) -> Switching {
+    let begun = Switching { state: sequence(residual, frame, found), ..found.clone() };
+    begun.clone().settled(residual, frame).unwrap_or(begun)
 }
 
 /// The price, in units of information, of having chosen when to switch.
@@ -64,123 +192,189 @@ pub fn price(switching: &Switching) -> f64 {
     2.0 * switchings * (rows / switchings).ln() + 2.0 * switchings
 }
 
-/// Scatter from row to row: half the slow changes do not enter.
-fn local_scatter(residual: &[f64], stretches: &[Range<usize>]) -> Option<f64> {
-    let steps = stretches.iter().flat_map(|rows| residual[rows.clone()].windows(2).map(|p| (p[1] - p[0]).abs()));
-    let scatter = 1.4826 * median(steps.collect())? / std::f64::consts::SQRT_2;
-    (scatter > 0.0).then_some(scatter)
+/// Standard deviation of innovations, whatever the few greatest are.
+fn deviation(innovations: &[f64]) -> Option<f64> {
+    let deviation = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect())?;
+    (deviation > 0.0).then_some(deviation)
 }
 
-/// Two levels to start from: quarter and three-quarter points of the residual smoothed over five rows.
-fn first_levels(residual: &[f64], stretches: &[Range<usize>]) -> Option<(f64, f64)> {
-    let mut smooth: Vec<f64> = stretches
-        .iter()
-        .flat_map(|rows| residual[rows.clone()].windows(5).map(|window| window.iter().sum::<f64>() / 5.0))
-        .collect();
-    smooth.sort_by(f64::total_cmp);
-    // The best cut in two by the sum of squares (Otsu), so that a rare state is not missed.
-    let total: f64 = smooth.iter().sum();
-    let mut left = 0.0;
-    let mut best = (0.0, None);
-    for index in 1..smooth.len() {
-        left += smooth[index - 1];
-        let (below, above) = (count(index), count(smooth.len() - index));
-        let (low, high) = (left / below, (total - left) / above);
-        let between = below * above * (high - low) * (high - low);
-        if between > best.0 {
-            best = (between, Some((low, high)));
-        }
+/// One of the two sequences that are still in the race.
+#[derive(Clone, Copy)]
+struct Survivor {
+    cost: f64,
+    x: f64,
+    e: f64,
+}
+
+impl Survivor {
+    /// The innovation of a row after this one.
+    fn innovation(&self, x: f64, noise: Arma) -> f64 {
+        x - noise.phi * self.x - noise.theta * self.e
     }
-    best.1
 }
 
-/// The most likely sequence of the two levels.
-fn sequence(residual: &[f64], stretches: &[Range<usize>], levels: (f64, f64), scatter: f64) -> Vec<f64> {
+/// The most likely sequence of on (1) and off (0).
+fn sequence(residual: &[f64], frame: &Frame, found: &Switching) -> Vec<f64> {
     let mut state = vec![0.0; residual.len()];
-    let price = 3.0 * count(residual.len().max(2)).ln();
-    let cost = |x: f64, level: f64| ((x - level) / scatter).powi(2).min(25.0);
-    for rows in stretches {
-        let mut back = Vec::with_capacity(rows.len());
-        let (mut off, mut on) = (0.0_f64, 0.0_f64);
-        for row in rows.clone() {
-            let (from_off, from_on) = (on + price < off, off + price < on);
-            back.push((from_off, from_on));
-            let (best_off, best_on) = (off.min(on + price), on.min(off + price));
-            off = best_off + cost(residual[row], levels.0);
-            on = best_on + cost(residual[row], levels.1);
-        }
-        let mut is_on = on < off;
-        for (index, row) in rows.clone().enumerate().rev() {
-            state[row] = if is_on { 1.0 } else { 0.0 };
-            let (off_came_from_on, on_came_from_off) = back[index];
-            is_on = if is_on { !on_came_from_off } else { off_came_from_on };
-        }
+    for rows in &frame.stretches {
+        follow_stretch(residual, frame, found, rows.clone(), &mut state);
     }
     state
 }
 
-fn separated(residual: &[f64], stretches: &[Range<usize>], found: &Switching) -> bool {
-    let mut means: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
-    for rows in stretches {
-        let mut start = rows.start;
-        for row in rows.start + 1..=rows.end {
-            if row == rows.end || found.state[row] != found.state[start] {
-                let mean = residual[start..row].iter().sum::<f64>() / count(row - start);
-                means[usize::from(found.state[start] > 0.5)].push(mean);
-                start = row;
-            }
-        }
+fn follow_stretch(residual: &[f64], frame: &Frame, found: &Switching, rows: Range<usize>, state: &mut [f64]) {
+    let price = 2.0 * count(residual.len().max(20) / 10).ln() + 2.0;
+    let cost = |row: usize, e: f64| (e * frame.weight(row) / found.deviation).powi(2).min(SURPRISE_MAX);
+    let value = |row: usize, on: usize| residual[row] - found.off - if on == 1 { found.level } else { 0.0 };
+    let begin = |on: usize| {
+        let x = value(rows.start, on);
+        Survivor { cost: cost(rows.start, x * found.noise.first_weight()), x, e: 0.0 }
+    };
+    let mut race = [begin(0), begin(1)];
+    let mut back: Vec<[usize; 2]> = vec![[0, 1]];
+    for row in rows.start + 1..rows.end {
+        let step = |to: usize| {
+            let x = value(row, to);
+            let from = |from: usize| {
+                let e = race[from].innovation(x, found.noise);
+                let price = if from == to { 0.0 } else { price };
+                (Survivor { cost: race[from].cost + price + cost(row, e), x, e }, from)
+            };
+            let (stay, switch) = (from(to), from(1 - to));
+            if switch.0.cost < stay.0.cost { switch } else { stay }
+        };
+        let (off, on) = (step(0), step(1));
+        back.push([off.1, on.1]);
+        race = [off.0, on.0];
     }
-    let level = [found.off, found.off + found.level];
-    let spread =
-        |index: usize| 1.4826 * median(means[index].iter().map(|m| (m - level[index]).abs()).collect()).unwrap_or(0.0);
-    let enough = means.iter().all(|means| means.len() >= SPELLS_MIN);
-    enough && std::f64::consts::SQRT_2 * found.level > SEPARATION_MIN * spread(0).hypot(spread(1))
+    let mut on = usize::from(race[1].cost < race[0].cost);
+    for (row, came_from) in rows.zip(back).rev() {
+        state[row] = if on == 1 { 1.0 } else { 0.0 };
+        on = came_from[on];
+    }
 }
 
 /// The chance, row by row and from earlier rows of the stretch only, that the switch is on.
 #[must_use]
-pub fn follow(residual: &[f64], found: &Switching, deviation: f64, share_on: f64) -> Vec<f64> {
-    let stay = 0.97;
-    let mut on = share_on;
-    residual
-        .iter()
-        .map(|x| {
-            let now = on;
-            let weight = |level: f64| (-0.5 * ((x - level) / deviation).powi(2).min(50.0)).exp();
-            let (yes, no) = (now * weight(found.off + found.level), (1.0 - now) * weight(found.off));
-            let posterior = if yes + no > 0.0 { yes / (yes + no) } else { now };
-            on = posterior * stay + (1.0 - posterior) * (1.0 - stay);
-            now
-        })
-        .collect()
+pub fn follow(residual: &[f64], found: &Switching, share_on: f64) -> Vec<f64> {
+    let mut belief = share_on;
+    let mut last: Option<[(f64, f64); 2]> = None;
+    let chance = |e: f64| (-0.5 * (e / found.deviation).powi(2).min(SURPRISE_MAX)).exp();
+    let mut told = Vec::with_capacity(residual.len());
+    for x in residual {
+        told.push(belief * STAYS + (1.0 - belief) * (1.0 - STAYS));
+        let x = [x - found.off, x - found.off - found.level];
+        // From each state before to each state now: how likely, and with which innovation.
+        let path = |from: usize, to: usize| {
+            let e = match last {
+                Some(last) => x[to] - found.noise.phi * last[from].0 - found.noise.theta * last[from].1,
+                None => x[to] * found.noise.first_weight(),
+            };
+            let stays = if to == from { STAYS } else { 1.0 - STAYS };
+            let before = if from == 1 { belief } else { 1.0 - belief };
+            (stays * before * chance(e), e)
+        };
+        let now = [0, 1].map(|to| {
+            let (off, on) = (path(0, to), path(1, to));
+            let sum = off.0 + on.0;
+            let mean = (off.0 * off.1 + on.0 * on.1) / sum.max(f64::MIN_POSITIVE);
+            (sum, if last.is_none() { 0.0 } else { mean })
+        });
+        last = Some([(x[0], now[0].1), (x[1], now[1].1)]);
+        let sum = now[0].0 + now[1].0;
+        belief = if sum > 0.0 { now[1].0 / sum } else { belief };
+    }
+    told
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::frame::units;
     use super::*;
+    use crate::physics::Scene;
+    use adapters::Recording;
+    use adapters::recording::{Cells, Numbers};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    fn noise(rows: usize, seed: u64) -> Vec<f64> {
+    /// One run of so many rows.
+    fn frame(rows: usize) -> Frame {
+        let mut recording = Recording::new("test", (0..rows).map(count).collect(), None);
+        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; rows])));
+        let scene = Scene::new(&recording, "spindle_power_w", &Default::default()).expect("a scene");
+        Frame::new(&scene, &units(&scene), 1, |_| true)
+    }
+
+    /// Noise with this memory and unit variance.
+    fn noise(rows: usize, phi: f64, seed: u64) -> Vec<f64> {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
-        (0..rows).map(|_| StandardNormal.sample(&mut rng)).collect()
+        let mut last = 0.0;
+        let mut next = |_| {
+            let e: f64 = StandardNormal.sample(&mut rng);
+            last = phi * last + (1.0 - phi * phi).sqrt() * e;
+            last
+        };
+        (0..rows).map(&mut next).collect()
+    }
+
+    fn on(row: usize) -> f64 {
+        if row / 60 % 2 == 1 { 1.0 } else { 0.0 }
+    }
+
+    fn with_pump(noise: &[f64], level: f64) -> Vec<f64> {
+        noise.iter().enumerate().map(|(row, x)| x + level * on(row)).collect()
     }
 
     #[test]
     fn a_pump_is_found_with_its_level() {
-        let mut residual = noise(1000, 3);
-        residual.iter_mut().enumerate().for_each(|(row, x)| *x += if row / 60 % 2 == 1 { 4.0 } else { 0.0 });
-        let all = std::iter::once(0..1000).collect::<Vec<_>>();
-        let found = find(&residual, &all).expect("a switch");
+        let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
+        let found = find(&residual, &frame(1000), Arma { phi: 0.97, theta: -0.65 }).expect("a switch");
         assert!((found.level - 4.0).abs() < 0.3 && found.switchings == 16, "{} {}", found.level, found.switchings);
     }
 
     #[test]
+    fn a_pump_as_strong_as_slow_noise_is_found() {
+        let residual = with_pump(&noise(2000, 0.95, 6), 1.5);
+        let found = find(&residual, &frame(2000), Arma { phi: 0.97, theta: 0.0 }).expect("a switch");
+        let right = found.state.iter().enumerate().filter(|(row, state)| **state == on(*row)).count();
+        assert!((found.level - 1.5).abs() < 0.2 && right > 1800, "{} {right}", found.level);
+    }
+
+    #[test]
     fn noise_and_a_drift_are_no_pump() {
-        let all = std::iter::once(0..1000).collect::<Vec<_>>();
-        assert_eq!(find(&noise(1000, 4), &all), None);
-        let drift: Vec<f64> = noise(1000, 5).iter().enumerate().map(|(row, x)| x + 0.006 * count(row)).collect();
-        assert_eq!(find(&drift, &all), None);
+        let frame = frame(1000);
+        assert_eq!(find(&noise(1000, 0.0, 4), &frame, Arma::WHITE), None);
+        assert_eq!(find(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }), None);
+        let drift: Vec<f64> = noise(1000, 0.0, 5).iter().enumerate().map(|(row, x)| x + 0.006 * count(row)).collect();
+        assert_eq!(find(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }), None);
+    }
+
+    #[test]
+    fn what_flickers_is_no_consumer() {
+        let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
+        let mut found = find(&residual, &frame(1000), Arma::WHITE).expect("a switch");
+        assert!(found.stays());
+        (0..1000).step_by(20).for_each(|row| found.state[row] = 1.0 - found.state[row]);
+        assert!(!found.stays());
+    }
+
+    #[test]
+    fn what_switches_with_the_machine_is_no_switch_of_its_own() {
+        let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
+        let found = find(&residual, &frame(1000), Arma::WHITE).expect("a switch");
+        let with_the_pump: Vec<bool> = (0..1000).map(|row| (row + 2) % 60 < 5).collect();
+        let seldom: Vec<bool> = (0..1000).map(|row| (row + 2) % 170 < 5).collect();
+        let cut: Vec<bool> = (0..1000).map(|row| row % 50 > 25).collect();
+        assert!(!found.by_itself(&with_the_pump, &cut));
+        assert!(!found.by_itself(&seldom, &found.state.iter().map(|on| *on > 0.5).collect::<Vec<bool>>()));
+        assert!(found.by_itself(&seldom, &cut));
+    }
+
+    #[test]
+    fn a_followed_pump_is_known_soon_after_it_switches() {
+        let found = find(&with_pump(&noise(2000, 0.9, 6), 3.0), &frame(2000), Arma { phi: 0.9, theta: 0.0 });
+        let told = follow(&with_pump(&noise(2000, 0.9, 7), 3.0), &found.expect("a switch"), 0.5);
+        let right = told.iter().enumerate().filter(|(row, chance)| (*chance - on(*row)).abs() < 0.5).count();
+        assert!(right > 1850, "{right}");
     }
 }

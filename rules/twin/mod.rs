@@ -26,6 +26,7 @@ pub mod fit;
 pub mod frame;
 pub mod gate;
 pub mod hidden;
+mod hidden_lots;
 pub mod holdout;
 pub mod inputs;
 pub mod latent;

@@ -350,8 +350,8 @@ fn form_name(name: &str) -> Option<&'static str> {
 }
 
 /// Form names beside [`FORM_NAMES`]: of states, delays and places.
-const MORE_FORM_NAMES: [&str; 10] =
-    ["lag", "delay", "direct", "flag", "lots", "one", "speed", "clipped", "mean", "slope"];
+const MORE_FORM_NAMES: [&str; 12] =
+    ["lag", "delay", "direct", "flag", "lots", "stretch", "stretches", "one", "speed", "clipped", "mean", "slope"];
 
 /// Every form name that an effect of the catalogue uses.
 pub(super) const FORM_NAMES: [&str; 27] = [

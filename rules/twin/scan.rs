@@ -10,6 +10,7 @@ use super::frame::Frame;
 use super::linear::{dot, extend_basis, project_out};
 use super::noise::Arma;
 use crate::statistics::count;
+use std::borrow::Cow;
 use std::cell::OnceCell;
 
 /// Share of a column's length that must lie outside what the fit can absorb: below it the hypothesis leaves no trace.
@@ -52,6 +53,7 @@ pub struct Bank<'a> {
 }
 
 /// A design at one setting: whitened columns and their inner products.
+#[derive(Debug, Clone)]
 struct White {
     columns: Vec<Vec<f64>>,
     gram: Vec<Vec<f64>>,
@@ -65,20 +67,21 @@ impl<'a> Bank<'a> {
     }
 
     fn at(&self, setting: usize) -> &[White] {
-        self.whitened[setting].get_or_init(|| {
-            let one = |design: &Design| {
-                let white = |column: &Vec<f64>| self.frame.whiten(column, SETTINGS[setting]);
-                let columns: Vec<Vec<f64>> = design.columns.iter().map(white).collect();
-                let gram = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
-                White { columns, gram }
-            };
-            self.designs.iter().map(one).collect()
-        })
+        self.whitened[setting].get_or_init(|| self.white(SETTINGS[setting]))
+    }
+
+    fn white(&self, noise: Arma) -> Vec<White> {
+        let one = |design: &Design| {
+            let white = |column: &Vec<f64>| self.frame.whiten(column, noise);
+            let columns: Vec<Vec<f64>> = design.columns.iter().map(white).collect();
+            let gram = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
+            White { columns, gram }
+        };
+        self.designs.iter().map(one).collect()
     }
 
     /// The setting at which the fit's residual is likeliest.
-    #[must_use]
-    pub fn nearest(&self, fit: &Fit) -> usize {
+    fn nearest(&self, fit: &Fit) -> usize {
         let likelihood = |noise: Arma| {
             let e = self.frame.whiten(&fit.residual, noise);
             self.frame.log_likelihood(dot(&e, &e), noise)
@@ -96,7 +99,7 @@ impl<'a> Bank<'a> {
         settings.dedup();
         let mut best: Vec<f64> = vec![f64::NEG_INFINITY; self.designs.len()];
         for setting in settings {
-            let stage = self.stage(fit, setting);
+            let stage = self.stage(fit, SETTINGS[setting], Cow::Borrowed(self.at(setting)));
             for (index, best) in best.iter_mut().enumerate() {
                 let rss = stage.rss - self.explained(&stage, index, &stage.residual);
                 // The fit's own noise lies between the settings: at the nearest one the gain is over that setting.
@@ -118,10 +121,13 @@ impl<'a> Bank<'a> {
         best.into_iter().enumerate().map(score).collect()
     }
 
-    /// A fit seen through one setting.
+    /// A fit seen through exactly this noise.
     #[must_use]
-    pub fn stage(&self, fit: &Fit, setting: usize) -> Stage {
-        let noise = SETTINGS[setting];
+    pub fn through(&self, fit: &Fit, noise: Arma) -> Stage<'_> {
+        self.stage(fit, noise, Cow::Owned(self.white(noise)))
+    }
+
+    fn stage<'s>(&self, fit: &Fit, noise: Arma, white: Cow<'s, [White]>) -> Stage<'s> {
         let mut basis = Vec::new();
         for column in &fit.tangent {
             extend_basis(&mut basis, self.frame.whiten(column, noise), 1e-7);
@@ -129,22 +135,16 @@ impl<'a> Bank<'a> {
         let mut residual = self.frame.whiten(&fit.residual, noise);
         project_out(&basis, &mut residual);
         let rss = dot(&residual, &residual);
-        let outside = self.at(setting).iter().map(|white| outside(white, &basis)).collect();
-        Stage { setting, basis, residual, rss, outside }
+        let outside = white.iter().map(|white| outside(white, &basis)).collect();
+        Stage { white, basis, residual, rss, outside }
     }
 
     /// Sum of squares of `target`, which lies outside the basis, that a design explains with lawful signs.
     #[must_use]
-    pub fn explained(&self, stage: &Stage, design: usize, target: &[f64]) -> f64 {
-        let white = &self.at(stage.setting)[design];
+    pub fn explained(&self, stage: &Stage<'_>, design: usize, target: &[f64]) -> f64 {
+        let white = &stage.white[design];
         let along: Vec<f64> = white.columns.iter().map(|column| dot(column, target)).collect();
         lawful_gain(&stage.outside[design], &along, &self.designs[design].ranges)
-    }
-
-    /// Innovations of a fit at the noise of a setting.
-    #[must_use]
-    pub fn innovations(&self, fit: &Fit, setting: usize) -> Vec<f64> {
-        self.frame.whiten(&fit.residual, SETTINGS[setting])
     }
 
     /// The rows of the comparison.
@@ -154,9 +154,9 @@ impl<'a> Bank<'a> {
     }
 }
 
-/// A fit seen through one noise setting.
-pub struct Stage {
-    setting: usize,
+/// A fit seen through one noise.
+pub struct Stage<'s> {
+    white: Cow<'s, [White]>,
     /// Orthonormal basis of the whitened tangent.
     pub basis: Vec<Vec<f64>>,
     /// Whitened residual outside that basis.

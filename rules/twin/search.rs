@@ -24,6 +24,10 @@ const STEP_INFORMATION: f64 = 6.0;
 const STEP_SHARE: f64 = 0.05;
 /// The p-value that a finding must not exceed.
 pub const P_MAX: f64 = 0.02;
+/// Information by which a fault of the measurement may explain less than a cause in the machine and still be named first.
+const MEASURED_AS_WELL: f64 = 3.0;
+/// Faults of a meter.
+const METER: [&str; 6] = ["sensor_gain", "zero_drift", "offset", "clock_lag", "meter_window", "saturation"];
 
 /// A set of effects on top of the baseline, fitted together with it.
 #[derive(Clone)]
@@ -101,6 +105,7 @@ impl<'a, 'b> Search<'a, 'b> {
             best = next;
         }
         let best = self.pruned(best);
+        let best = self.meter_first(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
         Found { best, p_values, others: self.tried, refused_p }
@@ -146,8 +151,9 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut chosen: Vec<&Score> = Vec::new();
         for score in &scores {
             let kind = self.bank.designs[score.design].kind.as_str();
-            let lawful = !kinds.contains(&kind) && !present.iter().any(|present| excludes(present, kind));
-            if chosen.len() < most && score.gain.is_finite() && lawful {
+            let unseen = self.bank.designs[score.design].noise.is_some();
+            let wanted = unseen || chosen.len() < most && !kinds.contains(&kind);
+            if wanted && score.gain.is_finite() && !present.iter().any(|present| excludes(present, kind)) {
                 kinds.push(kind);
                 chosen.push(score);
             }
@@ -163,7 +169,7 @@ impl<'a, 'b> Search<'a, 'b> {
         parts.push(self.bank.designs[design].part.clone());
         let mut members = from.members.clone();
         members.push(design);
-        self.fitted(members, &parts, from.fit.noise)
+        self.fitted(members, &parts, self.bank.designs[design].noise.unwrap_or(from.fit.noise))
     }
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
@@ -199,6 +205,26 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut parts = from.fit.parts.clone();
         parts.remove(first + position);
         self.fitted(members, &parts, from.fit.noise)
+    }
+
+    /// Of two explanations that the recording does not tell apart, one a fault of the measurement and one of the machine,
+    /// the measurement is named first: it is looked at sooner, and the other stands beside it.
+    fn meter_first(&mut self, best: Hypothesis) -> Hypothesis {
+        let kinds = |of: &Hypothesis| -> Vec<&str> {
+            of.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect()
+        };
+        let ours = kinds(&best);
+        let as_good = self.tried.iter().filter(|other| {
+            let theirs = kinds(other);
+            let new: Vec<&&str> = theirs.iter().filter(|kind| !ours.contains(kind)).collect();
+            let gone: Vec<&&str> = ours.iter().filter(|kind| !theirs.contains(kind)).collect();
+            let swapped = matches!((new.as_slice(), gone.as_slice()), ([new], [gone])
+                if METER.contains(new) && !METER.contains(gone));
+            theirs.len() == ours.len() && swapped && best.information - other.information < MEASURED_AS_WELL
+        });
+        let Some(other) = as_good.max_by(|a, b| a.information.total_cmp(&b.information)).cloned() else { return best };
+        self.tried.push(best);
+        other
     }
 
     /// Drops members that have become superfluous.

@@ -10,7 +10,7 @@ use crate::physics::{effect, unit_in};
 use crate::statistics::count;
 
 /// Information within which two explanations cannot be told apart.
-const CLASS_INFORMATION: f64 = 6.0;
+pub(super) const CLASS_INFORMATION: f64 = 6.0;
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
 /// 95 %: a share that no amount of rows makes smaller (GUM, type B).
 const LAW_SHARE: f64 = 0.05;
@@ -47,7 +47,11 @@ pub fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
 #[must_use]
 pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     let missing = missing(case, &outcome);
-    let alternatives = alternatives(&outcome);
+    let mut alternatives = alternatives(&outcome);
+    // Not after all names were found too small to be worth claiming.
+    if let Some(nameless) = case.nameless.as_ref().filter(|_| !missing.is_empty()) {
+        alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
+    }
     let verdict = outcome.verdict(!alternatives.is_empty());
     let mismatch = regions(case, &outcome);
     let unit = unit_of(&case.model.output).to_owned();

@@ -19,8 +19,7 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
         }
         Verdict::Explained => format!("The model lacks {}{}. {fit}", names.join(" and "), region(diagnosis)),
         Verdict::Ambiguous => {
-            let others: Vec<String> =
-                diagnosis.alternatives.iter().map(|other| other.effect.replace('_', " ")).collect();
+            let others: Vec<String> = diagnosis.alternatives.iter().map(|other| rival(&other.effect)).collect();
             format!(
                 "Something is missing from the model{}: most likely {}, but this recording cannot rule out {}. {fit}",
                 region(diagnosis),
@@ -29,6 +28,11 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
             )
         }
     }
+}
+
+/// A rival in words; one without a name too.
+fn rival(effect: &str) -> String {
+    if effect == "unknown" { "a cause that is not in the catalogue".to_owned() } else { effect.replace('_', " ") }
 }
 
 fn improvement(diagnosis: &Diagnosis) -> String {

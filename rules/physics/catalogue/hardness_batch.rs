@@ -1,7 +1,9 @@
 //! A lot of material is harder or softer than the one before.
 
 use crate::physics::cut::{cut, cut_times};
-use crate::physics::excitation::{since_run, step_forms, where_word, word_forms};
+use crate::physics::excitation::{
+    ln_count, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
+};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
@@ -11,7 +13,7 @@ pub struct HardnessBatch;
 static DOC: EffectDoc = EffectDoc {
     kind: "hardness_batch",
     family: "cutting",
-    law: "y = gain * L in one lot, or from one run on; lots: y = gain_i * L in lot i against the first",
+    law: "y = gain * L in one lot, or from one run on, or in a stretch of runs; lots: y = gain_i * L in lot i against the first",
     parameters: &[
         ParameterDoc {
             name: "gain",
@@ -103,7 +105,7 @@ impl Effect for HardnessBatch {
         if forms.len() > 2 {
             forms.push(Form { name: "lots", ..Form::plain() });
         }
-        forms.extend(step_forms(scene, "step"));
+        forms.extend(steps_between_lots(scene));
         forms
     }
 
@@ -112,7 +114,13 @@ impl Effect for HardnessBatch {
             return every_lot(scene);
         }
         let (column, word) = form.place.as_ref()?;
-        let here = if column == "run" { since_run(scene, word) } else { where_word(scene, column, word) }?;
+        if form.name == "stretches" {
+            return from_start_to_start(scene, word);
+        }
+        let here = match column.as_str() {
+            "run" => since_run(scene, word).or_else(|| within_runs(scene, word)),
+            _ => where_word(scene, column, word),
+        }?;
         Some(vec![("gain", cut_times(scene, |row| here[row])?)])
     }
 
@@ -123,6 +131,54 @@ impl Effect for HardnessBatch {
 
 /// Names of the gains of the second and further lots.
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];
+
+/// Steps at the start of a run; where the lots are recorded, only of a run that begins one.
+fn steps_between_lots(scene: &Scene) -> Vec<Form> {
+    let mut steps = step_forms(scene, "step");
+    let Some(lots) = scene.words("lot").filter(|lots| lots.words().len() > 1) else { return steps };
+    let begins_a_lot = |form: &Form| {
+        let run = form.place.as_ref().and_then(|(_, run)| scene.run_names().iter().position(|name| name == run));
+        run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
+    };
+    steps.retain(begins_a_lot);
+    let ln_choices = ln_count(steps.len());
+    steps.iter_mut().for_each(|form| form.ln_choices = ln_choices);
+    steps
+}
+
+/// The form for an odd lot nobody wrote down: the runs from `first` to `last`, one of `e^ln_choices` stretches.
+#[must_use]
+pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> Form {
+    let place = Some(("run".to_owned(), stretch_of_runs(scene, first, last)));
+    Form { name: "stretch", place, ln_choices, ..Form::default() }
+}
+
+/// The form for lots nobody wrote down: these runs begin the second and the further ones.
+#[must_use]
+pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> Form {
+    let names: Vec<&str> = starts.iter().map(|run| scene.run_names()[*run].as_str()).collect();
+    Form { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..Form::default() }
+}
+
+/// Lots beyond which no gains of their own are fitted.
+pub const LOTS_MAX: usize = GAINS.len() + 1;
+
+/// Between the runs that begin a lot.
+const LOT_TO_LOT: &str = ", ";
+
+fn from_start_to_start(scene: &Scene, starts: &str) -> Option<Columns> {
+    let row = |name: &str| {
+        let run = scene.run_names().iter().position(|known| known == name)?;
+        Some(scene.runs()[run].start)
+    };
+    let mut rows: Vec<usize> = starts.split(LOT_TO_LOT).map(row).collect::<Option<_>>()?;
+    rows.push(scene.rows());
+    let gain = |(gain, lot): (&&'static str, &[usize])| {
+        let here = |row: usize| f64::from(u8::from((lot[0]..lot[1]).contains(&row)));
+        Some((*gain, cut_times(scene, here)?))
+    };
+    GAINS.iter().zip(rows.windows(2)).map(gain).collect()
+}
 
 fn every_lot(scene: &Scene) -> Option<Columns> {
     let lots = scene.words("lot")?;
