@@ -29,7 +29,7 @@ impl Case<'_> {
         let found = latent::find(&base.residual, &self.frame, base.noise)?;
         let (change, cut) = self.pace_of_groups();
         let acts =
-            found.stays() && found.by_itself(&change, &cut) && latent::jumps(&found, &base.residual, &self.frame);
+            found.stays() && found.by_itself(&change, &cut) && latent::steps(&found, &base.residual, &self.frame);
         if !acts {
             return None;
         }

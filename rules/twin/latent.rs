@@ -26,12 +26,14 @@ const SHARES_APART_MAX: f64 = 0.35;
 const SPELL_ROWS_MIN: usize = 4;
 /// See [`SPELL_ROWS_MIN`].
 const SHORT_SPELLS_MAX: f64 = 0.25;
+/// Rows on either side of a switching by which its step is measured, and how many there must be.
+const BESIDE_ROWS: usize = 5;
+const BESIDE_ROWS_MIN: usize = 3;
 /// Switchings that must be seen within a run, and their share of all.
-const JUMPS_MIN: usize = 2;
-/// See [`JUMPS_MIN`].
-const JUMPS_SHARE_MIN: f64 = 0.3;
-/// What the middle one of these must jump by, in levels: noise makes it seem more, an edge between two rows less.
-const JUMP: std::ops::RangeInclusive<f64> = 0.5..=2.2;
+const STEPS_MIN: usize = 2;
+const STEPS_SHARE_MIN: f64 = 0.3;
+/// What the middle one of these must step by, in levels.
+const STEP: std::ops::RangeInclusive<f64> = 0.5..=1.8;
 /// Levels to start from, in deviations of the innovations.
 const STARTS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Rounds of sequence and level to choose a start, and of sequence, level and noise after it.
@@ -164,17 +166,25 @@ impl Switching {
     }
 }
 
-/// Does the residual jump by the level where it switches? A consumer does, from one row to the next; what wanders does
-/// not, nor does what is one level in one run and another in the next.
+/// Does the residual step by the level where it switches, and stay there? A consumer does; what wanders does not, nor
+/// does a spike, nor what is one level in one run and another in the next.
 #[must_use]
-pub fn jumps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
-    let within = frame.stretches.iter().flat_map(|rows| rows.start + 1..rows.end);
-    let jump = |row: usize| (found.state[row] - found.state[row - 1]) * (residual[row] - residual[row - 1]);
-    let jumps: Vec<f64> = within.filter(|row| found.state[*row] != found.state[*row - 1]).map(jump).collect();
-    let seen = jumps.len();
-    seen >= JUMPS_MIN
-        && count(seen) >= JUMPS_SHARE_MIN * count(found.switchings)
-        && median(jumps).is_some_and(|jump| JUMP.contains(&(jump / found.level)))
+pub fn steps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
+    let mut steps = Vec::new();
+    for rows in &frame.stretches {
+        for row in rows.start + 1..rows.end {
+            let turn = found.state[row] - found.state[row - 1];
+            // The row of the switching itself may be on for a part.
+            let before = residual[row.saturating_sub(BESIDE_ROWS).max(rows.start)..row].to_vec();
+            let after = residual[row + 1..(row + 1 + BESIDE_ROWS).min(rows.end)].to_vec();
+            if turn != 0.0 && before.len().min(after.len()) >= BESIDE_ROWS_MIN {
+                steps.extend(median(after).zip(median(before)).map(|(after, before)| turn * (after - before)));
+            }
+        }
+    }
+    let seen = steps.len();
+    let enough = seen >= STEPS_MIN && count(seen) >= STEPS_SHARE_MIN * count(found.switchings);
+    enough && median(steps).is_some_and(|step| STEP.contains(&(step / found.level)))
 }
 
 /// The same switch in another residual, with the noise that is there.
@@ -347,6 +357,15 @@ mod tests {
         assert_eq!(find(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }), None);
         let drift: Vec<f64> = noise(1000, 0.0, 5).iter().enumerate().map(|(row, x)| x + 0.006 * count(row)).collect();
         assert_eq!(find(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }), None);
+    }
+
+    #[test]
+    fn a_spike_is_no_step() {
+        let frame = frame(1000);
+        let pump = with_pump(&noise(1000, 0.0, 3), 4.0);
+        let found = find(&pump, &frame, Arma::WHITE).expect("a switch");
+        let spikes: Vec<f64> = (0..1000).map(|row| if row % 60 == 0 { 4.0 } else { 0.0 }).collect();
+        assert!(steps(&found, &pump, &frame) && !steps(&found, &spikes, &frame));
     }
 
     #[test]
