@@ -147,8 +147,8 @@ mod tests {
         let mut all = vec![(0.0, 0.0)];
         for (run, gain) in gains.iter().enumerate() {
             let (xx, xy) = all[run];
-            // The third run is held out.
-            let weight = if run == 3 { 0.0 } else { 10.0 };
+            // The second run is held out.
+            let weight = if run == 1 { 0.0 } else { 10.0 };
             all.push((xx + weight, xy + weight * gain));
         }
         Sums(all)
