@@ -15,6 +15,8 @@ use std::ops::Range;
 
 /// Switchings that must be seen, those between runs included.
 const SWITCHINGS_MIN: usize = 4;
+/// Switchings that the first sequence is priced for.
+const SWITCHINGS_FIRST: usize = 10;
 /// Share of the rows that each of the two levels must have.
 const SHARE_MIN: f64 = 0.15;
 /// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
@@ -24,7 +26,6 @@ const OWN_DOING: f64 = 0.7;
 const SHARES_APART_MAX: f64 = 0.35;
 /// Rows of a spell that is no flicker, and the share of spells that may be shorter.
 const SPELL_ROWS_MIN: usize = 4;
-/// See [`SPELL_ROWS_MIN`].
 const SHORT_SPELLS_MAX: f64 = 0.25;
 /// Rows on either side of a switching by which its step is measured, and how many there must be.
 const BESIDE_ROWS: usize = 5;
@@ -182,8 +183,7 @@ pub fn steps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
             }
         }
     }
-    let seen = steps.len();
-    let enough = seen >= STEPS_MIN && count(seen) >= STEPS_SHARE_MIN * count(found.switchings);
+    let enough = steps.len() >= STEPS_MIN && count(steps.len()) >= STEPS_SHARE_MIN * count(found.switchings);
     enough && median(steps).is_some_and(|step| STEP.contains(&(step / found.level)))
 }
 
@@ -233,7 +233,8 @@ fn sequence(residual: &[f64], frame: &Frame, found: &Switching) -> Vec<f64> {
 }
 
 fn follow_stretch(residual: &[f64], frame: &Frame, found: &Switching, rows: Range<usize>, state: &mut [f64]) {
-    let price = 2.0 * count(residual.len().max(20) / 10).ln() + 2.0;
+    // What one more switching costs beside as many as there were: the slope of [`price`].
+    let price = 2.0 * (count(residual.len()) / count(found.switchings.max(SWITCHINGS_FIRST))).ln().max(1.0);
     let cost = |row: usize, e: f64| (e * frame.weight(row) / found.deviation).powi(2).min(SURPRISE_MAX);
     let value = |row: usize, on: usize| residual[row] - found.off - if on == 1 { found.level } else { 0.0 };
     let begin = |on: usize| {
