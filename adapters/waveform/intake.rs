@@ -34,22 +34,37 @@ pub struct Counts {
     pub connections: u64,
 }
 
-/// Clock and counts of one stream.
+/// Header, clock and counts of one stream.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Intake {
+pub struct Intake {
+    header: Option<Header>,
     time: TimeBase,
-    pub(super) counts: Counts,
+    counts: Counts,
 }
 
 impl Intake {
-    /// The sampler begins anew, perhaps on another clock.
-    pub(super) fn connected(&mut self) {
+    /// The sampler begins anew with this header, perhaps on another clock.
+    pub(super) fn connected(&mut self, header: Header) {
+        self.header = Some(header);
         self.time = TimeBase::default();
         self.counts.connections += 1;
     }
 
+    /// What the stream carries, once it has come.
+    #[must_use]
+    pub fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// What it has gone through.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
     /// How slow the sampler's clock runs, ppm, once known.
-    pub(super) fn drift_ppm(&self) -> Option<f64> {
+    #[must_use]
+    pub fn drift_ppm(&self) -> Option<f64> {
         self.time.drift_ppm()
     }
 

@@ -39,7 +39,7 @@ mod timebase;
 
 pub use frame::{AMPLITUDE, Frame, FrameError, Header};
 pub use iio::Iio;
-pub use intake::{Block, Counts};
+pub use intake::{Block, Counts, Intake};
 pub use producer::{Producer, Sampler};
 pub use receiver::Receiver;
 pub use recorded::Recorded;

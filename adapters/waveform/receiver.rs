@@ -1,7 +1,7 @@
 //! A connection to a stream, with deadline, gaps, clipping and clock.
 
 use super::frame::{FRAME_HEAD, FrameError, HEADER_MAX, Header, head, samples};
-use super::intake::{Block, Counts, Intake, end_ns, missing};
+use super::intake::{Block, Intake, end_ns, missing};
 use crate::address::Endpoint;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
@@ -23,7 +23,6 @@ pub struct Receiver {
     name: String,
     at: Endpoint,
     open: Option<Open>,
-    header: Option<Header>,
     intake: Intake,
 }
 
@@ -31,25 +30,13 @@ impl Receiver {
     /// A receiver that connects at the first read. `name` is the address.
     #[must_use]
     pub fn new(name: &str, at: &Endpoint) -> Self {
-        Self { name: name.to_owned(), at: at.clone(), open: None, header: None, intake: Intake::default() }
+        Self { name: name.to_owned(), at: at.clone(), open: None, intake: Intake::default() }
     }
 
-    /// What the stream carries, once it has been connected to.
+    /// What has come so far.
     #[must_use]
-    pub fn header(&self) -> Option<&Header> {
-        self.header.as_ref()
-    }
-
-    /// What it has gone through.
-    #[must_use]
-    pub fn counts(&self) -> Counts {
-        self.intake.counts
-    }
-
-    /// How slow the sampler's clock runs, ppm, once known.
-    #[must_use]
-    pub fn drift_ppm(&self) -> Option<f64> {
-        self.intake.drift_ppm()
+    pub fn intake(&self) -> &Intake {
+        &self.intake
     }
 
     /// The next block. Blocks for two seconds at most.
@@ -71,8 +58,7 @@ impl Receiver {
         let connected = stream::connect(&self.at, until);
         let mut stream = connected.map_err(|error| self.line(&format!("cannot connect: {error}")))?;
         let header = self.header_line(&mut stream, until)?;
-        self.header = Some(header.clone());
-        self.intake.connected();
+        self.intake.connected(header.clone());
         Ok(Open { stream, header, next: None })
     }
 

@@ -7,7 +7,7 @@
 //! What is sampled is not the current of a phase but its amplitude, as the drive knows it ([`Header::amplitude`]).
 
 use super::frame::Header;
-use super::intake::{Block, Counts, Intake, end_ns, missing};
+use super::intake::{Block, Intake, end_ns, missing};
 use crate::clock::TimeNs;
 use crate::nclink::sample::{self, Column};
 
@@ -24,7 +24,6 @@ pub struct SampledCurrent {
     axis: Option<u32>,
     /// A per unit of a value.
     ampere: f64,
-    header: Option<Header>,
     intake: Intake,
     due_ns: Option<TimeNs>,
 }
@@ -33,25 +32,13 @@ impl SampledCurrent {
     /// The current of this axis, or the first load current of a block; `ampere` is how many amperes a value of 1 is.
     #[must_use]
     pub fn new(axis: Option<u32>, ampere: f64) -> Self {
-        Self { axis, ampere, header: None, intake: Intake::default(), due_ns: None }
+        Self { axis, ampere, intake: Intake::default(), due_ns: None }
     }
 
-    /// What is sampled, once it has come.
+    /// What has come so far.
     #[must_use]
-    pub fn header(&self) -> Option<&Header> {
-        self.header.as_ref()
-    }
-
-    /// What it has gone through.
-    #[must_use]
-    pub fn counts(&self) -> Counts {
-        self.intake.counts
-    }
-
-    /// How slow the controller's clock runs, ppm, once known.
-    #[must_use]
-    pub fn drift_ppm(&self) -> Option<f64> {
-        self.intake.drift_ppm()
+    pub fn intake(&self) -> &Intake {
+        &self.intake
     }
 
     /// The current out of a block of the controller's that arrived at `arrived_ns`, in pieces without a gap.
@@ -76,9 +63,9 @@ impl SampledCurrent {
     /// A new rate begins anew.
     fn header_of(&mut self, rate_hz: f64) -> Header {
         let header = Header::amplitude(rate_hz, SCALE_A, FULL_SCALE);
-        if self.header.as_ref() != Some(&header) {
-            (self.header, self.due_ns) = (Some(header.clone()), None);
-            self.intake.connected();
+        if self.intake.header() != Some(&header) {
+            self.due_ns = None;
+            self.intake.connected(header.clone());
         }
         header
     }
@@ -133,9 +120,9 @@ mod tests {
         assert_eq!((first.len(), first[0].gap, first[0].raw[0], first[0].raw.len()), (1, 0, 150, 100));
         assert_eq!(current.take(&block(1100, &[Some(1.0); 50]), 1_150_000_000)[0].gap, 0);
         assert_eq!(current.take(&block(1180, &[Some(1.0); 20]), 1_200_000_000)[0].gap, 30);
-        let counts = current.counts();
+        let counts = current.intake().counts();
         assert_eq!((counts.samples, counts.gaps, counts.missing), (170, 1, 30));
-        assert_eq!(current.header().map(|header| header.rate_hz), Some(1000.0));
+        assert_eq!(current.intake().header().map(|header| header.rate_hz), Some(1000.0));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::chain::{Chain, Sums};
 use super::keep::Keeper;
 use adapters::address::WaveformKeep;
 use adapters::driver::Fact;
-use adapters::waveform::{Block, Counts, Header};
+use adapters::waveform::{Block, Header, Intake};
 use adapters::{Absence, ChannelId, Reading, SourceError};
 
 /// Blocks in, one reading of `spindle_current_a` out whenever it is asked for.
@@ -72,7 +72,8 @@ impl Features {
     }
 
     /// What is known of the stream.
-    pub(super) fn facts(&self, counts: Counts, header: Option<&Header>, drift_ppm: Option<f64>) -> Vec<Fact> {
+    pub(super) fn facts(&self, intake: &Intake) -> Vec<Fact> {
+        let counts = intake.counts();
         #[expect(clippy::cast_precision_loss, reason = "counts of samples stay far below 2^53 for centuries")]
         let count = |name: &str, count: u64| Fact::number(name, count as f64);
         let mut facts = vec![
@@ -82,8 +83,8 @@ impl Features {
             count("waveform_clipped_samples", counts.clipped),
             count("waveform_connections", counts.connections),
         ];
-        facts.extend(header.map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
-        facts.extend(drift_ppm.map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
+        facts.extend(intake.header().map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
+        facts.extend(intake.drift_ppm().map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
         if let Some(unbalance) = self.chain.as_ref().and_then(Chain::unbalance) {
             facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
         }

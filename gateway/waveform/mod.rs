@@ -70,7 +70,7 @@ impl SpindleCurrent {
         let began_ns = clock.now_ns();
         for _ in 0..BLOCKS_MAX {
             let block = self.receiver.read(clock)?;
-            let Some(header) = self.receiver.header().cloned() else { break };
+            let Some(header) = self.receiver.intake().header().cloned() else { break };
             let instants = block.raw.len() / header.channels.len();
             let length_ns = header.duration_ns(f64::from(u32::try_from(instants).unwrap_or(u32::MAX)));
             let end_ns = block.first_ns + length_ns;
@@ -103,8 +103,7 @@ impl Source for SpindleCurrent {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        let receiver = &self.receiver;
-        self.features.facts(receiver.counts(), receiver.header(), receiver.drift_ppm())
+        self.features.facts(self.receiver.intake())
     }
 }
 

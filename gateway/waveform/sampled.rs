@@ -90,7 +90,7 @@ impl ControllerSamples {
         let some = !waiting.is_empty();
         for (block, arrived) in waiting {
             let blocks = self.current.take(&block, arrived_ns(clock, arrived));
-            let Some(header) = self.current.header().cloned() else { continue };
+            let Some(header) = self.current.intake().header().cloned() else { continue };
             for block in &blocks {
                 self.features.feed(&self.name, &header, block)?;
             }
@@ -143,6 +143,6 @@ impl Source for ControllerSamples {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        self.features.facts(self.current.counts(), self.current.header(), self.current.drift_ppm())
+        self.features.facts(self.current.intake())
     }
 }

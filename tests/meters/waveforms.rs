@@ -68,7 +68,7 @@ fn gaps_and_clipped_samples_are_counted() {
     let blocks: Vec<_> = (0..4).map(|_| receiver.read(&clock).unwrap_or_else(|error| panic!("{error}"))).collect();
     assert_eq!(blocks.iter().map(|block| block.gap).collect::<Vec<_>>(), [0, 0, 20, 0]);
     assert_eq!(blocks.iter().map(|block| block.clipped).collect::<Vec<_>>(), [0, 0, 2, 0]);
-    let counts = receiver.counts();
+    let counts = receiver.intake().counts();
     assert_eq!((counts.gaps, counts.missing, counts.samples, counts.clipped), (1, 20, 80, 2));
 }
 
