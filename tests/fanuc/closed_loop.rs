@@ -1,8 +1,8 @@
 //! The loop closed: a gateway reads a served FANUC machine, a script holds the spindle load, the gate lets it through, the
 //! ladder takes it from the mailbox. Two real processes.
 
-use crate::commands::Serving;
-use crate::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use crate::process::{get, run, stderr, stdout, text, wait_for};
+use crate::served::{Serving, channel, prepared, started};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -30,29 +30,9 @@ if has(rapid) && rapid == 0.0 { request_feed_override(60.0, \"gently\"); }
 if memory.slow > 20 { request_feed_hold(\"look at the tool\"); }
 ";
 
-fn prepared(directory: &Path, address: &str) -> PathBuf {
-    prepared_with(directory, address, SCRIPT)
-}
-
-fn prepared_with(directory: &Path, address: &str, script: &str) -> PathBuf {
-    let scripts = directory.join("data/scripts");
-    std::fs::create_dir_all(&scripts).expect("a directory");
-    std::fs::write(scripts.join("load.rhai"), script).expect("a script");
-    let config = directory.join("cnc-gateway.toml");
-    let written = format!(
-        "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n\
-         [gate]\nmode = \"armed\"\nsource = \"lathe\"\n[http]\nlisten = \"127.0.0.1:0\"\n"
-    );
-    std::fs::write(&config, written).expect("a configuration");
-    config
-}
-
-fn started(config: &Path) -> (Gateway, String) {
-    let mut command = program();
-    command.args(["run", "--config", text(config), "--listen", "127.0.0.1:0"]);
-    let mut gateway = Gateway::spawn(command);
-    let address = gateway.address();
-    (gateway, address)
+fn configured(directory: &Path, address: &str, script: &str) -> PathBuf {
+    let source = format!("[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n");
+    prepared(directory, script, &format!("{source}[gate]\nmode = \"armed\"\nsource = \"lathe\"\n"))
 }
 
 fn armed(config: &Path) {
@@ -68,8 +48,7 @@ struct Shown {
 
 fn shown(address: &str) -> Shown {
     let status = get(address, "/api/v1/status").json();
-    let channels = status["channels"].as_array().cloned().unwrap_or_default();
-    let of = |name: &str| channels.iter().find(|row| row["name"] == name).and_then(|row| row["value"].as_f64());
+    let of = |name: &str| channel(&status, name)?.as_f64();
     Shown { gate: status["gate"].clone(), override_pct: of("feed_override_pct"), load_pct: of("spindle_load_pct") }
 }
 
@@ -77,7 +56,8 @@ fn shown(address: &str) -> Shown {
 fn the_load_is_held_through_the_mailbox_of_a_served_machine() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
     let directory = tempfile::tempdir().expect("a directory");
-    let config = prepared(directory.path(), &format!("{}?write=mailbox&power_diagnosis=4902", serving.address));
+    let config =
+        configured(directory.path(), &format!("{}?write=mailbox&power_diagnosis=4902", serving.address), SCRIPT);
     let (gateway, address) = started(&config);
     wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
     armed(&config);
@@ -104,15 +84,11 @@ fn the_dial_is_known_and_a_feed_hold_is_latched_by_the_ladder() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125", "--dial", "80"]);
     let directory = tempfile::tempdir().expect("a directory");
     let keys = "write=mailbox&dial=R907&request=R905&power_diagnosis=4902";
-    let config = prepared_with(directory.path(), &format!("{}?{keys}", serving.address), HOLDING);
+    let config = configured(directory.path(), &format!("{}?{keys}", serving.address), HOLDING);
     let (gateway, address) = started(&config);
     wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
     armed(&config);
-    let of = |name: &str| {
-        let status = get(&address, "/api/v1/status").json();
-        let channels = status["channels"].as_array().cloned().unwrap_or_default();
-        channels.into_iter().find(|row| row["name"] == name).map(|row| row["value"].clone())
-    };
+    let of = |name: &str| channel(&get(&address, "/api/v1/status").json(), name);
     let dial = wait_for("the gateway's override below the dial", Duration::from_secs(150), || {
         let now = shown(&address);
         assert!(now.gate["disarmed"].is_null() || now.gate["disarmed"] == "not armed since the start", "{}", now.gate);
@@ -130,7 +106,8 @@ fn the_dial_is_known_and_a_feed_hold_is_latched_by_the_ladder() {
 fn a_direct_write_is_not_held_and_ends_the_arming() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
     let directory = tempfile::tempdir().expect("a directory");
-    let config = prepared(directory.path(), &format!("{}?write=direct&power_diagnosis=4902", serving.address));
+    let config =
+        configured(directory.path(), &format!("{}?write=direct&power_diagnosis=4902", serving.address), SCRIPT);
     let (gateway, address) = started(&config);
     wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
     armed(&config);

@@ -1,50 +1,24 @@
 //! The commands as a user calls them: `serve fanuc` and `doctor`, as processes.
 
+use crate::process::program;
+use crate::served::Serving;
 use crate::support::{controller, serve};
 use crate::vendor::library;
 use adapters::fanuc::server::ServerSettings;
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
-fn gateway() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_cnc-gateway"))
-}
-
-/// A served machine; ends with the test.
-pub(crate) struct Serving {
-    child: Child,
-    pub(crate) address: String,
-}
-
-impl Serving {
-    pub(crate) fn start(arguments: &[&str]) -> Self {
-        let mut child = gateway()
-            .args(["serve", "fanuc", "--listen", "127.0.0.1:0"])
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
-        let address = line.split_whitespace().next().unwrap_or_default().to_owned();
-        assert!(address.starts_with("fanuc://"), "{line}");
-        Self { child, address }
-    }
-}
-
-impl Drop for Serving {
-    fn drop(&mut self) {
-        let _ended_already = self.child.kill();
-        let _reaped = self.child.wait();
-    }
-}
-
 pub(crate) fn doctor(arguments: &[&str]) -> (Output, Value) {
-    let output = gateway().arg("doctor").args(arguments).arg("--json").output().expect("runs");
+    let output = program().arg("doctor").args(arguments).arg("--json").output().expect("runs");
     let value = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
     (output, value)
+}
+
+/// The examination without `--json`: exit code and text.
+fn for_people(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = program().arg("doctor").args(arguments).output().expect("runs");
+    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
 /// The examination of a machine that may still be starting.
@@ -88,7 +62,7 @@ fn doctor_says_what_is_wrong_and_what_to_do() {
     let (output, report) = doctor(&["fanuc://127.0.0.1:9"]);
     assert_eq!((output.status.code(), report["reachable"].as_bool()), (Some(1), Some(false)));
     assert!(report["problems"][0]["next"].as_str().is_some_and(|next| next.contains("8193")), "{report:#}");
-    let output = gateway().args(["doctor", "fanuk://x"]).output().expect("runs");
+    let output = program().args(["doctor", "fanuk://x"]).output().expect("runs");
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("did you mean fanuc"));
     let (output, report) = doctor(&["simulated://lathe?device=meter"]);
@@ -98,10 +72,8 @@ fn doctor_says_what_is_wrong_and_what_to_do() {
 #[test]
 fn doctor_for_people_shows_values_with_units() {
     let server = serve(controller(4), ServerSettings::default());
-    let address = format!("fanuc://{}", server.address());
-    let output = gateway().args(["doctor", &address]).output().expect("runs");
-    let text = String::from_utf8_lossy(&output.stdout);
-    assert_eq!(output.status.code(), Some(0), "{text}");
+    let (code, text) = for_people(&[&format!("fanuc://{}", server.address())]);
+    assert_eq!(code, Some(0), "{text}");
     for part in ["answers", "series: G421", "spindle_speed_rpm", "1200 rpm", "not_supported"] {
         assert!(text.contains(part), "{part}: {text}");
     }
@@ -136,10 +108,7 @@ fn doctor_compares_for_people_and_says_when_there_is_nothing_to_compare() {
     let library = library(&[]);
     let server = serve(controller(4), ServerSettings::default());
     let address = format!("fanuc://{}?backend=native", server.address());
-    let shown = |file: &str| {
-        let output = gateway().args(["doctor", &address, "--compare", file]).output().expect("runs");
-        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
-    };
+    let shown = |file: &str| for_people(&[&address, "--compare", file]);
     let (code, text) = shown(&library.file.display().to_string());
     assert_eq!(code, Some(0), "{text}");
     for part in ["channels compared in 3 rounds, 1 differ", "native -17 %", "library 17 %   (the library's load meter"]

@@ -12,5 +12,7 @@ mod paths;
 mod process;
 mod reading;
 mod round_trips;
+#[path = "../support/served.rs"]
+mod served;
 mod support;
 mod vendor;

@@ -1,7 +1,8 @@
 //! Several paths over one connection: as few frames as there are for one, each path under its own names.
 
-use crate::commands::{Serving, doctor};
-use crate::process::{Gateway, get, program, text as shown, wait_for};
+use crate::commands::doctor;
+use crate::process::{get, wait_for};
+use crate::served::{Serving, channel, prepared, started};
 use crate::support::{controller, number, opened, poll, serve, text, value};
 use crate::vendor::{self, library};
 use adapters::Absence;
@@ -114,17 +115,11 @@ fn a_box_shows_the_second_turret_of_a_served_machine() {
     let (_, report) = doctor(&[&address]);
     assert_eq!((report["identity"]["paths"].as_f64(), &report["identity"]["path2_axes"]), (Some(2.0), &"X Z".into()));
     let directory = tempfile::tempdir().expect("a directory");
-    let config = directory.path().join("cnc-gateway.toml");
-    let written = format!("[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"{address}\"\n");
-    std::fs::write(&config, written).expect("a configuration");
-    let mut command = program();
-    command.args(["run", "--config", shown(&config), "--listen", "127.0.0.1:0"]);
-    let mut gateway = Gateway::spawn(command);
-    let at = gateway.address();
+    let config = prepared(directory.path(), "", &format!("[[source]]\naddress = \"{address}\"\n"));
+    let (gateway, at) = started(&config);
     let both = wait_for("both paths in the merged sample, cutting", Duration::from_secs(60), || {
         let status = get(&at, "/api/v1/status").json();
-        let channels = status["channels"].as_array().cloned().unwrap_or_default();
-        let of = |name: &str| channels.iter().find(|row| row["name"] == name).map(|row| row["value"].clone());
+        let of = |name: &str| channel(&status, name);
         let (first, second) = (of("feed_mm_min")?.as_f64()?, of("path2_feed_mm_min")?.as_f64()?);
         let programs = (of("program")?, of("path2_program")?);
         (second > 0.0).then_some((first, second, programs))

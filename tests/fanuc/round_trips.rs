@@ -1,6 +1,6 @@
 //! What a poll costs, against a served machine in another process.
 
-use crate::commands::Serving;
+use crate::served::Serving;
 use crate::vendor::{library, settings};
 use adapters::address::{Address, Target};
 use adapters::fanuc::focas::Focas;

@@ -11,4 +11,7 @@ mod outputs;
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;
 mod running;
+#[path = "../support/served.rs"]
+#[allow(dead_code, reason = "the suite of FANUC uses more of it")]
+mod served;
 mod shifting;

@@ -1,75 +1,44 @@
 //! Thermal offsets of a running gateway against a served control: written between programs only, accounted for, given back
 //! after the gateway was killed. The control is another process, which refuses an offset while a program runs.
 
-use super::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use super::process::{Gateway, get, run, stderr, stdout, text, wait_for};
+use super::served::{Serving, prepared, started};
 use adapters::clock::SystemClock;
 use adapters::fanuc::item::Item;
 use adapters::fanuc::{answer::Answer, open::native};
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
 use std::time::Duration;
 
-/// A served machine in its warm-up, whose program ends within half a minute; ends with the test.
-struct Served {
-    child: Child,
-    address: String,
-}
+/// A machine in its warm-up, whose program ends within half a minute.
+const WARMING_UP: [&str; 2] = ["--machine", "simulated://lathe?begun_s=85"];
 
-impl Served {
-    fn start() -> Self {
-        let arguments = ["serve", "fanuc", "--listen", "127.0.0.1:0", "--machine", "simulated://lathe?begun_s=85"];
-        let mut child = program().args(arguments).stdout(Stdio::piped()).spawn().expect("starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
-        let address = line.split_whitespace().next().unwrap_or_default().to_owned();
-        assert!(address.starts_with("fanuc://"), "{line}");
-        Self { child, address }
-    }
+const SCRIPT: &str =
+    "propose_offset_um(\"z\", 7.3, \"thermal error\"); request_feed_override(80, \"must not be written\");";
 
-    /// The external offset of Z as the control tells it, um: asked over a connection of the test's own.
-    fn z_offset_um(&self) -> Option<f64> {
-        let address: adapters::Address = self.address.parse().expect("an address");
-        let adapters::address::Target::Fanuc { at, path, options, .. } = address.target() else { return None };
-        let line = native("test", at, *path, options).line;
-        let item = Item::WorkOffset(0, 2);
-        let asked = line.ask(&SystemClock::new(), &[item]).ok()?;
-        match asked.of(item)? {
-            Ok(Answer::Number(Some(mm))) => Some(mm * 1000.0),
-            _ => None,
-        }
+/// The external offset of Z as the control tells it, um: asked over a connection of the test's own.
+fn z_offset_um(address: &str) -> Option<f64> {
+    let address: adapters::Address = address.parse().expect("an address");
+    let adapters::address::Target::Fanuc { at, path, options, .. } = address.target() else { return None };
+    let line = native("test", at, *path, options).line;
+    let item = Item::WorkOffset(0, 2);
+    let asked = line.ask(&SystemClock::new(), &[item]).ok()?;
+    match asked.of(item)? {
+        Ok(Answer::Number(Some(mm))) => Some(mm * 1000.0),
+        _ => None,
     }
 }
 
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ended_already = self.child.kill();
-        let _reaped = self.child.wait();
-    }
-}
-
-fn prepared(directory: &Path, address: &str) -> PathBuf {
-    let scripts = directory.join("data/scripts");
-    std::fs::create_dir_all(&scripts).expect("a directory");
-    let script =
-        "propose_offset_um(\"z\", 7.3, \"thermal error\"); request_feed_override(80, \"must not be written\");";
-    std::fs::write(scripts.join("thermal.rhai"), script).expect("a script");
-    let config = directory.join("cnc-gateway.toml");
-    let written = format!(
-        "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"{address}?allow=EXT\"\nname = \"lathe\"\n\
-         [gate]\nstale_s = 2.0\n[gate.offset]\nmode = \"armed\"\nsource = \"lathe\"\naxes = \"z\"\nmin_interval_s = 1.0\n\
-         [http]\nlisten = \"127.0.0.1:0\"\n"
+fn configured(directory: &Path, address: &str) -> PathBuf {
+    let sections = format!(
+        "[[source]]\naddress = \"{address}?allow=EXT\"\nname = \"lathe\"\n[gate]\nstale_s = 2.0\n\
+         [gate.offset]\nmode = \"armed\"\nsource = \"lathe\"\naxes = \"z\"\nmin_interval_s = 1.0\n"
     );
-    std::fs::write(&config, written).expect("a configuration");
-    config
+    prepared(directory, SCRIPT, &sections)
 }
 
-fn started(config: &Path) -> (Gateway, String) {
-    let mut command = program();
-    command.args(["run", "--config", text(config), "--listen", "127.0.0.1:0"]);
-    let mut gateway = Gateway::spawn(command);
-    let address = gateway.address();
+fn deciding(config: &Path) -> (Gateway, String) {
+    let (gateway, address) = started(config);
     wait_for("a decision", Duration::from_secs(60), || {
         get(&address, "/api/v1/status").json()["gate"]["permitted_pct"].is_number().then_some(())
     });
@@ -99,10 +68,10 @@ fn of<'a>(rows: &'a [Value], kind: &str) -> Vec<&'a Value> {
 
 #[test]
 fn an_external_offset_is_written_between_programs_only_and_given_back_after_a_kill() {
-    let served = Served::start();
+    let served = Serving::start(&WARMING_UP);
     let directory = tempfile::tempdir().expect("a directory");
-    let config = prepared(directory.path(), &served.address);
-    let (gateway, address) = started(&config);
+    let config = configured(directory.path(), &served.address);
+    let (gateway, address) = deciding(&config);
     assert_eq!(get(&address, "/api/v1/audit?sinse=1").status, 400, "a misspelt key is refused");
     let told = run(&["arm", "--for", "30m", "--by", "fitter", "--config", text(&config)]);
     assert!(
@@ -112,7 +81,7 @@ fn an_external_offset_is_written_between_programs_only_and_given_back_after_a_ki
         stderr(&told)
     );
     let (first, then) = wait_for("a shift of 7 um", Duration::from_secs(400), || {
-        (shift_um(&address) == 7.0).then(|| (served.z_offset_um(), shift_um(&address)))
+        (shift_um(&address) == 7.0).then(|| (z_offset_um(&served.address), shift_um(&address)))
     });
     println!("in the control: {first:?} um, by the gateway's account {then} um");
     assert_eq!(first, Some(7.0));
@@ -120,11 +89,11 @@ fn an_external_offset_is_written_between_programs_only_and_given_back_after_a_ki
         (of(&audit(&address), "z_offset_write").len() >= 2).then_some(())
     });
     gateway.kill();
-    assert_eq!(served.z_offset_um(), Some(7.0), "nothing takes an offset back by itself");
+    assert_eq!(z_offset_um(&served.address), Some(7.0), "nothing takes an offset back by itself");
 
-    let (gateway, address) = started(&config);
+    let (gateway, address) = deciding(&config);
     wait_for("given back", Duration::from_secs(500), || (shift_um(&address) == 0.0).then_some(()));
-    assert_eq!(served.z_offset_um(), Some(0.0), "what the operator had set");
+    assert_eq!(z_offset_um(&served.address), Some(0.0), "what the operator had set");
     wait_for("the row to be stored", Duration::from_secs(20), || {
         (!of(&audit(&address), "z_offset_restore").is_empty()).then_some(())
     });
