@@ -4,10 +4,12 @@ use super::item::Area;
 use super::line::Line;
 use super::open::{OpenedFanuc, native};
 use super::server::{Controller, Served, Server, ServerSettings, SimulatedControl};
-use super::work_offset::{ExternalOffset, ShiftLimits};
+use super::work_offset::ExternalOffsets;
 use crate::address::{Address, Target};
 use crate::clock::{Clock, ScaledClock, SystemClock};
 use crate::driver::{Actuator, LadderRequest, SourceError};
+use crate::offset::{Axis, OffsetSink};
+use crate::shift::{ShiftLimits, Shifts};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::units::OverridePct;
 use std::net::TcpListener;
@@ -214,26 +216,26 @@ fn the_external_offset_moves_by_steps_between_programs_and_is_given_back() {
     let server = serve(Box::new(control));
     let clock = SystemClock::new();
     let limits = ShiftLimits { step_um: 5.0, total_um: 12.0 };
-    let mut offset = ExternalOffset::new("fanuc://x", line(&server, "write=mailbox&allow=EXT"), 2, limits);
-    let shifts: Vec<i32> = (0..4).map(|_| offset.shift(&clock, 30.0).expect("at rest").after).collect();
-    assert_eq!(shifts, [45, 50, 52, 52], "5 µm at a time, 12 µm in all, on top of the operator's 40 µm");
+    let place = ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox&allow=EXT"));
+    let mut offset = Shifts::within(limits, place);
+    let shifts: Vec<f64> = (0..4).map(|_| offset.shift(&clock, Axis::Z, 30.0).expect("at rest").after_um).collect();
+    assert_eq!(shifts, [45.0, 50.0, 52.0, 52.0], "5 µm at a time, 12 µm in all, on top of the operator's 40 µm");
     server.with(|control| control.expect("on").status.run = 3);
-    let error = offset.shift(&clock, 0.0).expect_err("a program runs").to_string();
+    let error = offset.shift(&clock, Axis::Z, 0.0).expect_err("a program runs").to_string();
     assert!(error.contains("a program runs"), "{error}");
     server.with(|control| control.expect("on").status.run = 0);
     server.with(|control| control.expect("on").work_offsets.insert((0, 2), 100));
-    let moved = offset.shift(&clock, 3.0).expect("at rest");
-    assert!(moved.changed_by_others && moved.after == 103, "{moved:?}");
-    let restored = offset.restore(&clock).expect("at rest").expect("something to give back");
-    assert_eq!((restored.after, restored.shift), (100, 0));
+    let moved = offset.shift(&clock, Axis::Z, 3.0).expect("at rest");
+    assert!(moved.changed_by_others && moved.after_um == 103.0, "{moved:?}");
+    let restored = offset.restore(&clock, Axis::Z).expect("at rest").expect("something to give back");
+    assert_eq!((restored.after_um, restored.shift_um()), (100.0, 0.0));
 }
 
 #[test]
 fn what_is_not_allowed_is_not_sent() {
     let server = serve(Box::new(Controller::new(4, &['X', 'Z'])));
-    let limits = ShiftLimits { step_um: 5.0, total_um: 12.0 };
-    let mut offset = ExternalOffset::new("fanuc://x", line(&server, "write=mailbox"), 1, limits);
-    let error = offset.shift(&SystemClock::new(), 3.0).expect_err("not on the list").to_string();
+    let mut offset = Shifts::new(ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox")));
+    let error = offset.shift(&SystemClock::new(), Axis::X, 3.0).expect_err("not on the list").to_string();
     assert!(error.contains("allow="), "{error}");
     assert_eq!(server.with(|control| control.map(|control| control.writes)), Some(0));
 }
