@@ -2,7 +2,7 @@
 
 use crate::address::Endpoint;
 use std::io::{self, ErrorKind, Read};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
 /// A name that has more addresses than this is tried at the first ones.
@@ -10,16 +10,36 @@ const ADDRESSES_MAX: usize = 4;
 /// A system refuses a timeout of zero.
 const LEAST: Duration = Duration::from_millis(1);
 
-/// The first address of the host that answers, tried one after the other until `until` (a millisecond each when that has
-/// passed). `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before.
+/// The addresses of a host, at least one.
+///
+/// # Errors
+/// The name is not known.
+pub(crate) fn addresses(at: &Endpoint) -> io::Result<Vec<SocketAddr>> {
+    let found: Vec<SocketAddr> = (at.host.as_str(), at.port).to_socket_addrs()?.take(ADDRESSES_MAX).collect();
+    match found.is_empty() {
+        true => Err(io::Error::new(ErrorKind::NotFound, "the name has no address")),
+        false => Ok(found),
+    }
+}
+
+/// A connection to this host; see [`connect_any`].
+///
+/// # Errors
+/// As there, or the name is not known.
+pub(crate) fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+    connect_any(&addresses(at)?, until)
+}
+
+/// The first address that answers, tried one after the other until `until` (a millisecond each when that has passed).
+/// `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before.
 ///
 /// # Errors
 /// What the system says of the last address.
-pub(crate) fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
+pub(crate) fn connect_any(addresses: &[SocketAddr], until: Instant) -> io::Result<TcpStream> {
     let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
-    for address in (at.host.as_str(), at.port).to_socket_addrs()?.take(ADDRESSES_MAX) {
+    for address in addresses {
         let left = until.saturating_duration_since(Instant::now()).max(LEAST);
-        match TcpStream::connect_timeout(&address, left) {
+        match TcpStream::connect_timeout(address, left) {
             Ok(stream) => return stream.set_nodelay(true).map(|()| stream),
             Err(error) => last = error,
         }

@@ -15,8 +15,9 @@ use super::request;
 use super::statistics::Statistics;
 use super::wire::{Frame, FrameKind, HEADER_LEN, Header, Reply, Request, WireError, frame, replies, request_body};
 use crate::address::Endpoint;
-use std::io::{ErrorKind, Read, Write as _};
-use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use crate::stream::{self, Short};
+use std::io::{ErrorKind, Write as _};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Longest request that is sent; older controllers take 1450 bytes.
@@ -55,9 +56,7 @@ impl Native {
     /// See [`FocasError`].
     pub fn connect(settings: NativeSettings) -> Result<Self, FocasError> {
         let deadline = Instant::now() + settings.timeout;
-        let mut stream = tcp(&settings.at, settings.timeout)?;
-        let line = |error| io_error(&error, settings.timeout);
-        stream.set_nodelay(true).map_err(line)?;
+        let mut stream = tcp(&settings.at, deadline)?;
         send(&mut stream, &frame(CLIENT, FrameKind::Open, &FOR_QUESTIONS), settings.timeout)?;
         let answer = receive(&mut stream, deadline, settings.timeout)?;
         let opening = match answer.kind {
@@ -180,27 +179,16 @@ fn protocol(error: &WireError) -> FocasError {
     FocasError::Protocol(error.to_string())
 }
 
-fn tcp(at: &Endpoint, timeout: Duration) -> Result<TcpStream, FocasError> {
-    let found = (at.host.as_str(), at.port).to_socket_addrs();
-    let addresses: Vec<SocketAddr> = found.map_err(|error| FocasError::Name(error.to_string()))?.take(4).collect();
-    let mut last = FocasError::Name("it has no address".to_owned());
-    for address in addresses {
-        match TcpStream::connect_timeout(&address, timeout) {
-            Ok(stream) => return Ok(stream),
-            Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
-                last = FocasError::NobodyThere(error.to_string());
-            }
-            Err(error) => last = FocasError::Unreachable(error.to_string()),
-        }
-    }
-    Err(last)
+fn tcp(at: &Endpoint, until: Instant) -> Result<TcpStream, FocasError> {
+    let addresses = stream::addresses(at).map_err(|error| FocasError::Name(error.to_string()))?;
+    stream::connect_any(&addresses, until).map_err(|error| match error.kind() {
+        ErrorKind::ConnectionRefused => FocasError::NobodyThere(error.to_string()),
+        _ => FocasError::Unreachable(error.to_string()),
+    })
 }
 
 fn io_error(error: &std::io::Error, timeout: Duration) -> FocasError {
-    match error.kind() {
-        ErrorKind::WouldBlock | ErrorKind::TimedOut => FocasError::Timeout(timeout),
-        _ => FocasError::Broken(error.to_string()),
-    }
+    if stream::is_silence(error) { FocasError::Timeout(timeout) } else { FocasError::Broken(error.to_string()) }
 }
 
 fn send(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), FocasError> {
@@ -219,19 +207,10 @@ fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Resu
 }
 
 /// Reads until the buffer is full or the deadline is over.
-fn fill(stream: &mut TcpStream, mut buffer: &mut [u8], deadline: Instant, timeout: Duration) -> Result<(), FocasError> {
-    while !buffer.is_empty() {
-        let left = deadline.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(FocasError::Timeout(timeout));
-        }
-        stream.set_read_timeout(Some(left)).map_err(|error| io_error(&error, timeout))?;
-        match stream.read(buffer) {
-            Ok(0) => return Err(FocasError::Broken("the controller closed it".to_owned())),
-            Ok(count) => buffer = &mut buffer[count..],
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(io_error(&error, timeout)),
-        }
-    }
-    Ok(())
+fn fill(stream: &mut TcpStream, buffer: &mut [u8], deadline: Instant, timeout: Duration) -> Result<(), FocasError> {
+    stream::fill(stream, buffer, deadline).map_err(|short| match short {
+        Short::Silent => FocasError::Timeout(timeout),
+        Short::Closed => FocasError::Broken("the controller closed it".to_owned()),
+        Short::Broken(error) => FocasError::Broken(error.to_string()),
+    })
 }
