@@ -3,7 +3,8 @@
 //! Path 1 keeps the plain names, so that everything that knows one path knows it unchanged. What belongs to path N is
 //! called `pathN_` and the plain name: `path2_spindle_speed_rpm`. The unit stays at the end of the name.
 
-use super::{Channel, Kind, number, text};
+use super::Kind::{Continuous, Held};
+use super::{Channel, number, text};
 
 /// Paths that have channels.
 pub const PATHS: std::ops::RangeInclusive<u8> = 1..=3;
@@ -14,161 +15,57 @@ pub fn on_path(name: &str, path: u8) -> String {
     if path == 1 { name.to_owned() } else { format!("path{path}_{name}") }
 }
 
+macro_rules! numbered {
+    ($path:literal, $name:literal, $unit:literal, $range:expr, $kind:expr, $en:literal, $zh:literal) => {
+        number(
+            concat!("path", $path, "_", $name),
+            $unit,
+            $range,
+            $kind,
+            concat!($en, ", path ", $path),
+            concat!("通道", $path, $zh),
+        )
+    };
+}
+
+macro_rules! named {
+    ($path:literal, $name:literal, $en:literal, $zh:literal) => {
+        text(concat!("path", $path, "_", $name), concat!($en, ", path ", $path), concat!("通道", $path, $zh))
+    };
+}
+
+/// Motion goes both ways.
+const SPEEDS: (f64, f64) = (-100_000.0, 100_000.0);
+const PLACES: (f64, f64) = (-100_000.0, 100_000.0);
+const FEEDS: (f64, f64) = (0.0, 200_000.0);
+const OVERRIDES: (f64, f64) = (0.0, 254.0);
+const LOADS: (f64, f64) = (-500.0, 500.0);
+
 macro_rules! path {
     ($number:literal) => {
         [
-            number(
-                concat!("path", $number, "_spindle_programmed_rpm"),
-                "rpm",
-                (-100000.0, 100000.0),
-                Kind::Held,
-                concat!("Commanded spindle speed before overrides, path ", $number),
-                concat!("通道", $number, "主轴编程转速"),
-            ),
-            number(
-                concat!("path", $number, "_feed_programmed_mm_min"),
-                "mm/min",
-                (0.0, 200000.0),
-                Kind::Held,
-                concat!("Commanded feed before overrides, path ", $number),
-                concat!("通道", $number, "编程进给速度"),
-            ),
-            number(
-                concat!("path", $number, "_spindle_speed_rpm"),
-                "rpm",
-                (-100000.0, 100000.0),
-                Kind::Continuous,
-                concat!("Actual spindle speed, path ", $number),
-                concat!("通道", $number, "主轴实际转速"),
-            ),
-            number(
-                concat!("path", $number, "_feed_mm_min"),
-                "mm/min",
-                (0.0, 200000.0),
-                Kind::Continuous,
-                concat!("Actual feed, path ", $number),
-                concat!("通道", $number, "实际进给速度"),
-            ),
-            number(
-                concat!("path", $number, "_feed_override_pct"),
-                "%",
-                (0.0, 254.0),
-                Kind::Held,
-                concat!("Feed override in force, path ", $number),
-                concat!("通道", $number, "进给倍率"),
-            ),
-            number(
-                concat!("path", $number, "_spindle_override_pct"),
-                "%",
-                (0.0, 254.0),
-                Kind::Held,
-                concat!("Spindle override in force, path ", $number),
-                concat!("通道", $number, "主轴倍率"),
-            ),
-            number(
-                concat!("path", $number, "_spindle_load_pct"),
-                "%",
-                (-500.0, 500.0),
-                Kind::Continuous,
-                concat!("Spindle load, path ", $number),
-                concat!("通道", $number, "主轴负载"),
-            ),
-            number(
-                concat!("path", $number, "_x_axis_position_mm"),
-                "mm",
-                (-100000.0, 100000.0),
-                Kind::Continuous,
-                concat!("X axis position, path ", $number),
-                concat!("通道", $number, "X轴位置"),
-            ),
-            number(
-                concat!("path", $number, "_y_axis_position_mm"),
-                "mm",
-                (-100000.0, 100000.0),
-                Kind::Continuous,
-                concat!("Y axis position, path ", $number),
-                concat!("通道", $number, "Y轴位置"),
-            ),
-            number(
-                concat!("path", $number, "_z_axis_position_mm"),
-                "mm",
-                (-100000.0, 100000.0),
-                Kind::Continuous,
-                concat!("Z axis position, path ", $number),
-                concat!("通道", $number, "Z轴位置"),
-            ),
-            number(
-                concat!("path", $number, "_x_axis_load_pct"),
-                "%",
-                (-500.0, 500.0),
-                Kind::Continuous,
-                concat!("X axis load, path ", $number),
-                concat!("通道", $number, "X轴负载"),
-            ),
-            number(
-                concat!("path", $number, "_y_axis_load_pct"),
-                "%",
-                (-500.0, 500.0),
-                Kind::Continuous,
-                concat!("Y axis load, path ", $number),
-                concat!("通道", $number, "Y轴负载"),
-            ),
-            number(
-                concat!("path", $number, "_z_axis_load_pct"),
-                "%",
-                (-500.0, 500.0),
-                Kind::Continuous,
-                concat!("Z axis load, path ", $number),
-                concat!("通道", $number, "Z轴负载"),
-            ),
-            number(
-                concat!("path", $number, "_rapid"),
-                "1",
-                (0.0, 1.0),
-                Kind::Held,
-                concat!("Rapid traverse active, path ", $number),
-                concat!("通道", $number, "快速移动标志"),
-            ),
-            text(
-                concat!("path", $number, "_mode"),
-                concat!("Controller mode, path ", $number),
-                concat!("通道", $number, "控制方式"),
-            ),
-            text(
-                concat!("path", $number, "_execution"),
-                concat!("Execution state, path ", $number),
-                concat!("通道", $number, "执行状态"),
-            ),
-            text(
-                concat!("path", $number, "_program"),
-                concat!("NC program running, path ", $number),
-                concat!("通道", $number, "数控程序"),
-            ),
-            text(
-                concat!("path", $number, "_block"),
-                concat!("NC block running, path ", $number),
-                concat!("通道", $number, "程序段"),
-            ),
-            text(
-                concat!("path", $number, "_tool"),
-                concat!("Tool in use, path ", $number),
-                concat!("通道", $number, "刀具"),
-            ),
-            text(
-                concat!("path", $number, "_alarm"),
-                concat!("Alarm, empty when there is none, path ", $number),
-                concat!("通道", $number, "报警"),
-            ),
-            text(
-                concat!("path", $number, "_motion"),
-                concat!("Motion word, path ", $number),
-                concat!("通道", $number, "运动状态"),
-            ),
-            text(
-                concat!("path", $number, "_operation"),
-                concat!("Threading or tapping, path ", $number),
-                concat!("通道", $number, "工序"),
-            ),
+            numbered!($number, "spindle_programmed_rpm", "rpm", SPEEDS, Held, "Commanded spindle speed before overrides", "主轴编程转速"),
+            numbered!($number, "feed_programmed_mm_min", "mm/min", FEEDS, Held, "Commanded feed before overrides", "编程进给速度"),
+            numbered!($number, "spindle_speed_rpm", "rpm", SPEEDS, Continuous, "Actual spindle speed", "主轴实际转速"),
+            numbered!($number, "feed_mm_min", "mm/min", FEEDS, Continuous, "Actual feed", "实际进给速度"),
+            numbered!($number, "feed_override_pct", "%", OVERRIDES, Held, "Feed override in force", "进给倍率"),
+            numbered!($number, "spindle_override_pct", "%", OVERRIDES, Held, "Spindle override in force", "主轴倍率"),
+            numbered!($number, "spindle_load_pct", "%", LOADS, Continuous, "Spindle load", "主轴负载"),
+            numbered!($number, "x_axis_position_mm", "mm", PLACES, Continuous, "X axis position", "X轴位置"),
+            numbered!($number, "y_axis_position_mm", "mm", PLACES, Continuous, "Y axis position", "Y轴位置"),
+            numbered!($number, "z_axis_position_mm", "mm", PLACES, Continuous, "Z axis position", "Z轴位置"),
+            numbered!($number, "x_axis_load_pct", "%", LOADS, Continuous, "X axis load", "X轴负载"),
+            numbered!($number, "y_axis_load_pct", "%", LOADS, Continuous, "Y axis load", "Y轴负载"),
+            numbered!($number, "z_axis_load_pct", "%", LOADS, Continuous, "Z axis load", "Z轴负载"),
+            numbered!($number, "rapid", "1", (0.0, 1.0), Held, "Rapid traverse active", "快速移动标志"),
+            named!($number, "mode", "Controller mode", "控制方式"),
+            named!($number, "execution", "Execution state", "执行状态"),
+            named!($number, "program", "NC program running", "数控程序"),
+            named!($number, "block", "NC block running", "程序段"),
+            named!($number, "tool", "Tool in use", "刀具"),
+            named!($number, "alarm", "Alarm, empty when there is none", "报警"),
+            named!($number, "motion", "Motion word", "运动状态"),
+            named!($number, "operation", "Threading or tapping", "工序"),
         ]
     };
 }

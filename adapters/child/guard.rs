@@ -52,12 +52,17 @@ impl Guarded {
     /// # Errors
     /// It is not.
     pub fn bytes(&self) -> Result<Vec<u8>, Overrun> {
-        let mut all: Vec<u8> = self.words.iter().flat_map(|word| word.to_ne_bytes()).collect();
-        match all[self.length..].iter().rposition(|byte| *byte != PATTERN) {
+        let whole = u64::from_ne_bytes([PATTERN; 8]);
+        let (first, margin) = self.words.split_at(self.length.div_ceil(8));
+        // Most of the margin is looked at by words and never copied.
+        let reached = margin.iter().rposition(|word| *word != whole).map_or(0, |last| last + 1);
+        let touched = first.iter().chain(&margin[..reached]);
+        let mut bytes: Vec<u8> = touched.flat_map(|word| word.to_ne_bytes()).collect();
+        match bytes[self.length..].iter().rposition(|byte| *byte != PATTERN) {
             Some(last) => Err(Overrun { length: self.length, beyond: last + 1 }),
             None => {
-                all.truncate(self.length);
-                Ok(all)
+                bytes.truncate(self.length);
+                Ok(bytes)
             }
         }
     }

@@ -286,7 +286,7 @@ fn last_words(mut running: Running) -> String {
 
 fn spawn(settings: &ChildSettings) -> std::io::Result<Running> {
     let (stream, theirs) = UnixStream::pair()?;
-    let program = settings.program.clone().map_or_else(std::env::current_exe, Ok)?;
+    let program = settings.program.clone().map_or_else(own_program, Ok)?;
     let child = Command::new(program)
         .arg(SUBCOMMAND)
         .args(&settings.arguments)
@@ -296,6 +296,12 @@ fn spawn(settings: &ChildSettings) -> std::io::Result<Running> {
         .stderr(Stdio::null())
         .spawn()?;
     Ok(Running { child, stream, arrived: Vec::new() })
+}
+
+/// This program as it runs, also after an update has put another file in its place.
+fn own_program() -> std::io::Result<PathBuf> {
+    let running = PathBuf::from("/proc/self/exe");
+    if running.exists() { Ok(running) } else { std::env::current_exe() }
 }
 
 fn left(deadline: Instant) -> std::io::Result<Duration> {

@@ -14,7 +14,7 @@
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
 //! that the ladder left it there.
 
-use super::answer::Answer;
+use super::answer::{Answer, ItemResult};
 use super::asking::Asking;
 use super::dial::Dial;
 use super::feed_override;
@@ -126,15 +126,22 @@ impl FanucActuator {
             // A vacant variable asks for nothing.
             (Some(Ok(Answer::Number(None))), _) => Ok(OverridePct::FULL),
             (Some(Ok(Answer::Number(Some(value)))), _) => self.percent(*value),
-            (Some(Err(error)), _) => Err(self.refused(&format!("it cannot be read back: {error:?}"), "See doctor")),
-            _ => Err(self.decode("another kind of answer")),
+            (other, _) => Err(self.unread(other)),
         }
     }
 
     fn bytes<'a>(&self, asked: &'a Asked, item: Item) -> Result<&'a [i32], SourceError> {
         match asked.of(item) {
             Some(Ok(Answer::Memory(bytes))) => Ok(bytes),
-            other => Err(self.refused(&format!("it cannot be read back: {other:?}"), "See doctor")),
+            other => Err(self.unread(other)),
+        }
+    }
+
+    /// It was asked for, and this came.
+    fn unread(&self, found: Option<&ItemResult>) -> SourceError {
+        match found {
+            Some(Err(error)) => self.refused(&format!("it cannot be read back: {error}"), error.next()),
+            _ => self.decode("another kind of answer"),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::code::ReturnCode;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Kind, series and version of a control.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -136,6 +137,30 @@ pub enum ItemError {
     /// This way of talking to the control cannot ask for it.
     NotOffered,
 }
+
+impl fmt::Display for ItemError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused(refusal) => refusal.code.fmt(f),
+            Self::Malformed(what) => f.write_str(what),
+            Self::NotOffered => f.write_str("the control, or this way of talking to it, does not have it"),
+        }
+    }
+}
+
+impl ItemError {
+    /// What to do next.
+    #[must_use]
+    pub fn next(&self) -> &'static str {
+        match self {
+            Self::Refused(refusal) => refusal.code.next(),
+            Self::Malformed(_) | Self::NotOffered => SEE_DOCTOR,
+        }
+    }
+}
+
+/// Next step where what a control answers has to be looked at.
+pub(super) const SEE_DOCTOR: &str = "Look at what the control answers: cnc-gateway doctor with this address";
 
 /// What became of one item.
 pub type ItemResult = Result<Answer, ItemError>;

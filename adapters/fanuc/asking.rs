@@ -4,7 +4,7 @@
 //! acknowledged, and the gateway switches the bit off again. So a request counts once however often it is sent, a line
 //! that breaks in between leaves nothing that asks a second time, and a ladder without the rungs is found out.
 
-use super::answer::Answer;
+use super::answer::{Answer, SEE_DOCTOR};
 use super::item::{Area, Item, Stretch, Write};
 use super::line::Line;
 use super::server::ladder::request_bit;
@@ -79,7 +79,8 @@ impl Asking {
         let item = Item::Pmc(Stretch::bytes(self.at.0, self.at.1, 2));
         match self.line.ask(clock, &[item])?.of(item) {
             Some(Ok(Answer::Memory(bytes))) if bytes.len() == 2 => Ok((bytes[0], bytes[1])),
-            other => Err(self.refused(request, format!("its bytes cannot be read: {other:?}"), "See doctor")),
+            Some(Err(error)) => Err(self.refused(request, format!("its bytes cannot be read: {error}"), error.next())),
+            _ => Err(self.refused(request, "its bytes cannot be read: another kind of answer".to_owned(), SEE_DOCTOR)),
         }
     }
 

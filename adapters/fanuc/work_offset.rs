@@ -6,7 +6,7 @@
 //! and the shift is added to it, and a value that somebody changed in between is the new starting point. Increment system
 //! IS-B in millimetres only, where an increment is a micrometre.
 
-use super::answer::{Answer, Status};
+use super::answer::{Answer, SEE_DOCTOR, Status};
 use super::item::{Item, Write};
 use super::line::{Asked, Line};
 use crate::clock::Clock;
@@ -44,7 +44,7 @@ impl ExternalOffsets {
 
     fn offset_um(&self, axis: Axis, item: Item, asked: &Asked) -> Result<f64, SourceError> {
         let Some(Ok(Answer::Number(Some(mm)))) = asked.of(item) else {
-            return Err(self.refused(axis, "the external offset cannot be read", "See doctor"));
+            return Err(self.refused(axis, "the external offset cannot be read", SEE_DOCTOR));
         };
         let um = mm * 1000.0;
         if (um - um.round()).abs() > 1e-6 {
@@ -81,7 +81,7 @@ impl OffsetPlace for ExternalOffsets {
         match asked.of(Item::Status) {
             Some(Ok(Answer::Status(Status { run: 0, .. }))) => self.offset_um(axis, item, &asked),
             Some(Ok(Answer::Status(_))) => Err(self.refused(axis, "a program runs", "It is done between two programs")),
-            _ => Err(self.refused(axis, "the state of the control is unknown", "See doctor")),
+            _ => Err(self.refused(axis, "the state of the control is unknown", SEE_DOCTOR)),
         }
     }
 
