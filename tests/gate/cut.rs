@@ -49,27 +49,43 @@ pub(crate) fn asking(pct: f64) -> OverrideRequest {
 /// One thing that is wrong in an otherwise ordinary cut, and why 100 % is held then.
 pub(crate) type Case = (&'static str, fn(&mut Sample, &mut Estimates), Hold);
 
-pub(crate) fn cases() -> Vec<Case> {
+/// What stands in the way of an override and of an offset alike.
+pub(crate) fn common_cases() -> Vec<Case> {
     let missing = |name: &str, why| Hold::Missing(id(name), why);
     vec![
-        ("rapid flag", |it, _| set_number(it, "rapid", 1.0), Hold::Rapid),
-        ("rapid state", |_, estimates| estimates.state = State::Rapid, Hold::Rapid),
         ("unknown state", |_, estimates| estimates.state = State::Unknown, Hold::StateUnknown),
-        ("threading", |it, _| set_text(it, "operation", operation::THREADING), Hold::Threading),
-        ("tapping", |it, _| set_text(it, "operation", operation::TAPPING), Hold::Tapping),
         ("alarm", |it, _| set_text(it, "alarm", "PS0010"), Hold::Alarm),
         ("manual", |it, _| set_text(it, "mode", mode::MANUAL), Hold::Manual),
         ("MDI", |it, _| set_text(it, "mode", mode::MANUAL_DATA_INPUT), Hold::Mdi),
         ("single block", |it, _| set_text(it, "mode", mode::SEMI_AUTOMATIC), Hold::SingleBlock),
+        ("edit", |it, _| set_text(it, "mode", mode::EDIT), Hold::NotAutomatic),
+        ("a mode nobody knows", |it, _| set_text(it, "mode", "AUTO?"), Hold::NotAutomatic),
+        ("feed hold", |it, _| set_text(it, "execution", execution::FEED_HOLD), Hold::FeedHold),
+        ("no mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Timeout)), missing("mode", Absence::Timeout)),
+        ("an old mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Stale)), missing("mode", Absence::Stale)),
+        (
+            "an old execution",
+            |it, _| it.set(id("execution"), Slot::absent(Absence::Stale)),
+            missing("execution", Absence::Stale),
+        ),
+        ("a silent alarm", |it, _| it.set(id("alarm"), Slot::absent(Absence::Stale)), missing("alarm", Absence::Stale)),
+    ]
+}
+
+/// What stands in the way of an override.
+pub(crate) fn cases() -> Vec<Case> {
+    let missing = |name: &str, why| Hold::Missing(id(name), why);
+    let mut cases = common_cases();
+    cases.extend::<[Case; 12]>([
+        ("rapid flag", |it, _| set_number(it, "rapid", 1.0), Hold::Rapid),
+        ("rapid state", |_, estimates| estimates.state = State::Rapid, Hold::Rapid),
+        ("threading", |it, _| set_text(it, "operation", operation::THREADING), Hold::Threading),
+        ("tapping", |it, _| set_text(it, "operation", operation::TAPPING), Hold::Tapping),
         ("single block switch", |it, _| set_number(it, "single_block", 1.0), Hold::SingleBlock),
         ("dry run", |it, _| set_number(it, "dry_run", 1.0), Hold::DryRun),
-        ("edit", |it, _| set_text(it, "mode", mode::EDIT), Hold::NotAutomatic),
-        ("a word nobody knows", |it, _| set_text(it, "mode", "AUTO?"), Hold::NotAutomatic),
-        ("feed hold", |it, _| set_text(it, "execution", execution::FEED_HOLD), Hold::FeedHold),
         ("stopped", |it, _| set_text(it, "execution", execution::STOPPED), Hold::NotRunning),
         ("interrupted", |it, _| set_text(it, "execution", execution::INTERRUPTED), Hold::NotRunning),
         ("ready", |it, _| set_text(it, "execution", execution::READY), Hold::NotRunning),
-        ("no mode", |it, _| it.set(id("mode"), Slot::absent(Absence::Timeout)), missing("mode", Absence::Timeout)),
         (
             "no feed",
             |it, _| it.set(id("feed_mm_min"), Slot::absent(Absence::Disconnected)),
@@ -80,9 +96,9 @@ pub(crate) fn cases() -> Vec<Case> {
             |it, _| it.set(id("spindle_speed_rpm"), Slot { value: Value::number(1000.0), age_ns: SECOND_NS }),
             missing("spindle_speed_rpm", Absence::Stale),
         ),
-        ("a silent alarm", |it, _| it.set(id("alarm"), Slot::absent(Absence::Stale)), missing("alarm", Absence::Stale)),
         ("no load", |it, _| it.set(id("spindle_power_w"), Slot::absent(Absence::Stale)), Hold::OnlyEstimated),
-    ]
+    ]);
+    cases
 }
 
 /// A generator of numbers for the random test: cheap, seeded, of no quality that matters here.

@@ -1,11 +1,11 @@
 //! Thermal offsets: what is decided, what reaches the control, and what is given back.
 
-use super::cut::{TICK_NS, cutting, limits, set_number, set_text};
+use super::cut::{Case, TICK_NS, common_cases, cutting, limits, set_number, set_text};
+use adapters::Sample;
 use adapters::clock::{ManualClock, SECOND_NS};
 use adapters::offset::{Axis, Left, OffsetSink};
 use adapters::simulated::{Simulated, SimulatedSettings};
-use adapters::words::{execution, mode};
-use adapters::{Absence, Sample, Slot};
+use adapters::words::execution;
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Moved, OffsetBound, OffsetOutcome, Order, carry_out};
 use gateway::gate::{Disarmed, Gate, Hold, OffsetVerdict};
@@ -90,19 +90,12 @@ fn a_shift_is_made_by_steps_with_rests_and_never_beyond_the_total() {
 
 #[test]
 fn only_between_programs_with_fresh_values_and_no_alarm() {
-    type Case = (&'static str, fn(&mut Sample, &mut Estimates), Hold);
-    let id = |name| adapters::ChannelId::of(name).expect("a channel");
-    let cases: [Case; 9] = [
+    let mut cases = common_cases();
+    cases.extend::<[Case; 3]>([
         ("active", |it, _| set_text(it, "execution", execution::ACTIVE), Hold::Running),
         ("stopped within", |it, _| set_text(it, "execution", execution::STOPPED), Hold::Running),
-        ("feed hold", |it, _| set_text(it, "execution", execution::FEED_HOLD), Hold::FeedHold),
-        ("alarm", |it, _| set_text(it, "alarm", "SV0401"), Hold::Alarm),
-        ("manual", |it, _| set_text(it, "mode", mode::MANUAL), Hold::Manual),
-        ("MDI", |it, _| set_text(it, "mode", mode::MANUAL_DATA_INPUT), Hold::Mdi),
-        ("single block", |it, _| set_text(it, "mode", mode::SEMI_AUTOMATIC), Hold::SingleBlock),
-        ("unknown", |_, estimates| estimates.state = State::Unknown, Hold::StateUnknown),
         ("a word nobody knows", |it, _| set_text(it, "execution", "RUNNING?"), Hold::Running),
-    ];
+    ]);
     for (what, spoil, hold) in cases {
         let mut gate = Gate::new(offset_limits(GateMode::Armed));
         gate.arm("fitter", None, 0).expect("may be armed");
@@ -111,16 +104,6 @@ fn only_between_programs_with_fresh_values_and_no_alarm() {
         gate.decide(None, &sample, &estimates);
         let verdict = gate.shift(&[proposal(Axis::Z, 3.0)], &sample, &estimates).pop().expect("decided");
         assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::Held(hold), None), "{what}");
-    }
-    for name in ["mode", "execution", "alarm"] {
-        let mut gate = Gate::new(offset_limits(GateMode::Armed));
-        gate.arm("fitter", None, 0).expect("may be armed");
-        let (mut sample, estimates) = resting(0);
-        sample.set(id(name), Slot::absent(Absence::Stale));
-        gate.decide(None, &sample, &estimates);
-        let verdict = gate.shift(&[proposal(Axis::Z, 3.0)], &sample, &estimates).pop().expect("decided");
-        let missing = Hold::Missing(id(name), Absence::Stale);
-        assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::Held(missing), None), "{name}");
     }
 }
 
