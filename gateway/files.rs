@@ -125,6 +125,15 @@ pub fn read_text(path: &Path, limit: usize) -> std::io::Result<String> {
     Ok(text)
 }
 
+/// What to do about a file that is there and cannot be read.
+#[must_use]
+pub fn advice(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        std::io::ErrorKind::InvalidData => "save the file as UTF-8",
+        _ => "look at the permissions",
+    }
+}
+
 /// A whole file in one step: written beside its place, then renamed. Its directory is made if need be.
 ///
 /// # Errors

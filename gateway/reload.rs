@@ -1,7 +1,7 @@
 //! The scripts on disk: written there on the first start, watched, compiled and tried beside the tick, swapped only when all
 //! of them compile and all their trials pass.
 
-use crate::files::{Lookout, Mark, Rest, mark, read_text, replace};
+use crate::files::{Lookout, Mark, Rest, advice, mark, read_text, replace};
 use adapters::channel::nearest;
 use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, shipped};
 use std::collections::BTreeMap;
@@ -114,8 +114,7 @@ fn read_script(path: &Path) -> std::io::Result<ScriptFile> {
 fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
     let next = match error.kind() {
         std::io::ErrorKind::NotFound => misspelt(path),
-        std::io::ErrorKind::InvalidData => "save the file as UTF-8".to_owned(),
-        _ => "look at the permissions".to_owned(),
+        _ => advice(error).to_owned(),
     };
     Problem {
         file: path.display().to_string(),

@@ -1,7 +1,7 @@
 //! The recipe on disk, read and checked beside the tick.
 
 use super::Loaded;
-use crate::files::{Lookout, Rest, mark, read_text};
+use crate::files::{Lookout, Rest, advice, mark, read_text};
 use rules::operations::{TEXT_MAX, parse};
 use rules::script::Problem;
 use std::path::Path;
@@ -19,8 +19,7 @@ pub fn read(path: &Path) -> Result<Loaded, Vec<Problem>> {
 fn unreadable(name: &str, error: &std::io::Error) -> Problem {
     let next = match error.kind() {
         std::io::ErrorKind::NotFound => "`path` under [operations] names it; create it, or leave the section out",
-        std::io::ErrorKind::InvalidData => "save the file as UTF-8",
-        _ => "look at the permissions",
+        _ => advice(error),
     };
     let what = format!("the operations recipe cannot be read: {error}");
     Problem { file: name.to_owned(), line: None, column: None, what, next: next.to_owned() }
