@@ -137,8 +137,8 @@ impl Commands {
     ) {
         let Some(mut verdict) = pipeline.verdict().copied() else { return };
         let row = self.trail.request(pipeline.scripts().decision().request.as_ref(), &verdict);
-        let judged = pipeline.gate_mut().ask(asks, sample);
         let gate = pipeline.gate_mut();
+        let judged = gate.ask(asks, sample);
         row.into_iter().for_each(|row| self.keep(row, gate, health));
         let mut sent = Vec::new();
         for (ask, outcome) in judged {
@@ -151,7 +151,7 @@ impl Commands {
         let mut said = Vec::new();
         self.hand.step(&verdict, &sent, now_ns, |it| said.push(it));
         self.hand.listen(|it| said.push(it));
-        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+        self.hear(said, sample, gate, health);
         self.shift(pipeline, sample, now_ns, health);
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
     }
@@ -168,7 +168,7 @@ impl Commands {
         let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).collect();
         let mut said = Vec::new();
         self.hand.shift(&orders, now_ns, |it| said.push(it));
-        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+        self.hear(said, sample, gate, health);
     }
 
     fn moved(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
@@ -180,6 +180,10 @@ impl Commands {
 
     fn target_of_offsets(&self, gate: &Gate) -> String {
         gate.limits().offset.source.clone().unwrap_or_else(|| self.target.clone())
+    }
+
+    fn hear(&mut self, said: Vec<Said>, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
     }
 
     fn heard(&mut self, said: Said, sample: &Sample, gate: &mut Gate, health: &mut Health) {
@@ -259,7 +263,7 @@ impl Commands {
         let mut said = Vec::new();
         self.hand.shift(&gate.offsets().farewell(), sample.at_ns, |it| said.push(it));
         self.hand.close(|it| said.push(it));
-        said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
+        self.hear(said, sample, gate, health);
     }
 
     /// What stands in the machine's mailbox, percent.

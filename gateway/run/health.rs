@@ -75,10 +75,7 @@ impl Health {
     /// Remembers and tells that something happened.
     pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
         notice.say();
-        let (kind, text) = (notice.code.to_owned(), notice.operator.clone());
-        let detail =
-            if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
-        self.kept.record(Event { at_ns, kind, source: source.to_owned(), text, detail }.into());
+        self.kept.record(stored(at_ns, source, notice).into());
     }
 
     /// Remembers a record that is no event.
@@ -179,17 +176,7 @@ impl Health {
     /// The last tick is over.
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
         self.save(pipeline);
-        let notice = Notice::new(Severity::Info, "stopped", "stopped");
-        self.kept.record(
-            Event {
-                at_ns,
-                kind: notice.code.to_owned(),
-                source: "gateway".to_owned(),
-                text: notice.operator,
-                detail: String::new(),
-            }
-            .into(),
-        );
+        self.kept.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
         self.kept.close();
     }
 
@@ -199,16 +186,16 @@ impl Health {
         self.kept.status()
     }
 
-    /// What does not work.
+    /// What does not work, of the store too.
     #[must_use]
-    pub fn problems(&self) -> Vec<Problem> {
+    pub fn problems(&self, history: &HistoryStatus) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut add = |what: String, next: &str| problems.push(Problem { what, next: next.to_owned() });
         if let Some(what) = self.port.borrow().clone() {
             add(what, "stop the other program, or choose another port with --listen");
         }
-        if let Some(what) = self.kept.status().error {
-            add(what, "polling goes on");
+        if let Some(what) = &history.error {
+            add(what.clone(), "polling goes on");
         }
         if self.behind_ns > 0 {
             let what = format!("the wall clock is {} behind the box", span(self.behind_ns));
@@ -219,6 +206,12 @@ impl Health {
         }
         problems
     }
+}
+
+/// A notice as a row of the history.
+fn stored(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
+    let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
+    Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
 }
 
 /// A length of time in words.

@@ -14,7 +14,7 @@ use crate::http::Published;
 use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
-use crate::status::{AlarmStatus, Problem, Status, TickStatus};
+use crate::status::{AlarmStatus, HistoryStatus, Problem, Status, TickStatus};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use adapters::simulated::Simulated;
@@ -153,6 +153,7 @@ impl Ticker {
         let Identity { machine, simulated, speed, rate_hz } = self.identity.clone();
         let (late_p50_ms, late_p99_ms) = self.pace.late_ms();
         let count = self.pipeline.tally().ticks();
+        let history = self.health.history_status();
         Status {
             schema: "status/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -174,8 +175,8 @@ impl Ticker {
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
             wear: self.wear.status(),
-            history: self.health.history_status(),
-            problems: self.problems(),
+            problems: self.problems(&history),
+            history,
         }
     }
 
@@ -189,8 +190,13 @@ impl Ticker {
             .collect()
     }
 
-    fn problems(&self) -> Vec<Problem> {
+    fn problems(&self, history: &HistoryStatus) -> Vec<Problem> {
         let recipe = self.operations.as_ref().and_then(Operations::problem);
-        self.health.problems().into_iter().chain(recipe).chain(self.commands.problems(self.pipeline.gate())).collect()
+        self.health
+            .problems(history)
+            .into_iter()
+            .chain(recipe)
+            .chain(self.commands.problems(self.pipeline.gate()))
+            .collect()
     }
 }
