@@ -29,7 +29,6 @@ pub mod recording;
 pub mod replay;
 pub mod sample;
 pub mod serial;
-pub mod shift;
 pub mod simulated;
 pub(crate) mod stream;
 pub mod temperature;

@@ -2,10 +2,12 @@
 //!
 //! The offset belongs to the operator, who may have set it to anything and may set it anew at any time. A shift is added to
 //! what the operator has set; what somebody has changed in between is the new starting point. [`Ledger`] keeps that account,
-//! the same for every control.
+//! the same for every control. A line that fails, or a gateway that dies, in the middle of a write leaves open whether the
+//! control has taken it: the intent stays in the account until the control was read again.
 
 use crate::clock::Clock;
 use crate::driver::SourceError;
+use serde::{Deserialize, Serialize};
 
 /// An axis whose offset can be shifted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -46,64 +48,55 @@ impl Axis {
 }
 
 /// What a shift has left in a control, um.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Left {
     /// What the operator had set.
     pub base_um: f64,
-    /// What was written last: that and the shift.
+    /// What was written last and is known to have been taken: that and the shift.
     pub written_um: f64,
+    /// What was to be written next, while it is not known whether the control has taken it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intended_um: Option<f64>,
 }
 
-/// What a shift came to, um.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shifted {
-    /// The offset before.
-    pub before_um: f64,
-    /// What the operator had set: the offset without the shift.
-    pub base_um: f64,
-    /// What was written.
-    pub asked_um: f64,
-    /// The offset now, as read back.
-    pub after_um: f64,
-    /// Had somebody else changed the offset since it was last written?
-    pub changed_by_others: bool,
-}
-
-impl Shifted {
-    /// The shift in force.
+impl Left {
+    /// The shift that is known to be in force.
     #[must_use]
     pub fn shift_um(&self) -> f64 {
-        self.after_um - self.base_um
-    }
-
-    /// Is in force what was written?
-    #[must_use]
-    pub fn is_taken(&self) -> bool {
-        same(self.asked_um, self.after_um)
+        self.written_um - self.base_um
     }
 }
 
-/// Something that accepts a shift of an axis. Only the gate holds one, beside its [`Actuator`](crate::Actuator).
+/// The offset of an axis. Only the gate holds one, beside its [`Actuator`](crate::Actuator).
 pub trait OffsetSink: Send {
     /// The address, as in the configuration.
     fn name(&self) -> &str;
 
-    /// Shifts this axis by `wanted_um` from what the operator has set, not from where it is, and reads back.
+    /// The offset in force, um, where it may be moved now.
     ///
     /// # Errors
-    /// [`SourceError::Refused`] where nothing may be moved now: a program runs, the machine measures in inches, the control
-    /// says no. Others where the line failed.
-    fn shift(&mut self, clock: &dyn Clock, axis: Axis, wanted_um: f64) -> Result<Shifted, SourceError>;
+    /// [`SourceError::Refused`] where nothing may be moved now: a program runs, the machine measures in inches. Others where
+    /// the line failed.
+    fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError>;
 
-    /// Gives back what the operator had set, in one step; `None` where nothing was shifted. What somebody has set in between
-    /// is left alone.
+    /// Writes an offset, um, in the place of the one that was found, and gives what is in force then, as read back.
     ///
     /// # Errors
-    /// As for [`OffsetSink::shift`].
-    fn restore(&mut self, clock: &dyn Clock, axis: Axis) -> Result<Option<Shifted>, SourceError>;
+    /// [`SourceError::Refused`] where the control says no. After any error the offset may have been taken or not.
+    fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError>;
+}
 
-    /// Takes over what an earlier run of the gateway has left in the control.
-    fn resume(&mut self, axis: Axis, left: Left);
+/// What became of what was written last, by what is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LastWrite {
+    /// It is in force, as was known; or nothing was written.
+    InForce,
+    /// It was not known whether it had been taken; it was.
+    Taken,
+    /// It was not known whether it had been taken; it was not.
+    NotTaken,
+    /// Somebody else has changed the offset since.
+    Replaced,
 }
 
 /// Whose is which part of the offset of one axis.
@@ -113,39 +106,45 @@ pub struct Ledger(Option<Left>);
 impl Ledger {
     /// With what an earlier run has left.
     #[must_use]
-    pub fn with(left: Left) -> Self {
-        Self(Some(left))
+    pub fn with(left: Option<Left>) -> Self {
+        Self(left)
     }
 
-    /// Is anything shifted, by this account?
+    /// What is left in the control, by this account; nothing where it is the operator's alone.
     #[must_use]
-    pub fn is_shifted(&self) -> bool {
-        self.0.is_some()
+    pub fn left(&self) -> Option<Left> {
+        self.0
     }
 
-    /// What the operator has set, now that this offset is found; and whether somebody has changed it since it was written.
-    #[must_use]
-    pub fn base(&self, found_um: f64) -> (f64, bool) {
-        match self.0 {
-            Some(Left { base_um, written_um }) if same(written_um, found_um) => (base_um, false),
-            Some(_) => (found_um, true),
-            None => (found_um, false),
-        }
+    /// This offset is found: the account agrees with it from now on. Gives what the operator has set, and what has become of
+    /// the last write.
+    pub fn settle(&mut self, found_um: f64) -> (f64, LastWrite) {
+        let Some(Left { base_um, written_um, intended_um }) = self.0 else { return (found_um, LastWrite::InForce) };
+        let (base_um, last) = match intended_um {
+            Some(intended_um) if same(intended_um, found_um) => (base_um, LastWrite::Taken),
+            Some(_) if same(written_um, found_um) => (base_um, LastWrite::NotTaken),
+            None if same(written_um, found_um) => (base_um, LastWrite::InForce),
+            _ => (found_um, LastWrite::Replaced),
+        };
+        self.note(base_um, found_um);
+        (base_um, last)
     }
 
-    /// This was written on that base.
-    pub fn note(&mut self, base_um: f64, written_um: f64) {
-        self.0 = Some(Left { base_um, written_um });
+    /// This is about to be written in the place of what is there.
+    pub fn intend(&mut self, base_um: f64, found_um: f64, wanted_um: f64) {
+        self.0 = Some(Left { base_um, written_um: found_um, intended_um: Some(wanted_um) });
     }
 
-    /// Everything was given back.
-    pub fn clear(&mut self) {
-        self.0 = None;
+    /// This is in force on that base.
+    pub fn note(&mut self, base_um: f64, found_um: f64) {
+        let left = Left { base_um, written_um: found_um, intended_um: None };
+        self.0 = (!same(base_um, found_um)).then_some(left);
     }
 }
 
-/// Controls count in tenths of a micrometre at the finest.
-fn same(a_um: f64, b_um: f64) -> bool {
+/// Are these offsets the same to a control? Controls count in tenths of a micrometre at the finest.
+#[must_use]
+pub fn same(a_um: f64, b_um: f64) -> bool {
     (a_um - b_um).abs() < 0.05
 }
 
@@ -156,10 +155,25 @@ mod tests {
     #[test]
     fn what_somebody_else_has_set_is_the_new_beginning() {
         let mut ledger = Ledger::default();
-        assert_eq!((ledger.base(40.0), ledger.is_shifted()), ((40.0, false), false));
+        assert_eq!((ledger.settle(40.0), ledger.left()), ((40.0, LastWrite::InForce), None));
         ledger.note(40.0, 45.0);
-        assert_eq!(ledger.base(45.0), (40.0, false));
-        assert_eq!(ledger.base(100.0), (100.0, true));
-        assert_eq!(Ledger::with(Left { base_um: 1.0, written_um: 3.0 }).base(3.0), (1.0, false));
+        assert_eq!(ledger.settle(45.0), (40.0, LastWrite::InForce));
+        assert_eq!((ledger.settle(100.0), ledger.left()), ((100.0, LastWrite::Replaced), None));
+        ledger.note(40.0, 40.0);
+        assert_eq!(ledger.left(), None, "given back");
+    }
+
+    #[test]
+    fn an_open_write_is_settled_by_what_is_found() {
+        for (found_um, last, shift_um) in
+            [(48.0, LastWrite::Taken, 8.0), (45.0, LastWrite::NotTaken, 5.0), (7.0, LastWrite::Replaced, 0.0)]
+        {
+            let mut ledger = Ledger::default();
+            ledger.intend(40.0, 45.0, 48.0);
+            let (base_um, found) = ledger.settle(found_um);
+            let left = ledger.left().map_or(0.0, |left| left.shift_um());
+            assert_eq!((found, left, found_um - base_um), (last, shift_um, shift_um));
+            assert!(ledger.left().is_none_or(|left| left.intended_um.is_none()));
+        }
     }
 }

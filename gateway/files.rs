@@ -4,7 +4,7 @@
 //! disk never delays a tick; a change is taken when it has stood still for one look, so that no file is read while an editor
 //! is writing it. What the box writes itself takes its place in one step, so that nobody ever finds half a file.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, SystemTime};
@@ -140,10 +140,31 @@ pub fn advice(error: &std::io::Error) -> &'static str {
 /// The file or its directory cannot be written; what was there before stays.
 pub fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-    let mut fresh = path.as_os_str().to_owned();
-    fresh.push(".writing");
+    let fresh = fresh(path);
     std::fs::write(&fresh, text)?;
     std::fs::rename(&fresh, path)
+}
+
+/// The same, and returns only when it would survive a power cut.
+///
+/// # Errors
+/// As for [`replace`].
+pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(directory)?;
+    let fresh = fresh(path);
+    let mut file = std::fs::File::create(&fresh)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    std::fs::rename(&fresh, path)?;
+    std::fs::File::open(directory)?.sync_all()
+}
+
+/// Where a file is written before it takes its place.
+fn fresh(path: &Path) -> PathBuf {
+    let mut fresh = path.as_os_str().to_owned();
+    fresh.push(".writing");
+    fresh.into()
 }
 
 #[cfg(test)]

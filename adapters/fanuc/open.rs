@@ -14,7 +14,6 @@ use super::work_offset::ExternalOffsets;
 use crate::address::{Endpoint, FanucOptions, WriteMethod};
 use crate::driver::{Actuator, Source};
 use crate::offset::OffsetSink;
-use crate::shift::Shifts;
 use std::path::Path;
 
 /// What an address opens.
@@ -70,8 +69,7 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
     let actuator = FanucActuator::new(name, line.clone(), path, options);
     let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);
     let shiftable = options.allow.iter().any(|text| Allowed::read(text) == Some(Allowed::ExternalOffset));
-    let shifts = || Box::new(Shifts::new(ExternalOffsets::new(name, line.clone()))) as Box<dyn OffsetSink>;
-    let offsets = shiftable.then(shifts);
+    let offsets = shiftable.then(|| Box::new(ExternalOffsets::new(name, line.clone())) as Box<dyn OffsetSink>);
     OpenedFanuc { sources, actuator, offsets, line }
 }
 

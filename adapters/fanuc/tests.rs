@@ -9,7 +9,6 @@ use crate::address::{Address, Target};
 use crate::clock::{Clock, ScaledClock, SystemClock};
 use crate::driver::{Actuator, LadderRequest, SourceError};
 use crate::offset::{Axis, OffsetSink};
-use crate::shift::{ShiftLimits, Shifts};
 use crate::simulated::{Simulated, SimulatedSettings};
 use crate::units::OverridePct;
 use std::net::TcpListener;
@@ -209,33 +208,33 @@ fn line(server: &Server, keys: &str) -> Line {
 }
 
 #[test]
-fn the_external_offset_moves_by_steps_between_programs_and_is_given_back() {
+fn the_external_offset_is_moved_between_programs_only_and_never_over_what_somebody_has_just_set() {
     let mut control = Controller::new(4, &['X', 'Z']);
     control.offsets_only_at_rest = true;
     control.work_offsets.insert((0, 2), 40);
     let server = serve(Box::new(control));
     let clock = SystemClock::new();
-    let limits = ShiftLimits { step_um: 5.0, total_um: 12.0 };
-    let place = ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox&allow=EXT"));
-    let mut offset = Shifts::within(limits, place);
-    let shifts: Vec<f64> = (0..4).map(|_| offset.shift(&clock, Axis::Z, 30.0).expect("at rest").after_um).collect();
-    assert_eq!(shifts, [45.0, 50.0, 52.0, 52.0], "5 µm at a time, 12 µm in all, on top of the operator's 40 µm");
+    let mut offsets = ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox&allow=EXT"));
+    assert_eq!(offsets.at_rest(&clock, Axis::Z).expect("at rest"), 40.0);
+    assert_eq!(offsets.write(&clock, Axis::Z, 40.0, 45.4).expect("at rest"), 45.0, "whole increments");
     server.with(|control| control.expect("on").status.run = 3);
-    let error = offset.shift(&clock, Axis::Z, 0.0).expect_err("a program runs").to_string();
-    assert!(error.contains("a program runs"), "{error}");
+    for error in [offsets.at_rest(&clock, Axis::Z), offsets.write(&clock, Axis::Z, 45.0, 50.0)] {
+        let error = error.expect_err("a program runs").to_string();
+        assert!(error.contains("a program runs"), "{error}");
+    }
     server.with(|control| control.expect("on").status.run = 0);
     server.with(|control| control.expect("on").work_offsets.insert((0, 2), 100));
-    let moved = offset.shift(&clock, Axis::Z, 3.0).expect("at rest");
-    assert!(moved.changed_by_others && moved.after_um == 103.0, "{moved:?}");
-    let restored = offset.restore(&clock, Axis::Z).expect("at rest").expect("something to give back");
-    assert_eq!((restored.after_um, restored.shift_um()), (100.0, 0.0));
+    let error = offsets.write(&clock, Axis::Z, 45.0, 48.0).expect_err("it is another by now").to_string();
+    assert!(error.contains("somebody has just changed it"), "{error}");
+    assert_eq!(offsets.at_rest(&clock, Axis::Z).expect("at rest"), 100.0);
+    assert!(offsets.at_rest(&clock, Axis::Y).expect_err("a lathe").to_string().contains("no axis of this name"));
 }
 
 #[test]
 fn what_is_not_allowed_is_not_sent() {
     let server = serve(Box::new(Controller::new(4, &['X', 'Z'])));
-    let mut offset = Shifts::new(ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox")));
-    let error = offset.shift(&SystemClock::new(), Axis::X, 3.0).expect_err("not on the list").to_string();
+    let mut offsets = ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox"));
+    let error = offsets.write(&SystemClock::new(), Axis::X, 0.0, 3.0).expect_err("not on the list").to_string();
     assert!(error.contains("allow="), "{error}");
     assert_eq!(server.with(|control| control.map(|control| control.writes)), Some(0));
 }

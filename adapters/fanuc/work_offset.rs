@@ -2,17 +2,16 @@
 //! the gate may hold them.
 //!
 //! The offset is in the coordinate of every work offset G54 to G59 and takes effect for blocks that are not yet
-//! buffered; hence only while no program runs. The operator may use the external offset too: what was there is kept
-//! and the shift is added to it, and a value that somebody changed in between is the new starting point. Increment system
-//! IS-B in millimetres only, where an increment is a micrometre.
+//! buffered; hence only while no program runs. The operator may use the external offset too; whose is which part of it is
+//! the gate's account ([`crate::offset::Ledger`]). Increment system IS-B in millimetres only, where an increment is a
+//! micrometre.
 
 use super::answer::{Answer, SEE_DOCTOR, Status};
 use super::item::{Item, Write};
 use super::line::{Asked, Line};
 use crate::clock::Clock;
 use crate::driver::SourceError;
-use crate::offset::Axis;
-use crate::shift::OffsetPlace;
+use crate::offset::{Axis, OffsetSink};
 
 /// The external offsets of the axes that the control names with the letters X, Y and Z.
 pub struct ExternalOffsets {
@@ -63,7 +62,7 @@ impl ExternalOffsets {
     }
 }
 
-impl OffsetPlace for ExternalOffsets {
+impl OffsetSink for ExternalOffsets {
     fn name(&self) -> &str {
         &self.name
     }
@@ -85,10 +84,14 @@ impl OffsetPlace for ExternalOffsets {
         }
     }
 
-    fn write(&mut self, clock: &dyn Clock, axis: Axis, offset_um: f64) -> Result<f64, SourceError> {
+    /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
+    fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
+        if self.at_rest(clock, axis)? != found_um {
+            return Err(self.refused(axis, "somebody has just changed it", "It is looked at again"));
+        }
         let number = self.number(clock, axis)?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; an increment is a micrometre")]
-        let value = offset_um.round() as i32;
+        let value = wanted_um.round() as i32;
         self.line.write(clock, &Write::WorkOffset { number: 0, axis: number, value })?;
         let item = Item::WorkOffset(0, number);
         self.offset_um(axis, item, &self.line.ask(clock, &[item])?)

@@ -5,14 +5,19 @@ use crate::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::{UnixListener, UnixStream};
-use tokio::sync::oneshot;
+use tokio::sync::{Semaphore, oneshot};
 
 /// Whoever connects has so long to say what he wants.
 const ASK_WITHIN: Duration = Duration::from_secs(5);
+/// So many are talked to at the same time.
+const TALKING_MAX: usize = 16;
+/// After a connection that could not be taken.
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// The socket; it goes with this.
 #[derive(Debug)]
@@ -34,11 +39,7 @@ pub fn listen(data_dir: &Path, orders: SyncSender<Posted>) -> Option<Listening> 
     let path = socket(data_dir);
     match bind(&path) {
         Ok(listener) => {
-            let task = tokio::spawn(async move {
-                while let Ok((stream, _)) = listener.accept().await {
-                    tokio::spawn(answer(stream, orders.clone()));
-                }
-            });
+            let task = tokio::spawn(take(listener, orders));
             Some(Listening { path, task })
         }
         Err(error) => {
@@ -46,6 +47,25 @@ pub fn listen(data_dir: &Path, orders: SyncSender<Posted>) -> Option<Listening> 
                 format!("{}: no orders can be taken there ({error}), so the gate cannot be armed", path.display());
             Notice::new(Severity::Warning, "no_control_socket", text).say();
             None
+        }
+    }
+}
+
+/// Takes one order after another; whoever comes while too many are being talked to waits for his turn.
+async fn take(listener: UnixListener, orders: SyncSender<Posted>) {
+    let room = Arc::new(Semaphore::new(TALKING_MAX));
+    loop {
+        let Ok(place) = room.clone().acquire_owned().await else { return };
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                let orders = orders.clone();
+                tokio::spawn(async move {
+                    answer(stream, orders).await;
+                    drop(place);
+                });
+            }
+            // The process is short of files for a moment; a disarming must not fail for that.
+            Err(_) => tokio::time::sleep(PAUSE).await,
         }
     }
 }

@@ -202,6 +202,11 @@ impl Interlocks {
         }
     }
 
+    /// The number in this channel, unless it is too old.
+    pub(super) fn fresh(&self, sample: &Sample, id: ChannelId) -> Option<f64> {
+        self.absence(sample, id).is_none().then(|| sample.number(id).ok())?
+    }
+
     /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::look`].
     pub(super) fn between_programs(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
         let needed = [self.mode, self.execution].into_iter().flatten();

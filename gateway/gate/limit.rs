@@ -96,6 +96,11 @@ impl Slew {
         whole(self.exact_pct)
     }
 
+    /// Begins anew, at 100 %, with the next step.
+    pub(super) fn restart(&mut self) {
+        (self.exact_pct, self.at_ns) = (100.0, None);
+    }
+
     /// At once to 100 %.
     pub(super) fn jump_to_full(&mut self, at_ns: TimeNs) -> OverridePct {
         self.exact_pct = 100.0;

@@ -18,11 +18,13 @@
 //! | `ask` | feed hold and stop: once, and then not before somebody has seen to it |
 //! | `arming` | who let it write, and until when |
 //! | `write` | writing, reading back, restoring |
+//! | `fault` | what ends an arming on the way to the machine |
 //! | `offset` | thermal offsets: the same for shifts of an axis, between programs |
 //! | `trail` | what of it goes into the audit |
 
 mod arming;
 mod ask;
+mod fault;
 mod hold;
 mod limit;
 pub mod offset;
@@ -33,11 +35,12 @@ mod write;
 
 pub use arming::{ArmError, Armed, Disarmed};
 pub use ask::{Ask, AskOutcome};
+pub use fault::Fault;
 pub use hold::Hold;
 pub use limit::Bound;
 pub use offset::{OffsetVerdict, Offsets};
 pub use verdict::{Outcome, Verdict};
-pub use write::{Fault, Occasion, Reaction, Writer, Written};
+pub use write::{Occasion, Reaction, Writer, Written};
 
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -60,6 +63,10 @@ pub struct Gate {
     aim: Aim,
     slew: Slew,
     arming: Arming,
+    /// Was the last verdict one that may be written?
+    wrote: bool,
+    /// An arming has ended since the last verdict.
+    ended: bool,
     asks: Asks,
     offsets: Offsets,
 }
@@ -75,6 +82,8 @@ impl Gate {
             aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
             arming: Arming::new(limits.greatest_mode(), limits.armed_for),
+            wrote: false,
+            ended: false,
             asks: Asks::new(),
             offsets: Offsets::new(limits.offset.clone()),
             limits,
@@ -95,8 +104,10 @@ impl Gate {
         self.arming.arm(by, lasts, at_ns)
     }
 
-    /// Ends the permission to write. The writer restores 100 % at the next verdict.
+    /// Ends the permission to write. The writer restores 100 % at the next verdict, which is not armed even when somebody
+    /// arms the gate again before it.
     pub fn disarm(&mut self, why: Disarmed) {
+        self.ended |= self.arming.state().is_ok();
         self.arming.disarm(why);
     }
 
@@ -117,6 +128,13 @@ impl Gate {
             GateMode::Shadow | GateMode::Armed => self.interlocks.look(sample, estimates),
         };
         self.arming.silent(matches!(hold, Some(Hold::Missing(..))), at_ns);
+        let armed = self.writes_override() && !std::mem::take(&mut self.ended);
+        if armed && !std::mem::replace(&mut self.wrote, armed) {
+            // The machine is at its dial; what was decided before nobody wrote is no place to begin from.
+            self.aim.reset();
+            self.slew.restart();
+        }
+        self.wrote = armed;
         let wanted_pct = request.map(|request| request.pct);
         let (target_pct, bound) = limit::band(wanted_pct, self.limits.min_pct, self.limits.max_pct);
         let ceiling_pct = self.ceiling_pct(sample);
@@ -136,13 +154,13 @@ impl Gate {
         };
         let slewing = hold.is_none() && bound.is_none() && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { Outcome::Limited(Bound::Slew) } else { outcome };
-        Verdict { at_ns, wanted_pct, permitted, outcome, armed: self.writes_override() }
+        Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
 
     /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide`]: each request passes once, and then not
     /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
     pub fn ask(&mut self, asks: &[Ask], sample: &Sample) -> Vec<(Ask, AskOutcome)> {
-        let armed = self.writes_override();
+        let armed = self.wrote && self.writes_override();
         self.asks.judge(asks, sample, armed)
     }
 
@@ -164,9 +182,22 @@ impl Gate {
         let now = Circumstances {
             at_ns: sample.at_ns,
             hold: self.interlocks.between_programs(sample, estimates),
-            armed: self.limits.offset.mode == GateMode::Armed && self.arming.state().is_ok(),
+            armed: self.writes_offsets(),
         };
         self.offsets.decide(proposals, now)
+    }
+
+    /// What is to be looked at in the control, because nobody knows for sure what is in force there. Call it after
+    /// [`Gate::decide`].
+    pub fn looks(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::Order> {
+        let may = self.offsets.is_unsettled() && self.interlocks.between_programs(sample, estimates).is_none();
+        if may { self.offsets.looks(sample.at_ns) } else { Vec::new() }
+    }
+
+    /// May offsets be written?
+    #[must_use]
+    pub fn writes_offsets(&self) -> bool {
+        self.limits.offset.mode == GateMode::Armed && self.arming.state().is_ok()
     }
 
     /// The offsets, for what is in force.
@@ -191,7 +222,7 @@ impl Gate {
         if self.limits.above_dial {
             return self.limits.max_pct;
         }
-        let dial_pct = self.dial.and_then(|dial| sample.number(dial).ok());
+        let dial_pct = self.dial.and_then(|dial| self.interlocks.fresh(sample, dial));
         dial_pct.unwrap_or(100.0).clamp(100.0, 254.0)
     }
 }

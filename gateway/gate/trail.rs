@@ -7,10 +7,11 @@ use super::ask::{Ask, AskOutcome};
 use super::verdict::{Outcome, Verdict};
 use super::write::{Occasion, Reaction, Written};
 use crate::config;
-use crate::history::{Audit, ReactionTime};
+use crate::history::{Audit, Command, ReactionTime};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use rules::script::OverrideRequest;
+use std::collections::VecDeque;
 
 /// Rows of requests per second on average; twenty times as many may come at once.
 const ROWS_PER_S: f64 = 10.0;
@@ -27,10 +28,29 @@ struct Told {
     script: Option<u64>,
 }
 
+/// Whose wish it was.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Author {
+    pub(super) script: String,
+    pub(super) version: String,
+    pub(super) reason: String,
+}
+
+impl Author {
+    pub(super) fn new(script: &str, version: u64, reason: &str) -> Self {
+        Self { script: words(script), version: format!("{version:016x}"), reason: words(reason) }
+    }
+}
+
+/// A write is told at most so many changes of what is asked for after the one that led to it.
+const AUTHORS_MAX: usize = 32;
+
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub struct Trail {
     told: Option<Told>,
+    /// Who has asked since when, the newest at the end.
+    authors: VecDeque<(TimeNs, Author)>,
     pace: Pace,
 }
 
@@ -79,6 +99,8 @@ impl Trail {
         if self.told.as_ref() == Some(&told) || quiet {
             return None;
         }
+        let author = request.map_or(Author::default(), |it| Author::new(&it.script, it.version, &it.reason));
+        self.follow(verdict.at_ns, &author);
         self.told = Some(told);
         let also = self.pace.may_tell(verdict.at_ns)?;
         let wish = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
@@ -87,10 +109,74 @@ impl Trail {
             asked: request.map(|request| request.pct),
             after: Some(percent(verdict.permitted)),
             reason: format!("{wish}: {}{also}", verdict.reason()),
-            script: request.map_or(String::new(), |request| words(&request.script)),
-            script_version: request.map_or(String::new(), |request| format!("{:016x}", request.version)),
+            script: author.script,
+            script_version: author.version,
             ..of("request", verdict.at_ns)
         })
+    }
+
+    fn follow(&mut self, at_ns: TimeNs, author: &Author) {
+        if self.authors.back().is_some_and(|(_, last)| last == author) {
+            return;
+        }
+        if self.authors.len() >= AUTHORS_MAX {
+            self.authors.pop_front();
+        }
+        self.authors.push_back((at_ns, author.clone()));
+    }
+
+    /// Who asked for what this write came from; nobody when the machine was given back.
+    fn author(&self, written: &Written) -> Author {
+        let before = self.authors.iter().rev().find(|(at_ns, _)| *at_ns <= written.sample_ns);
+        let author = before.filter(|_| written.occasion != Occasion::Release);
+        author.map_or(Author::default(), |(_, author)| author.clone())
+    }
+
+    /// A write; a sign of life is no news unless it failed.
+    #[must_use]
+    pub fn write(&self, written: &Written) -> Option<Audit> {
+        if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
+            return None;
+        }
+        let Author { script, version, reason } = self.author(written);
+        Some(Audit {
+            outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
+            before: written.before.map(percent),
+            asked: Some(percent(written.asked)),
+            after: written.after.map(percent),
+            reason: why(written, &reason),
+            script,
+            script_version: version,
+            ..of("write", written.at_ns)
+        })
+    }
+
+    /// The same for the table of commands.
+    #[must_use]
+    pub fn command(&self, written: &Written, target: &str) -> Option<Command> {
+        let Audit { at_ns, before, asked, after, unit, reason, script, script_version, .. } = self.write(written)?;
+        Some(Command {
+            at_ns,
+            command: "feed_override_pct".to_owned(),
+            target: target.to_owned(),
+            before,
+            asked,
+            after,
+            unit,
+            outcome: if written.fault.is_some() { "failed" } else { "done" }.to_owned(),
+            reason,
+            script,
+            script_version,
+        })
+    }
+}
+
+/// Why it was written, and by whose words; or what went wrong.
+fn why(written: &Written, reason: &str) -> String {
+    match &written.fault {
+        Some(fault) => words(&fault.to_string()),
+        None if reason.is_empty() => written.occasion.words().to_owned(),
+        None => format!("{}: {reason}", written.occasion.words()),
     }
 }
 
@@ -135,22 +221,6 @@ fn offsets(limits: &config::Offset) -> String {
     let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.word()).collect();
     let config::Offset { step_um, total_um, .. } = limits;
     format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.word())
-}
-
-/// A write; a sign of life is no news unless it failed.
-#[must_use]
-pub fn write(written: &Written) -> Option<Audit> {
-    if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
-        return None;
-    }
-    Some(Audit {
-        outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
-        before: written.before.map(percent),
-        asked: Some(percent(written.asked)),
-        after: written.after.map(percent),
-        reason: written.fault.as_ref().map_or(written.occasion.words().to_owned(), |fault| words(&fault.to_string())),
-        ..of("write", written.at_ns)
-    })
 }
 
 /// A step was seen to be in force.

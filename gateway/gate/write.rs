@@ -5,14 +5,13 @@
 //! of what was written: the time of that is the step's reaction time. What is anything else when the machine has had its time
 //! to settle ends the arming.
 
-use super::arming::Disarmed;
+use super::fault::Fault;
 use super::verdict::{Outcome, Verdict};
 use crate::config;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
-use adapters::{Actuator, Axis, LadderRequest, LadderRule, SourceError};
+use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
 use std::collections::VecDeque;
-use std::fmt;
 
 /// Why the writer wrote.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +41,8 @@ impl Occasion {
 pub struct Written {
     /// When it was issued.
     pub at_ns: TimeNs,
+    /// The sample that led to it.
+    pub sample_ns: TimeNs,
     /// Why.
     pub occasion: Occasion,
     /// The override in force before, as read, where it could be read.
@@ -69,75 +70,8 @@ pub struct Reaction {
     pub seen_ns: TimeNs,
 }
 
-/// Why the machine is not written to any more. The gate is to be disarmed with [`Fault::disarmed`], and an alarm raised.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Fault {
-    /// The machine shows another override than any that was written while it had time to settle.
-    ReadBack {
-        /// Written last.
-        asked: OverridePct,
-        /// Read back.
-        found: OverridePct,
-    },
-    /// Writing or reading back failed.
-    Line(SourceError),
-    /// The control shows another offset than the one that was written.
-    Offset {
-        /// Which axis.
-        axis: Axis,
-        /// Written, um.
-        asked_um: f64,
-        /// Read back, um.
-        found_um: f64,
-    },
-    /// An offset could not be written or read back.
-    OffsetLine(SourceError),
-}
-
-impl Fault {
-    /// The reason the gate is disarmed with.
-    #[must_use]
-    pub fn disarmed(&self) -> Disarmed {
-        match self {
-            Self::ReadBack { .. } => Disarmed::ReadBack,
-            Self::Offset { .. } => Disarmed::Offset,
-            Self::Line(_) | Self::OffsetLine(_) => Disarmed::Line,
-        }
-    }
-
-    /// The alarm in Chinese.
-    #[must_use]
-    pub fn zh(&self) -> &'static str {
-        match self {
-            Self::ReadBack { .. } | Self::Line(_) => "写入的进给倍率未生效，闸门已解除；请检查梯形图与面板倍率",
-            Self::Offset { .. } | Self::OffsetLine(_) => {
-                "写入的工件零点偏移未生效，闸门已解除；请检查数控系统的偏移保护"
-            }
-        }
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ReadBack { asked, found } => write!(
-                f,
-                "feed override {asked} was written and {found} is in force: the machine does not take it; the gate is disarmed. \
-                 Look whether the ladder passes the gateway's override on, and whether the dial limits it"
-            ),
-            Self::Line(error) => write!(f, "the feed override could not be written; the gate is disarmed. {error}"),
-            Self::Offset { axis, asked_um, found_um } => write!(
-                f,
-                "offset {asked_um:.0} um of {} was written and the control shows {found_um:.0} um; the gate is disarmed. Look \
-                 whether the offsets are protected, and who else writes them",
-                axis.word()
-            ),
-            Self::OffsetLine(error) => {
-                write!(f, "the offset could not be written or read back; the gate is disarmed. {error}")
-            }
-        }
-    }
-}
+/// A ladder waits for at least so many signs of life (`heartbeat_s` is at most a third of its patience).
+const HEARTBEATS_PATIENCE: i64 = 3;
 
 /// How the writer keeps its pace, from `[gate]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,6 +100,8 @@ pub struct Writer<A> {
     dials: VecDeque<(TimeNs, OverridePct)>,
     dial_is_known: bool,
     holding: bool,
+    /// Something went wrong: nothing is written until a verdict that is not armed has been seen.
+    failed: bool,
     changed_ns: Option<TimeNs>,
     pending: Option<Pending>,
 }
@@ -184,6 +120,7 @@ impl<A: Actuator> Writer<A> {
             dials: VecDeque::new(),
             dial_is_known: false,
             holding: false,
+            failed: false,
             changed_ns: None,
             pending: None,
         }
@@ -195,13 +132,48 @@ impl<A: Actuator> Writer<A> {
     }
 
     /// Writes what an armed verdict permits, when it has changed or the sign of life is due. The first verdict that is
-    /// not armed any more gives the machine back to its dial. Anything else writes nothing.
+    /// not armed any more gives the machine back to its dial. Anything else writes nothing; neither does an armed verdict
+    /// after a fault, until one that is not armed has been seen.
     pub fn step(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<Written> {
-        if verdict.armed {
-            let occasion = self.due(verdict, clock.now_ns())?;
-            return self.write(occasion, verdict.permitted, verdict.at_ns, clock);
+        if !verdict.armed {
+            self.failed = false;
+            return self.release(clock);
         }
-        self.release(clock)
+        if self.failed {
+            return None;
+        }
+        let at_ns = clock.now_ns();
+        let occasion = self.due(verdict, at_ns)?;
+        let written = match self.interrupted(at_ns, clock) {
+            None => self.write(occasion, verdict.permitted, verdict.at_ns, clock)?,
+            fault => {
+                let (asked, sample_ns) = (verdict.permitted, verdict.at_ns);
+                Written { at_ns, sample_ns, occasion, before: None, asked, after: None, fault }
+            }
+        };
+        self.failed = written.fault.is_some();
+        Some(written)
+    }
+
+    /// Signs of life have failed for longer than the ladder waits, and it has taken the dial back: going on from there
+    /// would be a leap.
+    fn interrupted(&mut self, now_ns: TimeNs, clock: &dyn Clock) -> Option<Fault> {
+        let (at_ns, asked) = *self.recent.back().filter(|_| self.holding)?;
+        let silent = self.late(at_ns, now_ns)?;
+        let fallen_back = match self.read(clock) {
+            Ok(found) => self.mismatch(asked, found, now_ns).is_some(),
+            // Writing meets it too, and knows what it means.
+            Err(SourceError::Off { .. }) => false,
+            Err(_) => true,
+        };
+        fallen_back.then_some(silent)
+    }
+
+    /// More time than the ladder has patience for has passed.
+    fn late(&self, from_ns: TimeNs, to_ns: TimeNs) -> Option<Fault> {
+        let silent_ns = to_ns - from_ns;
+        let patience_ns = self.pace.heartbeat_ns.saturating_mul(HEARTBEATS_PATIENCE);
+        (silent_ns > patience_ns).then_some(Fault::Late { silent_ms: silent_ns / 1_000_000 })
     }
 
     /// Gives the machine back to its dial, if it was being written to.
@@ -263,7 +235,7 @@ impl<A: Actuator> Writer<A> {
     }
 
     fn give_up(&mut self, fault: Fault) -> Option<Result<Reaction, Fault>> {
-        self.pending = None;
+        (self.pending, self.failed) = (None, true);
         Some(Err(fault))
     }
 
@@ -303,15 +275,16 @@ impl<A: Actuator> Writer<A> {
             self.changed_ns = Some(at_ns);
             self.pending = Some(Pending { asked, sample_ns, issued_ns: at_ns });
         }
+        let late = self.late(at_ns, clock.now_ns()).filter(|_| occasion != Occasion::Release);
         let (after, fault) = match sent.and_then(|()| self.read(clock)) {
-            Ok(found) => (Some(found), self.mismatch(asked, found, at_ns)),
+            Ok(found) => (Some(found), self.mismatch(asked, found, at_ns).or(late)),
             Err(SourceError::Off { .. }) => {
                 self.begin_anew();
                 return None;
             }
             Err(error) => (None, Some(Fault::Line(error))),
         };
-        Some(Written { at_ns, occasion, before, asked, after, fault })
+        Some(Written { at_ns, sample_ns, occasion, before, asked, after, fault })
     }
 
     /// What is in force before the first write; later, what was written last.

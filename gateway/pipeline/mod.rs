@@ -18,7 +18,7 @@ pub use journal::Journal;
 pub use parts::Parts;
 pub use tally::Tally;
 
-use crate::gate::{Gate, OffsetVerdict, Verdict};
+use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
 use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::{self, Estimated, Estimates};
@@ -158,6 +158,12 @@ impl Pipeline {
     /// What the gate makes of the offsets that were proposed at this tick; after [`Pipeline::decide`].
     pub fn shift(&mut self, sample: &Sample) -> Vec<OffsetVerdict> {
         self.gate.shift(&self.scripts.decision().offsets, sample, &self.estimates)
+    }
+
+    /// What is to be looked at in the control, because nobody knows for sure what is in force there; after
+    /// [`Pipeline::decide`].
+    pub fn looks(&mut self, sample: &Sample) -> Vec<offset::Order> {
+        self.gate.looks(sample, &self.estimates)
     }
 
     /// What the gate made of the last request.

@@ -7,9 +7,9 @@ use super::report::milliseconds;
 use super::shifting::{self, Shifting};
 use crate::config::{self, GateMode};
 use crate::control::{self, Posted, Reply};
-use crate::gate::offset::{self, Moved, Order};
-use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Written, trail};
-use crate::history::{Alarm, AlarmClear, Command, ReactionTime};
+use crate::gate::offset::{Moved, Order};
+use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, trail};
+use crate::history::{Alarm, AlarmClear, ReactionTime};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::status::{AlarmStatus, Problem};
@@ -159,21 +159,22 @@ impl Commands {
     /// Offsets: into the audit first, then to the machine.
     fn shift(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
         let verdicts = pipeline.shift(sample);
-        if verdicts.is_empty() {
-            return;
-        }
         let rows = self.shifting.rows(&pipeline.scripts().decision().offsets, &verdicts, pipeline.gate());
+        let looks = pipeline.looks(sample);
         let gate = pipeline.gate_mut();
         rows.into_iter().for_each(|row| self.keep(row, gate, health));
-        let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).collect();
+        let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).chain(looks).collect();
         let mut said = Vec::new();
-        self.hand.shift(&orders, now_ns, |it| said.push(it));
+        self.hand.shift(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
         self.hear(said, sample, gate, health);
     }
 
     fn moved(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
-        offset::moved(moved).into_iter().for_each(|row| self.keep(row, gate, health));
-        shifting::command(moved, &self.target_of_offsets(gate)).into_iter().for_each(|row| health.keep(row.into()));
+        if let Some(row) = self.shifting.row(moved) {
+            let command = shifting::command(moved, &row, &self.target_of_offsets(gate));
+            self.keep(row, gate, health);
+            command.into_iter().for_each(|row| health.keep(row.into()));
+        }
         self.shifting.answered(moved, gate, health);
         moved.fault().into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
     }
@@ -190,10 +191,8 @@ impl Commands {
         match said {
             Said::Written(written) => {
                 self.written = (written.occasion != Occasion::Release).then(|| f64::from(written.asked.percent()));
-                trail::write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
-                if written.occasion != Occasion::SignOfLife {
-                    health.keep(self.command(&written).into());
-                }
+                self.trail.write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
+                self.trail.command(&written, &self.target).into_iter().for_each(|row| health.keep(row.into()));
                 written.fault.into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
             }
             Said::Seen(reaction) => {
@@ -204,28 +203,13 @@ impl Commands {
             }
             Said::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
             Said::Moved(moved) => self.moved(&moved, sample, gate, health),
+            Said::Withdrawn(order) => gate.offsets_mut().withdrawn(order),
             Said::Asked(ask, failed) => {
                 self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
                 if let Some(failed) = failed {
                     health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
                 }
             }
-        }
-    }
-
-    fn command(&self, written: &Written) -> Command {
-        let percent = |pct: adapters::units::OverridePct| f64::from(pct.percent());
-        Command {
-            at_ns: written.at_ns,
-            command: "feed_override_pct".to_owned(),
-            target: self.target.clone(),
-            before: written.before.map(percent),
-            asked: Some(percent(written.asked)),
-            after: written.after.map(percent),
-            unit: "%".to_owned(),
-            outcome: if written.fault.is_some() { "failed" } else { "done" }.to_owned(),
-            reason: written.fault.as_ref().map_or_else(|| written.occasion.words().to_owned(), ToString::to_string),
-            ..Command::default()
         }
     }
 
@@ -261,7 +245,7 @@ impl Commands {
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();
-        self.hand.shift(&gate.offsets().farewell(), sample.at_ns, |it| said.push(it));
+        self.hand.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
         self.hand.close(|it| said.push(it));
         self.hear(said, sample, gate, health);
     }
@@ -286,7 +270,7 @@ impl Commands {
     pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
         let alarm = self.alarm.as_ref().map(|(_, text)| Problem { what: text.clone(), next });
-        alarm.into_iter().chain(self.shifting.problem(gate))
+        alarm.into_iter().chain(self.shifting.problems(gate))
     }
 }
 

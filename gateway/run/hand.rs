@@ -1,30 +1,33 @@
 //! The hand that writes: the only thing in the process that holds an actuator, on a thread of its own because a controller
 //! may take seconds to answer. The tick lays its verdict down and goes on; only the newest counts. Whatever stops the tick
 //! stops the verdicts, with them the signs of life, and with those the override at the machine.
+//!
+//! What waits while the controller takes its time is judged again when its turn comes: a verdict, a request or an order that
+//! has grown old, or whose arming has ended meanwhile, goes nowhere, and the tick is told.
 
+use super::desk::Desk;
 use super::priority;
 use crate::config;
-use crate::gate::offset::{Moved, Order, carry_out};
+use crate::gate::offset::{Account, Moved, Order};
 use crate::gate::{Ask, Fault, Reaction, Verdict, Writer, Written};
+use adapters::Actuator;
 use adapters::clock::{Clock, ManualClock, TimeNs};
-use adapters::{Actuator, OffsetSink};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// What is told but not yet listened to; beyond that the hand lets go.
 const SAID_MAX: usize = 1024;
-/// Requests to the ladder that wait.
-const ASKS_MAX: usize = 8;
-/// Orders to shift an axis that wait; each axis has at most one.
-const ORDERS_MAX: usize = 8;
 /// While a change has not been seen in force it is looked for this often.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Without a verdict for this long the hand looks whether it shall end.
 const REST: Duration = Duration::from_millis(500);
 /// A controller that does not answer is not waited for at the end; the ladder falls back by itself.
 const LET_GO_WITHIN: Duration = Duration::from_secs(3);
+/// Why a request never reached the ladder.
+const NOT_HANDED_OVER: &str = "not handed over: the gate was disarmed before the controller had time for it, or it had none for \
+                               ten seconds";
 
 /// What the hand tells.
 #[derive(Debug)]
@@ -39,6 +42,8 @@ pub enum Said {
     Asked(Ask, Option<String>),
     /// An order to shift an axis was carried out, or could not be.
     Moved(Box<Moved>),
+    /// An order that was not carried out: the arming ended before its turn came, or it waited too long.
+    Withdrawn(Order),
 }
 
 /// What the hand may touch.
@@ -47,13 +52,13 @@ pub struct Tools {
     /// The way to the feed override.
     pub actuator: Option<Box<dyn Actuator>>,
     /// The way to the offsets.
-    pub offsets: Option<Box<dyn OffsetSink>>,
+    pub offsets: Option<Account>,
 }
 
 /// The same with the account of what was written.
 pub struct Holding {
     writer: Option<AnyWriter>,
-    offsets: Option<Box<dyn OffsetSink>>,
+    offsets: Option<Account>,
 }
 
 impl Holding {
@@ -110,28 +115,40 @@ impl Hand {
             Self::None => {}
             Self::Inline(holding, clock) => {
                 clock.set(now_ns);
-                act(holding, asks, Some(verdict), clock, &mut tell);
+                asks.iter().for_each(|it| ask(holding, it, clock, &mut tell));
+                write(holding, Some(verdict), clock, &mut tell);
             }
-            Self::Thread(remote) => remote.lay_down(verdict, asks),
+            Self::Thread(remote) => {
+                let refused = remote.desk.lay_down(verdict, asks);
+                refused.into_iter().for_each(|it| tell(Said::Asked(it, Some(NOT_HANDED_OVER.to_owned()))));
+            }
         }
     }
 
-    /// Orders shifts of axes. What came of them is told here or with [`Hand::listen`].
-    pub fn shift(&mut self, orders: &[Order], now_ns: TimeNs, mut tell: impl FnMut(Said)) {
+    /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`Hand::listen`].
+    pub fn shift(&mut self, orders: &[Order], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(Said)) {
         match self {
             Self::None => {}
             Self::Inline(holding, clock) => {
                 clock.set(now_ns);
-                shift(holding, orders, clock, &mut tell);
+                orders.iter().for_each(|order| shift(holding, *order, clock, &mut tell));
             }
-            Self::Thread(remote) => remote.order(orders),
+            Self::Thread(remote) => {
+                let withdrawn = remote.desk.order(orders, armed);
+                withdrawn.into_iter().for_each(|order| tell(Said::Withdrawn(order)));
+            }
         }
     }
 
-    /// What the hand has told since.
+    /// What the hand has told since; also that it is not there any more.
     pub fn listen(&mut self, mut tell: impl FnMut(Said)) {
-        if let Self::Thread(remote) = self {
-            remote.said.try_iter().for_each(&mut tell);
+        let Self::Thread(remote) = self else { return };
+        loop {
+            match remote.said.try_recv() {
+                Ok(said) => tell(said),
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => return tell(Said::Fault(Fault::Gone)),
+            }
         }
     }
 
@@ -153,27 +170,8 @@ pub struct Remote {
 }
 
 impl Remote {
-    fn lay_down(&self, verdict: &Verdict, asks: &[Ask]) {
-        let mut paper = self.desk.lock();
-        paper.verdict = Some(*verdict);
-        let room = ASKS_MAX.saturating_sub(paper.asks.len());
-        paper.asks.extend(asks.iter().take(room).cloned());
-        self.desk.arrived.notify_one();
-    }
-
-    fn order(&self, orders: &[Order]) {
-        if orders.is_empty() {
-            return;
-        }
-        let mut paper = self.desk.lock();
-        let room = ORDERS_MAX.saturating_sub(paper.orders.len());
-        paper.orders.extend(orders.iter().take(room).copied());
-        self.desk.arrived.notify_one();
-    }
-
     fn close(&mut self, tell: &mut dyn FnMut(Said)) {
-        self.desk.lock().closing = true;
-        self.desk.arrived.notify_one();
+        self.desk.close();
         let until = Instant::now() + LET_GO_WITHIN;
         // The sender goes with the thread.
         while let Ok(said) = self.said.recv_timeout(until.saturating_duration_since(Instant::now())) {
@@ -186,47 +184,27 @@ impl Remote {
     }
 }
 
-#[derive(Debug, Default)]
-struct Paper {
-    verdict: Option<Verdict>,
-    asks: Vec<Ask>,
-    orders: Vec<Order>,
-    closing: bool,
-}
-
-/// Where the tick lays its verdicts down.
-#[derive(Debug, Default)]
-struct Desk {
-    paper: Mutex<Paper>,
-    arrived: Condvar,
-}
-
-impl Desk {
-    fn lock(&self) -> MutexGuard<'_, Paper> {
-        // A paper is complete whenever the lock is free.
-        self.paper.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Waits at most so long for a paper, and takes it.
-    fn take(&self, limit: Duration) -> Paper {
-        let empty = |paper: &mut Paper| paper.verdict.is_none() && paper.orders.is_empty() && !paper.closing;
-        let waited = self.arrived.wait_timeout_while(self.lock(), limit, empty);
-        let mut paper = waited.unwrap_or_else(PoisonError::into_inner).0;
-        let closing = paper.closing;
-        Paper { closing, ..std::mem::take(&mut *paper) }
-    }
-}
-
 fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<Said>) {
     // The tick tells what is granted; it is the same for both.
     let _granted = priority::ask();
     let mut heard = true;
     while heard {
-        let paper = desk.take(if holding.is_waiting() { LOOK_EVERY } else { REST });
+        let (verdict, closing) = desk.take(if holding.is_waiting() { LOOK_EVERY } else { REST });
         let mut tell = |said| heard &= say.try_send(said).is_ok();
-        act(&mut holding, &paper.asks, paper.verdict.as_ref(), clock, &mut tell);
-        shift(&mut holding, &paper.orders, clock, &mut tell);
-        if paper.closing {
+        while let Some((it, in_time)) = desk.next_ask() {
+            match in_time {
+                true => ask(&mut holding, &it, clock, &mut tell),
+                false => tell(Said::Asked(it, Some(NOT_HANDED_OVER.to_owned()))),
+            }
+        }
+        write(&mut holding, verdict.as_ref(), clock, &mut tell);
+        while let Some((order, in_time)) = desk.next_order() {
+            match in_time {
+                true => shift(&mut holding, order, clock, &mut tell),
+                false => tell(Said::Withdrawn(order)),
+            }
+        }
+        if closing {
             break;
         }
     }
@@ -237,12 +215,14 @@ fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<S
     }
 }
 
-fn act(holding: &mut Holding, asks: &[Ask], verdict: Option<&Verdict>, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
+fn ask(holding: &mut Holding, ask: &Ask, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
     let Some(writer) = &mut holding.writer else { return };
-    for ask in asks {
-        let failed = writer.ask(ask.request, clock).err().map(|error| error.to_string());
-        tell(Said::Asked(ask.clone(), failed));
-    }
+    let failed = writer.ask(ask.request, clock).err().map(|error| error.to_string());
+    tell(Said::Asked(ask.clone(), failed));
+}
+
+fn write(holding: &mut Holding, verdict: Option<&Verdict>, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
+    let Some(writer) = &mut holding.writer else { return };
     if let Some(written) = verdict.and_then(|verdict| writer.step(verdict, clock)) {
         tell(Said::Written(written));
     }
@@ -253,7 +233,7 @@ fn act(holding: &mut Holding, asks: &[Ask], verdict: Option<&Verdict>, clock: &d
     }
 }
 
-fn shift(holding: &mut Holding, orders: &[Order], clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
-    let Some(sink) = &mut holding.offsets else { return };
-    orders.iter().for_each(|order| tell(Said::Moved(Box::new(carry_out(sink.as_mut(), *order, clock)))));
+fn shift(holding: &mut Holding, order: Order, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
+    let Some(offsets) = &mut holding.offsets else { return };
+    tell(Said::Moved(Box::new(offsets.carry_out(order, clock))));
 }

@@ -3,6 +3,7 @@
 pub mod clock;
 pub mod command;
 pub mod deadline;
+mod desk;
 pub mod feed;
 pub mod hand;
 pub mod health;
@@ -29,6 +30,7 @@ use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
 use ::rules::estimators;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use adapters::{Actuator, OffsetSink};
 use clock::BoxClock;
 use command::Commands;
 use deadline::{RUN_MAX, RunLimit};
@@ -65,6 +67,9 @@ pub struct Plan {
 
 /// The tick, ready to go, and what it publishes.
 type Begun = (Ticker, watch::Receiver<Option<Published>>);
+
+/// The ways to the feed override and to the offsets, where they may be written.
+type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
 
 /// Orders of persons at the box.
 type Orders = mpsc::Receiver<control::Posted>;
@@ -192,11 +197,12 @@ fn commands(
     if limits.greatest_mode() != GateMode::Armed {
         return Ok(Commands::new(Hand::None, Shifting::idle(data_dir), target, orders));
     }
-    let mut tools = tools(limits, &mut ways)?;
-    let shifting = match &mut tools.offsets {
-        Some(sink) => Shifting::resume(data_dir, sink.as_mut(), gate),
-        None => Shifting::idle(data_dir),
+    let (actuator, sink) = tools(limits, &mut ways)?;
+    let (shifting, offsets) = match sink {
+        Some(sink) => Shifting::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?,
+        None => (Shifting::idle(data_dir), None),
     };
+    let tools = Tools { actuator, offsets };
     let hand = match plan.speed {
         MachineSpeed::Real => Hand::start(tools, limits, clock.clone())
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
@@ -206,13 +212,13 @@ fn commands(
 }
 
 /// What may be written, and nothing else.
-fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Tools, CannotRun> {
-    let mut tools = Tools::default();
+fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Ends, CannotRun> {
+    let (mut actuator, mut sink) = (None, None);
     if limits.mode == GateMode::Armed {
         let target = limits.source.as_deref().unwrap_or_default();
         let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.actuator.take());
         let what = format!("[gate] source = {target:?} has no feed override that could be written");
-        tools.actuator =
+        actuator =
             Some(way.ok_or_else(|| CannotRun::new(what, "name the controller there, or write mode = \"shadow\""))?);
     }
     if limits.offset.mode == GateMode::Armed {
@@ -220,9 +226,9 @@ fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Tools, CannotRun> {
         let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.offsets.take());
         let what = format!("[gate.offset] source = {target:?} has no external offset that could be written");
         let next = "name the controller there (fanuc:// needs allow=EXT), or write mode = \"shadow\"";
-        tools.offsets = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
+        sink = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
     }
-    Ok(tools)
+    Ok((actuator, sink))
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

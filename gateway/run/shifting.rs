@@ -1,68 +1,61 @@
-//! Thermal offsets on their way to the control and into the history, and what is left in the control when the gateway ends.
+//! Thermal offsets on their way to the control and into the history, and what is left in the controls when the gateway ends.
 
 use super::health::Health;
-use crate::files::replace;
-use crate::gate::offset::{Moved, OffsetTrail, Order};
-use crate::gate::{Gate, OffsetVerdict, offset};
+use crate::cli::CannotRun;
+use crate::gate::offset::{Account, Book, Moved, OffsetTrail, Order};
+use crate::gate::{Gate, OffsetVerdict};
 use crate::history::{Audit, Command};
 use crate::log::{Notice, Severity};
 use crate::status::Problem;
 use adapters::SourceError;
-use adapters::clock::TimeNs;
-use adapters::offset::{Axis, Left, OffsetSink, Shifted};
+use adapters::offset::{Axis, Left, OffsetSink};
 use rules::script::OffsetProposal;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the data directory.
-const FILE: &str = "offsets.json";
 const SOURCE: &str = "gate";
-
-/// What one axis has in the control that is not the operator's.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Kept {
-    base_um: f64,
-    written_um: f64,
-}
-
-/// `offsets/1`: what was written to which control and not given back.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-struct Memory {
-    schema: String,
-    /// Address of the control.
-    target: String,
-    axes: BTreeMap<String, Kept>,
-}
 
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub struct Shifting {
-    path: Option<PathBuf>,
-    memory: Memory,
+    /// The control that is written to; none where nothing can be.
+    target: Option<String>,
+    /// What is left in each control.
+    left: Vec<(String, Axis, Left)>,
+    /// A book that could not be read, where it was put.
+    unreadable: Option<PathBuf>,
     trail: OffsetTrail,
     refused: Option<String>,
 }
 
 impl Shifting {
-    /// With what an earlier run has left in this control, which gate and sink are told.
-    #[must_use]
-    pub fn resume(data_dir: &Path, sink: &mut dyn OffsetSink, gate: &mut Gate) -> Self {
-        let path = data_dir.join(FILE);
+    /// With what an earlier run has left in this control, which the gate is told; it is looked at before anything is written.
+    ///
+    /// # Errors
+    /// The book of what is left cannot be read, nor put aside.
+    pub fn resume(data_dir: &Path, sink: Box<dyn OffsetSink>, gate: &mut Gate) -> Result<(Self, Account), CannotRun> {
         let target = sink.name().to_owned();
-        let memory = recall(&path).filter(|memory| memory.target == target).unwrap_or_default();
-        for (axis, Kept { base_um, written_um }) in memory.left() {
-            sink.resume(axis, Left { base_um, written_um });
-            gate.offsets_mut().resume(axis, written_um - base_um);
+        let (book, unreadable) = match Book::open(data_dir, &target) {
+            Ok(book) => (book, None),
+            Err(_) => {
+                Book::begin_anew(data_dir, &target).map(|(book, aside)| (book, Some(aside))).map_err(|error| {
+                    CannotRun::new(format!("{}: {error}", data_dir.display()), "look at the permissions")
+                })?
+            }
+        };
+        for axis in Axis::ALL {
+            if let Some(left) = book.left(axis) {
+                gate.offsets_mut().resume(axis, left.shift_um());
+                gate.offsets_mut().unsettle(axis);
+            }
         }
-        let memory = Memory { schema: "offsets/1".to_owned(), target, ..memory };
-        Self { path: Some(path), memory, ..Self::default() }
+        let shifting = Self { target: Some(target), left: left(&book), unreadable, ..Self::default() };
+        Ok((shifting, Account::new(sink, book)))
     }
 
     /// Nothing can be written; but an earlier run may have left something, which a person has to see to.
     #[must_use]
     pub fn idle(data_dir: &Path) -> Self {
-        Self { memory: recall(&data_dir.join(FILE)).unwrap_or_default(), ..Self::default() }
+        Self { left: Book::open(data_dir, "").map(|book| left(&book)).unwrap_or_default(), ..Self::default() }
     }
 
     /// The rows of this tick's verdicts that say something new.
@@ -72,33 +65,27 @@ impl Shifting {
         verdicts.iter().filter_map(|verdict| self.trail.proposal(of(verdict.axis), verdict, limits)).collect()
     }
 
-    /// The control has answered: for the gate, for the file, for the operator.
-    pub fn answered(&mut self, moved: &Moved, gate: &mut Gate, health: &mut Health) {
-        let axis = moved.order.axis();
-        let shifted = moved.result.as_ref().ok().and_then(Option::as_ref);
-        gate.offsets_mut().answered(axis, shifted);
-        if let Some(shifted) = shifted {
-            self.remember(axis, shifted, moved.at_ns, health);
-        }
-        self.tell_refusal(moved, health);
+    /// The row of the audit.
+    #[must_use]
+    pub fn row(&self, moved: &Moved) -> Option<Audit> {
+        self.trail.moved(moved)
     }
 
-    fn remember(&mut self, axis: Axis, shifted: &Shifted, at_ns: TimeNs, health: &mut Health) {
-        let kept = Kept { base_um: shifted.base_um, written_um: shifted.after_um };
-        if shifted.shift_um() == 0.0 {
-            self.memory.axes.remove(axis.word());
-        } else {
-            self.memory.axes.insert(axis.word().to_owned(), kept);
+    /// The control has answered: for the gate, for the operator.
+    pub fn answered(&mut self, moved: &Moved, gate: &mut Gate, health: &mut Health) {
+        gate.offsets_mut().answered(moved);
+        if let Some(target) = &self.target {
+            let axis = moved.order.axis();
+            self.left.retain(|(of, known, _)| (of, *known) != (target, axis));
+            self.left.extend(moved.left.map(|left| (target.clone(), axis, left)));
         }
-        let Some(path) = &self.path else { return };
-        let text = serde_json::to_string(&self.memory).unwrap_or_default();
-        if let Err(error) = replace(path, &text) {
+        if let Err(why) = &moved.kept {
             let text = format!(
-                "{}: what is shifted in the control could not be kept ({error}); after a restart it would count as the operator's",
-                path.display()
+                "what is shifted in the control could not be kept ({why}); after a restart the control is looked at again"
             );
-            health.event(at_ns, SOURCE, &Notice::new(Severity::Error, "offset_not_kept", text));
+            health.event(moved.at_ns, SOURCE, &Notice::new(Severity::Error, "offset_not_kept", text));
         }
+        self.tell_refusal(moved, health);
     }
 
     /// A control that says no is told once; it is asked again.
@@ -115,50 +102,64 @@ impl Shifting {
         self.refused = refused;
     }
 
-    /// A shift that stays in the control although nobody follows it up.
-    #[must_use]
-    pub fn problem(&self, gate: &Gate) -> Option<Problem> {
-        let follows = gate.armed().is_ok() || (self.path.is_some() && gate.limits().offset.restore);
-        if follows || self.memory.axes.is_empty() {
-            return None;
-        }
-        let each = |(axis, kept): (&String, &Kept)| {
-            format!("{axis} by {:+.0} um, to {:.0} um", kept.written_um - kept.base_um, kept.written_um)
+    /// Shifts that stay in a control although nobody follows them up.
+    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
+        let unreadable = self.unreadable.as_ref().map(|path| Problem {
+            what: format!("{}: what an earlier run has left in the control cannot be read", path.display()),
+            next: "look at the external offsets at the control, set them right there, and delete the file".to_owned(),
+        });
+        let own =
+            self.abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| Problem {
+                what: format!("the external offset in the control is still shifted: {shifts}"),
+                next: "arm the gate again, or set the offset back at the control".to_owned(),
+            });
+        let others = self.abandoned(|target, _| !self.is_own(target)).map(|shifts| Problem {
+            what: format!("the external offset is still shifted in a control that is no longer written to: {shifts}"),
+            next: "name that control again as `source` under [gate.offset], or set the offset back there".to_owned(),
+        });
+        [unreadable, own, others].into_iter().flatten()
+    }
+
+    /// Of this gateway's control; where none is written to, any.
+    fn is_own(&self, target: &str) -> bool {
+        self.target.as_ref().is_none_or(|own| own == target)
+    }
+
+    /// Will somebody move it, or give it back?
+    fn follows(&self, axis: Axis, gate: &Gate) -> bool {
+        let limits = &gate.limits().offset;
+        self.target.is_some() && (limits.restore || (gate.armed().is_ok() && limits.axes.contains(&axis)))
+    }
+
+    fn abandoned(&self, counts: impl Fn(&str, Axis) -> bool) -> Option<String> {
+        let of = |(target, axis, left): &(String, Axis, Left)| {
+            let place = if self.is_own(target) { String::new() } else { format!("{target} ") };
+            format!("{place}{} by {:+.0} um, to {:.0} um", axis.word(), left.shift_um(), left.written_um)
         };
-        let shifts: Vec<String> = self.memory.axes.iter().map(each).collect();
-        let what = format!("the external offset in the control is still shifted: {}", shifts.join(", "));
-        Some(Problem { what, next: "arm the gate again, or set the offset back at the control".to_owned() })
+        let shifts: Vec<String> = self.left.iter().filter(|(target, axis, _)| counts(target, *axis)).map(of).collect();
+        (!shifts.is_empty()).then(|| shifts.join(", "))
     }
 }
 
-impl Memory {
-    fn left(&self) -> impl Iterator<Item = (Axis, Kept)> {
-        self.axes.iter().filter_map(|(axis, kept)| Some((Axis::of(axis)?, *kept)))
-    }
+fn left(book: &Book) -> Vec<(String, Axis, Left)> {
+    book.all().map(|(target, axis, left)| (target.to_owned(), axis, left)).collect()
 }
 
-fn recall(path: &Path) -> Option<Memory> {
-    serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
-}
-
-/// The row of the table of commands; nothing where nothing was written.
+/// The row of the table of commands; nothing where nothing was to be written.
 #[must_use]
-pub fn command(moved: &Moved, target: &str) -> Option<Command> {
-    let row = offset::moved(moved)?;
+pub fn command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
     let verb = match moved.order {
         Order::Shift { .. } => "shift",
         Order::Restore(_) => "restore",
+        Order::Look(_) => return None,
     };
-    Some(Command {
-        at_ns: row.at_ns,
-        command: format!("{}_offset_{verb}", moved.order.axis().word()),
-        target: target.to_owned(),
-        before: row.before,
-        asked: row.asked,
-        after: row.after,
-        unit: row.unit,
-        outcome: if row.outcome == "written" { "done" } else { "failed" }.to_owned(),
-        reason: row.reason,
-        ..Command::default()
-    })
+    let outcome = match row.outcome.as_str() {
+        "written" => "done",
+        "settled" | "replaced" => return None,
+        _ => "failed",
+    };
+    let Audit { at_ns, before, asked, after, unit, reason, script, script_version, .. } = row.clone();
+    let command = format!("{}_offset_{verb}", moved.order.axis().word());
+    let (target, outcome) = (target.to_owned(), outcome.to_owned());
+    Some(Command { at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version })
 }

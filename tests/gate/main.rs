@@ -5,6 +5,7 @@ mod cut;
 mod day;
 mod decisions;
 mod killed;
+mod late;
 mod offsets;
 mod outputs;
 #[path = "../box/process.rs"]

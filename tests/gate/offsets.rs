@@ -1,18 +1,19 @@
 //! Thermal offsets: what is decided, what reaches the control, and what is given back.
 
 use super::cut::{Case, TICK_NS, common_cases, cutting, limits, set_number, set_text};
-use adapters::Sample;
-use adapters::clock::{ManualClock, SECOND_NS};
-use adapters::offset::{Axis, Left, OffsetSink};
-use adapters::simulated::{Simulated, SimulatedSettings};
+use adapters::clock::{Clock, ManualClock, SECOND_NS};
+use adapters::offset::{Axis, LastWrite, OffsetSink};
+use adapters::simulated::{Simulated, SimulatedOffsets, SimulatedSettings};
 use adapters::words::execution;
+use adapters::{Sample, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Moved, OffsetBound, OffsetOutcome, Order, carry_out};
+use gateway::gate::offset::{Account, Book, Moved, OffsetBound, OffsetOutcome, Order, Shifted};
 use gateway::gate::{Disarmed, Gate, Hold, OffsetVerdict};
 use rules::estimators::{Estimates, State};
 use rules::script::OffsetProposal;
 use std::path::Path;
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// Z may be shifted by 5 um at a time and 12 um in all, once a minute.
 fn offset_limits(mode: GateMode) -> config::Gate {
@@ -49,17 +50,16 @@ fn judged(gate: &mut Gate, at_ns: i64, um: Option<f64>) -> Option<OffsetVerdict>
     gate.shift(&proposals, &sample, &estimates).pop()
 }
 
+fn answer(order: Order, result: Result<Option<Shifted>, SourceError>) -> Moved {
+    Moved { at_ns: 0, order, result, left: None, kept: Ok(()) }
+}
+
 /// A control that does what it is told, at once.
 fn obey(gate: &mut Gate, verdict: &OffsetVerdict) -> Option<f64> {
-    let Some(Order::Shift { axis, wanted_um }) = verdict.order else { return None };
-    let shifted = adapters::offset::Shifted {
-        before_um: 0.0,
-        base_um: 0.0,
-        asked_um: wanted_um,
-        after_um: wanted_um,
-        changed_by_others: false,
-    };
-    gate.offsets_mut().answered(axis, Some(&shifted));
+    let Some(Order::Shift { wanted_um, .. }) = verdict.order else { return None };
+    let (base_um, before_um, last) = (0.0, 0.0, LastWrite::InForce);
+    let shifted = Shifted { before_um, base_um, asked_um: wanted_um, after_um: wanted_um, last };
+    gate.offsets_mut().answered(&answer(verdict.order?, Ok(Some(shifted))));
     Some(wanted_um)
 }
 
@@ -166,31 +166,160 @@ fn stood(machine: &Simulated) -> ManualClock {
     ManualClock::at(s * SECOND_NS)
 }
 
-fn moved(sink: &mut dyn OffsetSink, clock: &ManualClock, order: Order) -> Moved {
-    carry_out(sink, order, clock)
+/// The machine between two parts, with this set by the operator, and what the gate holds of it.
+struct Bench {
+    machine: Simulated,
+    clock: ManualClock,
+    directory: TempDir,
+}
+
+impl Bench {
+    fn new(operator_um: f64) -> Self {
+        let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), 0);
+        machine.set_offset(Axis::Z, operator_um);
+        Self { clock: stood(&machine), machine, directory: tempfile::tempdir().expect("a directory") }
+    }
+
+    /// As after a start of the gateway.
+    fn account(&self, sink: Box<dyn OffsetSink>) -> Account {
+        let book = Book::open(self.directory.path(), "simulated://lathe").expect("readable");
+        Account::new(sink, book)
+    }
+
+    fn started(&self) -> Account {
+        self.account(Box::new(self.machine.offsets()))
+    }
+}
+
+fn shift(from_um: f64, wanted_um: f64) -> Order {
+    Order::Shift { axis: Axis::Z, from_um, wanted_um }
+}
+
+fn done(account: &mut Account, clock: &ManualClock, order: Order) -> Shifted {
+    account.carry_out(order, clock).result.expect("at rest").expect("something to do")
 }
 
 #[test]
 fn the_simulated_control_counts_refuses_in_a_program_and_gives_back_what_the_operator_had() {
-    let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), 0);
-    machine.set_offset(Axis::Z, 40.0);
+    let bench = Bench::new(40.0);
+    let Bench { machine, clock, .. } = &bench;
     let running = (60..3600).find(|s| machine.moment(s * SECOND_NS).panel.execution == execution::ACTIVE);
-    let (mut sink, shift) = (machine.offsets(), |um| Order::Shift { axis: Axis::Z, wanted_um: um });
-    let refused = moved(&mut sink, &ManualClock::at(running.expect("a program") * SECOND_NS), shift(3.0));
+    let mut account = bench.started();
+    let refused = account.carry_out(shift(0.0, 3.0), &ManualClock::at(running.expect("a program") * SECOND_NS));
     assert!(refused.result.is_err() && refused.fault().is_none() && machine.written().writes() == 0, "{refused:?}");
-    let clock = stood(&machine);
-    let done = moved(&mut sink, &clock, shift(3.4)).result.expect("at rest").expect("shifted");
-    assert_eq!((done.before_um, done.after_um, done.shift_um()), (40.0, 43.0, 3.0), "whole micrometres");
-    machine.set_offset(Axis::Z, 100.0);
-    let done = moved(&mut sink, &clock, shift(5.0)).result.expect("at rest").expect("shifted");
-    assert!(done.changed_by_others && done.after_um == 105.0, "{done:?}");
-    assert_eq!(machine.written().offsets, 2);
+    let shifted = done(&mut account, clock, shift(0.0, 3.4));
+    assert_eq!((shifted.before_um, shifted.after_um, shifted.shift_um()), (40.0, 43.0, 3.0), "whole micrometres");
     // Another process of the gateway, which knows what this one has left.
-    let mut sink = machine.offsets();
-    sink.resume(Axis::Z, Left { base_um: 100.0, written_um: 105.0 });
-    let done = moved(&mut sink, &clock, Order::Restore(Axis::Z)).result.expect("at rest").expect("given back");
-    assert_eq!((done.after_um, machine.offset_um(Axis::Z)), (100.0, 100.0));
+    let mut account = bench.started();
+    let back = done(&mut account, clock, Order::Restore(Axis::Z));
+    assert_eq!((back.after_um, machine.offset_um(Axis::Z), machine.written().offsets), (40.0, 40.0, 2));
+    assert_eq!(account.carry_out(Order::Restore(Axis::Z), clock).result, Ok(None), "nothing is left");
     machine.protect_offsets(true);
-    let held_back = moved(&mut sink, &clock, shift(5.0));
+    let held_back = account.carry_out(shift(0.0, 5.0), clock);
     assert_eq!(held_back.fault().map(|fault| fault.disarmed()), Some(Disarmed::Offset), "{held_back:?}");
+}
+
+#[test]
+fn what_the_operator_sets_anew_is_the_beginning_and_no_step_is_made_on_top_of_it_unasked() {
+    let bench = Bench::new(40.0);
+    let Bench { machine, clock, .. } = &bench;
+    let mut account = bench.started();
+    done(&mut account, clock, shift(0.0, 5.0));
+    machine.set_offset(Axis::Z, 100.0);
+    let found = done(&mut account, clock, shift(5.0, 10.0));
+    assert_eq!((found.last, found.shift_um(), machine.offset_um(Axis::Z)), (LastWrite::Replaced, 0.0, 100.0));
+    let shifted = done(&mut account, clock, shift(0.0, 5.0));
+    assert_eq!((shifted.base_um, shifted.after_um), (100.0, 105.0), "by a step from where the gate knows it to be");
+    machine.set_offset(Axis::Z, 7.0);
+    let found = done(&mut account, clock, Order::Restore(Axis::Z));
+    assert_eq!((found.last, machine.offset_um(Axis::Z)), (LastWrite::Replaced, 7.0), "it is the operator's");
+    assert_eq!(machine.written().offsets, 2);
+}
+
+/// A control behind a line that fails in the middle of a write: after the control has taken it, or before.
+struct Broken {
+    sink: SimulatedOffsets,
+    taken: bool,
+}
+
+impl OffsetSink for Broken {
+    fn name(&self) -> &str {
+        self.sink.name()
+    }
+
+    fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
+        self.sink.at_rest(clock, axis)
+    }
+
+    fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
+        if self.taken {
+            self.sink.write(clock, axis, found_um, wanted_um)?;
+        }
+        let (source_name, what, next) = (self.name().to_owned(), "cut".to_owned(), String::new());
+        Err(SourceError::Line { source_name, what, next })
+    }
+}
+
+#[test]
+fn a_write_whose_end_nobody_saw_is_settled_by_looking_and_never_made_twice() {
+    for (taken, last) in [(true, LastWrite::Taken), (false, LastWrite::NotTaken)] {
+        for restarted in [false, true] {
+            let bench = Bench::new(40.0);
+            let Bench { machine, clock, .. } = &bench;
+            let mut account = bench.account(Box::new(Broken { sink: machine.offsets(), taken }));
+            let broken = account.carry_out(shift(0.0, 5.0), clock);
+            assert!(broken.fault().is_some() && broken.is_open(), "{broken:?}");
+            if restarted {
+                account = bench.started();
+            }
+            let writes = machine.written().offsets;
+            let found = done(&mut account, clock, Order::Look(Axis::Z));
+            let shift_um = if taken { 5.0 } else { 0.0 };
+            assert_eq!((found.last, found.base_um, found.shift_um()), (last, 40.0, shift_um), "{restarted}");
+            assert_eq!(machine.written().offsets, writes, "looking writes nothing");
+            let mut account = bench.started();
+            account.carry_out(Order::Restore(Axis::Z), clock).result.expect("at rest");
+            assert_eq!(machine.offset_um(Axis::Z), 40.0, "what the operator had set, whatever happened");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_accounted_for_is_not_written() {
+    let bench = Bench::new(40.0);
+    let mut account = bench.started();
+    // A directory stands where the file is to be written.
+    std::fs::create_dir(bench.directory.path().join("offsets.json.writing")).expect("made");
+    let refused = account.carry_out(shift(0.0, 5.0), &bench.clock);
+    let text = refused.result.as_ref().expect_err("refused").to_string();
+    assert!(text.contains("could not be accounted for") && refused.fault().is_none() && !refused.is_open(), "{text}");
+    assert_eq!(bench.machine.written().writes(), 0);
+}
+
+#[test]
+fn what_is_in_doubt_is_looked_at_before_anything_is_written_and_other_axes_are_given_back() {
+    let mut gate = Gate::new(offset_limits(GateMode::Armed));
+    gate.offsets_mut().resume(Axis::X, 4.0);
+    gate.offsets_mut().resume(Axis::Z, 5.0);
+    gate.offsets_mut().unsettle(Axis::Z);
+    gate.arm("fitter", None, 0).expect("may be armed");
+    let (sample, estimates) = resting(0);
+    gate.decide(None, &sample, &estimates);
+    let orders = |gate: &mut Gate, at_ns| {
+        let (sample, estimates) = resting(at_ns);
+        gate.decide(None, &sample, &estimates);
+        let verdicts = gate.shift(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, &estimates);
+        let mut orders: Vec<Order> = verdicts.into_iter().filter_map(|verdict| verdict.order).collect();
+        orders.extend(gate.looks(&sample, &estimates));
+        orders
+    };
+    assert_eq!(orders(&mut gate, 0), [Order::Look(Axis::Z)]);
+    assert_eq!(orders(&mut gate, 5 * SECOND_NS), [], "it has not been answered");
+    let off = SourceError::Off { source_name: "test".to_owned() };
+    gate.offsets_mut().answered(&answer(Order::Look(Axis::Z), Err(off)));
+    assert_eq!(orders(&mut gate, 6 * SECOND_NS), [Order::Look(Axis::Z)], "again");
+    let found = Shifted { before_um: 3.0, base_um: 0.0, asked_um: 3.0, after_um: 3.0, last: LastWrite::NotTaken };
+    gate.offsets_mut().answered(&answer(Order::Look(Axis::Z), Ok(Some(found))));
+    assert_eq!(orders(&mut gate, 7 * SECOND_NS), [Order::Shift { axis: Axis::Z, from_um: 3.0, wanted_um: 8.0 }]);
+    assert_eq!(orders(&mut gate, 70 * SECOND_NS), [Order::Restore(Axis::X)], "the configuration does not name it");
 }

@@ -5,13 +5,14 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
 use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Moved, Order};
+use gateway::gate::offset::{Account, Book, Moved, Order};
 use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
 use gateway::pipeline::{NoStore, Pipeline};
 use gateway::run::hand::{Hand, Said, Tools};
 use rules::estimators;
 use rules::script::{Host, ScriptFile};
 use std::path::Path;
+use tempfile::TempDir;
 
 pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
 /// The machine is looked at this often.
@@ -52,6 +53,8 @@ pub(crate) struct Bench {
     pub(crate) moves: Vec<Moved>,
     /// What went wrong on the way to the machine.
     pub(crate) faults: Vec<String>,
+    /// Where the account of the offsets is kept.
+    _directory: TempDir,
 }
 
 impl Bench {
@@ -76,11 +79,15 @@ impl Bench {
         let mut host = Host::new();
         host.load(scripts).expect("the scripts are accepted");
         let actuator: Box<dyn Actuator> = Box::new(machine.feed_override());
+        let directory = tempfile::tempdir().expect("a directory");
+        let book = Book::open(directory.path(), "simulated://lathe").expect("none yet");
+        let offsets = Account::new(Box::new(machine.offsets()), book);
         let estimators = estimators::Pipeline::new(estimators::Settings::default());
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
-            hand: Hand::inline(Tools { actuator: Some(actuator), offsets: Some(Box::new(machine.offsets())) }, limits),
+            hand: Hand::inline(Tools { actuator: Some(actuator), offsets: Some(offsets) }, limits),
+            _directory: directory,
             machine,
             sample: Sample::empty(0),
             now_ns: 0,
@@ -109,8 +116,8 @@ impl Bench {
         let mut said = Vec::new();
         self.hand.step(&verdict, &sent, self.now_ns, |it| said.push(it));
         let orders: Vec<Order> = self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
-        self.hand.shift(&orders, self.now_ns, |it| said.push(it));
         let gate = self.pipeline.gate_mut();
+        self.hand.shift(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
         for it in said {
             let fault = match it {
                 Said::Written(written) => written.fault,
@@ -120,11 +127,14 @@ impl Bench {
                     None
                 }
                 Said::Moved(moved) => {
-                    gate.offsets_mut()
-                        .answered(moved.order.axis(), moved.result.as_ref().ok().and_then(Option::as_ref));
+                    gate.offsets_mut().answered(&moved);
                     let fault = moved.fault();
                     self.moves.push(*moved);
                     fault
+                }
+                Said::Withdrawn(order) => {
+                    gate.offsets_mut().withdrawn(order);
+                    None
                 }
                 Said::Asked(_, failed) => {
                     self.faults.extend(failed);

@@ -11,22 +11,27 @@
 //! Without a proposal the shift goes back to what the operator has set, by the same steps. A number that is none moves
 //! nothing. A control that shows something else than was written ends the arming and raises an alarm.
 //!
-//! A work offset has no sign of life: nothing takes it back when the gateway dies. Therefore what is left in the control is
-//! kept in a file beside the history, and `on_disarm = "restore"`, which is the default, gives it back in one step as soon
+//! A work offset has no sign of life: nothing takes it back when the gateway dies. Therefore what is to be written is kept in
+//! a file beside the history before it is written ([`Book`]); after a failed line and after a start the control is looked at
+//! before anything else is written to it; and `on_disarm = "restore"`, which is the default, gives it back in one step as soon
 //! as no program runs: after disarming, at the end of the gateway, and after a start that finds something left. One large
 //! step between two programs is better than an offset that nobody follows up while the machine cools. `"keep"` is for shops
 //! that arm anew in the middle of a batch and would rather have no step in it.
 
+mod account;
+mod book;
 mod order;
 mod trail;
 
-pub use order::{Moved, Order, carry_out};
-pub use trail::{OffsetTrail, moved};
+pub use account::Account;
+pub use book::Book;
+pub use order::{Moved, Order, Shifted};
+pub use trail::OffsetTrail;
 
 use super::hold::Hold;
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::offset::{Axis, Shifted};
+use adapters::offset::Axis;
 use rules::script::OffsetProposal;
 
 /// What became of a proposal.
@@ -78,15 +83,23 @@ pub struct OffsetVerdict {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Slide {
     axis: Axis,
+    /// The configuration no longer names it: it is only given back.
+    retired: bool,
     shift_um: f64,
     /// Something was ordered and has not been answered.
     waiting: bool,
+    /// What is in force is not known for sure: nothing is written before somebody has looked.
+    unsettled: bool,
+    /// When it was last looked for.
+    looked_ns: Option<TimeNs>,
     /// When it was last proposed for.
     proposed_ns: Option<TimeNs>,
 }
 
 /// A proposal may be missing for this long before the shift goes back: a value may be absent for a moment.
 const MISSING_NS: i64 = 10 * SECOND_NS;
+/// Time between two looks at what is in force.
+const LOOK_EVERY_NS: i64 = SECOND_NS;
 
 /// What is known at a tick besides the proposals.
 #[derive(Debug, Clone, Copy)]
@@ -107,17 +120,35 @@ pub struct Offsets {
 impl Offsets {
     /// Nothing is shifted, as far as is known.
     pub(super) fn new(limits: config::Offset) -> Self {
-        let slides = limits
-            .axes
-            .iter()
-            .map(|axis| Slide { axis: *axis, shift_um: 0.0, waiting: false, proposed_ns: None })
-            .collect();
+        let slides = limits.axes.iter().map(|axis| Slide::new(*axis)).collect();
         Self { limits, slides, ordered_ns: None }
     }
 
-    /// An earlier run has left this shift.
+    /// An earlier run has left this shift. One of an axis that the configuration no longer names is given back.
     pub fn resume(&mut self, axis: Axis, shift_um: f64) {
-        self.slides.iter_mut().filter(|slide| slide.axis == axis).for_each(|slide| slide.shift_um = shift_um);
+        if !self.slides.iter().any(|slide| slide.axis == axis) {
+            self.slides.push(Slide { retired: true, ..Slide::new(axis) });
+        }
+        self.of(axis, |slide| slide.shift_um = shift_um);
+    }
+
+    /// What is in force is not known for sure: it is looked at before anything is written.
+    pub fn unsettle(&mut self, axis: Axis) {
+        self.of(axis, |slide| slide.unsettled = true);
+    }
+
+    fn of(&mut self, axis: Axis, change: impl FnMut(&mut Slide)) {
+        self.slides.iter_mut().filter(|slide| slide.axis == axis).for_each(change);
+    }
+
+    /// Is there anything to look at?
+    pub(super) fn is_unsettled(&self) -> bool {
+        self.limits.mode == GateMode::Armed && self.slides.iter().any(|slide| slide.unsettled)
+    }
+
+    /// What is to be looked at now, while nothing stands in the way.
+    pub(super) fn looks(&mut self, at_ns: TimeNs) -> Vec<Order> {
+        self.slides.iter_mut().filter_map(|slide| slide.look(at_ns)).collect()
     }
 
     /// Is there anything to decide about?
@@ -145,12 +176,13 @@ impl Offsets {
                 .contains(&(now.at_ns - ordered_ns))
         });
         for slide in &mut self.slides {
-            let wanted_um = proposals.iter().find(|it| it.axis == slide.axis).map(|it| it.offset_um);
+            let of_slide = |it: &&OffsetProposal| it.axis == slide.axis && !slide.retired;
+            let wanted_um = proposals.iter().find(of_slide).map(|it| it.offset_um);
             if slide.rests(wanted_um.is_some(), now.at_ns) {
                 continue;
             }
             let mut verdict = slide.judge(wanted_um, &self.limits, now);
-            if rested && now.hold.is_none() && !slide.waiting && self.limits.mode == GateMode::Armed {
+            if rested && now.hold.is_none() && slide.may_order() && self.limits.mode == GateMode::Armed {
                 verdict.order = slide.order(&verdict, &self.limits);
                 slide.waiting = verdict.order.is_some();
             }
@@ -163,11 +195,19 @@ impl Offsets {
     }
 
     /// The answer to an order: what is in force now, where that is known.
-    pub fn answered(&mut self, axis: Axis, shifted: Option<&Shifted>) {
-        for slide in self.slides.iter_mut().filter(|slide| slide.axis == axis) {
+    pub fn answered(&mut self, moved: &Moved) {
+        self.of(moved.order.axis(), |slide| {
             slide.waiting = false;
-            slide.shift_um = shifted.map_or(slide.shift_um, Shifted::shift_um);
-        }
+            slide.unsettled = moved.is_open() || (slide.unsettled && moved.result.is_err());
+            if let Ok(shifted) = &moved.result {
+                slide.shift_um = shifted.map_or(0.0, |shifted| shifted.shift_um());
+            }
+        });
+    }
+
+    /// An order that was not carried out.
+    pub fn withdrawn(&mut self, order: Order) {
+        self.of(order.axis(), |slide| slide.waiting = false);
     }
 
     /// What is to be given back at the end.
@@ -193,6 +233,33 @@ fn not_allowed(proposal: &OffsetProposal, now: Circumstances) -> OffsetVerdict {
 }
 
 impl Slide {
+    fn new(axis: Axis) -> Self {
+        Self {
+            axis,
+            retired: false,
+            shift_um: 0.0,
+            waiting: false,
+            unsettled: false,
+            looked_ns: None,
+            proposed_ns: None,
+        }
+    }
+
+    /// Nothing is under way, and what is in force is known.
+    fn may_order(&self) -> bool {
+        !self.waiting && !self.unsettled
+    }
+
+    fn look(&mut self, at_ns: TimeNs) -> Option<Order> {
+        let since_ns = |looked_ns: TimeNs| at_ns - looked_ns;
+        let rested = self.looked_ns.is_none_or(|looked_ns| !(0..LOOK_EVERY_NS).contains(&since_ns(looked_ns)));
+        let looks = self.unsettled && !self.waiting && rested;
+        looks.then(|| {
+            (self.waiting, self.looked_ns) = (true, Some(at_ns));
+            Order::Look(self.axis)
+        })
+    }
+
     /// Nothing is proposed, and nothing to be given back yet.
     fn rests(&mut self, proposed: bool, at_ns: TimeNs) -> bool {
         if proposed {
@@ -224,8 +291,9 @@ impl Slide {
 
     /// What is to be written: a step while armed; afterwards everything back, where that is configured.
     fn order(&self, verdict: &OffsetVerdict, limits: &config::Offset) -> Option<Order> {
-        if verdict.armed {
-            let step = Order::Shift { axis: self.axis, wanted_um: verdict.permitted_um };
+        if verdict.armed && !self.retired {
+            let (axis, from_um, wanted_um) = (self.axis, self.shift_um, verdict.permitted_um);
+            let step = Order::Shift { axis, from_um, wanted_um };
             return (verdict.permitted_um != self.shift_um).then_some(step);
         }
         (limits.restore && self.shift_um != 0.0).then_some(Order::Restore(self.axis))

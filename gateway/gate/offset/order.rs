@@ -1,22 +1,26 @@
-//! Carrying out what was decided about an offset.
+//! What is ordered about an offset, and what came of it.
 
-use super::super::write::Fault;
+use crate::gate::Fault;
 use adapters::SourceError;
-use adapters::clock::{Clock, TimeNs};
-use adapters::offset::{Axis, OffsetSink, Shifted};
+use adapters::clock::TimeNs;
+use adapters::offset::{Axis, LastWrite, Left, same};
 
-/// What is to be written to the control.
+/// What is to be done at the control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Order {
     /// This shift from what the operator has set.
     Shift {
         /// Which axis.
         axis: Axis,
+        /// The shift that the gate counts on, um. Where there is another, nothing is written.
+        from_um: f64,
         /// How far, um.
         wanted_um: f64,
     },
     /// What the operator has set, in one step.
     Restore(Axis),
+    /// Only look what is there.
+    Look(Axis),
 }
 
 impl Order {
@@ -24,8 +28,43 @@ impl Order {
     #[must_use]
     pub fn axis(self) -> Axis {
         match self {
-            Self::Shift { axis, .. } | Self::Restore(axis) => axis,
+            Self::Shift { axis, .. } | Self::Restore(axis) | Self::Look(axis) => axis,
         }
+    }
+}
+
+/// What a shift came to, um.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shifted {
+    /// The offset before.
+    pub before_um: f64,
+    /// What the operator had set: the offset without the shift.
+    pub base_um: f64,
+    /// What was written; the same as before where nothing was.
+    pub asked_um: f64,
+    /// The offset now, as read back.
+    pub after_um: f64,
+    /// What had become of the write before.
+    pub last: LastWrite,
+}
+
+impl Shifted {
+    /// The shift in force.
+    #[must_use]
+    pub fn shift_um(&self) -> f64 {
+        self.after_um - self.base_um
+    }
+
+    /// Is in force what was written?
+    #[must_use]
+    pub fn is_taken(&self) -> bool {
+        same(self.asked_um, self.after_um)
+    }
+
+    /// Was anything written?
+    #[must_use]
+    pub fn is_written(&self) -> bool {
+        !same(self.asked_um, self.before_um)
     }
 }
 
@@ -38,6 +77,10 @@ pub struct Moved {
     pub order: Order,
     /// What is in force now; nothing where there was nothing to give back.
     pub result: Result<Option<Shifted>, SourceError>,
+    /// What is left in the control, by the account.
+    pub left: Option<Left>,
+    /// Why the account could not be kept on disk.
+    pub kept: Result<(), String>,
 }
 
 impl Moved {
@@ -54,14 +97,10 @@ impl Moved {
             Err(error) => Some(Fault::OffsetLine(error.clone())),
         }
     }
-}
 
-/// Writes, and reads back. Blocks as long as the control takes.
-pub fn carry_out(sink: &mut dyn OffsetSink, order: Order, clock: &dyn Clock) -> Moved {
-    let at_ns = clock.now_ns();
-    let result = match order {
-        Order::Shift { axis, wanted_um } => sink.shift(clock, axis, wanted_um).map(Some),
-        Order::Restore(axis) => sink.restore(clock, axis),
-    };
-    Moved { at_ns, order, result }
+    /// Is it open whether the control has taken what was written?
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.left.is_some_and(|left| left.intended_um.is_some())
+    }
 }

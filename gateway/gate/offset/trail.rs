@@ -1,11 +1,11 @@
 //! What of the offsets goes into the audit: each change of what is proposed and of what becomes of it, and each write.
 
-use super::order::{Moved, Order};
+use super::order::{Moved, Order, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::config;
-use crate::gate::trail::{Pace, words};
+use crate::gate::trail::{Author, Pace, words};
 use crate::history::Audit;
-use adapters::offset::{Axis, Shifted};
+use adapters::offset::{Axis, LastWrite};
 use rules::script::OffsetProposal;
 
 /// What was last recorded of the proposals for an axis.
@@ -21,6 +21,8 @@ struct Known {
 #[derive(Debug, Default)]
 pub struct OffsetTrail {
     known: [Option<Known>; Axis::ALL.len()],
+    /// Who proposed what was ordered last.
+    authors: [Author; Axis::ALL.len()],
     pace: Pace,
 }
 
@@ -32,6 +34,10 @@ impl OffsetTrail {
         verdict: &OffsetVerdict,
         limits: &config::Offset,
     ) -> Option<Audit> {
+        if verdict.order.is_some() {
+            self.authors[verdict.axis.index()] =
+                proposal.map_or(Author::default(), |it| Author::new(&it.script, it.version, &it.reason));
+        }
         let known = Known {
             #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
             asked_um: verdict.wanted_um.map(|um| um.round() as i64),
@@ -57,6 +63,71 @@ impl OffsetTrail {
             ..row("request", verdict.axis, verdict.at_ns)
         })
     }
+
+    /// The row of an order that was carried out, or could not be. One that changed nothing and found nothing is no news.
+    #[must_use]
+    pub fn moved(&self, moved: &Moved) -> Option<Audit> {
+        let axis = moved.order.axis();
+        let author = &self.authors[axis.index()];
+        let (script, script_version) = match moved.order {
+            Order::Shift { .. } => (author.script.clone(), author.version.clone()),
+            Order::Restore(_) | Order::Look(_) => (String::new(), String::new()),
+        };
+        let signed = |row: Audit| Audit { script, script_version, ..row };
+        match &moved.result {
+            Ok(None) => None,
+            Ok(Some(shifted)) if shifted.is_written() => Some(signed(written(moved, shifted, &author.reason))),
+            Ok(Some(shifted)) => found(moved, shifted),
+            Err(error) => {
+                let outcome = if moved.fault().is_some() { "failed" } else { "refused" };
+                let open = if moved.is_open() { "; whether it was taken is looked at next" } else { "" };
+                let reason = format!("{}{open}", words(&error.to_string()));
+                Some(signed(Audit { outcome: outcome.to_owned(), reason, ..row(verb(moved.order), axis, moved.at_ns) }))
+            }
+        }
+    }
+}
+
+fn verb(order: Order) -> &'static str {
+    match order {
+        Order::Shift { .. } => "write",
+        Order::Restore(_) => "restore",
+        Order::Look(_) => "found",
+    }
+}
+
+fn written(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
+    let (base_um, shift_um) = (shifted.base_um, shifted.shift_um());
+    let taken = if shifted.is_taken() { "" } else { "; the control shows something else than was written" };
+    let why =
+        if why.is_empty() || matches!(moved.order, Order::Restore(_)) { String::new() } else { format!("{why}: ") };
+    Audit {
+        outcome: if shifted.is_taken() { "written" } else { "failed" }.to_owned(),
+        before: Some(shifted.before_um),
+        asked: Some(shifted.asked_um),
+        after: Some(shifted.after_um),
+        reason: format!("{why}shift {shift_um:+.0} um from {base_um:.0} um set by the operator{taken}"),
+        ..row(verb(moved.order), moved.order.axis(), moved.at_ns)
+    }
+}
+
+/// Nothing was written; what was found may be news.
+fn found(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
+    let (outcome, of_last) = match shifted.last {
+        LastWrite::InForce if !matches!(moved.order, Order::Look(_)) => return None,
+        LastWrite::InForce => ("settled", "as was known"),
+        LastWrite::Taken => ("settled", "the write before, whose end nobody saw, was taken"),
+        LastWrite::NotTaken => ("settled", "the write before, whose end nobody saw, was not taken"),
+        LastWrite::Replaced => ("replaced", "somebody else had changed the offset, which is the new beginning"),
+    };
+    let (base_um, shift_um) = (shifted.base_um, shifted.shift_um());
+    Some(Audit {
+        outcome: outcome.to_owned(),
+        before: Some(shifted.before_um),
+        after: Some(shifted.after_um),
+        reason: format!("shift {shift_um:+.0} um from {base_um:.0} um set by the operator; {of_last}"),
+        ..row("found", moved.order.axis(), moved.at_ns)
+    })
 }
 
 /// `z_offset_request` and the like.
@@ -87,39 +158,4 @@ fn reason(verdict: &OffsetVerdict, limits: &config::Offset) -> String {
         OffsetOutcome::NotAllowed => "`axes` under [gate.offset] does not name this axis".to_owned(),
         OffsetOutcome::Refused => "an offset is a number of micrometres; nothing is moved".to_owned(),
     }
-}
-
-/// An order that was carried out, or could not be. One that changed nothing is no news.
-#[must_use]
-pub fn moved(moved: &Moved) -> Option<Audit> {
-    let (what, axis) = match moved.order {
-        Order::Shift { axis, .. } => ("write", axis),
-        Order::Restore(axis) => ("restore", axis),
-    };
-    let row = row(what, axis, moved.at_ns);
-    match &moved.result {
-        Ok(None) => None,
-        Ok(Some(shifted)) => Some(Audit {
-            outcome: if shifted.is_taken() { "written" } else { "failed" }.to_owned(),
-            before: Some(shifted.before_um),
-            asked: Some(shifted.asked_um),
-            after: Some(shifted.after_um),
-            reason: told(shifted),
-            ..row
-        }),
-        Err(error) => {
-            let outcome = if moved.fault().is_some() { "failed" } else { "refused" };
-            Some(Audit { outcome: outcome.to_owned(), reason: words(&error.to_string()), ..row })
-        }
-    }
-}
-
-fn told(shifted: &Shifted) -> String {
-    let others = if shifted.changed_by_others {
-        "; somebody else had changed the offset, which is the new beginning"
-    } else {
-        ""
-    };
-    let taken = if shifted.is_taken() { "" } else { "; the control shows something else than was written" };
-    format!("shift {:+.0} um from {:.0} um set by the operator{others}{taken}", shifted.shift_um(), shifted.base_um)
 }

@@ -1,0 +1,93 @@
+//! Carrying out what was decided about an offset, and the account of what is the operator's and what the gateway's.
+//!
+//! Nothing is written before the intent is on disk: when the line fails or the gateway dies in the middle, the next look at
+//! the control tells whether it has been taken, and nothing is written on top of what nobody knows. When somebody else has
+//! changed the offset, or the gate has counted on another shift than there is, nothing is written either; the gate decides
+//! anew from what was found.
+
+use super::book::Book;
+use super::order::{Moved, Order, Shifted};
+use adapters::SourceError;
+use adapters::clock::Clock;
+use adapters::offset::{Axis, LastWrite, Ledger, Left, OffsetSink, same};
+
+/// No gate may ask for a greater shift than this, whatever its configuration says.
+const MOST_UM: f64 = 1000.0;
+
+/// Holds the only sink of offsets there is. Blocks as long as the control takes to answer.
+pub struct Account {
+    sink: Box<dyn OffsetSink>,
+    ledgers: [Ledger; Axis::ALL.len()],
+    book: Book,
+}
+
+impl Account {
+    /// With what the book knows of this control.
+    #[must_use]
+    pub fn new(sink: Box<dyn OffsetSink>, book: Book) -> Self {
+        let ledgers = Axis::ALL.map(|axis| Ledger::with(book.left(axis)));
+        Self { sink, ledgers, book }
+    }
+
+    /// Carries out an order.
+    pub fn carry_out(&mut self, order: Order, clock: &dyn Clock) -> Moved {
+        let at_ns = clock.now_ns();
+        let axis = order.axis();
+        let result = self.result(order, clock);
+        let left = self.left(axis);
+        // An open intent is in the book already.
+        let kept = if result.is_ok() { self.book.keep(axis, left) } else { Ok(()) };
+        Moved { at_ns, order, result, left, kept: kept.map_err(|error| error.to_string()) }
+    }
+
+    fn left(&self, axis: Axis) -> Option<Left> {
+        self.ledgers[axis.index()].left()
+    }
+
+    fn result(&mut self, order: Order, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
+        let axis = order.axis();
+        if matches!(order, Order::Restore(_)) && self.left(axis).is_none() {
+            return Ok(None);
+        }
+        let before_um = self.sink.at_rest(clock, axis)?;
+        let (base_um, last) = self.ledgers[axis.index()].settle(before_um);
+        let asked_um = match order {
+            Order::Look(_) => before_um,
+            _ if last == LastWrite::Replaced => before_um,
+            Order::Shift { from_um, .. } if !same(from_um, before_um - base_um) => before_um,
+            Order::Shift { wanted_um, .. } => base_um + wanted_um.round().clamp(-MOST_UM, MOST_UM),
+            Order::Restore(_) => base_um,
+        };
+        let after_um = match same(asked_um, before_um) {
+            true => before_um,
+            false => self.write(clock, axis, [base_um, before_um, asked_um])?,
+        };
+        Ok(Some(Shifted { before_um, base_um, asked_um, after_um, last }))
+    }
+
+    fn write(
+        &mut self,
+        clock: &dyn Clock,
+        axis: Axis,
+        [base_um, before_um, asked_um]: [f64; 3],
+    ) -> Result<f64, SourceError> {
+        let settled = self.ledgers[axis.index()];
+        self.ledgers[axis.index()].intend(base_um, before_um, asked_um);
+        if let Err(error) = self.book.keep(axis, self.left(axis)) {
+            self.ledgers[axis.index()] = settled;
+            return Err(self.unaccounted(axis, &error));
+        }
+        let after_um = self.sink.write(clock, axis, before_um, asked_um)?;
+        self.ledgers[axis.index()].note(base_um, after_um);
+        Ok(after_um)
+    }
+
+    fn unaccounted(&self, axis: Axis, error: &std::io::Error) -> SourceError {
+        SourceError::Refused {
+            source_name: self.sink.name().to_owned(),
+            request: format!("the external offset of {}", axis.word()),
+            what: format!("it could not be accounted for in {}: {error}", self.book.path().display()),
+            next: "Nothing is written before that; free some room, or look at the permissions".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! `offsets.json`: what was written to which control and not given back. Survives a power cut.
+//!
+//! ```json
+//! {"schema":"offsets/2","controls":{"fanuc://192.168.1.10:8193":{"z":{"base_um":0.0,"written_um":5.0,"intended_um":7.0}}}}
+//! ```
+//!
+//! A control that the configuration no longer names keeps its entry: what is shifted there a person has to see to.
+
+use crate::files::replace_durably;
+use adapters::offset::{Axis, Left};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Name of the file in the data directory.
+const FILE: &str = "offsets.json";
+const SCHEMA: &str = "offsets/2";
+
+type Axes = BTreeMap<String, Left>;
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Content {
+    schema: String,
+    /// By the address of the control.
+    controls: BTreeMap<String, Axes>,
+}
+
+/// `offsets/1` knew one control.
+#[derive(Deserialize)]
+struct OneControl {
+    target: String,
+    axes: Axes,
+}
+
+/// See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Book {
+    path: PathBuf,
+    target: String,
+    content: Content,
+}
+
+impl Book {
+    /// The book in this directory, for this control; empty where there is none.
+    ///
+    /// # Errors
+    /// There is one that cannot be read. Nobody knows then what is left in the control.
+    pub fn open(data_dir: &Path, target: &str) -> io::Result<Self> {
+        let path = data_dir.join(FILE);
+        let content = match std::fs::read_to_string(&path) {
+            Ok(text) => parse(&text)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Content::default(),
+            Err(error) => return Err(error),
+        };
+        Ok(Self { path, target: target.to_owned(), content: Content { schema: SCHEMA.to_owned(), ..content } })
+    }
+
+    /// Puts a book that cannot be read aside, and begins an empty one.
+    ///
+    /// # Errors
+    /// It cannot be put aside.
+    pub fn begin_anew(data_dir: &Path, target: &str) -> io::Result<(Self, PathBuf)> {
+        let (path, aside) = (data_dir.join(FILE), data_dir.join(format!("{FILE}.unreadable")));
+        std::fs::rename(path, &aside)?;
+        Self::open(data_dir, target).map(|book| (book, aside))
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is left of this axis in this control.
+    #[must_use]
+    pub fn left(&self, axis: Axis) -> Option<Left> {
+        self.content.controls.get(&self.target)?.get(axis.word()).copied()
+    }
+
+    /// What is left in every control: its address, the axis, and what it is.
+    pub fn all(&self) -> impl Iterator<Item = (&str, Axis, Left)> {
+        let each = self.content.controls.iter().flat_map(|(target, axes)| axes.iter().map(move |it| (target, it)));
+        each.filter_map(|(target, (axis, left))| Some((target.as_str(), Axis::of(axis)?, *left)))
+    }
+
+    /// Keeps what is left of this axis; returns when it would survive a power cut.
+    ///
+    /// # Errors
+    /// It cannot be written; the book stays as it was.
+    pub fn keep(&mut self, axis: Axis, left: Option<Left>) -> io::Result<()> {
+        let mut content = self.content.clone();
+        let axes = content.controls.entry(self.target.clone()).or_default();
+        match left {
+            Some(left) => drop(axes.insert(axis.word().to_owned(), left)),
+            None => drop(axes.remove(axis.word())),
+        }
+        content.controls.retain(|_, axes| !axes.is_empty());
+        if content == self.content {
+            return Ok(());
+        }
+        replace_durably(&self.path, &serde_json::to_string(&content)?)?;
+        self.content = content;
+        Ok(())
+    }
+}
+
+fn parse(text: &str) -> io::Result<Content> {
+    let of_one =
+        |OneControl { target, axes }| Content { controls: BTreeMap::from([(target, axes)]), ..Content::default() };
+    let parsed = serde_json::from_str::<Content>(text);
+    parsed.or_else(|error| serde_json::from_str(text).map(of_one).map_err(|_| error.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEFT: Left = Left { base_um: 40.0, written_um: 45.0, intended_um: Some(48.0) };
+
+    #[test]
+    fn what_is_left_in_another_control_stays_in_the_book() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let mut book = Book::open(directory.path(), "fanuc://a").expect("none yet");
+        book.keep(Axis::Z, Some(LEFT)).expect("written");
+        let mut other = Book::open(directory.path(), "fanuc://b").expect("readable");
+        assert_eq!(other.left(Axis::Z), None);
+        other.keep(Axis::X, Some(LEFT)).expect("written");
+        other.keep(Axis::X, None).expect("written");
+        let book = Book::open(directory.path(), "fanuc://a").expect("readable");
+        assert_eq!(book.all().collect::<Vec<_>>(), [("fanuc://a", Axis::Z, LEFT)]);
+    }
+
+    #[test]
+    fn the_first_form_is_read_and_half_a_file_is_put_aside() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join(FILE);
+        let first = r#"{"schema":"offsets/1","target":"fanuc://a","axes":{"z":{"base_um":40.0,"written_um":45.0}}}"#;
+        std::fs::write(&path, first).expect("written");
+        let book = Book::open(directory.path(), "fanuc://a").expect("readable");
+        assert_eq!(book.left(Axis::Z), Some(Left { intended_um: None, ..LEFT }));
+        std::fs::write(&path, &first[..30]).expect("written");
+        assert!(Book::open(directory.path(), "fanuc://a").is_err());
+        let (book, aside) = Book::begin_anew(directory.path(), "fanuc://a").expect("put aside");
+        assert!(aside.is_file() && book.all().next().is_none());
+    }
+}
