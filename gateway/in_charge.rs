@@ -19,9 +19,14 @@ pub fn path(data_dir: &Path) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn keep(data_dir: &Path, files: &[ScriptFile]) -> std::io::Result<()> {
+    crate::files::replace(&path(data_dir), &text(files))
+}
+
+/// What the file says of this set.
+#[must_use]
+pub fn text(files: &[ScriptFile]) -> String {
     let scripts: Map<String, Value> = files.iter().map(|file| (file.name.clone(), json!(file.text))).collect();
-    let text = json!({ "schema": "scripts_in_charge/1", "scripts": scripts }).to_string();
-    crate::files::replace(&path(data_dir), &text)
+    json!({ "schema": "scripts_in_charge/1", "scripts": scripts }).to_string()
 }
 
 /// The texts that were kept; `None` where there are none.

@@ -92,7 +92,8 @@ impl Pipeline {
     /// Takes one tick. Samples come in the order of time.
     pub fn step(&mut self, sample: &Sample, store: &mut dyn Store) {
         self.infer(sample);
-        self.decide(sample, store);
+        self.decide(sample);
+        self.record(sample, store);
     }
 
     /// The first half of a tick.
@@ -107,19 +108,24 @@ impl Pipeline {
         (self.estimates.wear_limit_w, self.estimates.tool_wear_mm) = (wear_limit_w, tool_wear_mm);
     }
 
-    /// The second half of a tick: decides, stores, records.
-    pub fn decide(&mut self, sample: &Sample, store: &mut dyn Store) {
+    /// The second half of a tick: decides.
+    pub fn decide(&mut self, sample: &Sample) {
         let estimates = self.estimates;
         self.tally.step(sample.at_ns, estimates.state);
         let decision = self.scripts.tick(sample, &estimates);
-        let verdict = self.gate.decide(decision.request.as_ref(), sample, &estimates);
+        self.verdict = Some(self.gate.decide(decision.request.as_ref(), sample, &estimates));
+    }
+
+    /// What can wait until the decision is on its way to the machine: stores and records, where something was decided.
+    pub fn record(&mut self, sample: &Sample, store: &mut dyn Store) {
+        let Some(verdict) = self.verdict else { return };
+        let estimates = self.estimates;
         self.extras.clear();
         self.extras.extend(stored_values(&estimates));
         self.extras.extend(self.own.iter().map(|series| own_value(&self.scripts, &series.name)));
         store.sample(sample, &self.extras);
         self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
         self.decisions.step(self.scripts.decision(), &verdict, |record| store.record(record));
-        self.verdict = Some(verdict);
         if let Some(part) = self.parts.step(&self.channels, sample, estimates.state) {
             store.record(part.into());
         }

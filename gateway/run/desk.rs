@@ -1,8 +1,14 @@
 //! Where the tick lays down what the hand is to do.
+//!
+//! A thread that sleeps is woken by way of the kernel and of a processor that may sleep too, which takes between some tens of
+//! microseconds and, on a loaded or virtual processor, a millisecond. While the gate is armed the hand therefore wakes by
+//! itself shortly before the next verdict is due, and looks for it until it is there.
 
+use super::pace::{LEAD, LEAD_PERIOD_MIN};
 use crate::gate::offset::Order;
 use crate::gate::{Ask, Verdict};
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -16,6 +22,8 @@ const VERDICT_LASTS: Duration = Duration::from_secs(1);
 const ASK_LASTS: Duration = Duration::from_secs(10);
 /// After this time a program may have begun.
 const ORDER_LASTS: Duration = Duration::from_secs(2);
+/// A verdict that is so late is waited for asleep.
+const LIE_IN_WAIT: Duration = Duration::from_micros(900);
 
 #[derive(Debug, Default)]
 struct Paper {
@@ -23,6 +31,8 @@ struct Paper {
     asks: VecDeque<(Instant, Ask)>,
     orders: VecDeque<(Instant, Order)>,
     closing: bool,
+    /// When the last verdict came, if it was armed: the next is due a period later.
+    armed_at: Option<Instant>,
 }
 
 /// See the [module](self).
@@ -30,9 +40,23 @@ struct Paper {
 pub(super) struct Desk {
     paper: Mutex<Paper>,
     arrived: Condvar,
+    /// Grows with everything that is laid down.
+    laid: AtomicU64,
+    /// Time between two verdicts; none where nobody lies in wait.
+    period: Option<Duration>,
 }
 
 impl Desk {
+    /// Verdicts come at this period.
+    pub(super) fn new(period: Duration) -> Self {
+        Self { period: Some(period).filter(|period| *period >= LEAD_PERIOD_MIN), ..Self::default() }
+    }
+
+    fn told(&self) {
+        self.laid.fetch_add(1, Ordering::Release);
+        self.arrived.notify_one();
+    }
+
     fn lock(&self) -> MutexGuard<'_, Paper> {
         // A paper is complete whenever the lock is free.
         self.paper.lock().unwrap_or_else(PoisonError::into_inner)
@@ -42,7 +66,9 @@ impl Desk {
     /// arming has ended.
     pub(super) fn lay_down(&self, verdict: &Verdict, asks: &[Ask]) -> Vec<Ask> {
         let mut paper = self.lock();
-        paper.verdict = Some((Instant::now(), *verdict));
+        let now = Instant::now();
+        paper.verdict = Some((now, *verdict));
+        paper.armed_at = verdict.armed.then_some(now);
         let mut refused = Vec::new();
         if !verdict.armed {
             refused.extend(paper.asks.drain(..).map(|(_, ask)| ask));
@@ -54,7 +80,8 @@ impl Desk {
                 refused.push(ask.clone());
             }
         }
-        self.arrived.notify_one();
+        drop(paper);
+        self.told();
         refused
     }
 
@@ -74,8 +101,9 @@ impl Desk {
                 withdrawn.push(*order);
             }
         }
+        drop(paper);
         if !orders.is_empty() {
-            self.arrived.notify_one();
+            self.told();
         }
         withdrawn
     }
@@ -83,17 +111,35 @@ impl Desk {
     /// Nothing more will come.
     pub(super) fn close(&self) {
         self.lock().closing = true;
-        self.arrived.notify_one();
+        self.told();
     }
 
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
     pub(super) fn take(&self, limit: Duration) -> (Option<Verdict>, bool) {
         let empty = |paper: &mut Paper| paper.verdict.is_none() && paper.orders.is_empty() && !paper.closing;
-        let waited = self.arrived.wait_timeout_while(self.lock(), limit, empty);
+        let paper = self.lock();
+        let due = self.period.zip(paper.armed_at).map(|(period, at)| at + period);
+        let laid = self.laid.load(Ordering::Acquire);
+        let asleep = due.map_or(limit, |due| due.saturating_duration_since(Instant::now() + LEAD).min(limit));
+        let waited = self.arrived.wait_timeout_while(paper, asleep, empty);
         let mut paper = waited.unwrap_or_else(PoisonError::into_inner).0;
+        if let Some(due) = due.filter(|_| asleep < limit && empty(&mut paper)) {
+            drop(paper);
+            self.lie_in_wait(laid, due + LIE_IN_WAIT);
+            let waited = self.arrived.wait_timeout_while(self.lock(), limit - asleep, empty);
+            paper = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
         let fresh = |(laid, verdict): &(Instant, Verdict)| !verdict.armed || laid.elapsed() <= VERDICT_LASTS;
         let fresh = paper.verdict.take().filter(fresh);
         (fresh.map(|(_, verdict)| verdict), paper.closing)
+    }
+
+    /// Awake until something is laid down, or it has become too late for it.
+    fn lie_in_wait(&self, laid: u64, until: Instant) {
+        while self.laid.load(Ordering::Acquire) == laid && Instant::now() < until {
+            // The tick may go on meanwhile, on a box with one processor.
+            std::thread::yield_now();
+        }
     }
 
     /// The next request to the ladder, and whether it comes in time.

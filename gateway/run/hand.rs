@@ -88,13 +88,18 @@ pub enum Hand {
 }
 
 impl Hand {
-    /// On a thread, by this clock.
+    /// On a thread, by this clock, with a verdict at every such period.
     ///
     /// # Errors
     /// There is no thread to be had.
-    pub fn start(tools: Tools, limits: &config::Gate, clock: Arc<dyn Clock>) -> std::io::Result<Self> {
+    pub fn start(
+        tools: Tools,
+        limits: &config::Gate,
+        clock: Arc<dyn Clock>,
+        period: Duration,
+    ) -> std::io::Result<Self> {
         let holding = Holding::of(tools, limits);
-        let desk = Arc::new(Desk::default());
+        let desk = Arc::new(Desk::new(period));
         let (say, said) = sync_channel(SAID_MAX);
         let of_thread = desk.clone();
         let thread = std::thread::Builder::new()

@@ -4,15 +4,15 @@
 use super::clock::{BoxClock, ClockStep};
 use super::feed::Feed;
 use super::keep::Kept;
+use super::save::Saver;
 use crate::alignment::{self, Alignment};
-use crate::files::replace;
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
 use crate::status::{HistoryStatus, Problem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -37,6 +37,7 @@ pub struct Health {
     sources: Vec<Option<String>>,
     looked: Option<Instant>,
     saved: Instant,
+    saver: Saver,
     day: Option<i64>,
     stores: bool,
     /// The lags of the meters, stored beside the values of the pipeline.
@@ -65,6 +66,7 @@ impl Health {
             sources: Vec::new(),
             looked: None,
             saved: Instant::now(),
+            saver: Saver::start(),
             day: None,
             stores,
             lags: [ExtraValue::Missing("not_yet"); alignment::SERIES],
@@ -167,15 +169,19 @@ impl Health {
         let scripts = self.memory.with_file_name(SCRIPTS_MEMORY);
         let both = [(&self.memory, pipeline.estimators().snapshot()), (&scripts, pipeline.scripts().snapshot())];
         for (path, snapshot) in both {
-            if let Err(error) = replace(path, &snapshot.to_string()) {
-                tracing::warn!("what was learned could not be saved in {}: {error}", path.display());
-            }
+            self.saver.put(path, snapshot.to_string());
         }
+    }
+
+    /// Puts a file of the box's own on disk, beside the tick.
+    pub fn put(&self, path: &Path, text: String) {
+        self.saver.put(path, text);
     }
 
     /// The last tick is over.
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
         self.save(pipeline);
+        self.saver.close();
         self.kept.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
         self.kept.close();
     }

@@ -13,6 +13,7 @@ pub mod pace;
 pub mod priority;
 pub mod report;
 pub mod rules;
+pub mod save;
 pub mod shifting;
 pub mod tick;
 pub mod twin;
@@ -204,7 +205,7 @@ fn commands(
     };
     let tools = Tools { actuator, offsets };
     let hand = match plan.speed {
-        MachineSpeed::Real => Hand::start(tools, limits, clock.clone())
+        MachineSpeed::Real => Hand::start(tools, limits, clock.clone(), open::period(&plan.config))
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
         MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(tools, limits),
     };

@@ -93,7 +93,7 @@ impl Watched {
         let notice = match reloader.step(pipeline.scripts_mut()) {
             None => return,
             Some(Ok(count)) => {
-                self.keep(pipeline.scripts());
+                health.put(&in_charge::path(&self.data_dir), in_charge::text(pipeline.scripts().files()));
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }

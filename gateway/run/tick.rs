@@ -100,10 +100,11 @@ impl Ticker {
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
             self.health.aligned(sample.at_ns, self.feed.alignment_mut());
             self.pipeline.inform(self.wear.step(&sample, &inferred, &mut self.health));
-            self.pipeline.decide(&sample, &mut self.health);
+            self.pipeline.decide(&sample);
             let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
             // What can wait comes after what is written to the machine.
+            self.pipeline.record(&sample, &mut self.health);
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }

@@ -96,7 +96,8 @@ fn hand(controller: &Controller, directory: &tempfile::TempDir) -> Hand {
     let book = Book::open(directory.path(), "test").expect("readable");
     let offsets = Some(Account::new(Box::new(controller.clone()), book));
     let tools = Tools { actuator: Some(Box::new(controller.clone())), offsets };
-    Hand::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new())).expect("a thread")
+    Hand::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
+        .expect("a thread")
 }
 
 /// Listens until something of this kind is told.

@@ -33,7 +33,7 @@ struct OneControl {
     axes: Axes,
 }
 
-/// See the [module](self).
+/// What was written to which control and not given back; survives a power cut.
 #[derive(Debug, Clone)]
 pub struct Book {
     path: PathBuf,
