@@ -85,10 +85,14 @@ pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
     starts.iter().step_by(starts.len().div_ceil(STEPS_MAX).max(1)).map(form).collect()
 }
 
+/// The position among the scene's runs of the first run of this name.
+pub(crate) fn run_named(scene: &Scene, name: &str) -> Option<usize> {
+    scene.run_names().iter().position(|known| known == name)
+}
+
 /// One from the first row of the run on, zero before; `None` when there is no such run.
 pub(crate) fn since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> {
-    let index = scene.run_names().iter().position(|name| name == run)?;
-    let start = scene.runs()[index].start;
+    let start = scene.runs()[run_named(scene, run)?].start;
     Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
 }
 
@@ -102,8 +106,7 @@ pub(crate) fn within_runs(scene: &Scene, stretch: &str) -> Option<Vec<f64>> {
 /// The first and the last run of a stretch that is written `first to last`.
 fn runs_of(scene: &Scene, stretch: &str) -> Option<(usize, usize)> {
     let (first, last) = stretch.split_once(RUN_TO_RUN)?;
-    let place = |name: &str| scene.run_names().iter().position(|run| run == name);
-    let (first, last) = (place(first)?, place(last)?);
+    let (first, last) = (run_named(scene, first)?, run_named(scene, last)?);
     (first <= last).then_some((first, last))
 }
 

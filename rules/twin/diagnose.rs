@@ -12,7 +12,7 @@ use super::noise::Arma;
 use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
-use super::unknown::Unknown;
+use super::unknown::{Doubt, Nameless, Unknown};
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median};
@@ -66,8 +66,6 @@ pub struct Case<'a> {
     pub ripple: Option<super::ripple::Ripple>,
     /// A hidden switch that was followed, where there is one.
     pub switching: Option<super::latent::Switching>,
-    /// A cause without a name that explains as much as the named ones, where there is one.
-    pub nameless: Option<super::unknown::Nameless>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -100,22 +98,8 @@ impl<'a> Case<'a> {
         let frame = Frame::new(&scene, &units, size, |unit| !held.contains(&unit));
         let held_frame = Frame::new(&scene, &units, size, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        let (ripple, switching, nameless, whole) = (None, None, None, None);
-        Self {
-            model,
-            scene,
-            parts,
-            units,
-            held,
-            frame,
-            held_frame,
-            recorded,
-            faults,
-            ripple,
-            switching,
-            nameless,
-            whole,
-        }
+        let (ripple, switching, whole) = (None, None, None);
+        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, whole }
     }
 
     /// The diagnosis found from an excerpt and told over the whole, and the whole again.
@@ -139,11 +123,10 @@ impl<'a> Case<'a> {
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let (mut found, designs) = self.search(&base, seed);
         let base = self.settle(base, &mut found);
-        let unknown = self.unknown(&base, &found, seed);
-        self.nameless = if unknown.is_none() { self.nameless(&base, &found, &designs) } else { None };
-        let found = if unknown.is_none() { self.worth_claiming(found, &base) } else { found };
+        let doubt = self.doubt(&base, &found, &designs, seed);
+        let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base) } else { found };
         self.show_hidden(&base);
-        let outcome = Outcome::new(self, base, found, designs, unknown);
+        let outcome = Outcome::new(self, base, found, designs, doubt);
         verdicts::judge(self, outcome)
     }
 
@@ -287,6 +270,8 @@ pub struct Outcome {
     pub designs: Vec<Design>,
     /// What remains unexplained.
     pub unknown: Option<Unknown>,
+    /// A cause without a name that explains as much as the named ones.
+    pub nameless: Option<Nameless>,
     /// The fits compared.
     pub fits: Fits,
     /// Row by row.
@@ -296,7 +281,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    fn new(case: &mut Case<'_>, base: Fit, found: Found, designs: Vec<Design>, unknown: Option<Unknown>) -> Self {
+    fn new(case: &mut Case<'_>, base: Fit, found: Found, designs: Vec<Design>, doubt: Doubt) -> Self {
+        let Doubt { unknown, nameless } = doubt;
         let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
         let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
         let none = empty();
@@ -321,7 +307,7 @@ impl Outcome {
             compared: case.told().scene.usable().to_vec(),
             effects: added.clone(),
         };
-        Self { base, found, designs, unknown, fits, rows, added }
+        Self { base, found, designs, unknown, nameless, fits, rows, added }
     }
 
     /// The fit that is reported.

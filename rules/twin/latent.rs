@@ -172,14 +172,14 @@ impl Switching {
 #[must_use]
 pub fn steps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
     let mut steps = Vec::new();
+    let turn = |row: usize| found.state[row] - found.state[row - 1];
     for rows in &frame.stretches {
-        for row in rows.start + 1..rows.end {
-            let turn = found.state[row] - found.state[row - 1];
+        for row in (rows.start + 1..rows.end).filter(|row| turn(*row) != 0.0) {
             // The row of the switching itself may be on for a part.
             let before = residual[row.saturating_sub(BESIDE_ROWS).max(rows.start)..row].to_vec();
             let after = residual[row + 1..(row + 1 + BESIDE_ROWS).min(rows.end)].to_vec();
-            if turn != 0.0 && before.len().min(after.len()) >= BESIDE_ROWS_MIN {
-                steps.extend(median(after).zip(median(before)).map(|(after, before)| turn * (after - before)));
+            if before.len().min(after.len()) >= BESIDE_ROWS_MIN {
+                steps.extend(median(after).zip(median(before)).map(|(after, before)| turn(row) * (after - before)));
             }
         }
     }
@@ -216,13 +216,6 @@ struct Survivor {
     e: f64,
 }
 
-impl Survivor {
-    /// The innovation of a row after this one.
-    fn innovation(&self, x: f64, noise: Arma) -> f64 {
-        x - noise.phi * self.x - noise.theta * self.e
-    }
-}
-
 /// The most likely sequence of on (1) and off (0).
 fn sequence(residual: &[f64], frame: &Frame, found: &Switching) -> Vec<f64> {
     let mut state = vec![0.0; residual.len()];
@@ -247,7 +240,7 @@ fn follow_stretch(residual: &[f64], frame: &Frame, found: &Switching, rows: Rang
         let step = |to: usize| {
             let x = value(row, to);
             let from = |from: usize| {
-                let e = race[from].innovation(x, found.noise);
+                let e = found.noise.innovation(x, race[from].x, race[from].e);
                 let price = if from == to { 0.0 } else { price };
                 (Survivor { cost: race[from].cost + price + cost(row, e), x, e }, from)
             };
@@ -278,7 +271,7 @@ pub fn follow(residual: &[f64], found: &Switching, share_on: f64) -> Vec<f64> {
         // From each state before to each state now: how likely, and with which innovation.
         let path = |from: usize, to: usize| {
             let e = match last {
-                Some(last) => x[to] - found.noise.phi * last[from].0 - found.noise.theta * last[from].1,
+                Some(last) => found.noise.innovation(x[to], last[from].0, last[from].1),
                 None => x[to] * found.noise.first_weight(),
             };
             let stays = if to == from { STAYS } else { 1.0 - STAYS };

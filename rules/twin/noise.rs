@@ -27,6 +27,12 @@ impl Arma {
         ((1.0 - self.phi * self.phi) / (1.0 + 2.0 * self.phi * self.theta + self.theta * self.theta)).sqrt()
     }
 
+    /// The innovation of a row with value `x` after a row with value `last_x` and innovation `last_e`.
+    #[must_use]
+    pub fn innovation(self, x: f64, last_x: f64, last_e: f64) -> f64 {
+        x - self.phi * last_x - self.theta * last_e
+    }
+
     /// Long-run variance over variance of a row: how many rows count as one.
     #[must_use]
     pub fn inflation(self) -> f64 {
@@ -71,7 +77,7 @@ pub fn whiten(column: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f6
         let (mut last_x, mut last_e) = (0.0, 0.0);
         for row in rows.clone() {
             let x = column[row];
-            let e = if row == rows.start { x * first } else { x - noise.phi * last_x - noise.theta * last_e };
+            let e = if row == rows.start { x * first } else { noise.innovation(x, last_x, last_e) };
             out[row] = e;
             last_x = x;
             // The stationary start carries its full size into the recursion only through x.

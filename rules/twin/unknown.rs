@@ -12,7 +12,7 @@ use super::empirical::{as_design, empirical_designs};
 use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::model::{Body, simulate};
-use super::scan::{Bank, price};
+use super::scan::{Bank, Score, price};
 use super::search::{Found, Hypothesis, P_MAX};
 use crate::physics::Role;
 
@@ -77,25 +77,60 @@ struct Form {
     information: f64,
 }
 
+/// Why the names that a search found may not be right.
+pub struct Doubt {
+    /// What remains unexplained: the names are withdrawn.
+    pub unknown: Option<Unknown>,
+    /// What explains as much: the names stand, and it beside them.
+    pub nameless: Option<Nameless>,
+}
+
+/// The empirical forms of a case, and what each explains on top of the baseline alone.
+struct Yardsticks<'a> {
+    bank: Bank<'a>,
+    of_base: Vec<Score>,
+}
+
 impl Case<'_> {
-    /// An empirical form where something real remains that the named effects do not explain.
-    pub(super) fn unknown(&mut self, base: &Fit, found: &Found, seed: u64) -> Option<Unknown> {
+    /// Weighs what was found against causes without a name.
+    pub(super) fn doubt(&mut self, base: &Fit, found: &Found, designs: &[Design], seed: u64) -> Doubt {
         let _ = simulate(&found.best.fit.parts, &mut self.scene);
-        let mut designs = empirical_designs(&self.scene, &self.frame, self.model);
+        let forms = self.empirical_forms();
+        let frame = self.frame.clone();
+        let bank = Bank::new(&forms, &frame);
+        let of_base = bank.scan(base, self.ln_rows(base));
+        let yardsticks = Yardsticks { bank, of_base };
+        let unknown = self.unknown(base, found, &yardsticks, seed);
+        let nameless = if unknown.is_none() { self.nameless(base, found, designs, &yardsticks) } else { None };
+        Doubt { unknown, nameless }
+    }
+
+    /// Every empirical form worth trying.
+    fn empirical_forms(&self) -> Vec<Design> {
+        let mut forms = empirical_designs(&self.scene, &self.frame, self.model);
         if self.frame.levels.is_some() {
             // Tools are draws, not points on a curve over time, and each wears along its own: what grows with the use of
             // a tool has been asked for by name.
             let named = ["time_s", "time_in_run_s", "cutting_time_min"];
-            designs.retain(|design| match &design.part.body {
+            forms.retain(|design| match &design.part.body {
                 Body::Empirical(form) => !named.contains(&form.channel.as_str()),
                 _ => true,
             });
         }
-        let frame = self.frame.clone();
-        let bank = Bank::new(&designs, &frame);
-        let on_top = self.best_empirical(&found.best.fit, &bank)?;
-        let anything = !found.best.members.is_empty();
-        let alone = if anything { self.best_empirical(base, &bank)? } else { on_top.clone() };
+        forms
+    }
+
+    /// An empirical form where something real remains that the named effects do not explain.
+    fn unknown(&mut self, base: &Fit, found: &Found, forms: &Yardsticks<'_>, seed: u64) -> Option<Unknown> {
+        let best = &found.best;
+        let anything = !best.members.is_empty();
+        let alone = self.best_empirical(base, forms, &forms.of_base)?;
+        let on_top = if anything {
+            let of_best = forms.bank.scan(&best.fit, self.ln_rows(&best.fit));
+            self.best_empirical(&best.fit, forms, &of_best)?
+        } else {
+            alone.clone()
+        };
         let named = found.best.information;
         let least = if anything { UNKNOWN_INFORMATION } else { NOTHING_NAMED_INFORMATION };
         let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
@@ -116,7 +151,7 @@ impl Case<'_> {
         if small {
             return None;
         }
-        let p = p_value(&bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
+        let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
         if !better && p > P_MAX {
             return None;
         }
@@ -126,20 +161,18 @@ impl Case<'_> {
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording
     /// does not tell that the name is right. Prices are left out, for where a peak stands and how wide it is is nothing
     /// that a recording of a few speeds could tell.
-    pub(super) fn nameless(&mut self, base: &Fit, found: &Found, designs: &[Design]) -> Option<Nameless> {
+    fn nameless(&mut self, base: &Fit, found: &Found, designs: &[Design], forms: &Yardsticks<'_>) -> Option<Nameless> {
         let best = &found.best;
         if best.members.is_empty() {
             return None;
         }
-        let _ = simulate(&best.fit.parts, &mut self.scene);
-        let mut forms = empirical_designs(&self.scene, &self.frame, self.model);
-        forms.retain(|design| matches!(&design.part.body, Body::Empirical(form) if form.is_simple()));
-        let frame = self.frame.clone();
-        let bank = Bank::new(&forms, &frame);
-        let scores = bank.scan(base, self.ln_rows(base));
-        let likeliest =
-            scores.iter().filter(|score| score.gain.is_finite()).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-        let form = self.with_form(base, &self.sharpened(base, &forms[likeliest.design], likeliest.gain))?;
+        let simple = |score: &&Score| match &forms.bank.designs[score.design].part.body {
+            Body::Empirical(form) => form.is_simple() && score.gain.is_finite(),
+            _ => false,
+        };
+        let likeliest = forms.of_base.iter().filter(simple).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+        let form = self.sharpened(base, &forms.bank.designs[likeliest.design], likeliest.gain);
+        let form = self.with_form(base, &form)?;
         let delta_ic = 2.0 * (best.fit.log_likelihood - form.fit.log_likelihood);
         if delta_ic > super::verdicts::CLASS_INFORMATION {
             return None;
@@ -172,11 +205,10 @@ impl Case<'_> {
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    fn best_empirical(&mut self, from: &Fit, bank: &Bank<'_>) -> Option<Form> {
-        let scores = bank.scan(from, self.ln_rows(from));
+    fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<Form> {
         let known = scores.iter().filter(|score| score.information.is_finite());
         let best = known.max_by(|a, b| a.information.total_cmp(&b.information))?;
-        let design = self.sharpened(from, &bank.designs[best.design], best.gain);
+        let design = self.sharpened(from, &forms.bank.designs[best.design], best.gain);
         self.with_form(from, &design)
     }
 

@@ -49,7 +49,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     let missing = missing(case, &outcome);
     let mut alternatives = alternatives(&outcome);
     // Not after all names were found too small to be worth claiming.
-    if let Some(nameless) = case.nameless.as_ref().filter(|_| !missing.is_empty()) {
+    if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
     }
     let verdict = outcome.verdict(!alternatives.is_empty());

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{
-    ln_count, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
+    ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
@@ -137,7 +137,7 @@ fn steps_between_lots(scene: &Scene) -> Vec<Form> {
     let mut steps = step_forms(scene, "step");
     let Some(lots) = scene.words("lot").filter(|lots| lots.words().len() > 1) else { return steps };
     let begins_a_lot = |form: &Form| {
-        let run = form.place.as_ref().and_then(|(_, run)| scene.run_names().iter().position(|name| name == run));
+        let run = form.place.as_ref().and_then(|(_, run)| run_named(scene, run));
         run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
     };
     steps.retain(begins_a_lot);
@@ -167,10 +167,7 @@ pub const LOTS_MAX: usize = GAINS.len() + 1;
 const LOT_TO_LOT: &str = ", ";
 
 fn from_start_to_start(scene: &Scene, starts: &str) -> Option<Columns> {
-    let row = |name: &str| {
-        let run = scene.run_names().iter().position(|known| known == name)?;
-        Some(scene.runs()[run].start)
-    };
+    let row = |name: &str| Some(scene.runs()[run_named(scene, name)?].start);
     let mut rows: Vec<usize> = starts.split(LOT_TO_LOT).map(row).collect::<Option<_>>()?;
     rows.push(scene.rows());
     let gain = |(gain, lot): (&&'static str, &[usize])| {
