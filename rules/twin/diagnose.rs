@@ -123,7 +123,7 @@ impl<'a> Case<'a> {
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let (mut found, designs) = self.search(&base, seed);
         let base = self.settle(base, &mut found);
-        let doubt = self.doubt(&base, &found, &designs, seed);
+        let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base) } else { found };
         self.show_hidden(&base);
         let outcome = Outcome::new(self, base, found, designs, doubt);

@@ -1,13 +1,14 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
-//! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed or something
-//! that fades through each pass; by itself, in the cut only, or in proportion to the removal rate. It is the yardstick
+//! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed, something
+//! that fades through each pass or a wave over the position of a slide (`periodic`); by itself, in the cut only, or in proportion to the removal rate. It is the yardstick
 //! for "something real remains that no candidate explains".
 
 use super::designs::Design;
 use super::frame::Frame;
 use super::model::{Body, Model, Parameter, Part};
 use crate::physics::{Entry, Role, Scene};
+use std::f64::consts::TAU;
 
 /// By what the bent line is multiplied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +32,8 @@ pub enum Shape {
     Peak(f64, f64),
     /// What is there at first and fades over this distance.
     Fading(f64),
+    /// A wave of this period, one of so many that can be told apart.
+    Wave(f64, usize),
 }
 
 /// A shape over one channel.
@@ -55,7 +58,7 @@ const FADING_PERIODS: f64 = 4.0;
 /// Seconds since the first row of the run.
 const TIME_IN_RUN: &str = "time_in_run_s";
 /// Seconds since the tool went into the cut; zero outside it.
-const TIME_IN_CUT: &str = "time_in_cut_s";
+pub(super) const TIME_IN_CUT: &str = "time_in_cut_s";
 /// The cut as the model simulates it, in the unit of the output.
 const LOAD: &str = "simulated_cut";
 /// The same over the speed in thousands of turns a minute.
@@ -83,6 +86,11 @@ impl Empirical {
                 Shape::Peak(centre, down * width),
             ],
             Shape::Fading(over) => vec![Shape::Fading(up * over), Shape::Fading(down * over)],
+            Shape::Wave(period, among) => {
+                // What a period is known by: a part of a turn over the whole distance.
+                let turns = self.scale / period;
+                vec![Shape::Wave(self.scale / (turns + step), among), Shape::Wave(self.scale / (turns - step), among)]
+            }
         };
         shapes.into_iter().map(|shape| Self { shape, ..self.clone() }).collect()
     }
@@ -104,6 +112,11 @@ impl Empirical {
             Shape::Fading(over) => {
                 let over = over / self.scale;
                 return Some(vec![("level".to_owned(), column(&|x| (-x / over).exp()))]);
+            }
+            Shape::Wave(period, _) => {
+                let turns = TAU * self.scale / period;
+                let (cosine, sine) = (column(&|x| (turns * x).cos()), column(&|x| (turns * x).sin()));
+                return Some(vec![("cosine".to_owned(), cosine), ("sine".to_owned(), sine)]);
             }
         };
         let mut columns = vec![("slope".to_owned(), column(&|x| x))];
@@ -133,6 +146,7 @@ impl Empirical {
             }
             Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
             Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
+            Shape::Wave(period, _) => format!("wave over {} with a period of {period:.4}", self.channel),
         };
         format!("y = {factor}{shape}")
     }
@@ -159,6 +173,10 @@ impl Empirical {
                 return format!("level / (1.0 + (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
             }
             Shape::Fading(over) => return format!("level * exp(-{x} / {:?})", over / self.scale),
+            Shape::Wave(period, _) => {
+                let turns = TAU * self.scale / period;
+                return format!("cosine * cos({turns:?} * {x}) + sine * sin({turns:?} * {x})");
+            }
         };
         let mut terms = vec![format!("slope * {x}")];
         if self.factor != Factor::Always {
@@ -172,7 +190,7 @@ impl Empirical {
     }
 }
 
-fn channel_values(scene: &Scene, channel: &str) -> Option<Vec<f64>> {
+pub(super) fn channel_values(scene: &Scene, channel: &str) -> Option<Vec<f64>> {
     match channel {
         TIME => Some(scene.clock_s().to_vec()),
         TIME_IN_RUN => {
@@ -207,7 +225,7 @@ fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
     Some(values)
 }
 
-fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
+pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
     let speed = || scene.role(Role::Speed);
     match factor {
         Factor::Always => Some(vec![1.0; scene.rows()]),
@@ -311,8 +329,9 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
     let chosen = match form.shape {
         Shape::Bent(_) => 0,
         Shape::Peak(..) => 2,
-        Shape::Fading(_) => 1,
+        Shape::Fading(_) | Shape::Wave(..) => 1,
     };
+    let among = if let Shape::Wave(_, among) = form.shape { among } else { 1 };
     let parameters = columns.iter().map(|(name, _)| Parameter {
         name: name.clone(),
         value: 0.0,
@@ -333,7 +352,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
         kind: "unknown".to_owned(),
         ranges: vec![any; columns.len()],
         freedom: columns.len() + chosen,
-        ln_choices: 0.0,
+        ln_choices: crate::statistics::count(among).ln(),
         reluctance: 0.0,
         noise: None,
         part,

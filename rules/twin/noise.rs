@@ -87,6 +87,26 @@ pub fn whiten(column: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f6
     out
 }
 
+/// The transpose of [`whiten`]: with it the inner product of innovations `e` and a whitened column is that of
+/// `unwhiten(e)` and the column itself.
+#[must_use]
+pub fn unwhiten(innovations: &[f64], stretches: &[Range<usize>], noise: Arma) -> Vec<f64> {
+    let mut out = vec![0.0; innovations.len()];
+    for rows in stretches {
+        let mut next = 0.0;
+        for row in rows.clone().rev() {
+            let carried = innovations[row] - noise.theta * next;
+            if row == rows.start {
+                out[row] = noise.first_weight() * innovations[row] - noise.phi * next;
+            } else {
+                out[row] = carried - noise.phi * next;
+                next = carried;
+            }
+        }
+    }
+    out
+}
+
 /// Logarithm of the likelihood, up to a constant, of innovations with this sum of squares.
 #[must_use]
 pub fn log_likelihood(rss: f64, rows: usize, stretches: usize, noise: Arma) -> f64 {
@@ -181,5 +201,14 @@ mod tests {
         let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
         let e = whiten(&noise, &ALL, fit(&noise, &ALL));
         assert!((dot(&e, &e) / dot(&noise, &noise) - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn unwhitening_is_the_transpose() {
+        let stretches = [0..7, 7..8, 8..20];
+        let noise = Arma { phi: 0.9, theta: -0.6 };
+        let (a, b): (Vec<f64>, Vec<f64>) = (0..20).map(count).map(|x| ((3.1 * x).sin(), (1.7 * x).cos())).unzip();
+        let one = dot(&whiten(&a, &stretches, noise), &b);
+        assert!((one - dot(&a, &unwhiten(&b, &stretches, noise))).abs() < 1e-12);
     }
 }

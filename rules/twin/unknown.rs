@@ -12,6 +12,8 @@ use super::empirical::{as_design, empirical_designs};
 use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::model::{Body, simulate};
+use super::outdone::LEADING_SHARE;
+use super::periodic::waves;
 use super::scan::{Bank, Score, price};
 use super::search::{Found, Hypothesis, P_MAX};
 use crate::physics::Role;
@@ -61,7 +63,7 @@ pub struct Nameless {
 
 /// What an empirical form must explain beyond what is named: a bent line over any channel is a yardstick, a peak at one
 /// speed or what fades through every pass is as good a cause as those with a name.
-fn margin(form: &Design, named: f64) -> f64 {
+pub(super) fn margin(form: &Design, named: f64) -> f64 {
     match &form.part.body {
         Body::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
         _ => (BETTER_SHARE * named).max(BETTER_INFORMATION),
@@ -70,9 +72,9 @@ fn margin(form: &Design, named: f64) -> f64 {
 
 /// An empirical form fitted on top of something.
 #[derive(Clone)]
-struct Form {
-    design: Design,
-    fit: Fit,
+pub(super) struct Form {
+    pub(super) design: Design,
+    pub(super) fit: Fit,
     /// Information over what it was fitted on top of.
     information: f64,
 }
@@ -86,23 +88,31 @@ pub struct Doubt {
 }
 
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
-struct Yardsticks<'a> {
-    bank: Bank<'a>,
+pub(super) struct Yardsticks<'a> {
+    pub(super) bank: Bank<'a>,
     of_base: Vec<Score>,
 }
 
 impl Case<'_> {
     /// Weighs what was found against causes without a name.
-    pub(super) fn doubt(&mut self, base: &Fit, found: &Found, designs: &[Design], seed: u64) -> Doubt {
+    pub(super) fn doubt(&mut self, base: &Fit, found: &mut Found, designs: &[Design], seed: u64) -> Doubt {
         let _ = simulate(&found.best.fit.parts, &mut self.scene);
-        let forms = self.empirical_forms();
+        let mut forms = self.empirical_forms();
+        let left = [base, &found.best.fit].map(|fit| waves(&self.scene, &self.frame, &fit.residual, fit.noise));
+        let left = left.into_iter().flatten();
+        forms.extend(left.filter_map(|form| as_design(form, &self.scene, &self.frame)));
         let frame = self.frame.clone();
         let bank = Bank::new(&forms, &frame);
         let of_base = bank.scan(base, self.ln_rows(base));
         let yardsticks = Yardsticks { bank, of_base };
-        let unknown = self.unknown(base, found, &yardsticks, seed);
-        let nameless = if unknown.is_none() { self.nameless(base, found, designs, &yardsticks) } else { None };
-        Doubt { unknown, nameless }
+        let outdone = self.outdone(base, &found.best, designs, &yardsticks);
+        let leading = outdone.iter().any(|outdone| outdone.share >= LEADING_SHARE);
+        let unknown = self.unknown(base, found, &yardsticks, leading, seed);
+        if unknown.is_some() {
+            return Doubt { unknown, nameless: None };
+        }
+        self.drop_minor(base, found, designs, &yardsticks, outdone);
+        Doubt { unknown, nameless: self.nameless(base, found, designs, &yardsticks) }
     }
 
     /// Every empirical form worth trying.
@@ -121,7 +131,14 @@ impl Case<'_> {
     }
 
     /// An empirical form where something real remains that the named effects do not explain.
-    fn unknown(&mut self, base: &Fit, found: &Found, forms: &Yardsticks<'_>, seed: u64) -> Option<Unknown> {
+    fn unknown(
+        &mut self,
+        base: &Fit,
+        found: &Found,
+        forms: &Yardsticks<'_>,
+        outdone: bool,
+        seed: u64,
+    ) -> Option<Unknown> {
         let best = &found.best;
         let anything = !best.members.is_empty();
         let alone = self.best_empirical(base, forms, &forms.of_base)?;
@@ -141,10 +158,10 @@ impl Case<'_> {
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
         let unlike = anything && self.unlike(&found.best);
         let doubted = remains && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
-        if !(doubted || better || unlike) {
+        if !(doubted || better || unlike || outdone) {
             return None;
         }
-        let better = better || unlike;
+        let better = better || unlike || outdone;
         let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
         let small = self.negligible(&from.residual, &to.fit.residual, noise, to.information);
@@ -195,7 +212,7 @@ impl Case<'_> {
 
     /// Is a bent line over the velocity of the axis no more than the shape of a friction that has been named? No law of
     /// friction fits a real axis to its noise.
-    fn is_friction(&self, empirical: &Design, named: &Fit) -> bool {
+    pub(super) fn is_friction(&self, empirical: &Design, named: &Fit) -> bool {
         let friction = ["dry_friction", "viscous_friction", "stribeck", "axis_friction"];
         let of_velocity = match &empirical.part.body {
             Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
@@ -205,7 +222,7 @@ impl Case<'_> {
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<Form> {
+    pub(super) fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<Form> {
         let known = scores.iter().filter(|score| score.information.is_finite());
         let best = known.max_by(|a, b| a.information.total_cmp(&b.information))?;
         let design = self.sharpened(from, &forms.bank.designs[best.design], best.gain);

@@ -1,0 +1,87 @@
+//! Of several names found together, which would be better without one: each is tried against a cause without a name in
+//! its place, beside all the others.
+//!
+//! One that leads and is outdone is not what it was called, and with it falls what was named to mend it: a taper and a
+//! load loss imitate an insert that is cold when it enters better than either alone. One that adds little and is outdone
+//! mends the form of the law that leads; nothing follows for the leader, and it is not claimed.
+
+use super::designs::Design;
+use super::diagnose::Case;
+use super::fit::Fit;
+use super::scan::price;
+use super::search::{Found, Hypothesis};
+use super::unknown::{Yardsticks, margin};
+
+/// Share of all that is named from which a member leads.
+pub(super) const LEADING_SHARE: f64 = 0.5;
+/// Share below which it adds little.
+const MINOR_SHARE: f64 = 0.25;
+
+/// A member in whose place a form without a name explains clearly more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Outdone {
+    /// Which member.
+    position: usize,
+    /// What it adds, as a share of all that is named.
+    pub(super) share: f64,
+}
+
+impl Case<'_> {
+    /// The members that are outdone; none of a name that stands alone, which is weighed as a whole.
+    pub(super) fn outdone(
+        &mut self,
+        base: &Fit,
+        best: &Hypothesis,
+        designs: &[Design],
+        forms: &Yardsticks<'_>,
+    ) -> Vec<Outdone> {
+        // Where a feed drive tells how each tool wears, wear and settling have been asked for one beside the other.
+        if best.members.len() < 2 || self.frame.levels.is_some() {
+            return Vec::new();
+        }
+        let mut tried = |position| self.tried_without(position, base, best, designs, forms);
+        (0..best.members.len()).filter_map(|position| tried(position)).collect()
+    }
+
+    fn tried_without(
+        &mut self,
+        position: usize,
+        base: &Fit,
+        best: &Hypothesis,
+        designs: &[Design],
+        forms: &Yardsticks<'_>,
+    ) -> Option<Outdone> {
+        let ln_rows = self.ln_rows(base);
+        let rest = self.without(best, position)?.fit;
+        let scores = forms.bank.scan(&rest, ln_rows);
+        let form = self.best_empirical(&rest, forms, &scores)?;
+        let gained =
+            |fit: &Fit, design: &Design| 2.0 * (fit.log_likelihood - rest.log_likelihood) - price(design, ln_rows);
+        let own = gained(&best.fit, &designs[best.members[position]]);
+        let its = gained(&form.fit, &form.design);
+        let outdone = its > own + margin(&form.design, own) && !self.is_friction(&form.design, &best.fit);
+        outdone.then(|| Outdone { position, share: own / best.information })
+    }
+
+    /// Drops the members that add little and are outdone, one after the other.
+    pub(super) fn drop_minor(
+        &mut self,
+        base: &Fit,
+        found: &mut Found,
+        designs: &[Design],
+        forms: &Yardsticks<'_>,
+        mut outdone: Vec<Outdone>,
+    ) {
+        let least = |outdone: Vec<Outdone>| {
+            let minor = outdone.into_iter().filter(|outdone| outdone.share < MINOR_SHARE);
+            minor.min_by(|a, b| a.share.total_cmp(&b.share))
+        };
+        while let Some(Outdone { position, .. }) = least(outdone) {
+            let paid = price(&designs[found.best.members[position]], self.ln_rows(base));
+            let Some(less) = self.without(&found.best, position) else { return };
+            found.best = Hypothesis { information: less.information + paid, ..less };
+            found.p_values.remove(position.min(found.p_values.len() - 1));
+            outdone = self.outdone(base, &found.best, designs, forms);
+        }
+    }
+}
