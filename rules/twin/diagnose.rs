@@ -204,10 +204,18 @@ impl<'a> Case<'a> {
         designs.extend(self.hidden_lots(base));
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
-        let frame = self.frame.clone();
-        let bank = Bank::new(&designs, &frame);
-        let found = self.with_data(|data| Search::new(data, base, &bank, seed).run());
+        let found = self.searched(base, &designs, seed);
+        if self.shows_hidden_beside(&found.best, &mut designs) {
+            let found = self.searched(base, &designs, seed);
+            return (found, designs);
+        }
         (found, designs)
+    }
+
+    fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> Found {
+        let frame = self.frame.clone();
+        let bank = Bank::new(designs, &frame);
+        self.with_data(|data| Search::new(data, base, &bank, seed).run())
     }
 
     /// The hypothesis with one member taken out and everything else refitted.

@@ -5,8 +5,9 @@ use super::designs::Design;
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::latent::{self, Switching};
-use super::model::simulate;
+use super::model::{Body, simulate};
 use super::ripple;
+use super::search::Hypothesis;
 use super::wave::{self, Wave};
 use crate::physics::{Form, OutputKind, Role};
 use crate::statistics::{count, median};
@@ -39,6 +40,25 @@ impl Case<'_> {
         let form = Form { name: "latent", ln_choices: 0.5 * latent::price(&found), ..Form::default() };
         let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         Some(Design { noise: Some(found.noise), ..design })
+    }
+
+    /// Looks for hidden states again beside what was found, which may have covered them; says whether there are any, and
+    /// then puts them into the place of those that showed before.
+    pub(super) fn shows_hidden_beside(&mut self, best: &Hypothesis, designs: &mut Vec<Design>) -> bool {
+        if best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
+            return false;
+        }
+        let named = |kind: &str| best.members.iter().any(|member| designs[*member].kind == kind);
+        let (switches, waves) = (named("auxiliary_switch"), named("ripple_alias"));
+        let switch = if switches { None } else { self.hidden_switch(&best.fit) };
+        let wave = if waves { None } else { self.hidden_ripple(&best.fit) };
+        let shown: Vec<Design> = switch.into_iter().chain(wave).collect();
+        let any = !shown.is_empty();
+        for design in shown {
+            designs.retain(|other| !(other.kind == design.kind && is_latent(other)));
+            designs.push(design);
+        }
+        any
     }
 
     /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else.
@@ -190,4 +210,9 @@ impl Case<'_> {
         }
         state
     }
+}
+
+/// Is its state read from a residual?
+fn is_latent(design: &Design) -> bool {
+    matches!(&design.part.body, Body::Effect(_, form) if form.name == "latent")
 }
