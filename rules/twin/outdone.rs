@@ -10,7 +10,7 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::scan::price;
 use super::search::{Found, Hypothesis};
-use super::unknown::{Yardsticks, margin};
+use super::unknown::{STANDS_SHARE, Yardsticks, margin};
 
 /// Share of all that is named from which a member leads.
 pub(super) const LEADING_SHARE: f64 = 0.5;
@@ -60,7 +60,14 @@ impl Case<'_> {
         let own = gained(&best.fit, &designs[best.members[position]]);
         let its = gained(&form.fit, &form.design);
         let outdone = its > own + margin(&form.design, own) && !self.is_friction(&form.design, &best.fit);
-        outdone.then(|| Outdone { position, share: own / best.information })
+        let share = own / best.information;
+        if outdone && share >= LEADING_SHARE {
+            // A leader that explains as much beside the form as without it is another thing than the form.
+            let both = self.with_form(&best.fit, &form.design)?.fit;
+            let beside = 2.0 * (both.log_likelihood - form.fit.log_likelihood);
+            return (beside < STANDS_SHARE * own).then_some(Outdone { position, share });
+        }
+        outdone.then_some(Outdone { position, share })
     }
 
     /// Drops the members that add little and are outdone, one after the other.

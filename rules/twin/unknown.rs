@@ -25,7 +25,7 @@ const UNKNOWN_INFORMATION: f64 = 8.0;
 /// The same where nothing is named: an alarm without a name must not be a false one either.
 const NOTHING_NAMED_INFORMATION: f64 = 20.0;
 /// Share of what is named that must be left to the names when an empirical form stands beside them.
-const STANDS_SHARE: f64 = 0.6;
+pub(super) const STANDS_SHARE: f64 = 0.6;
 /// By how much a bent line over one channel must explain more than all that is named, as a share of it, before the
 /// names are withdrawn: whatever bends over a channel nobody named is not what was named.
 const BETTER_SHARE: f64 = 0.1;
@@ -251,7 +251,7 @@ impl Case<'_> {
     }
 
     /// An empirical form on top of `from`, fitted in full.
-    fn with_form(&mut self, from: &Fit, design: &Design) -> Option<Form> {
+    pub(super) fn with_form(&mut self, from: &Fit, design: &Design) -> Option<Form> {
         let mut parts = from.parts.clone();
         parts.push(design.part.clone());
         let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
