@@ -39,8 +39,8 @@ impl Case<'_> {
         if best.members.len() < 2 || self.frame.levels.is_some() {
             return Vec::new();
         }
-        let mut tried = |position| self.tried_without(position, base, best, designs, forms);
-        (0..best.members.len()).filter_map(|position| tried(position)).collect()
+        let tried = |position| self.tried_without(position, base, best, designs, forms);
+        (0..best.members.len()).filter_map(tried).collect()
     }
 
     fn tried_without(
