@@ -98,7 +98,8 @@ impl Temperatures {
     /// Everything that is wrong with the file, in words.
     pub fn open(address: &str, file: &Path, sys: &Path) -> Result<Self, String> {
         let place = file.display();
-        let text = text_of(file, FILE_MAX).map_err(|error| format!("{place}: {error}"))?;
+        let unread = |error| format!("{place}: {error}; write temperature:FILE with a file that names the sensors");
+        let text = text_of(file, FILE_MAX).map_err(unread)?;
         let raw: Raw = toml::from_str(&text).map_err(|error| format!("{place}: {error}"))?;
         let mut problems = Vec::new();
         if raw.format != "temperatures/1" {

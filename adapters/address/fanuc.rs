@@ -81,7 +81,7 @@ impl FanucOptions {
         }
         let write = write(keys);
         Self {
-            further: further(keys),
+            further: Vec::new(),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),
             duty_pct: keys.number("duty_pct", 50, 1, 100),
@@ -96,26 +96,23 @@ impl FanucOptions {
     }
 }
 
-/// `paths=1,2`: path 1 keeps the plain channel names, the others have a prefix.
-fn further(keys: &mut Keys) -> Vec<u8> {
-    let Some(text) = keys.text("paths") else { return Vec::new() };
+/// `paths=2,1`: the first has the plain channel names and is the one that is written to, the others have a prefix.
+pub(super) fn paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
+    let text = keys.text("paths")?;
     let paths: Option<Vec<u8>> = text.split(',').map(|path| path.trim().parse().ok()).collect();
+    let once = |paths: &[u8]| paths.iter().enumerate().all(|(at, path)| !paths[..at].contains(path));
     match paths.as_deref() {
-        Some([1, further @ ..])
-            if further.is_sorted_by(|a, b| a < b) && further.iter().all(|path| further_exists(*path)) =>
-        {
-            further.to_vec()
+        Some(paths @ [own, further @ ..]) if once(paths) && paths.iter().all(|path| PATHS.contains(path)) => {
+            Some((*own, further.to_vec()))
         }
         _ => {
-            let last = PATHS.end();
-            keys.problem(format!("paths={text}: name path 1 first, then others up to {last}, for example paths=1,2"));
-            Vec::new()
+            keys.problem(format!(
+                "paths={text}: name paths up to {} once each, the one that is written to first, for example paths=1,2",
+                PATHS.end()
+            ));
+            None
         }
     }
-}
-
-fn further_exists(path: u8) -> bool {
-    path > 1 && PATHS.contains(&path)
 }
 
 #[derive(Clone, Copy, PartialEq)]

@@ -4,6 +4,7 @@ use super::keys::Keys;
 use super::meter::{self, WaveformKeep};
 use super::target::{Endpoint, Target, endpoint, library};
 use crate::nclink::mailbox::{Mailbox, Register};
+use crate::nclink::offset_mailbox::OffsetMailbox;
 use std::path::PathBuf;
 
 /// A Huazhong controller behind a broker.
@@ -27,6 +28,8 @@ pub struct NcLinkTarget {
     pub spindle_axis: Option<u32>,
     /// First register of the mailbox for the feed override; without one nothing is ever written.
     pub mailbox: Option<Register>,
+    /// First register of the mailbox for offsets; without one no axis is ever shifted.
+    pub offset: Option<Register>,
     /// Make the spindle's current out of the device's sample channel?
     pub sample: bool,
     /// Keep its raw samples around high currents?
@@ -55,8 +58,22 @@ pub struct HncNetTarget {
     pub sample_scale_a: Option<f64>,
     /// Keep raw samples of the spindle's current around high ones?
     pub keep: Option<WaveformKeep>,
-    /// First register of the mailbox for the feed override; without one nothing is ever written.
+    /// First register of the mailbox for the feed override; without one none is ever written.
     pub mailbox: Option<Register>,
+    /// How axes are shifted; without it none ever is.
+    pub offset: Option<HncOffset>,
+}
+
+/// How the vendor's library shifts an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HncOffset {
+    /// Through registers that the ladder reads, from this one on.
+    Registers(Register),
+    /// By the channel's external zero offset.
+    Zero {
+        /// What a count is, µm.
+        unit_um: f64,
+    },
 }
 
 pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
@@ -65,6 +82,7 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
     let f_channel = keys.number("f_channel", 2560, 0, 65_535);
     let spindle_axis = keys.optional("spindle_axis", 0, 63);
     let mailbox = mailbox(keys);
+    let offset = keys.text("offset").and_then(|text| registers(keys, &text, mailbox));
     let sample = keys.choice("sample", &[("no", false), ("yes", true)]);
     let keep = kept(keys, sample, "sample=yes")?;
     let rest = body.strip_prefix("//").unwrap_or(body);
@@ -84,6 +102,7 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
         f_channel,
         spindle_axis,
         mailbox,
+        offset,
         sample,
         keep,
     }))
@@ -109,6 +128,7 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
     }
     let keep = kept(keys, sample_scale_a.is_some(), "sample=yes&sample_scale_a=A")?;
     let mailbox = mailbox(keys);
+    let offset = hnc_offset(keys, mailbox);
     let (at, vendor_library) = (endpoint(body, Some(10001))?, vendor_library?);
     Ok(Target::HncNet(HncNetTarget {
         at,
@@ -121,7 +141,43 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
         sample_scale_a,
         keep,
         mailbox,
+        offset,
     }))
+}
+
+/// `offset=D110`, or `offset=zero` with what a count is.
+fn hnc_offset(keys: &mut Keys, mailbox: Option<Register>) -> Option<HncOffset> {
+    let text = keys.text("offset");
+    let unit_um = keys.optional("offset_unit_um", 1e-4, 100.0);
+    match (text.as_deref(), unit_um) {
+        (Some("zero"), Some(unit_um)) => return Some(HncOffset::Zero { unit_um }),
+        (Some("zero"), None) => {
+            let next = "say what a count of the external zero offset is, after comparing one shift at the panel";
+            keys.problem(format!("offset=zero needs offset_unit_um= (0.01 on most controls): {next}"));
+        }
+        (Some(text), None) => return registers(keys, text, mailbox).map(HncOffset::Registers),
+        (_, Some(_)) => keys.problem("offset_unit_um= counts only with offset=zero".to_owned()),
+        (None, None) => {}
+    }
+    None
+}
+
+/// Where the mailbox for offsets begins; it must not lie over the one for the feed override.
+fn registers(keys: &mut Keys, text: &str, mailbox: Option<Register>) -> Option<Register> {
+    let first = text.parse::<Register>().map_err(|problem| keys.problem(format!("offset={problem}"))).ok()?;
+    if !OffsetMailbox::may_begin(first) {
+        keys.problem(format!("offset={first}: name a W or D register; others are too short or keep their contents"));
+        return None;
+    }
+    let overlaps = |other: &Register| {
+        let apart = other.index + Mailbox::LENGTH <= first.index || first.index + OffsetMailbox::LENGTH <= other.index;
+        other.kind == first.kind && !apart
+    };
+    if let Some(other) = mailbox.filter(overlaps) {
+        keys.problem(format!("offset={first} lies over the mailbox at {other}: name eight registers of their own"));
+        return None;
+    }
+    Some(first)
 }
 
 /// `keep=` and `keep_above_a=`, where there are samples to be kept.

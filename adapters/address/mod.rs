@@ -7,7 +7,7 @@ mod meter;
 mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
-pub use huazhong::{HncNetTarget, NcLinkTarget};
+pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use target::{
     Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
@@ -125,6 +125,7 @@ mod tests {
             "fanuc://10.0.0.5:8193?path=1&backend=native",
             "fanuc://cnc?backend=vendor&library=/opt/fwlib/libfwlib32.so",
             "fanuc://cnc?paths=1,2",
+            "fanuc://cnc?paths=2,1&write=mailbox&mailbox=R920&allow=EXT",
             "fanuc://cnc?write=mailbox&request=R905&dial=R907",
             "fanuc://cnc?write=second_override&dial=G12",
             "fanuc://cnc?write=mailbox&mailbox=D900&period_ms=50&duty_pct=25&allow=#500-#509,EXT",
@@ -136,6 +137,9 @@ mod tests {
             "hncnet://cnc?library=x.so&sample=yes&sample_scale_a=0.001",
             "hncnet://cnc?library=x.so&local_host=10.0.0.2&local_port=9090&long_bytes=4&period_ms=200&sample=yes",
             "nclink://broker/SN1?write=mailbox&mailbox=R200",
+            "nclink://broker/SN1?write=mailbox&offset=D110",
+            "hncnet://cnc?library=x.so&offset=W40",
+            "hncnet://cnc?library=x.so&offset=zero&offset_unit_um=0.01",
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",
             "modbus-rtu:///dev/ttyUSB0?baud=9600&parity=none&unit=1&profile=eda9033a",
             "eda9033a:///dev/ttyUSB0?baud=9600&address=1&ct=20",
@@ -169,6 +173,15 @@ mod tests {
     }
 
     #[test]
+    fn an_offset_of_a_huazhong_control_is_configured_in_full_or_refused() {
+        assert!(refused("nclink://b/S?offset=R10").contains("W or D register"));
+        assert!(refused("nclink://b/S?offset=zero").contains("is no register"), "only the library can");
+        assert!(refused("nclink://b/S?write=mailbox&offset=D103").contains("lies over the mailbox at D100"));
+        assert!(refused("hncnet://cnc?library=x.so&offset=zero").contains("offset_unit_um="));
+        assert!(refused("hncnet://cnc?library=x.so&offset=D9&offset_unit_um=1").contains("only with offset=zero"));
+    }
+
+    #[test]
     fn all_problems_are_told_at_once() {
         let text = refused("modbus-tcp://meter:99999?unit=900&colour=red&profile=sdm630");
         for part in ["99999", "unit", "colour"] {
@@ -183,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn several_paths_begin_with_the_first() {
+    fn several_paths_begin_with_the_one_that_is_written_to() {
         let further = |text| match parse(text) {
             Target::Fanuc { options, .. } => options.further,
             other => panic!("{other:?}"),
@@ -191,7 +204,9 @@ mod tests {
         assert_eq!(further("fanuc://cnc"), [0u8; 0]);
         assert_eq!(further("fanuc://cnc?paths=1"), [0u8; 0]);
         assert_eq!(further("fanuc://cnc?paths=1,3"), [3]);
-        for wrong in ["2", "1,1", "1,4", "2,1", "1,2,", "x"] {
+        let Target::Fanuc { path, options, .. } = parse("fanuc://cnc?paths=2,1") else { panic!("a controller") };
+        assert_eq!((path, options.further), (2, vec![1]), "the first is written to");
+        for wrong in ["0", "1,1", "1,4", "2,1,2", "1,2,", "x"] {
             assert!(refused(&format!("fanuc://cnc?paths={wrong}")).contains("for example paths=1,2"), "{wrong}");
         }
         assert!(refused("fanuc://cnc?path=2&paths=1,2").contains("either"));

@@ -1,7 +1,7 @@
 //! What each scheme of an address means, typed.
 
 use super::SCHEMES;
-use super::fanuc::FanucOptions;
+use super::fanuc::{self, FanucOptions};
 use super::huazhong::{HncNetTarget, NcLinkTarget, hncnet, nclink};
 use super::keys::Keys;
 use super::meter::{self, EdaTarget, MeterTarget, WaveformKeep};
@@ -280,13 +280,19 @@ fn speed(keys: &mut Keys) -> Speed {
 
 fn fanuc(body: &str, keys: &mut Keys) -> Result<Target, String> {
     let named = keys.optional("path", 1, 10);
-    let path = named.unwrap_or(1);
     let vendor = keys.choice("backend", &[("native", false), ("vendor", true)]);
     let backend = if vendor { library(keys).map(FanucBackend::Vendor) } else { Ok(FanucBackend::Native) };
-    let options = Box::new(FanucOptions::read(keys));
-    if named.is_some() && !options.further.is_empty() {
-        keys.problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
-    }
+    let mut options = Box::new(FanucOptions::read(keys));
+    let path = match fanuc::paths(keys) {
+        Some((own, further)) => {
+            if named.is_some() {
+                keys.problem("give either path=, for one path under the plain channel names, or paths=".to_owned());
+            }
+            options.further = further;
+            own
+        }
+        None => named.unwrap_or(1),
+    };
     Ok(Target::Fanuc { at: endpoint(body, Some(8193))?, path, backend: backend?, options })
 }
 

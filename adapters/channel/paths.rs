@@ -1,7 +1,8 @@
 //! Channels of the further paths of a controller: a lathe with two turrets has a program, a state and a feed for each.
 //!
-//! Path 1 keeps the plain names, so that everything that knows one path knows it unchanged. What belongs to path N is
-//! called `pathN_` and the plain name: `path2_spindle_speed_rpm`. The unit stays at the end of the name.
+//! One path keeps the plain names, so that everything that knows one path knows it unchanged: the one that is written to,
+//! usually path 1. What belongs to another path N is called `pathN_` and the plain name: `path2_spindle_speed_rpm`. The
+//! unit stays at the end of the name.
 
 use super::Kind::{Continuous, Held};
 use super::{Channel, number, text};
@@ -9,10 +10,10 @@ use super::{Channel, number, text};
 /// Paths that have channels.
 pub const PATHS: std::ops::RangeInclusive<u8> = 1..=3;
 
-/// Name of a channel on a path from 1.
+/// Name of a channel of a path from 1 that has not the plain names.
 #[must_use]
 pub fn on_path(name: &str, path: u8) -> String {
-    if path == 1 { name.to_owned() } else { format!("path{path}_{name}") }
+    format!("path{path}_{name}")
 }
 
 macro_rules! numbered {
@@ -73,8 +74,8 @@ macro_rules! path {
 /// Channels of one further path.
 const PER_PATH: usize = 22;
 
-/// The rows of path 2 and of path 3.
-pub(super) const FURTHER: [[Channel; PER_PATH]; 2] = [path!(2), path!(3)];
+/// The rows of each path, in the order in which they came into the table.
+pub(super) const FURTHER: [[Channel; PER_PATH]; 3] = [path!(2), path!(3), path!(1)];
 
 #[cfg(test)]
 mod tests {
@@ -83,15 +84,14 @@ mod tests {
 
     #[test]
     fn a_further_path_has_the_same_quantities_under_its_own_names() {
-        for (path, rows) in (2..).zip(FURTHER) {
+        for (path, rows) in [2, 3, 1].into_iter().zip(FURTHER) {
             for row in rows {
                 let plain = row.name.split_once('_').map(|(_, plain)| plain).expect("a prefix");
                 assert_eq!(on_path(plain, path), row.name);
-                let first = ChannelId::of(plain).expect("path 1 has it").channel();
+                let first = ChannelId::of(plain).expect("the plain names have it").channel();
                 assert_eq!((row.unit, row.range, row.kind), (first.unit, first.range, first.kind), "{}", row.name);
             }
         }
-        assert_eq!(on_path("program", 1), "program");
-        assert_eq!(usize::from(*PATHS.end()), 1 + FURTHER.len());
+        assert_eq!(usize::from(*PATHS.end()), FURTHER.len());
     }
 }

@@ -15,6 +15,12 @@ use std::ffi::{CStr, c_char, c_void};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Missing(pub &'static str);
 
+/// Why a library cannot be loaded, in the system's own words where it has some.
+#[must_use]
+pub fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}
+
 /// A Rust value as the library takes it.
 pub trait Argument<Raw> {
     /// The C value.
@@ -91,10 +97,11 @@ macro_rules! vendor_functions {
             ///
             /// # Errors
             /// The file is missing, is for another processor, or needs something that is not there.
-            pub(super) fn load(path: &std::path::Path) -> Result<Self, libloading::Error> {
+            pub(super) fn load(path: &std::path::Path) -> Result<Self, String> {
                 // SAFETY: loading runs the library's initialisers. This happens only in a child process that holds
                 // nothing but its line to the parent, and the user named the file.
-                let library = unsafe { libloading::Library::new(path) }?;
+                let library = unsafe { libloading::Library::new(path) };
+                let library = library.map_err(|error| $crate::child::reason(&error))?;
                 $(
                     // SAFETY: the signature is that of the vendor's header, as the one who listed it says; the pointer
                     // is kept beside the library and not used after it.

@@ -39,7 +39,7 @@ mod tests;
 
 pub use crate::vendor_functions as functions;
 pub use client::{Client, Taken};
-pub use ffi::{Argument, Missing, Returned};
+pub use ffi::{Argument, Missing, Returned, reason};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
 pub use message::MESSAGE_MAX;
 pub use serve::{SUBCOMMAND, serve, serve_words};

@@ -57,6 +57,9 @@ pub enum FocasError {
     /// What runs the vendor's library failed.
     #[error("{0}")]
     Library(String),
+    /// The vendor's library cannot be loaded, or lacks what nothing works without.
+    #[error("the library cannot be used: {0}")]
+    Unusable(String),
     /// This address may not be written to.
     #[error("{0}")]
     NotAllowed(String),
@@ -77,6 +80,9 @@ impl FocasError {
             Self::Protocol(_) => "Check that this is the FOCAS2 port of a FANUC controller",
             Self::Refused(refusal) => return refusal.code.next().to_owned(),
             Self::Library(_) => "The child process is started again by itself; backend=native needs no library",
+            Self::Unusable(_) => {
+                "Check library= in the address, and that the file is for this processor; backend=native needs none"
+            }
             Self::NotAllowed(_) => "Add it to allow= in the address if the ladder is made for it",
         };
         fixed.to_owned()

@@ -20,6 +20,9 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>
 /// with it.
 const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
 
+/// Next step where something listens and has never opened a session: perhaps it is no controller.
+const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and                             has the controller a connection left?";
+
 /// Parameter 1001, bit 0: the machine measures in inches.
 const INCH_MACHINE: Item = Item::Parameter(1001, 0);
 
@@ -316,7 +319,11 @@ impl Inner {
         if off && self.known {
             return SourceError::Off { source_name: self.name.clone() };
         }
-        self.error(error, "the opening of a connection")
+        let next = match error {
+            FocasError::Timeout(_) | FocasError::Broken(_) if !self.known => NEVER_OPENED.to_owned(),
+            _ => error.next(),
+        };
+        told(&self.name, error, "the opening of a connection", next)
     }
 
     fn error(&self, error: &FocasError, request: &str) -> SourceError {
@@ -327,7 +334,11 @@ impl Inner {
 /// A failure in the words of every driver.
 #[must_use]
 pub fn source_error(name: &str, error: &FocasError, request: &str) -> SourceError {
-    let (source_name, request, what, next) = (name.to_owned(), request.to_owned(), error.to_string(), error.next());
+    told(name, error, request, error.next())
+}
+
+fn told(name: &str, error: &FocasError, request: &str, next: String) -> SourceError {
+    let (source_name, request, what) = (name.to_owned(), request.to_owned(), error.to_string());
     match error {
         FocasError::Timeout(waited) => SourceError::Timeout {
             source_name,

@@ -34,9 +34,10 @@
 //!
 //! **Several paths** (`paths=1,2`, up to 3) share the connection: every block of a frame names its path, so the quick
 //! group of all of them is one round trip where the control's longest answer holds it (two paths do on every
-//! generation). Path 1 keeps the plain channel names, the channels of path N begin with `pathN_`; signals of path
-//! N stand 1000 (N - 1) bytes further. Parts, gear stage, drive currents and temperature are read of path 1, and only
-//! path 1 is written to. A single other path (`path=2`) has the plain names.
+//! generation). The path that is named first has the plain channel names, and is the one that is written to, with its
+//! override, its requests and its external offsets; the gate watches the plain names. The channels of another path N begin
+//! with `pathN_`; signals of path N stand 1000 (N - 1) bytes further. Parts, gear stage, drive currents and temperature are
+//! read of the first one only. `paths=2,1` writes to path 2 and reads path 1 besides; `path=2` reads nothing else.
 //!
 //! Where the facts come from: frames and layouts were fixed by watching the vendor's own client talk to a server of
 //! ours and agree with two independent open clients; the manuals named beside the constants give the rest. No real

@@ -65,11 +65,12 @@ pub fn ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
     names.into_iter().filter_map(ChannelId::of).collect()
 }
 
-/// Channels at their places in [`fast`], under the names of this path; `None` where the table has none. `names` come
-/// besides [`FAST`].
+/// Channels at their places in [`fast`], under the plain names or those of a further path; `None` where the table has
+/// none. `names` come besides [`FAST`].
 #[must_use]
-pub fn columns<'a>(path: u8, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
-    FAST.into_iter().chain([OPERATION]).chain(names).map(|name| ChannelId::of(&on_path(name, path))).collect()
+pub fn columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
+    let named = |name: &str| further.map_or_else(|| ChannelId::of(name), |path| ChannelId::of(&on_path(name, path)));
+    FAST.into_iter().chain([OPERATION]).chain(names).map(named).collect()
 }
 
 /// A look at the results of one poll.

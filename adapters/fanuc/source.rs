@@ -38,9 +38,9 @@ impl FanucSource {
     #[must_use]
     pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
         let power = manner.power_diagnosis;
-        // Whatever its number, the first path has the plain names.
-        let own = readings::columns(1, power.map(|_| readings::POWER));
-        let further = options.further.iter().map(|path| (manner.of_further(*path), readings::columns(*path, [])));
+        // Whatever its number, the path that is written to has the plain names.
+        let own = readings::columns(None, power.map(|_| readings::POWER));
+        let further = options.further.iter().map(|path| (manner.of_further(*path), readings::columns(Some(*path), [])));
         let paths: Vec<_> = std::iter::once((manner, own)).chain(further).collect();
         let mut questions = poll::fast(manner.path);
         questions.extend(power.map(|number| poll::power(number).on(manner.path)));

@@ -231,6 +231,45 @@ fn the_external_offset_is_moved_between_programs_only_and_never_over_what_somebo
 }
 
 #[test]
+fn the_path_that_is_named_first_is_written_to_on_the_one_connection() {
+    let (server, _) = lathe_with(20.0, |control| dial_at(90)(control.with_path()));
+    let clock = SystemClock::new();
+    let opened = opened(&server, "paths=2,1&write=mailbox&mailbox=R920&dial=R927");
+    let mut actuator = opened.actuator.expect("a way of writing");
+    assert_eq!(write(actuator.as_mut(), 70), Ok(pct(70)));
+    assert_eq!(actuator.read_dial(&clock), Ok(Some(pct(90))));
+    let overrides = || {
+        let byte = |at| move |control: &mut Controller| control.memory.byte(Area::G, at);
+        [12, 1012].map(|at| server.with(|control| control.map(byte(at))).map(super::feed_override::decode))
+    };
+    assert_eq!(overrides(), [Some(pct(90)), Some(pct(70))], "path 1 keeps its dial");
+    actuator.release(&clock).expect("given back");
+    std::thread::sleep(std::time::Duration::from_millis(30));
+    assert_eq!(overrides(), [Some(pct(90)); 2]);
+    assert_eq!(server.opened(), 1, "connections");
+    let mut direct = self::actuator(&server, "paths=2,1&write=direct");
+    let error = write(direct.as_mut(), 60).expect_err("the ladder of path 2 fights").to_string();
+    assert!(error.contains("not held: 60 %"), "{error}");
+}
+
+#[test]
+fn an_offset_is_shifted_on_the_path_that_is_named_first() {
+    let mut control = Controller::new(4, &['X', 'Z']).with_path(&['Z', 'X']);
+    control.status.run = 3;
+    let server = serve(Box::new(control));
+    let clock = SystemClock::new();
+    let mut second = opened(&server, "paths=2,1&allow=EXT").offsets.expect("EXT is allowed");
+    assert_eq!(second.write(&clock, Axis::Z, 0.0, 5.0), Ok(5.0), "its program does not run");
+    let found = server.with(|control| {
+        let control = control.expect("on");
+        (control.work_offsets.clone(), control.further[0].work_offsets.clone())
+    });
+    assert_eq!((found.0.len(), found.1.get(&(0, 1))), (0, Some(&5)), "Z is its first axis");
+    let mut first = opened(&server, "paths=1,2&allow=EXT").offsets.expect("EXT is allowed");
+    first.write(&clock, Axis::Z, 0.0, 5.0).expect_err("its program runs");
+}
+
+#[test]
 fn what_is_not_allowed_is_not_sent() {
     let server = serve(Box::new(Controller::new(4, &['X', 'Z'])));
     let mut offsets = ExternalOffsets::new("fanuc://x", line(&server, "write=mailbox"));

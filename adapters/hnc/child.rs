@@ -3,7 +3,7 @@
 use super::answer::{Answer, ItemError, ItemResult, ReturnCode};
 use super::decode::text_of;
 use super::ffi::Functions;
-use super::item::{Item, Width};
+use super::item::{EXTERNAL_ZERO, Item, Width};
 use super::line::DEAD_LINK;
 use super::message::{Ask, Tell};
 use super::sampling::{Columns, POINTS_MAX, SAMPLED_MAX, SampledItem};
@@ -55,7 +55,8 @@ fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
     let Some(session) = session else { return Tell::Confused("there is no connection".to_owned()) };
     match ask {
         Ask::Alive => session.alive(),
-        Ask::Write(kind, index, value, bytes) => session.write(kind, index, value, bytes),
+        Ask::Write(kind, index, value) => session.write(kind, index, value),
+        Ask::WriteZero(axis, counts) => session.write_zero(axis, counts),
         Ask::Sample(items) => session.sample(&items),
         Ask::Sampled => session.sampled(),
         Ask::Open { .. } | Ask::Read(_) => Tell::Confused("not on this connection".to_owned()),
@@ -110,9 +111,20 @@ fn value(bytes: &[u8], width: Width) -> ItemResult {
     }
 }
 
+/// Sets a value that lies in eight bytes with its sign: right however many of them the library takes.
+fn written(name: &str, value: i64, set: impl FnOnce(&mut Guarded) -> Result<i32, Missing>) -> Tell {
+    let mut buffer = Guarded::new(8);
+    buffer.put(&value.to_le_bytes());
+    match set(&mut buffer) {
+        Ok(0) => Tell::Done,
+        Ok(code) => Tell::Code(name.to_owned(), ReturnCode(code)),
+        Err(Missing(name)) => Tell::Confused(format!("the library has no {name}")),
+    }
+}
+
 impl Session {
     fn open(library: &Path, local: (&str, u16), at: (&str, u16), long_bytes: usize) -> Result<Self, Tell> {
-        let functions = Functions::load(library).map_err(|error| Tell::Unloadable(error.to_string()))?;
+        let functions = Functions::load(library).map_err(Tell::Unloadable)?;
         let text = |text: &str| CString::new(text).map_err(|error| Tell::Unloadable(error.to_string()));
         let (local_host, host) = (text(local.0)?, text(at.0)?);
         let without = |Missing(name)| Tell::Unloadable(format!("the library has no {name}"));
@@ -176,6 +188,9 @@ impl Session {
             Item::Register(kind, index) => {
                 value(&filled(VALUE_LEN, |out| f.HNC_RegGetValue(kind, index, out, c))?, Width::Whole)
             }
+            Item::ExternalZero(axis) => {
+                value(&filled(VALUE_LEN, |out| f.HNC_CrdsGetValue(EXTERNAL_ZERO, axis, out, 0, 0, c))?, Width::Whole)
+            }
             Item::Program => value(&filled(VALUE_LEN, |out| f.HNC_FprogGetFullName(0, out, c))?, Width::Text),
             Item::Alarms => self.alarms(),
         }
@@ -195,14 +210,14 @@ impl Session {
         alarms.map(Answer::Alarms)
     }
 
-    fn write(&self, kind: i32, index: i32, value: i64, bytes: usize) -> Tell {
-        let mut buffer = Guarded::new(8);
-        buffer.put(&value.to_le_bytes()[..bytes.min(8)]);
-        match self.functions.HNC_RegSetValue(kind, index, &mut buffer, self.client) {
-            Ok(0) => Tell::Done,
-            Ok(code) => Tell::Code("HNC_RegSetValue".to_owned(), ReturnCode(code)),
-            Err(Missing(name)) => Tell::Confused(format!("the library has no {name}")),
-        }
+    fn write(&self, kind: i32, index: i32, value: i64) -> Tell {
+        let set = |value: &mut Guarded| self.functions.HNC_RegSetValue(kind, index, value, self.client);
+        written("HNC_RegSetValue", value, set)
+    }
+
+    fn write_zero(&self, axis: i32, counts: i32) -> Tell {
+        let set = |value: &mut Guarded| self.functions.HNC_CrdsSetValue(EXTERNAL_ZERO, axis, value, 0, 0, self.client);
+        written("HNC_CrdsSetValue", i64::from(counts), set)
     }
 
     /// Configures and starts the sampling channels, one millisecond each, without end.

@@ -19,6 +19,10 @@ functions! {
         -> c_long;
     HNC_RegSetValue(kind: i32 => c_long, index: i32 => c_long, value: &mut Guarded => *mut c_void, client: i16 => i16)
         -> c_long;
+    HNC_CrdsGetValue(kind: i32 => c_long, axis: i32 => c_long, out: &mut Guarded => *mut c_void, channel: i32 => c_long,
+        system: i32 => c_long, client: i16 => i16) -> c_long;
+    HNC_CrdsSetValue(kind: i32 => c_long, axis: i32 => c_long, value: &mut Guarded => *mut c_void,
+        channel: i32 => c_long, system: i32 => c_long, client: i16 => i16) -> c_long;
     HNC_FprogGetFullName(channel: i32 => c_long, out: &mut Guarded => *mut c_void, client: i16 => i16) -> c_long;
     HNC_AlarmGetNum(kind: i32 => c_long, level: i32 => c_long, out: &mut Guarded => *mut c_void, client: i16 => i16)
         -> c_long;

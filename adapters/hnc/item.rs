@@ -25,6 +25,8 @@ pub enum Item {
     Axis(i32, i32, Width),
     /// `HNC_RegGetValue`: type, index.
     Register(i32, i32),
+    /// `HNC_CrdsGetValue` of channel 0: its external zero offset, of a logical axis.
+    ExternalZero(i32),
     /// `HNC_FprogGetFullName` of channel 0.
     Program,
     /// `HNC_AlarmGetNum` and `HNC_AlarmGetData`: errors of every kind.
@@ -49,6 +51,9 @@ pub const fn flag(kind: i32) -> Item {
 pub const fn real(kind: i32) -> Item {
     Item::Channel(kind, 0, Width::Real)
 }
+
+/// `HNC_CRDS_CH_G5X_OFFSET_ZERO`: the channel's external zero offset, in counts of [`MOVE_UNIT`].
+pub const EXTERNAL_ZERO: i32 = 9;
 
 /// Numbers of `HncChannel`.
 pub mod channel {

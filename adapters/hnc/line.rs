@@ -138,17 +138,21 @@ impl Line {
         let mut inner = self.locked();
         for (at, value) in words {
             let request = format!("writing {at}");
-            let Some((kind, bytes)) = register_type(*at) else {
+            let Some((kind, _)) = register_type(*at) else {
                 return Err(inner.refused(&request, "there is no such register".to_owned()));
             };
             let index = i32::try_from(at.index).unwrap_or(i32::MAX);
-            match inner.ask(&Ask::Write(kind, index, *value, bytes), &request)? {
-                Tell::Done => {}
-                Tell::Code(_, code) => return Err(inner.refused(&request, code.to_string())),
-                other => return Err(inner.nonsense(&request, &other)),
-            }
+            inner.done(&Ask::Write(kind, index, *value), &request)?;
         }
         Ok(())
+    }
+
+    /// Writes the channel's external zero offset of a logical axis, counts.
+    ///
+    /// # Errors
+    /// It is refused, or the line failed.
+    pub fn write_zero(&self, axis: i32, counts: i32) -> Result<(), SourceError> {
+        self.locked().done(&Ask::WriteZero(axis, counts), "writing the external zero offset")
     }
 
     /// Begins to sample.
@@ -224,6 +228,16 @@ impl Inner {
         let began = Instant::now();
         let told = self.child.told(ask).map_err(|error| self.child_failed(&error, request))?;
         if began.elapsed() > DEAD_LINK { Err(self.dead_link(began.elapsed())) } else { Ok(told) }
+    }
+
+    /// Something to be done that is done or refused.
+    fn done(&mut self, ask: &Ask, request: &str) -> Result<(), SourceError> {
+        match self.ask(ask, request)? {
+            Tell::Done => Ok(()),
+            Tell::Code(_, code) => Err(self.refused(request, code.to_string())),
+            Tell::Confused(what) => Err(self.refused(request, what)),
+            other => Err(self.nonsense(request, &other)),
+        }
     }
 
     /// A child in which the connection is open.

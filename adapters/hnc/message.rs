@@ -29,8 +29,10 @@ pub(super) enum Ask {
     /// Read these, one answer for each as soon as it is there. After an answer that cannot be trusted, or a link that is
     /// dead, no other comes.
     Read(Vec<Item>),
-    /// Write one register: type, index, value, bytes.
-    Write(i32, i32, i64, usize),
+    /// Write one register: type, index, value.
+    Write(i32, i32, i64),
+    /// Write the channel's external zero offset: logical axis, counts.
+    WriteZero(i32, i32),
     /// Begin to sample.
     Sample(Vec<SampledItem>),
     /// What has been sampled since.

@@ -16,6 +16,7 @@
 //! | `line` | the parent's side: the child, its deaths, the state of the connection |
 //! | `source` | the [`Source`](crate::Source) |
 //! | `actuator` | the [`Actuator`](crate::Actuator): the register mailbox of [`nclink::mailbox`](crate::nclink::mailbox) |
+//! | `offsets` | shifts of axes: registers of the ladder, or the external zero offset |
 //! | `sampling` | the 1 ms sampling channels: which, and whether a millisecond is missing; blocks go to whoever asked for them |
 //!
 //! **What the library does**, and what follows (measured logs and headers of the vendor's SDK, "V1"):
@@ -32,7 +33,8 @@
 //! on Windows, eight on 64-bit Linux; arguments, results and single values are right either way, arrays are read with
 //! `long_bytes` of the address. No public build for Linux exists; here the driver is proven against a library with the
 //! same functions that the tests compile and really load. To be checked on a machine: the unit of the load current (taken
-//! as A) and of the axis speed (taken as mm/min), and whether reading samples takes them away (both are handled by the
+//! as A) and of the axis speed (taken as mm/min), that the external zero offset is in counts of the positions and taken up
+//! with the next program (its count has to be said in the address), and whether reading samples takes them away (both are handled by the
 //! controller's own counter of milliseconds).
 
 mod actuator;
@@ -43,13 +45,14 @@ mod ffi;
 pub mod item;
 pub mod line;
 mod message;
+mod offsets;
 mod open;
 pub mod sampling;
 mod source;
 
 pub use actuator::HncActuator;
 pub use child::child;
-pub use open::{open, open_sampled};
+pub use open::{offsets, open, open_sampled};
 pub use source::HncSource;
 
 /// What the hidden subcommand calls this child.

@@ -2,10 +2,13 @@
 
 use super::actuator::HncActuator;
 use super::line::{HncSettings, Line};
+use super::offsets::{HncRegisters, ZeroOffsets};
 use super::source::HncSource;
-use crate::address::{Address, HncNetTarget};
+use crate::address::{Address, HncNetTarget, HncOffset};
 use crate::driver::Actuator;
 use crate::nclink::BlockSink;
+use crate::nclink::offset_mailbox::LadderOffsets;
+use crate::offset::OffsetSink;
 use crate::open::{Opened, Refused};
 use std::time::Duration;
 
@@ -36,6 +39,16 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
     if let Some(sink) = sink {
         source.on_block(sink);
     }
+    let offsets = target.offset.map(|how| offsets(&line, how));
     let actuator = target.mailbox.map(|first| Box::new(HncActuator::new(line, first)) as Box<dyn Actuator>);
-    Opened { sources: vec![Box::new(source)], actuator, offsets: None, simulated: None, refused: Refused::default() }
+    Opened { sources: vec![Box::new(source)], actuator, offsets, simulated: None, refused: Refused::default() }
+}
+
+/// The way to the offsets that the address names.
+#[must_use]
+pub fn offsets(line: &Line, how: HncOffset) -> Box<dyn OffsetSink> {
+    match how {
+        HncOffset::Registers(first) => Box::new(LadderOffsets::new(HncRegisters(line.clone()), first)),
+        HncOffset::Zero { unit_um } => Box::new(ZeroOffsets::new(line.clone(), unit_um)),
+    }
 }

@@ -70,6 +70,9 @@ pub(crate) trait Line: Send {
     fn late_answers(&self) -> u64;
 }
 
+/// `ENOTTY` of Linux.
+const NO_TERMINAL: i32 = 25;
+
 /// What a failed serial line means, and what to do.
 pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> Fault {
     let port = target.port.display();
@@ -77,6 +80,9 @@ pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> Fault {
         ErrorKind::NotFound => "Plug the adapter in and look with: ls /dev/serial/by-id".to_owned(),
         ErrorKind::PermissionDenied => "Add the gateway's user to the group dialout".to_owned(),
         ErrorKind::ResourceBusy => format!("Find the other program with: fuser {port}"),
+        _ if error.raw_os_error() == Some(NO_TERMINAL) => {
+            "This is no serial line; look for the adapter with: ls /dev/serial/by-id".to_owned()
+        }
         _ => "Check the adapter; the line is opened again by itself".to_owned(),
     };
     Fault::Line { what: format!("{port}: {error}"), next: format!("{next}.") }

@@ -42,6 +42,11 @@ impl ChannelWord {
         }
     }
 
+    /// Nothing runs, nothing is held, nothing is being reset.
+    pub(super) fn at_rest(self) -> bool {
+        !self.is(Self::CYCLING | Self::HOLDING | Self::RESETTING)
+    }
+
     pub(super) fn threading(self) -> bool {
         self.is(Self::THREADING)
     }

@@ -86,6 +86,9 @@ impl Mailbox {
     /// Sign of life.
     pub const HEARTBEAT: u32 = 3;
 
+    /// Registers in all.
+    pub const LENGTH: u32 = 4;
+
     /// The mailbox that begins at this register.
     #[must_use]
     pub fn new(first: Register) -> Self {

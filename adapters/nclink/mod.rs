@@ -16,6 +16,8 @@
 //! | `track` | what sample channels and events have brought, and whether a millisecond is missing |
 //! | `mailbox` | the registers through which the ladder is asked for an override |
 //! | `actuator` | the [`Actuator`](crate::Actuator): letters into the mailbox, the override in force read back |
+//! | `offset_mailbox` | the registers through which the ladder is asked to shift axes |
+//! | `registers`, `offsets` | a connection for whoever writes; the registers of a device for such shifts |
 //! | `device` | the other role: the simulated machine as an NC-Link device |
 //!
 //! **Flow.** `source` connects, probes the model, keeps the items that `map` knows, and at every poll sends one query
@@ -49,7 +51,10 @@ pub mod mailbox;
 mod map;
 mod message;
 pub mod model;
+pub mod offset_mailbox;
+mod offsets;
 mod open;
+mod registers;
 pub mod sample;
 mod source;
 pub mod topic;

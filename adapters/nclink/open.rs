@@ -2,9 +2,13 @@
 
 use super::actuator::NcLinkActuator;
 use super::connection::Link;
+use super::mailbox::Register;
+use super::offset_mailbox::LadderOffsets;
+use super::offsets::NcLinkRegisters;
 use super::source::{BlockSink, NcLinkSource};
 use crate::address::{Address, NcLinkTarget};
 use crate::driver::Actuator;
+use crate::offset::OffsetSink;
 use crate::open::{OpenError, Opened, Refused};
 
 /// What `nclinks://` is answered with.
@@ -32,14 +36,13 @@ pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<Block
     if let Some(sink) = sink {
         source.on_block(sink);
     }
+    let offsets = target.offset.map(|first| offsets(link.clone(), target.f_channel, first));
     let actuator = target.mailbox.map(|first| Box::new(NcLinkActuator::new(link, first)) as Box<dyn Actuator>);
-    Ok(Opened {
-        sources: vec![Box::new(source)],
-        actuator,
-        offsets: None,
-        simulated: None,
-        refused: Refused::default(),
-    })
+    Ok(Opened { sources: vec![Box::new(source)], actuator, offsets, simulated: None, refused: Refused::default() })
+}
+
+fn offsets(link: Link, f_channel: u32, first: Register) -> Box<dyn OffsetSink> {
+    Box::new(LadderOffsets::new(NcLinkRegisters::new(link, f_channel), first))
 }
 
 fn login(target: &NcLinkTarget) -> Result<Option<(String, String)>, OpenError> {

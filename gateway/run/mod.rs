@@ -226,7 +226,7 @@ fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Ends, CannotRun> {
         let target = limits.offset.source.as_deref().unwrap_or_default();
         let way = ways.iter_mut().find(|way| way.name == target).and_then(|way| way.offsets.take());
         let what = format!("[gate.offset] source = {target:?} has no external offset that could be written");
-        let next = "name the controller there (fanuc:// needs allow=EXT), or write mode = \"shadow\"";
+        let next = "name the controller there (fanuc:// needs allow=EXT, nclink:// and hncnet:// need offset=), or write mode = \"shadow\"";
         sink = Some(way.ok_or_else(|| CannotRun::new(what, next))?);
     }
     Ok((actuator, sink))

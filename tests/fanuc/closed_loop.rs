@@ -1,8 +1,8 @@
 //! The loop closed: a gateway reads a served FANUC machine, a script holds the spindle load, the gate lets it through, the
 //! ladder takes it from the mailbox. Two real processes.
 
-use crate::process::{get, run, stderr, stdout, text, wait_for};
-use crate::served::{Serving, channel, prepared, started};
+use crate::process::{get, run, stdout, text, wait_for};
+use crate::served::{Serving, armed, channel, prepared, started};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -33,11 +33,6 @@ if memory.slow > 20 { request_feed_hold(\"look at the tool\"); }
 fn configured(directory: &Path, address: &str, script: &str) -> PathBuf {
     let source = format!("[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n");
     prepared(directory, script, &format!("{source}[gate]\nmode = \"armed\"\nsource = \"lathe\"\n"))
-}
-
-fn armed(config: &Path) {
-    let told = run(&["arm", "--for", "30m", "--by", "fitter", "--config", text(config)]);
-    assert!(told.status.success(), "{}{}", stdout(&told), stderr(&told));
 }
 
 struct Shown {

@@ -2,7 +2,7 @@
 
 use crate::commands::doctor;
 use crate::process::{get, wait_for};
-use crate::served::{Serving, channel, prepared, started};
+use crate::served::{Serving, armed, channel, prepared, started};
 use crate::support::{controller, number, opened, poll, serve, text, value};
 use crate::vendor::{self, library};
 use adapters::Absence;
@@ -126,5 +126,29 @@ fn a_box_shows_the_second_turret_of_a_served_machine() {
     });
     println!("feed of path 1 and 2, mm/min, and their programs: {both:?}");
     assert_ne!(both.2.0, both.2.1);
+    gateway.stop();
+}
+
+/// The gate watches the second path and writes to it; the first one is read besides and left alone.
+#[test]
+fn the_override_of_the_second_turret_is_written_and_the_first_stays() {
+    let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125", "--paths", "2"]);
+    let address = format!("{}?paths=2,1&write=mailbox&mailbox=R920&power_diagnosis=4902", serving.address);
+    let directory = tempfile::tempdir().expect("a directory");
+    let script = "if has(rapid) && rapid == 0.0 { request_feed_override(60.0, \"gently\"); }";
+    let source = format!("[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n");
+    let sections = format!("{source}[gate]\nmode = \"armed\"\nsource = \"lathe\"\n");
+    let config = prepared(directory.path(), script, &sections);
+    let (gateway, at) = started(&config);
+    let status = || get(&at, "/api/v1/status").json();
+    wait_for("a decision", Duration::from_secs(60), || status()["gate"]["permitted_pct"].is_number().then_some(()));
+    armed(&config);
+    let (second, first) = wait_for("an override on path 2", Duration::from_secs(150), || {
+        let status = status();
+        let of = |name: &str| channel(&status, name)?.as_f64();
+        (of("feed_override_pct")? <= 61.0).then(|| (of("feed_override_pct"), of("path1_feed_override_pct")))
+    });
+    println!("override of path 2 {second:?} %, of path 1 {first:?} %");
+    assert_eq!(first, Some(100.0));
     gateway.stop();
 }

@@ -1,6 +1,7 @@
 /* A library with the functions of HncNetDll V1 and none of its code: fixed values of a mill that cuts, and faults on
  * purpose. The file named by FAKE_LIBRARY_FAULT holds "KIND FUNCTION [CODE]"; KIND is hang, abort, overrun, code, later
- * (1 = not there yet, with garbage in the buffer), slow (a dead link) or lots (an absurd count).
+ * (1 = not there yet, with garbage in the buffer), slow (a dead link), lots (an absurd count), rest (HNC_ChannelGetValue:
+ * no program runs) or deaf (HNC_RegSetValue: no rungs; no program runs either).
  * Compiled by the tests with the system's compiler. */
 #include <pthread.h>
 #include <stdint.h>
@@ -111,6 +112,23 @@ static Bit32 whole(void *out, int32_t value) { memcpy(out, &value, 4); return 0;
 static Bit32 real(void *out, double value) { memcpy(out, &value, 8); return 0; }
 static Bit32 text(void *out, const char *value) { strcpy(out, value); return 0; }
 
+/* Between two programs? */
+static int resting(void) {
+    int rest, deaf, number = 0;
+    trigger("rest", "HNC_ChannelGetValue", &rest, &number);
+    trigger("deaf", "HNC_RegSetValue", &deaf, &number);
+    return rest || deaf;
+}
+
+/* The rungs behind D110 to D117: a letter with a new number is taken between two programs. */
+static void ladder(void) {
+    int deaf, number = 0;
+    int32_t *d = registers[6] + 110;
+    trigger("deaf", "HNC_RegSetValue", &deaf, &number);
+    if (deaf || !resting() || d[3] == d[7]) return;
+    memcpy(d + 4, d, 4 * sizeof *d);
+}
+
 Bit32 HNC_SystemGetValue(Bit32 type, void *out, Bit16 client) {
     CHECKED(out, 48);
     switch (type) {
@@ -131,7 +149,7 @@ Bit32 HNC_ChannelGetValue(Bit32 type, Bit32 ch, Bit32 index, void *out, Bit16 cl
     case 14: return whole(out, 12);
     case 16: return whole(out, 1);
     case 17: case 19: case 22: case 23: case 25: case 26: return whole(out, 0);
-    case 18: return whole(out, 1);
+    case 18: return whole(out, !resting());
     case 32: return whole(out, 340);
     case 36: return whole(out, 17);
     case 45: return whole(out, 5);
@@ -161,6 +179,7 @@ Bit32 HNC_RegGetValue(Bit32 type, Bit32 index, void *out, Bit16 client) {
     CHECKED(out, 4);
     if (type < 0 || type > 8) return -1;
     if (index < 0 || index > 4095) return -2;
+    ladder();
     return whole(out, registers[type][index]);
 }
 
@@ -172,6 +191,22 @@ Bit32 HNC_RegSetValue(Bit32 type, Bit32 index, void *value, Bit16 client) {
     memcpy(&registers[type][index], value, 4);
     return 0;
 }
+
+#ifndef WITHOUT_CRDS
+/* The channel's external zero offset; the operator has set 40 um in Z. */
+static int32_t zero[3] = {0, 0, 4000};
+Bit32 HNC_CrdsGetValue(Bit32 type, Bit32 axis, void *out, Bit32 ch, Bit32 crds, Bit16 client) {
+    CHECKED(out, 8);
+    if (type != 9 || ch != 0 || axis < 0 || axis > 2) return -1;
+    return whole(out, zero[axis]);
+}
+Bit32 HNC_CrdsSetValue(Bit32 type, Bit32 axis, void *value, Bit32 ch, Bit32 crds, Bit16 client) {
+    CHECKED(NULL, 0);
+    if (type != 9 || ch != 0 || axis < 0 || axis > 2 || !resting()) return -1;
+    memcpy(&zero[axis], value, 4);
+    return 0;
+}
+#endif
 
 Bit32 HNC_FprogGetFullName(Bit32 ch, Bit8 *out, Bit16 client) {
     CHECKED(out, 60);

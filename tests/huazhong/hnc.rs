@@ -34,7 +34,7 @@ fn settings(library: &Library) -> HncSettings {
     }
 }
 
-fn line(library: &Library) -> Line {
+pub(crate) fn line(library: &Library) -> Line {
     Line::new(settings(library))
 }
 

@@ -15,6 +15,10 @@ mod library;
 mod nclink;
 mod samples;
 mod sampling;
+#[path = "../support/served.rs"]
+#[expect(dead_code, reason = "the suite of FANUC uses the rest of it")]
+mod served;
+mod shifting;
 mod stand;
 mod whole_box;
 mod writing;

@@ -82,9 +82,14 @@ pub(crate) struct Stand {
 impl Stand {
     /// `None` without mosquitto.
     pub(crate) fn start() -> Option<Self> {
+        Self::on_for(ON_FOR_S)
+    }
+
+    /// A machine that has been on for so long, s.
+    pub(crate) fn on_for(on_for_s: i64) -> Option<Self> {
         let broker = Broker::start()?;
         let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
-        let origin_ns = clock.now_ns() - ON_FOR_S * 1_000_000_000;
+        let origin_ns = clock.now_ns() - on_for_s * 1_000_000_000;
         let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
         let _at_work = machine.moment(clock.now_ns());
         let device = Served::start(broker.port, &machine, &clock);

@@ -1,6 +1,6 @@
 //! A served FANUC machine and a gateway that reads it: two real processes.
 
-use crate::process::{Gateway, program, text};
+use crate::process::{Gateway, program, run, stderr, stdout, text};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +41,12 @@ pub(crate) fn started(config: &Path) -> (Gateway, String) {
     let mut gateway = Gateway::spawn(command);
     let address = gateway.address();
     (gateway, address)
+}
+
+/// A person arms the gate of this configuration.
+pub(crate) fn armed(config: &Path) {
+    let told = run(&["arm", "--for", "30m", "--by", "fitter", "--config", text(config)]);
+    assert!(told.status.success(), "{}{}", stdout(&told), stderr(&told));
 }
 
 /// What a status tells of this channel.

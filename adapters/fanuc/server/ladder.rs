@@ -24,6 +24,8 @@
 //! | +1 | ladder | the same bits, latched when a bit comes on, until the operator acknowledges |
 //! | +2 | ladder | the operator's dial, %, before the gateway's override |
 //!
+//! A further path has the same bytes 20 higher and its own signals: R920 and G1012 for path 2.
+//!
 //! A bit that is on when the ladder starts is a leftover and latches nothing. While feed hold is latched, *SP (G008.5)
 //! is off and the axes stand. While a stop is latched, the ladder lets the running part end and no cycle start through.
 //! The gateway can neither end what it has asked for nor ask for the same a second time before it was acknowledged.
@@ -33,6 +35,7 @@ use crate::clock::TimeNs;
 use crate::driver::{LadderRequest, LadderRule};
 use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
+use crate::fanuc::poll::signal;
 use crate::units::OverridePct;
 
 /// Value of the first byte while an override is asked for.
@@ -77,6 +80,8 @@ pub enum MailboxState {
 /// The rungs and what they remember.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ladder {
+    /// The path whose signals it writes, from 1.
+    pub path: u8,
     /// Area and first byte of the mailbox.
     pub mailbox: (Area, u16),
     /// Area and byte of the second override.
@@ -93,12 +98,25 @@ pub struct Ladder {
     beat: Option<(u8, TimeNs)>,
 }
 
+/// The bytes of a path lie so far behind those of the one before.
+const PATH_STEP: u16 = 20;
+
 impl Default for Ladder {
     fn default() -> Self {
+        Self::of_path(1)
+    }
+}
+
+impl Ladder {
+    /// The rungs of a path from 1: R900 and so on for the first, R920 and so on for the second.
+    #[must_use]
+    pub fn of_path(path: u8) -> Self {
+        let byte = |at: u16| (Area::R, at + PATH_STEP * u16::from(path.max(1) - 1));
         Self {
-            mailbox: (Area::R, 900),
-            second: (Area::R, 910),
-            requests: (Area::R, 905),
+            path,
+            mailbox: byte(900),
+            second: byte(910),
+            requests: byte(905),
             dial: OverridePct::FULL,
             rule: LadderRule::default(),
             asked: None,
@@ -106,19 +124,17 @@ impl Default for Ladder {
             beat: None,
         }
     }
-}
 
-impl Ladder {
     /// One turn.
     pub fn scan(&mut self, memory: &mut Memory, now_ns: TimeNs) {
         let (area, at) = self.mailbox;
         let (taken, state) = self.taken(memory, now_ns);
         memory.set(area, at + 3, taken);
         memory.set(area, at + 4, state as u8);
-        memory.set(Area::G, feed_override::AT, feed_override::encode(self.in_force(taken, state)));
+        memory.set(Area::G, signal(feed_override::AT, self.path), feed_override::encode(self.in_force(taken, state)));
         let wanted = memory.byte(self.second.0, self.second.1);
         let second = OverridePct::new(if wanted == 0 { 100 } else { limited(wanted) }).unwrap_or(OverridePct::FULL);
-        memory.set(Area::G, feed_override::SECOND_AT, feed_override::encode(second));
+        memory.set(Area::G, signal(feed_override::SECOND_AT, self.path), feed_override::encode(second));
         self.latch(memory);
     }
 
@@ -138,13 +154,20 @@ impl Ladder {
         memory.set(area, at + 1, self.latched);
         memory.set(area, at + 2, self.dial.percent());
         let interlocks = if self.is_latched(LadderRequest::FeedHold) { RUNNING & !FEED_HOLD } else { RUNNING };
-        memory.set(Area::G, INTERLOCKS_AT, interlocks);
+        memory.set(Area::G, signal(INTERLOCKS_AT, self.path), interlocks);
     }
 
     /// Does the machine have to stand because of this?
     #[must_use]
     pub fn is_latched(&self, request: LadderRequest) -> bool {
         self.latched & request_bit(request) != 0
+    }
+
+    /// The override that both bytes of its path make now, %.
+    #[must_use]
+    pub fn makes(&self, memory: &Memory) -> OverridePct {
+        let byte = |at| feed_override::decode(memory.byte(Area::G, signal(at, self.path)));
+        LadderRule::Product.combine(byte(feed_override::AT), byte(feed_override::SECOND_AT))
     }
 
     /// The operator has seen to it.

@@ -8,7 +8,6 @@ use crate::address::SimulatedMachine;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::{Actuator, LadderRequest, LadderRule};
 use crate::fanuc::answer::{Alarm, Status};
-use crate::fanuc::feed_override;
 use crate::fanuc::item::Area;
 use crate::fanuc::wire::Number;
 use crate::simulated::{Moment, Panel, Simulated};
@@ -25,6 +24,8 @@ pub struct SimulatedControl {
     clock: Arc<dyn Clock>,
     controller: Controller,
     ladder: Ladder,
+    /// The rungs of the further paths.
+    further: Vec<Ladder>,
     scanned_ns: TimeNs,
     written: OverridePct,
     requests: [Requested; 2],
@@ -54,26 +55,34 @@ impl SimulatedControl {
         let scanned_ns = clock.now_ns();
         let (ladder, written) = (Ladder::default(), OverridePct::FULL);
         let requests = LadderRequest::ALL.map(|request| Requested { request, told: false, stood: false });
-        Self { machine, clock, controller, ladder, scanned_ns, written, requests }
+        let further = Vec::new();
+        Self { machine, clock, controller, ladder, further, scanned_ns, written, requests }
     }
 
     /// The same machine with a second turret, which works at the back of the part on a path of its own.
     #[must_use]
     pub fn with_path(mut self) -> Self {
         self.controller = self.controller.with_path(&['X', 'Z']);
+        for control in &mut self.controller.further {
+            control.offsets_only_at_rest = true;
+            control.parameter(1001, 0, Number::decimal(0, 0));
+        }
+        let mut ladder = Ladder::of_path(2);
+        (ladder.dial, ladder.rule) = (self.ladder.dial, self.ladder.rule);
+        self.further = vec![ladder];
         self
     }
 
     /// How the ladder combines the operator's dial and the mailbox.
     #[must_use]
     pub fn with_rule(mut self, rule: LadderRule) -> Self {
-        self.ladder.rule = rule;
+        std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(|ladder| ladder.rule = rule);
         self
     }
 
     /// The operator turns the dial of the feed override.
     pub fn turn_dial(&mut self, dial: OverridePct) {
-        self.ladder.dial = dial;
+        std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(|ladder| ladder.dial = dial);
     }
 
     /// Every scan since the last look, and what they mean for the machine.
@@ -81,11 +90,10 @@ impl SimulatedControl {
         self.scanned_ns = self.scanned_ns.max(now_ns - SCANS_MAX * SCAN_NS);
         while self.scanned_ns + SCAN_NS <= now_ns {
             self.scanned_ns += SCAN_NS;
-            self.ladder.scan(&mut self.controller.memory, self.scanned_ns);
+            let ladders = std::iter::once(&mut self.ladder).chain(&mut self.further);
+            ladders.for_each(|ladder| ladder.scan(&mut self.controller.memory, self.scanned_ns));
         }
-        let byte = |at| feed_override::decode(self.controller.memory.byte(Area::G, at)).percent();
-        let product = u16::from(byte(feed_override::AT)) * u16::from(byte(feed_override::SECOND_AT)) / 100;
-        let wanted = u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(OverridePct::FULL);
+        let wanted = self.ladder.makes(&self.controller.memory);
         // What this control's ladder has made of dial and mailbox is all that the machine below sees.
         if wanted != self.written {
             self.machine.turn_dial(now_ns, wanted);
@@ -119,15 +127,15 @@ impl Served for SimulatedControl {
         let moment = self.machine.moment(now_ns);
         if !moment.panel.booted {
             self.controller.memory.power_off();
-            self.ladder.power_off();
+            std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(Ladder::power_off);
             self.scanned_ns = now_ns;
             return None;
         }
         self.scan(now_ns);
         self.requests(&moment.panel);
         show(&mut self.controller, &moment);
-        for (path, control) in (2..).zip(&mut self.controller.further) {
-            second_path::show(control, &mut self.controller.memory, path, &moment);
+        for (ladder, control) in self.further.iter_mut().zip(&mut self.controller.further) {
+            second_path::show(control, &mut self.controller.memory, ladder, &moment);
         }
         Some(&mut self.controller)
     }

@@ -1,11 +1,12 @@
 //! What a further path of the simulated machine shows: a second turret at the back of the part. It cuts when the first
-//! path does, at half the speed and half the feed, under a program of its own; between two cuts of the first path it
-//! waits for it.
+//! path does, at half the speed and half the feed, under a program and an override of its own; between two cuts of the
+//! first path it waits for it, and its operator acknowledges what its ladder has latched.
 
 use super::controller::Controller;
+use super::ladder::Ladder;
 use super::machine::{status, whole};
 use super::memory::Memory;
-use crate::fanuc::feed_override;
+use crate::driver::LadderRequest;
 use crate::fanuc::item::Area;
 use crate::fanuc::poll::signal;
 use crate::fanuc::wire::Number;
@@ -16,20 +17,27 @@ const PROGRAM_STEP: i32 = 1000;
 /// Bits of F000: cycle start and drives ready.
 const STARTED: u8 = 0x20;
 const READY: u8 = 0x40;
-/// 100 %, inverted and plain.
-const FULL_INVERTED: u8 = 0x9B;
 const FULL: u8 = 100;
 /// Spindle override.
 const SPINDLE_AT: u16 = 30;
 
 /// The moment on the screen of a path from 2.
-pub(super) fn show(control: &mut Controller, memory: &mut Memory, path: u8, moment: &Moment) {
-    let panel = &moment.panel;
-    let cuts = panel.feed_mm_min > 0.0 && !panel.rapid;
+pub(super) fn show(control: &mut Controller, memory: &mut Memory, ladder: &mut Ladder, moment: &Moment) {
+    let (panel, path) = (&moment.panel, ladder.path);
+    let first_cuts = panel.feed_mm_min > 0.0 && !panel.rapid;
+    if !first_cuts {
+        LadderRequest::ALL.into_iter().for_each(|request| ladder.acknowledge(request));
+    }
+    let held = ladder.is_latched(LadderRequest::FeedHold);
+    let own = f64::from(ladder.makes(memory).percent()) / f64::from(panel.feed_override_pct.max(1));
+    let cuts = first_cuts && !held && own > 0.0;
     control.status = status(panel);
     (control.status.alarm, control.status.motion) = (0, i16::from(cuts));
+    if held {
+        control.status.run = 2;
+    }
     let half = |value: f64| if cuts { whole(value / 2.0) } else { whole(0.0) };
-    control.feed = half(panel.feed_mm_min);
+    control.feed = half(panel.feed_mm_min * own);
     let (speed, load) = (whole(panel.spindle_speed_rpm.abs() / 2.0), half(moment.electric.spindle_load_pct));
     control.spindles[0].quantities = [load, whole(6000.0), Number::decimal(1, 0), speed, load, speed];
     for (axis, place) in control.axes.iter_mut().zip([0, 2]) {
@@ -40,9 +48,10 @@ pub(super) fn show(control: &mut Controller, memory: &mut Memory, path: u8, mome
     let modal = [(5, panel.feed_programmed_mm_min / 2.0), (20, panel.spindle_programmed_rpm.abs() / 2.0)];
     control.modal_words.extend(modal.map(|(word, value)| (word, whole(value).mantissa)));
     control.modal_words.insert(22, 20 + i32::from(panel.tool));
+    // Half the speed at half the load.
+    let power = whole(moment.truth.spindle_power_w / 40.0).mantissa.saturating_mul(10);
+    control.diagnosis(4902, 2, Number::decimal(power, 0));
     let bits = if panel.drives_on { READY } else { 0 } | if cuts { STARTED } else { 0 };
     memory.set(Area::F, signal(0, path), bits);
-    memory.set(Area::G, signal(feed_override::AT, path), FULL_INVERTED);
-    memory.set(Area::G, signal(feed_override::SECOND_AT, path), FULL_INVERTED);
     memory.set(Area::G, signal(SPINDLE_AT, path), FULL);
 }

@@ -89,8 +89,7 @@ fn count(found: i16, most: usize) -> usize {
 
 impl Session {
     fn open(library: &Path, host: &str, port: u16, path: u8, timeout_s: i32) -> Result<(Self, Opening), Box<Tell>> {
-        let unloadable = |error: libloading::Error| Box::new(Tell::Unloadable(error.to_string()));
-        let functions = Functions::load(library).map_err(unloadable)?;
+        let functions = Functions::load(library).map_err(|why| Box::new(Tell::Unloadable(why)))?;
         let host = CString::new(host).map_err(|error| Box::new(Tell::Unloadable(error.to_string())))?;
         // Level 0 never writes a file, whatever is named.
         let started = functions.cnc_startupprocess(0, c"focas.log");

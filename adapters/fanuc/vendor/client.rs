@@ -115,7 +115,7 @@ fn open(child: &mut Client<Question>, settings: &VendorSettings) -> Result<Openi
         Tell::Code(ReturnCode(-16)) => FocasError::Unreachable(ReturnCode::SOCKET.to_string()),
         Tell::Code(ReturnCode(-17)) => FocasError::NoSession,
         Tell::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
-        Tell::Unloadable(what) => FocasError::Library(format!("{}: {what}", settings.vendor_library.display())),
+        Tell::Unloadable(what) => FocasError::Unusable(format!("{}: {what}", settings.vendor_library.display())),
         other => FocasError::Library(format!("{other:?}")),
     };
     child.end();

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `tree` | the model that a probe is answered with, laid out like Huazhong's default model |
 //! | `values` | what each data item is worth at a moment |
-//! | `registers` | R, W, D, B and P memory, F and G from the machine, and the mailbox that the ladder reads |
+//! | `registers` | R, W, D, B and P memory, F and G from the machine, and the mailboxes that the ladder reads |
 //! | `answer` | one request in, one answer out |
 //! | `sampling` | messages of the sample channels |
 //!
@@ -33,6 +33,9 @@ use std::time::Duration;
 
 /// Where the gateway posts its override: see the table in [`mailbox`](super::mailbox).
 pub const MAILBOX: &str = "D100";
+
+/// Where the gateway posts its shifts: see the table in [`offset_mailbox`](super::offset_mailbox).
+pub const OFFSETS: &str = "D110";
 
 /// Between two attempts to reach the broker.
 const REDIAL: Duration = Duration::from_secs(1);

@@ -1,11 +1,13 @@
 //! The registers of the simulated controller: memory that the PLC and clients share, F and G as the machine has them, and
-//! the mailbox from which the ladder takes the gateway's override.
+//! the mailboxes from which the ladder takes the gateway's override and its shifts.
 
 use super::values::channel_word;
 use crate::clock::Clock;
 use crate::driver::Actuator;
 use crate::nclink::mailbox::{Letter, Mailbox, Register, request_of};
-use crate::simulated::{Moment, Simulated, SimulatedOverride};
+use crate::nclink::offset_mailbox::OffsetMailbox;
+use crate::offset::{Axis, OffsetSink};
+use crate::simulated::{Moment, Simulated, SimulatedOffsets, SimulatedOverride};
 use std::collections::BTreeMap;
 
 /// First F and G word of channel 0, configuration HNC-30.
@@ -24,13 +26,18 @@ pub(super) struct Registers {
     memory: BTreeMap<Register, i64>,
     mailbox: Mailbox,
     ladder: SimulatedOverride,
+    offset_mailbox: OffsetMailbox,
+    offsets: SimulatedOffsets,
     heartbeat: Option<i64>,
 }
 
 impl Registers {
     pub(super) fn new(machine: &Simulated) -> Self {
         let mailbox = Mailbox::new(super::MAILBOX.parse().unwrap_or(Register { kind: 'D', index: 100 }));
-        Self { memory: BTreeMap::new(), mailbox, ladder: machine.feed_override(), heartbeat: None }
+        let first = super::OFFSETS.parse().unwrap_or(Register { kind: 'D', index: 110 });
+        let (offset_mailbox, offsets) = (OffsetMailbox::new(first), machine.offsets());
+        let (memory, ladder, heartbeat) = (BTreeMap::new(), machine.feed_override(), None);
+        Self { memory, mailbox, ladder, offset_mailbox, offsets, heartbeat }
     }
 
     /// The value of a register; `None` where there is none.
@@ -63,8 +70,39 @@ impl Registers {
         Ok(())
     }
 
-    /// What the ladder does with the mailbox after a client has written: a heartbeat that has moved delivers the letter.
+    /// What the ladder does after a client has written.
     pub(super) fn scan(&mut self, clock: &dyn Clock) {
+        self.override_letter(clock);
+        self.offset_letter(clock);
+    }
+
+    /// A letter with a new number is taken while no program runs, as far as the machine lets itself be shifted.
+    fn offset_letter(&mut self, clock: &dyn Clock) {
+        let word = |offset| self.memory.get(&self.offset_mailbox.word(offset)).copied().unwrap_or(0);
+        let words: Vec<i64> = (0..OffsetMailbox::LENGTH).map(word).collect();
+        let Some(letters) = OffsetMailbox::read(&words).filter(|letters| letters.number != letters.taken) else {
+            return;
+        };
+        let mut in_force_um = letters.in_force_um;
+        for (axis, in_force_um) in Axis::ALL.into_iter().zip(&mut in_force_um) {
+            let wanted_um = letters.wanted_um[axis.index()];
+            if wanted_um == *in_force_um {
+                continue;
+            }
+            #[expect(clippy::cast_precision_loss, reason = "a shift has few digits")]
+            let further_um = (wanted_um - *in_force_um) as f64;
+            let offsets = &mut self.offsets;
+            let found = offsets.at_rest(clock, axis);
+            if found.and_then(|found_um| offsets.write(clock, axis, found_um, found_um + further_um)).is_err() {
+                return;
+            }
+            *in_force_um = wanted_um;
+        }
+        self.memory.extend(self.offset_mailbox.taken(in_force_um, letters.number));
+    }
+
+    /// A heartbeat that has moved delivers the letter about the override.
+    fn override_letter(&mut self, clock: &dyn Clock) {
         let word = |offset| self.memory.get(&self.mailbox.word(offset)).copied().unwrap_or(0);
         let heartbeat = word(Mailbox::HEARTBEAT);
         if self.heartbeat == Some(heartbeat) || heartbeat == 0 {

@@ -91,9 +91,10 @@ pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
     let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
     let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
     let server = Server::start(listener, Box::new(control), settings).map_err(no_threads)?;
+    let further = if arguments.paths > 1 { "; those of path 2 are 20 higher" } else { "" };
     print(&format!(
         "fanuc://{} answers; the ladder's mailbox is at R900, requests at R905, the dial at R907, its second override \
-         at R910\n",
+         at R910{further}\n",
         server.address()
     ));
     let stop = Arc::new(AtomicBool::new(false));

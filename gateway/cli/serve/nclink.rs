@@ -3,7 +3,7 @@
 use super::{Common, Running, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
 use adapters::mqtt::Options;
-use adapters::nclink::device::{Device, MAILBOX, Said};
+use adapters::nclink::device::{Device, MAILBOX, OFFSETS, Said};
 use clap::Args;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,7 +61,9 @@ fn broker(text: &str) -> Result<Options, CannotRun> {
 
 fn line(name: &str, said: &Said) -> String {
     match said {
-        Said::Connected => format!("serving {name} (mailbox for the feed override: {MAILBOX})\n"),
+        Said::Connected => {
+            format!("serving {name} (mailbox for the feed override: {MAILBOX}, for offsets: {OFFSETS})\n")
+        }
         Said::Failed(error) => format!("not served: {error}; dialling again every second\n"),
     }
 }

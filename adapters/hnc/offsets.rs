@@ -1,0 +1,154 @@
+//! Shifts of axes through the vendor's library: by registers that the ladder reads, or by the channel's external zero
+//! offset.
+//!
+//! The external zero offset (coordinate type 9 of the vendor's headers, in counts) is taken up with the next program. What a
+//! count is has to be compared once at the panel and is said in the address; it must be what the control itself calls the
+//! unit of its positions. It is not saved in the control: the power takes it back to what the operator has saved.
+
+use super::answer::{Answer, ItemError, ItemResult};
+use super::decode::{text, whole};
+use super::item::{self, Item, Width, axis, channel, flag, register_type};
+use super::line::Line;
+use crate::clock::Clock;
+use crate::driver::SourceError;
+use crate::nclink::mailbox::Register;
+use crate::nclink::offset_mailbox::Registers;
+use crate::offset::{Axis, OffsetSink};
+
+/// Axes whose names are asked for.
+const AXES: i32 = 3;
+const DOCTOR: &str = "Look at what the control answers: cnc-gateway doctor with this address.";
+
+/// Nothing runs and nothing is held; `None` where the controller does not say.
+const STATE: [Item; 2] = [flag(channel::CYCLE), flag(channel::HOLD)];
+
+fn at_rest(state: &[ItemResult]) -> Option<bool> {
+    let flags: Result<Vec<i32>, _> = state.iter().map(whole).collect();
+    flags.ok().map(|flags| flags.iter().all(|flag| *flag == 0))
+}
+
+/// The registers of the ladder.
+pub(super) struct HncRegisters(pub(super) Line);
+
+impl Registers for HncRegisters {
+    fn name(&self) -> &str {
+        self.0.name()
+    }
+
+    fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+        let (kind, _) = register_type(first).unwrap_or((-1, 0));
+        let registers =
+            (first.index..first.index + count).map(|at| Item::Register(kind, i32::try_from(at).unwrap_or(-1)));
+        let items: Vec<Item> = STATE.into_iter().chain(registers).collect();
+        let mut results = self.0.read_each(&items)?;
+        let words = results.split_off(STATE.len());
+        let words = words.iter().filter_map(|word| whole(word).ok()).map(i64::from).collect();
+        Ok((words, at_rest(&results)))
+    }
+
+    fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+        self.0.write(words)
+    }
+}
+
+/// The channel's external zero offsets.
+pub(super) struct ZeroOffsets {
+    line: Line,
+    /// What a count is, µm.
+    unit_um: f64,
+}
+
+impl ZeroOffsets {
+    pub(super) fn new(line: Line, unit_um: f64) -> Self {
+        Self { line, unit_um }
+    }
+
+    /// The logical axis of this letter.
+    fn number(&self, axis: Axis) -> Result<i32, SourceError> {
+        let names: Vec<Item> = (0..AXES).map(|number| Item::Axis(axis::NAME, number, Width::Text)).collect();
+        let found = self.line.read_each(&names)?;
+        let named =
+            |name: &ItemResult| text(name).is_ok_and(|name| Axis::of(name.get(..1).unwrap_or("")) == Some(axis));
+        let number = found.iter().position(named).and_then(|at| i32::try_from(at).ok());
+        number.ok_or_else(|| {
+            self.refused(axis, "the control has no axis of this name".to_owned(), "Correct `axes` under [gate.offset].")
+        })
+    }
+
+    /// What the address says a count is must be what the control says of its positions.
+    fn same_unit(&self, axis: Axis, per_mm: &ItemResult) -> Result<(), SourceError> {
+        let unit_um = whole(per_mm).ok().filter(|per_mm| *per_mm > 0).map(|per_mm| 1000.0 / f64::from(per_mm));
+        match unit_um {
+            Some(unit_um) if (unit_um / self.unit_um - 1.0).abs() < 1e-6 => Ok(()),
+            Some(unit_um) => {
+                let what = format!("a count is {unit_um} µm for the control and {} µm in the address", self.unit_um);
+                Err(self.refused(axis, what, "Compare one shift at the panel and correct offset_unit_um=."))
+            }
+            None => Err(self.refused(axis, "the control does not say what a count is".to_owned(), DOCTOR)),
+        }
+    }
+
+    fn offset_um(&self, axis: Axis, found: &ItemResult) -> Result<f64, SourceError> {
+        let what = match found {
+            Ok(Answer::Whole(counts)) => return self.whole_um(axis, *counts),
+            Err(ItemError::NotOffered) => "the library has no HNC_CrdsGetValue".to_owned(),
+            other => format!("the external zero offset cannot be read ({other:?})"),
+        };
+        Err(self.refused(axis, what, "Write offset=D110 in the address, with rungs in the ladder."))
+    }
+
+    fn whole_um(&self, axis: Axis, counts: i32) -> Result<f64, SourceError> {
+        let um = f64::from(counts) * self.unit_um;
+        if (um - um.round()).abs() < 1e-3 {
+            return Ok(um.round());
+        }
+        let next = "Round the external zero offset to whole micrometres at the panel.";
+        Err(self.refused(axis, format!("the operator has set {um} µm, which is not whole"), next))
+    }
+
+    fn refused(&self, axis: Axis, what: String, next: &str) -> SourceError {
+        SourceError::Refused {
+            source_name: self.line.name().to_owned(),
+            request: format!("the external zero offset of {}", axis.word()),
+            what,
+            next: next.to_owned(),
+        }
+    }
+}
+
+impl OffsetSink for ZeroOffsets {
+    fn name(&self) -> &str {
+        self.line.name()
+    }
+
+    fn at_rest(&mut self, _: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
+        let zero = Item::ExternalZero(self.number(axis)?);
+        let [cycle, hold] = STATE;
+        let found = self.line.read_each(&[cycle, hold, item::MOVE_UNIT, zero])?;
+        let [state @ .., per_mm, zero] = found.as_slice() else {
+            return Err(self.refused(axis, "the control does not answer".to_owned(), DOCTOR));
+        };
+        match at_rest(state) {
+            Some(true) => {}
+            Some(false) => {
+                return Err(self.refused(axis, "a program runs".to_owned(), "It is done between two programs."));
+            }
+            None => return Err(self.refused(axis, "the state of the control is unknown".to_owned(), DOCTOR)),
+        }
+        self.same_unit(axis, per_mm)?;
+        self.offset_um(axis, zero)
+    }
+
+    /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
+    fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
+        if self.at_rest(clock, axis)? != found_um {
+            return Err(self.refused(axis, "somebody has just changed it".to_owned(), "It is looked at again."));
+        }
+        let number = self.number(axis)?;
+        #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
+        let counts = (wanted_um / self.unit_um).round() as i32;
+        self.line.write_zero(number, counts)?;
+        let found = self.line.read(Item::ExternalZero(number))?;
+        self.offset_um(axis, &found)
+    }
+}

@@ -1,0 +1,62 @@
+//! The registers of a device behind a broker, for shifts of axes.
+
+use super::connection::Link;
+use super::decode::{ChannelWord, status_word};
+use super::liberal::integer;
+use super::mailbox::Register;
+use super::message::{Answer, Ask};
+use super::offset_mailbox::Registers;
+use super::registers::{RegisterLine, path};
+use crate::driver::SourceError;
+use crate::words::execution;
+
+/// Where it is said whether a program runs.
+const CHANNEL_WORDS: &str = "CONTROLLER/VARIABLE@REG_F";
+const STATUS: &str = "STATUS";
+
+/// See the [module](self).
+pub(super) struct NcLinkRegisters {
+    line: RegisterLine,
+    /// Index of the channel's first F word.
+    f_channel: u32,
+}
+
+impl NcLinkRegisters {
+    pub(super) fn new(link: Link, f_channel: u32) -> Self {
+        Self { line: RegisterLine::new(link), f_channel }
+    }
+}
+
+impl Registers for NcLinkRegisters {
+    fn name(&self) -> &str {
+        self.line.name()
+    }
+
+    fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+        let indexes: Vec<u32> = (first.index..first.index + count).collect();
+        let state = match self.line.requires(CHANNEL_WORDS) {
+            Ok(()) => Ask::elements(CHANNEL_WORDS, &[self.f_channel]),
+            Err(SourceError::Refused { .. }) => Ask::value(STATUS),
+            Err(error) => return Err(error),
+        };
+        let by_word = state.id == CHANNEL_WORDS;
+        let answers = self.line.read(vec![Ask::elements(&path(first), &indexes), state])?;
+        let numbers = match answers.first() {
+            Some(Some(Ok(values))) => values.iter().filter_map(integer).collect(),
+            _ => Vec::new(),
+        };
+        Ok((numbers, answers.get(1).and_then(|answer| at_rest(answer.as_ref(), by_word))))
+    }
+
+    fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+        self.line.write(words)
+    }
+}
+
+fn at_rest(answer: Option<&Answer>, by_word: bool) -> Option<bool> {
+    let value = answer?.as_ref().ok()?.first()?;
+    if by_word {
+        return integer(value).map(|word| ChannelWord(word).at_rest());
+    }
+    status_word(value).map(|word| word == execution::READY)
+}

@@ -1,0 +1,116 @@
+//! A connection of one's own for whoever writes: the source may be waiting for an answer while the gate has something to
+//! write. Made when it is needed, and anew after the line broke.
+
+use super::connection::{Connection, Link};
+use super::mailbox::Register;
+use super::message::{Answer, Ask};
+use super::model::Model;
+use crate::driver::SourceError;
+
+/// Items of a device by their paths, written and read.
+pub(super) struct RegisterLine {
+    link: Link,
+    session: Option<(Connection, Model)>,
+}
+
+impl RegisterLine {
+    /// Nothing is connected before the first request.
+    pub(super) fn new(link: Link) -> Self {
+        Self { link, session: None }
+    }
+
+    /// The address.
+    pub(super) fn name(&self) -> &str {
+        &self.link.name
+    }
+
+    /// Writes registers in one request, in this order.
+    ///
+    /// # Errors
+    /// The first that is refused, or the line.
+    pub(super) fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+        let asks = words.iter().map(|(at, value)| Ask::write(&path(*at), at.index, *value)).collect();
+        let answers = self.exchange(asks, Connection::set)?;
+        for ((at, _), answer) in words.iter().zip(answers) {
+            let no = match answer {
+                Some(Ok(_)) => continue,
+                Some(Err(reason)) => reason,
+                None => "it said nothing of it".to_owned(),
+            };
+            return Err(refused(&self.link, &format!("writing {at}"), no));
+        }
+        Ok(())
+    }
+
+    /// Asks for items that are named by their paths; one answer for each.
+    ///
+    /// # Errors
+    /// The device has not one of them, or the line failed.
+    pub(super) fn read(&mut self, asks: Vec<Ask>) -> Result<Vec<Option<Answer>>, SourceError> {
+        self.exchange(asks, Connection::query)
+    }
+
+    /// Does the device have this?
+    ///
+    /// # Errors
+    /// Refused where not; or the line.
+    pub(super) fn requires(&mut self, path: &str) -> Result<(), SourceError> {
+        self.with(|_, model, link| named(link, model, path, false).map(|_| ()))
+    }
+
+    fn exchange(
+        &mut self,
+        mut asks: Vec<Ask>,
+        act: impl FnOnce(&mut Connection, &[Ask]) -> Result<Vec<Option<Answer>>, SourceError>,
+    ) -> Result<Vec<Option<Answer>>, SourceError> {
+        self.with(|connection, model, link| {
+            for ask in &mut asks {
+                ask.id = named(link, model, &ask.id, ask.params.value.is_some())?;
+            }
+            act(connection, &asks)
+        })
+    }
+
+    fn with<T>(
+        &mut self,
+        work: impl FnOnce(&mut Connection, &Model, &Link) -> Result<T, SourceError>,
+    ) -> Result<T, SourceError> {
+        let (mut connection, model) = match self.session.take() {
+            Some(session) => session,
+            None => self.connect()?,
+        };
+        let outcome = work(&mut connection, &model, &self.link);
+        self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some((connection, model));
+        outcome
+    }
+
+    fn connect(&self) -> Result<(Connection, Model), SourceError> {
+        let mut connection = Connection::open(&self.link, false)?;
+        let model = connection.probe()?;
+        Ok((connection, model))
+    }
+}
+
+/// The list that holds this register.
+pub(super) fn path(at: Register) -> String {
+    format!("CONTROLLER/VARIABLE@REG_{}", at.kind)
+}
+
+/// The name by which the device knows an item.
+fn named(link: &Link, model: &Model, path: &str, written: bool) -> Result<String, SourceError> {
+    let item = model.find(path).ok_or_else(|| refused(link, path, "the device does not have it".to_owned()))?;
+    if written && !item.settable {
+        return Err(refused(link, path, "its model says that it may not be written".to_owned()));
+    }
+    Ok(if model.names_by_path() { format!("/{}", item.path) } else { item.id.clone() })
+}
+
+fn refused(link: &Link, request: &str, what: String) -> SourceError {
+    SourceError::Refused {
+        source_name: link.name.clone(),
+        request: request.to_owned(),
+        what,
+        next: "Name another register in the address (mailbox=, offset=), or let the adapter of the device allow it."
+            .to_owned(),
+    }
+}
