@@ -1,12 +1,11 @@
-//! One set of scripts on its way through the history, and what it did.
+//! What one set of scripts did on its way through the history.
 
 use super::compare::{Kind, Spell};
 use super::seconds;
 use crate::pipeline::Tally;
-use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::estimators;
-use rules::script::{Decision, Host, Problem, ScriptSet};
+use rules::estimators::State;
+use rules::script::{Decision, Problem, Stop};
 use std::sync::Arc;
 
 /// A longer step between two samples is a gap.
@@ -55,12 +54,10 @@ impl Asked {
     }
 }
 
-/// One set of scripts on its way through the history, and what it did so far.
+/// What one set of scripts did so far.
 pub struct Lane {
     from_ns: TimeNs,
-    estimators: estimators::Pipeline,
-    host: Host,
-    generation: u64,
+    scripts: usize,
     tally: Tally,
     spells: Vec<Spell>,
     /// Spells that have begun, by place in `spells`.
@@ -73,15 +70,11 @@ pub struct Lane {
 }
 
 impl Lane {
-    /// Compared from `from_ns` on; what happens before counts for nothing.
-    pub(super) fn new(set: ScriptSet, from_ns: TimeNs) -> Self {
-        let mut host = Host::new();
-        host.install(set);
+    /// Of so many scripts, compared from `from_ns` on; what happens before counts for nothing.
+    pub(super) fn new(from_ns: TimeNs, scripts: usize) -> Self {
         Self {
             from_ns,
-            estimators: estimators::Pipeline::new(host.settings().clone()),
-            generation: host.generation(),
-            host,
+            scripts,
             tally: Tally::default(),
             spells: Vec::new(),
             open: Vec::new(),
@@ -93,44 +86,33 @@ impl Lane {
         }
     }
 
-    pub(super) fn step(&mut self, sample: &Sample, step_ns: i64) {
-        if self.generation != self.host.generation() {
-            self.generation = self.host.generation();
-            self.estimators.reconfigure(self.host.settings().clone());
+    /// What the parts of the set have decided together at this time.
+    pub(super) fn step(&mut self, at_ns: TimeNs, step_ns: i64, state: State, decisions: &[&Decision]) {
+        for decision in decisions {
+            self.take(at_ns, decision);
         }
-        let estimates = *self.estimators.infer(sample);
-        // Empty at almost every tick, so that it costs nothing to copy.
-        let decision = self.host.tick(sample, &estimates).clone();
-        self.take(&decision);
-        let before = std::mem::replace(&mut self.pct, decision.request.as_ref().map(|request| request.pct));
-        if sample.at_ns >= self.from_ns {
-            self.tally.step(sample.at_ns, estimates.state);
+        self.stops(at_ns, decisions);
+        let requests = decisions.iter().filter_map(|decision| decision.request.as_ref());
+        let before = std::mem::replace(&mut self.pct, least(requests.map(|request| request.pct)));
+        if at_ns >= self.from_ns {
+            self.tally.step(at_ns, state);
             self.asked.add(self.pct, before, step_ns);
         }
     }
 
-    fn take(&mut self, decision: &Decision) {
-        let at_ns = decision.at_ns;
+    fn take(&mut self, at_ns: TimeNs, decision: &Decision) {
         for change in &decision.alarms {
             let named = |spell: &Spell| {
                 spell.kind == Kind::Alarm && *spell.name == *change.name && *spell.script == *change.script
             };
             if change.raised {
                 let (script, name, text) = (change.script.clone(), change.name.clone(), change.en.clone());
-                self.begin(Spell {
-                    kind: Kind::Alarm,
-                    script,
-                    name,
-                    text,
-                    level: change.level.word(),
-                    from_ns: at_ns,
-                    to_ns: None,
-                });
+                let level = change.level.word();
+                self.begin(Spell { kind: Kind::Alarm, script, name, text, level, from_ns: at_ns, to_ns: None });
             } else {
                 self.finish(at_ns, named);
             }
         }
-        self.stops(decision);
         if at_ns >= self.from_ns {
             self.notes += decision.notes.len() as u64;
         }
@@ -139,19 +121,20 @@ impl Lane {
     }
 
     /// A stop lasts for as long as it is asked for.
-    fn stops(&mut self, decision: &Decision) {
-        let over = |spell: &Spell| {
-            let same = |stop: rules::script::Stop| *spell.name == *stop.word();
-            spell.kind == Kind::Stop && !decision.stops.iter().any(|request| same(request.stop))
+    fn stops(&mut self, at_ns: TimeNs, decisions: &[&Decision]) {
+        let asked = |word: &str| {
+            let requests = decisions.iter().flat_map(|decision| &decision.stops);
+            // The first script's words count.
+            requests.filter(|request| *request.stop.word() == *word).min_by_key(|request| request.script.clone())
         };
-        self.finish(decision.at_ns, over);
-        for request in &decision.stops {
-            let word = request.stop.word();
+        let over = |spell: &Spell| spell.kind == Kind::Stop && asked(&spell.name).is_none();
+        self.finish(at_ns, over);
+        for word in [Stop::FeedHold, Stop::ToolChange].map(Stop::word) {
+            let Some(request) = asked(word) else { continue };
             let standing = |at: &&usize| self.spells[**at].kind == Kind::Stop && *self.spells[**at].name == *word;
             if self.open.iter().find(standing).is_none() {
-                let (script, text) = (request.script.clone(), request.reason.clone());
-                let (name, from_ns) = (Arc::from(word), decision.at_ns);
-                self.begin(Spell { kind: Kind::Stop, script, name, text, level: "", from_ns, to_ns: None });
+                let (script, text, name) = (request.script.clone(), request.reason.clone(), Arc::from(word));
+                self.begin(Spell { kind: Kind::Stop, script, name, text, level: "", from_ns: at_ns, to_ns: None });
             }
         }
     }
@@ -177,7 +160,7 @@ impl Lane {
     }
 
     /// The stretch is over; what ended before it began is forgotten.
-    pub(super) fn end(&mut self, _at_ns: TimeNs) {
+    pub(super) fn end(&mut self) {
         let from_ns = self.from_ns;
         self.spells.retain(|spell| spell.to_ns.is_none_or(|to_ns| to_ns >= from_ns));
         self.spells.iter_mut().for_each(|spell| spell.from_ns = spell.from_ns.max(from_ns));
@@ -221,7 +204,7 @@ impl Lane {
     /// How many scripts there are.
     #[must_use]
     pub fn scripts(&self) -> usize {
-        self.host.status().scripts.len()
+        self.scripts
     }
 
     /// Alarms and stops beyond those that are listed.
@@ -229,6 +212,12 @@ impl Lane {
     pub fn left_out(&self) -> u64 {
         self.left_out
     }
+}
+
+/// The least request, as the host takes it; one that is no number goes first.
+fn least(requests: impl Iterator<Item = f64>) -> Option<f64> {
+    let key = |pct: &f64| if pct.is_finite() { *pct } else { f64::NEG_INFINITY };
+    requests.min_by(|a, b| key(a).total_cmp(&key(b)))
 }
 
 /// Is it another request? No request is the programmed feed.

@@ -9,12 +9,14 @@
 //! | file | what |
 //! |---|---|
 //! | `rows` | from stored columns to samples |
-//! | `lane` | one set of scripts, and what it did |
+//! | `race` | both sets side by side, what they have in common once |
+//! | `lane` | what one set did |
 //! | `compare` | alarms and stops that one side has and the other has not |
 //! | `report` | the answer in words and as JSON |
 
 mod compare;
 mod lane;
+mod race;
 mod report;
 mod rows;
 
@@ -27,7 +29,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use rows::Rows;
 use rules::script::ScriptSet;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// So much of the history before the stretch is gone through without being compared.
@@ -57,81 +59,30 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
     let began = Instant::now();
     let Plan { history, from_ns, to_ns, every_ns, running, edited } = plan;
     let reader = Reader::open(&history)?;
-    let mut race = Race::new(from_ns, running, edited);
     let mut query = Query::between(from_ns.saturating_sub(LEAD_IN_NS), to_ns.unwrap_or(TimeNs::MAX));
     query.series = rows::channels(&reader)?;
-    if !query.series.is_empty() {
+    let raced = race::race(from_ns, running, edited, |take| {
+        if query.series.is_empty() {
+            return Ok(());
+        }
         let mut rows = Rows::new(every_ns);
         reader.samples(&query, |chunk| {
-            rows.each(chunk, |sample| race.step(sample));
+            rows.each(chunk, &mut *take);
             ControlFlow::Continue(())
-        })?;
-    }
-    Ok(race.finish(&history, began.elapsed()))
-}
-
-/// Both lanes, and where they differ at the same moment.
-struct Race {
-    from_ns: TimeNs,
-    running: Lane,
-    edited: Lane,
-    rows: u64,
-    last_ns: Option<TimeNs>,
-    first_ns: Option<TimeNs>,
-    covered_ns: i64,
-    differing_ns: i64,
-}
-
-impl Race {
-    fn new(from_ns: TimeNs, running: ScriptSet, edited: ScriptSet) -> Self {
-        Self {
-            from_ns,
-            running: Lane::new(running, from_ns),
-            edited: Lane::new(edited, from_ns),
-            rows: 0,
-            last_ns: None,
-            first_ns: None,
-            covered_ns: 0,
-            differing_ns: 0,
-        }
-    }
-
-    fn step(&mut self, sample: &adapters::Sample) {
-        let at_ns = sample.at_ns;
-        let step_ns = self.last_ns.replace(at_ns).map_or(0, |last_ns| at_ns - last_ns);
-        // A longer step is a gap, in which nobody asked for anything.
-        let step_ns = if (0..=lane::STEP_MAX_NS).contains(&step_ns) { step_ns } else { 0 };
-        self.running.step(sample, step_ns);
-        self.edited.step(sample, step_ns);
-        if at_ns < self.from_ns {
-            return;
-        }
-        self.first_ns.get_or_insert(at_ns);
-        self.rows += 1;
-        self.covered_ns += step_ns;
-        if lane::differ(self.running.pct(), self.edited.pct()) {
-            self.differing_ns += step_ns;
-        }
-    }
-
-    fn finish(mut self, history: &Path, took: std::time::Duration) -> Report {
-        let end_ns = self.last_ns.unwrap_or(self.from_ns);
-        self.running.end(end_ns);
-        self.edited.end(end_ns);
-        let differences = compare::differences(self.running.spells(), self.edited.spells());
-        Report {
-            history: history.to_owned(),
-            from_ns: self.first_ns.unwrap_or(self.from_ns),
-            to_ns: end_ns,
-            rows: self.rows,
-            covered_s: seconds(self.covered_ns),
-            differing_s: seconds(self.differing_ns),
-            differences,
-            running: self.running,
-            edited: self.edited,
-            took,
-        }
-    }
+        })
+    })?;
+    Ok(Report {
+        history,
+        from_ns: raced.first_ns.unwrap_or(from_ns),
+        to_ns: raced.last_ns.unwrap_or(from_ns),
+        rows: raced.rows,
+        covered_s: raced.covered_s,
+        differing_s: raced.differing_s,
+        differences: compare::differences(raced.running.spells(), raced.edited.spells()),
+        running: raced.running,
+        edited: raced.edited,
+        took: began.elapsed(),
+    })
 }
 
 #[expect(clippy::cast_precision_loss, reason = "2^53 ns are a hundred days; beyond that microseconds suffice")]

@@ -150,6 +150,13 @@ impl fmt::Display for Report {
             let pct = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |pct| format!("{pct:.1} %"));
             let (mean, least) = (pct(asked.mean_pct()), pct(asked.least_pct));
             writeln!(f, "override, {name}: {:.0} s, mean {mean}, least {least}", asked.seconds())?;
+            if lane.left_out() > 0 {
+                writeln!(
+                    f,
+                    "  {} further alarms and stops, {name}, were not kept: take a shorter stretch",
+                    lane.left_out()
+                )?;
+            }
             lane.problems().iter().try_for_each(|problem| writeln!(f, "  {name} scripts failed: {problem}"))?;
         }
         writeln!(f, "another feed is asked for during {:.0} s", self.differing_s)?;

@@ -82,6 +82,22 @@ impl ScriptSet {
         self.scripts.len()
     }
 
+    /// What this set and another have in common, what only this one has, and what only the other has. A script sees nothing of
+    /// the others, so the parts together decide what the whole does. Each part keeps the settings of its set; the common one
+    /// those of this set.
+    #[must_use]
+    pub fn split(self, other: Self) -> (Self, Self, Self) {
+        let has = |set: &Self, script: &Script| {
+            set.scripts.iter().any(|its| its.file == script.file && its.version == script.version)
+        };
+        let part = |set: &Self, which: &dyn Fn(&Script) -> bool| {
+            let scripts = set.scripts.iter().filter(|script| which(script)).cloned().collect();
+            Self { scripts, settings: set.settings.clone(), files: set.files.clone() }
+        };
+        let common = part(&self, &|script| has(&other, script));
+        (common, part(&self, &|script| !has(&other, script)), part(&other, &|script| !has(&self, script)))
+    }
+
     /// No script at all.
     #[must_use]
     pub fn is_empty(&self) -> bool {
