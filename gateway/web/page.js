@@ -106,8 +106,8 @@ function showCards() {
   const gateRows = [row(text("wanted"), percent(gate.wanted_pct), gate.reason), row(text("permitted"), percent(gate.permitted_pct), gate.held),
     row(text("written"), percent(gate.written_pct), text(gate.mode))];
   for (const axis of gate.offset?.axes ?? []) {
-    const um = (value) => (value === null ? text("nothing") : `${number(value)} µm`);
-    gateRows.push(row(`${text("offset")} ${axis.axis.toUpperCase()}`, `${um(axis.wanted_um)} → ${um(axis.shift_um)}`, text(gate.offset.mode)));
+    const proposed = axis.wanted_um === null ? text("noProposal") : `${text("proposed")} ${number(axis.wanted_um)} µm`;
+    gateRows.push(row(`${text("offset")} ${axis.axis.toUpperCase()}`, `${number(axis.shift_um)} µm`, `${proposed} · ${text(gate.offset.mode)}`));
   }
   if (gate.armed_by) gateRows.push(row(text("armedBy"), gate.armed_by, `${text("until")} ${clock(gate.armed_until_ms)}`));
   if (gate.recent.length > 0) gateRows.push(recent(gate.recent));
@@ -125,7 +125,7 @@ function showCards() {
     const shown = pair.missing ? reason(pair.missing) : `${milliseconds(pair.lag_s)} ± ${milliseconds(pair.uncertainty_s)} ms`;
     const more = pair.missing ? pair.why : `${text("window")} ${milliseconds(pair.window_s)} ms` + (pair.drift_ppm === null ? "" : ` · ${text("drift")} ${number(pair.drift_ppm)} ± ${number(pair.drift_uncertainty_ppm)} ppm`);
     const used = pair.use === "merge" ? ` · ${text("putBack")} ${milliseconds(pair.applied_s)} ms` : "";
-    const line = row(`${text("meterLag")} (${name(pair.power)})`, shown, more + used);
+    const line = row(text("meterLag"), shown, `${name(pair.power)} · ${more}${used}`);
     line.title = `${pair.controller} → ${pair.meter}`;
     return line;
   })), text("none"));
