@@ -9,6 +9,7 @@ use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
 use adapters::clock::TimeNs;
 use rules::script::{Host, Problem, shipped};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
@@ -49,7 +50,8 @@ pub fn load(config: &Config) -> (Host, Watched) {
         let text = format!("changed scripts will not be noticed ({error}); start the box again after a change");
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
-    let watched = Watched { reloader: reloader.ok(), data_dir: config.gateway.data_dir.clone(), told };
+    let watched =
+        Watched { reloader: reloader.ok(), data_dir: config.gateway.data_dir.clone(), told, failed: BTreeMap::new() };
     watched.keep(&host);
     (host, watched)
 }
@@ -71,6 +73,8 @@ pub struct Watched {
     reloader: Option<Reloader>,
     data_dir: PathBuf,
     told: Vec<Notice>,
+    /// What each script has last failed with, since the last reload.
+    failed: BTreeMap<String, String>,
 }
 
 impl Watched {
@@ -78,6 +82,18 @@ impl Watched {
     fn keep(&self, host: &Host) {
         if let Err(error) = in_charge::keep(&self.data_dir, host.files()) {
             tracing::warn!("the scripts in charge could not be kept in {}: {error}", self.data_dir.display());
+        }
+    }
+
+    /// Prints what scripts have failed with at this tick, each once until scripts are reloaded or it fails with something else.
+    /// The history has every one.
+    pub fn tell(&mut self, problems: &[Problem]) {
+        for problem in problems {
+            let text = format!("a script was stopped: {problem}");
+            if self.failed.get(&problem.file) != Some(&text) {
+                Notice::new(Severity::Warning, "script_stopped", text.clone()).say();
+                self.failed.insert(problem.file.clone(), text);
+            }
         }
     }
 
@@ -93,6 +109,7 @@ impl Watched {
         let notice = match reloader.step(pipeline.scripts_mut()) {
             None => return,
             Some(Ok(count)) => {
+                self.failed.clear();
                 health.put(&in_charge::path(&self.data_dir), in_charge::text(pipeline.scripts().files()));
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)

@@ -105,6 +105,7 @@ impl Ticker {
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
             // What can wait comes after what is written to the machine.
             self.pipeline.record(&sample, &mut self.health);
+            self.scripts.tell(&self.pipeline.scripts().decision().problems);
             if let Some(twin) = &mut self.twin {
                 twin.step(&sample, &self.pipeline, &mut self.health);
             }

@@ -191,3 +191,24 @@ fn added_latency_from_sample_to_issued_write() {
     );
     assert!(write.len() > 50 && p99 <= 1.0, "{} writes, p99 {p99} ms", write.len());
 }
+
+#[test]
+fn a_script_that_is_refused_or_stopped_is_told_in_the_log_too() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = prepared(directory.path(), "simulated://lathe?begun_s=90");
+    let (mut gateway, address) = start(&config, "20");
+    let script = directory.path().join("data/scripts/mad.rhai");
+    std::fs::write(&script, "if spindel_power_w > 100.0 { note(\"x\"); }").expect("written");
+    let said = gateway.wait_said("mad.rhai:1:4");
+    assert!(said.contains("there is no variable `spindel_power_w`"), "{said}");
+    gateway.wait_said("did you mean `spindle_power_w`?");
+    std::fs::write(&script, "loop { }").expect("written");
+    gateway.wait_said("a script was stopped: mad.rhai:1:6: the script did not come to an end");
+    wait_for("the alarm in the status", Duration::from_secs(20), || {
+        let status = get(&address, "/api/v1/status").json();
+        let alarms = status["alarms"].as_array().expect("alarms").clone();
+        alarms.iter().any(|alarm| alarm["code"] == "script_stopped (mad.rhai)").then_some(())
+    });
+    let said = gateway.stop();
+    assert_eq!(said.matches("a script was stopped").count(), 1, "once: {said}");
+}
