@@ -205,7 +205,7 @@ impl<'a> Case<'a> {
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
         let found = self.searched(base, &designs, seed);
-        if self.shows_hidden_beside(&found.best, &mut designs) {
+        if self.shows_switch_beside(&found.best, &mut designs) {
             let found = self.searched(base, &designs, seed);
             return (found, designs);
         }

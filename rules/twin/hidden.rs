@@ -42,23 +42,18 @@ impl Case<'_> {
         Some(Design { noise: Some(found.noise), ..design })
     }
 
-    /// Looks for hidden states again beside what was found, which may have covered them; says whether there are any, and
-    /// then puts them into the place of those that showed before.
-    pub(super) fn shows_hidden_beside(&mut self, best: &Hypothesis, designs: &mut Vec<Design>) -> bool {
-        if best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
+    /// Looks for the switch again beside what was found, which may have covered it; says whether there is one, and then
+    /// puts it into the place of one that showed before. Not for the ripple: a wave that is followed row by row explains
+    /// a little of everything, and what it seems to gain beside others is no gain.
+    pub(super) fn shows_switch_beside(&mut self, best: &Hypothesis, designs: &mut Vec<Design>) -> bool {
+        let named = best.members.iter().any(|member| designs[*member].kind == "auxiliary_switch");
+        if named || best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
             return false;
         }
-        let named = |kind: &str| best.members.iter().any(|member| designs[*member].kind == kind);
-        let (switches, waves) = (named("auxiliary_switch"), named("ripple_alias"));
-        let switch = if switches { None } else { self.hidden_switch(&best.fit) };
-        let wave = if waves { None } else { self.hidden_ripple(&best.fit) };
-        let shown: Vec<Design> = switch.into_iter().chain(wave).collect();
-        let any = !shown.is_empty();
-        for design in shown {
-            designs.retain(|other| !(other.kind == design.kind && is_latent(other)));
-            designs.push(design);
-        }
-        any
+        let Some(switch) = self.hidden_switch(&best.fit) else { return false };
+        designs.retain(|other| !(other.kind == switch.kind && is_latent(other)));
+        designs.push(switch);
+        true
     }
 
     /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else.
