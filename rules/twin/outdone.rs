@@ -51,6 +51,10 @@ impl Case<'_> {
         designs: &[Design],
         forms: &Yardsticks<'_>,
     ) -> Option<Outdone> {
+        // A constant is part of every line: what bends beside it is something else.
+        if designs[best.members[position]].kind == "offset" {
+            return None;
+        }
         let ln_rows = self.ln_rows(base);
         let rest = self.without(best, position)?.fit;
         let scores = forms.bank.scan(&rest, ln_rows);
