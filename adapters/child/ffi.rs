@@ -10,15 +10,17 @@
 
 use super::Guarded;
 use std::ffi::{CStr, c_char, c_void};
+use std::path::Path;
 
 /// The function is not in this library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Missing(pub &'static str);
 
-/// Why a library cannot be loaded, in the system's own words where it has some.
+/// Why the library in this file cannot be loaded, in the system's own words where it has some.
 #[must_use]
-pub fn reason(error: &libloading::Error) -> String {
-    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+pub fn reason(error: &libloading::Error, file: &Path) -> String {
+    let words = std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
+    words.strip_prefix(&format!("{}: ", file.display())).map_or(words.clone(), str::to_owned)
 }
 
 /// A Rust value as the library takes it.
@@ -101,7 +103,7 @@ macro_rules! vendor_functions {
                 // SAFETY: loading runs the library's initialisers. This happens only in a child process that holds
                 // nothing but its line to the parent, and the user named the file.
                 let library = unsafe { libloading::Library::new(path) };
-                let library = library.map_err(|error| $crate::child::reason(&error))?;
+                let library = library.map_err(|error| $crate::child::reason(&error, path))?;
                 $(
                     // SAFETY: the signature is that of the vendor's header, as the one who listed it says; the pointer
                     // is kept beside the library and not used after it.

@@ -21,7 +21,8 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Focas>, FocasError> + Send>
 const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
 
 /// Next step where something listens and has never opened a session: perhaps it is no controller.
-const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and                             has the controller a connection left?";
+const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and \
+                            has the controller a connection left?";
 
 /// Parameter 1001, bit 0: the machine measures in inches.
 const INCH_MACHINE: Item = Item::Parameter(1001, 0);

@@ -33,9 +33,9 @@
 //! on Windows, eight on 64-bit Linux; arguments, results and single values are right either way, arrays are read with
 //! `long_bytes` of the address. No public build for Linux exists; here the driver is proven against a library with the
 //! same functions that the tests compile and really load. To be checked on a machine: the unit of the load current (taken
-//! as A) and of the axis speed (taken as mm/min), that the external zero offset is in counts of the positions and taken up
-//! with the next program (its count has to be said in the address), and whether reading samples takes them away (both are handled by the
-//! controller's own counter of milliseconds).
+//! as A) and of the axis speed (taken as mm/min); that the external zero offset is in counts of the positions (its count has
+//! to be said in the address), is taken up with the next program, and is forgotten without power while nobody saves it; and
+//! whether reading samples takes them away (the controller's own counter of milliseconds shows it either way).
 
 mod actuator;
 pub mod answer;

@@ -3,7 +3,8 @@
 //!
 //! The external zero offset (coordinate type 9 of the vendor's headers, in counts) is taken up with the next program. What a
 //! count is has to be compared once at the panel and is said in the address; it must be what the control itself calls the
-//! unit of its positions. It is not saved in the control: the power takes it back to what the operator has saved.
+//! unit of its positions. On a lathe X is shifted in what the control shows of X, which may be a diameter. Nothing is saved
+//! in the control: the power should take it back to what the operator has saved.
 
 use super::answer::{Answer, ItemError, ItemResult};
 use super::decode::{text, whole};
