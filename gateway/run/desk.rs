@@ -1,8 +1,9 @@
 //! Where the tick lays down what the hand is to do.
 //!
 //! A thread that sleeps is woken by way of the kernel and of a processor that may sleep too, which takes between some tens of
-//! microseconds and, on a loaded or virtual processor, a millisecond. While the gate is armed the hand therefore wakes by
-//! itself shortly before the next verdict is due, and looks for it until it is there.
+//! microseconds and, on a loaded or virtual processor, a millisecond. While the gate is armed a hand of real-time priority
+//! therefore wakes by itself shortly before the next verdict is due, and looks for it until it is there. A thread of ordinary
+//! priority that looked would have used up its turn when the verdict comes.
 
 use super::pace::{LEAD, LEAD_PERIOD_MIN};
 use crate::gate::offset::Order;
@@ -115,10 +116,11 @@ impl Desk {
     }
 
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
-    pub(super) fn take(&self, limit: Duration) -> (Option<Verdict>, bool) {
+    /// `awake`, it lies in wait for the next verdict that is due.
+    pub(super) fn take(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
         let empty = |paper: &mut Paper| paper.verdict.is_none() && paper.orders.is_empty() && !paper.closing;
         let paper = self.lock();
-        let due = self.period.zip(paper.armed_at).map(|(period, at)| at + period);
+        let due = self.period.filter(|_| awake).zip(paper.armed_at).map(|(period, at)| at + period);
         let laid = self.laid.load(Ordering::Acquire);
         let asleep = due.map_or(limit, |due| due.saturating_duration_since(Instant::now() + LEAD).min(limit));
         let waited = self.arrived.wait_timeout_while(paper, asleep, empty);

@@ -6,7 +6,7 @@
 //! has grown old, or whose arming has ended meanwhile, goes nowhere, and the tick is told.
 
 use super::desk::Desk;
-use super::priority;
+use super::priority::{self, Granted};
 use crate::config;
 use crate::gate::offset::{Account, Moved, Order};
 use crate::gate::{Ask, Fault, Reaction, Verdict, Writer, Written};
@@ -191,10 +191,10 @@ impl Remote {
 
 fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<Said>) {
     // The tick tells what is granted; it is the same for both.
-    let _granted = priority::ask();
+    let awake = priority::ask() == Granted::RealTime;
     let mut heard = true;
     while heard {
-        let (verdict, closing) = desk.take(if holding.is_waiting() { LOOK_EVERY } else { REST });
+        let (verdict, closing) = desk.take(if holding.is_waiting() { LOOK_EVERY } else { REST }, awake);
         let mut tell = |said| heard &= say.try_send(said).is_ok();
         while let Some((it, in_time)) = desk.next_ask() {
             match in_time {

@@ -108,7 +108,6 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     let feed =
         threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = Pace::on_clock(clock.clone(), period(config));
-    let pace = if config.gate.greatest_mode() == config::GateMode::Armed { pace.promptly() } else { pace };
     Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }
 

@@ -45,16 +45,15 @@ impl Pace {
         Self::new(Beat::Clock(clock, 0), due_ns, period)
     }
 
-    /// The same, lying in wait for each tick: for a machine that is written to.
-    #[must_use]
-    pub fn promptly(mut self) -> Self {
+    /// From now on lies in wait for each tick: for a machine that is written to, by a thread of real-time priority. One of
+    /// ordinary priority would be passed over for it when it is needed.
+    pub fn lie_in_wait(&mut self) {
         let lead_ns = i64::try_from(LEAD.as_nanos()).unwrap_or(0);
         if let Beat::Clock(_, early_ns) = &mut self.beat
             && self.period_ns >= i64::try_from(LEAD_PERIOD_MIN.as_nanos()).unwrap_or(0)
         {
             *early_ns = lead_ns;
         }
-        self
     }
 
     /// Ticks of an accelerated machine, beginning at `start_ns`.

@@ -4,11 +4,12 @@ use super::command::Commands;
 use super::feed::Feed;
 use super::health::Health;
 use super::pace::Pace;
-use super::priority;
+use super::priority::{self, Granted};
 use super::report;
 use super::rules::Watched;
 use super::twin::Twin;
 use super::wear::Wear;
+use crate::config::GateMode;
 use crate::gate::Ask;
 use crate::http::Published;
 use crate::log::{Notice, Severity};
@@ -88,7 +89,11 @@ impl Ticker {
         let mut sample = Sample::empty(0);
         let mut first_ns = None;
         if self.identity.speed == Some(1.0) {
-            priority::ask().tell();
+            let granted = priority::ask();
+            granted.tell();
+            if granted == Granted::RealTime && self.pipeline.gate().limits().greatest_mode() == GateMode::Armed {
+                self.pace.lie_in_wait();
+            }
         }
         while let Some(now_ns) = self.pace.next_tick(&self.wishes.stop) {
             let began_ns = *first_ns.get_or_insert(now_ns);

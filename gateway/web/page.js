@@ -125,7 +125,7 @@ function showCards() {
     const shown = pair.missing ? reason(pair.missing) : `${milliseconds(pair.lag_s)} ± ${milliseconds(pair.uncertainty_s)} ms`;
     const more = pair.missing ? pair.why : `${text("window")} ${milliseconds(pair.window_s)} ms` + (pair.drift_ppm === null ? "" : ` · ${text("drift")} ${number(pair.drift_ppm)} ± ${number(pair.drift_uncertainty_ppm)} ppm`);
     const used = pair.use === "merge" ? ` · ${text("putBack")} ${milliseconds(pair.applied_s)} ms` : "";
-    const line = row(text("meterLag"), shown, `${name(pair.power)} · ${more}${used}`);
+    const line = row(text("meterLag"), shown, `${name(pair.power).split(/[,，]/)[0]} · ${more}${used}`);
     line.title = `${pair.controller} → ${pair.meter}`;
     return line;
   })), text("none"));
