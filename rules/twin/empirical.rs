@@ -1,8 +1,9 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
 //! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed, something
-//! that fades through each pass or a wave over the position of a slide (`periodic`); by itself, in the cut only, or in proportion to the removal rate. It is the yardstick
-//! for "something real remains that no candidate explains".
+//! that fades through each pass, or a wave over the position of a slide or the time in the cut (`periodic`); by itself,
+//! in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no
+//! candidate explains".
 
 use super::designs::Design;
 use super::frame::Frame;
