@@ -42,8 +42,9 @@ impl Fault {
     #[must_use]
     pub fn disarmed(&self) -> Disarmed {
         match self {
-            Self::ReadBack { .. } => Disarmed::ReadBack,
-            Self::Offset { .. } => Disarmed::Offset,
+            // A machine that answers and says no has been reached.
+            Self::ReadBack { .. } | Self::Line(SourceError::Refused { .. }) => Disarmed::ReadBack,
+            Self::Offset { .. } | Self::OffsetLine(SourceError::Refused { .. }) => Disarmed::Offset,
             Self::Line(_) | Self::OffsetLine(_) | Self::Late { .. } | Self::Gone => Disarmed::Line,
         }
     }
@@ -90,5 +91,21 @@ impl fmt::Display for Fault {
                  Start the gateway again, and report this with the log",
             ),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_that_says_no_has_been_reached() {
+        let (source_name, what, next) = ("fanuc://10.0.0.7".to_owned(), "protected".to_owned(), String::new());
+        let line = SourceError::Line { source_name: source_name.clone(), what: what.clone(), next: next.clone() };
+        let refused = SourceError::Refused { source_name, request: "the offset".to_owned(), what, next };
+        assert_eq!(Fault::Line(refused.clone()).disarmed(), Disarmed::ReadBack);
+        assert_eq!(Fault::OffsetLine(refused).disarmed(), Disarmed::Offset);
+        assert_eq!(Fault::OffsetLine(line.clone()).disarmed(), Disarmed::Line);
+        assert_eq!(Fault::Line(line).disarmed(), Disarmed::Line);
     }
 }
