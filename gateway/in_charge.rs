@@ -1,12 +1,20 @@
 //! The scripts that were last in charge, kept beside everything else that the box writes: what a backtest compares with, and
 //! what comes into charge again after a start at which the directory holds something broken.
 
-use rules::script::{Problem, ScriptFile, ScriptSet, prepare};
+use crate::history::Event;
+use adapters::clock::TimeNs;
+use rules::script::{Host, Problem, ScriptFile, ScriptSet, prepare};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Name of the file in the data directory.
 const FILE: &str = "scripts_in_charge.json";
+/// Kind of the events that tell which versions came into charge.
+pub const KIND: &str = "scripts_in_charge";
+
+/// Scripts by file name, each with its version.
+pub type Versions = BTreeMap<String, u64>;
 
 /// Where they are kept.
 #[must_use]
@@ -47,9 +55,45 @@ pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<Problem>>> {
     kept(data_dir).map(|files| prepare(&files))
 }
 
+/// From `at_ns` on these scripts decide: what tells a backtest whose alarms the history holds.
+#[must_use]
+pub fn event(host: &Host, at_ns: TimeNs) -> Event {
+    let words = |(file, version): (&str, u64)| (file.to_owned(), json!(format!("{version:016x}")));
+    let scripts: Map<String, Value> = host.versions().map(words).collect();
+    Event {
+        at_ns,
+        kind: KIND.to_owned(),
+        source: "scripts".to_owned(),
+        text: format!("{} scripts are in charge", scripts.len()),
+        detail: json!({ "scripts": scripts }).to_string(),
+    }
+}
+
+/// What such an event says; `None` when it cannot be read.
+#[must_use]
+pub fn versions(event: &Event) -> Option<Versions> {
+    let document: Value = serde_json::from_str(&event.detail).ok()?;
+    let version =
+        |(file, version): (&String, &Value)| Some((file.clone(), u64::from_str_radix(version.as_str()?, 16).ok()?));
+    document["scripts"].as_object()?.iter().map(version).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_history_is_told_the_versions() {
+        let mut host = Host::new();
+        assert_eq!(versions(&event(&host, 7)), Some(Versions::new()));
+        host.load(&[ScriptFile { name: "a.rhai".to_owned(), text: "note(\"a\");\n".to_owned() }]).expect("compiles");
+        let told = versions(&event(&host, 7)).expect("readable");
+        assert_eq!(
+            told.into_iter().collect::<Vec<_>>(),
+            [("a.rhai".to_owned(), host.versions().next().expect("one").1)]
+        );
+        assert_eq!(versions(&Event { detail: "{".to_owned(), ..event(&host, 7) }), None, "half an event says nothing");
+    }
 
     #[test]
     fn what_was_kept_comes_back() {

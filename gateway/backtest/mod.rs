@@ -4,28 +4,36 @@
 //! before the stretch on, so that no-load powers have been learned when it begins. Nothing is written anywhere. The
 //! gate does not take part: compared is what the scripts ask for, not what would be let through.
 //!
-//! What the history does not keep is not there: the age of a value within its tick, and readings between two ticks.
+//! What the history does not keep is not there: the age of a value within its tick, and readings between two ticks. What it
+//! rounds is rounded. Alarms are therefore compared with those that were raised besides: one that a running script
+//! raised then and that the edited ones do not raise is lost, whatever the running ones do over the stored samples. Where
+//! another version was in charge there are no such alarms, and the report says so.
 //!
 //! | file | what |
 //! |---|---|
 //! | `rows` | from stored columns to samples |
 //! | `race` | both sets side by side, what they have in common once |
 //! | `lane` | what one set did |
+//! | `recorded` | the alarms that were raised then, as the history has them |
 //! | `compare` | alarms and stops that one side has and the other has not |
 //! | `report` | the answer in words and as JSON |
 
 mod compare;
 mod lane;
 mod race;
+mod recorded;
 mod report;
 mod rows;
 
-pub use compare::{Difference, Kind, Spell};
+pub use compare::{Difference, Evidence, Kind, Spell};
 pub use lane::{Asked, Lane};
+pub use recorded::{Other, Recorded};
 pub use report::Report;
 
 use crate::history::{HistoryError, Query, Reader};
 use adapters::clock::{SECOND_NS, TimeNs};
+use compare::Sides;
+use recorded::Concerned;
 use rows::Rows;
 use rules::script::ScriptSet;
 use std::ops::ControlFlow;
@@ -61,6 +69,7 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
     let reader = Reader::open(&history)?;
     let mut query = Query::between(from_ns.saturating_sub(LEAD_IN_NS), to_ns.unwrap_or(TimeNs::MAX));
     query.series = rows::channels(&reader)?;
+    let concerned = Concerned::of(&running, &edited);
     let raced = race::race(from_ns, running, edited, |take| {
         if query.series.is_empty() {
             return Ok(());
@@ -71,6 +80,10 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
             ControlFlow::Continue(())
         })
     })?;
+    let span = raced.first_ns.zip(raced.last_ns);
+    let recorded =
+        span.map(|(first_ns, last_ns)| recorded::read(&reader, &concerned, first_ns, last_ns)).transpose()?;
+    let recorded = recorded.unwrap_or_default();
     Ok(Report {
         history,
         from_ns: raced.first_ns.unwrap_or(from_ns),
@@ -78,7 +91,15 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
         rows: raced.rows,
         covered_s: raced.covered_s,
         differing_s: raced.differing_s,
-        differences: compare::differences(raced.running.spells(), raced.edited.spells()),
+        differences: Sides {
+            recorded: recorded.spells(),
+            running: raced.running.spells(),
+            edited: raced.edited.spells(),
+            from_ns,
+            near_ns: every_ns,
+        }
+        .differences(),
+        recorded,
         running: raced.running,
         edited: raced.edited,
         took: began.elapsed(),

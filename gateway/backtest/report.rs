@@ -1,7 +1,8 @@
 //! What a backtest found, in words and as JSON (`backtest/1`).
 
-use super::compare::{Difference, Spell};
+use super::compare::{Difference, Evidence, Spell};
 use super::lane::{Asked, Lane};
+use super::recorded::Recorded;
 use super::seconds;
 use crate::moment::utc;
 use rules::script::Problem;
@@ -29,6 +30,8 @@ pub struct Report {
     pub differing_s: f64,
     /// Alarms and stops, in the order of time.
     pub differences: Vec<Difference>,
+    /// The alarms that were raised then.
+    pub recorded: Recorded,
     /// The scripts in charge.
     pub running: Lane,
     /// The scripts that were tried.
@@ -66,6 +69,7 @@ impl Report {
             "to": utc(self.to_ns),
             "rows": self.rows,
             "covered_s": self.covered_s,
+            "recorded": recorded(&self.recorded),
             "running": lane(&self.running),
             "edited": lane(&self.edited),
             "lost": listed("lost"),
@@ -85,6 +89,19 @@ impl Report {
         let (running, edited) = (self.running.seconds_per_state(), self.edited.seconds_per_state());
         running.into_iter().zip(edited).map(|((state, running), (_, edited))| (state, running, edited))
     }
+}
+
+fn recorded(recorded: &Recorded) -> Value {
+    let others = recorded
+        .others
+        .iter()
+        .map(|(script, other)| json!({ "script": script, "alarms": other.alarms, "until": other.until_ns.map(utc) }));
+    json!({
+        "alarms": recorded.spells().len(),
+        "others": others.collect::<Vec<_>>(),
+        "unknown_until": recorded.unknown_until_ns.map(utc),
+        "more": recorded.more,
+    })
 }
 
 fn lane(lane: &Lane) -> Value {
@@ -107,7 +124,12 @@ fn lane(lane: &Lane) -> Value {
 
 fn difference(difference: &Difference) -> Value {
     match difference {
-        Difference::Lost(one) | Difference::Gained(one) => spell(one),
+        Difference::Lost(one, evidence) => {
+            let mut told = spell(one);
+            told["evidence"] = evidence.word().into();
+            told
+        }
+        Difference::Gained(one) => spell(one),
         Difference::Shifted(running, edited) => json!({ "running": spell(running), "edited": spell(edited) }),
     }
 }
@@ -126,15 +148,52 @@ fn line(spell: &Spell) -> String {
     format!("{} ({}) at {}, {lasted}: {}", spell.name, spell.script, utc(spell.from_ns), spell.text)
 }
 
+fn remark(evidence: Evidence) -> &'static str {
+    match evidence {
+        Evidence::Both => "",
+        Evidence::History => " (raised then; over the stored samples the running scripts do not raise it either)",
+        Evidence::Samples => " (over the stored samples; the history does not have it)",
+    }
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(until_ns) = self.unknown_until_ns {
+            let until = utc(until_ns);
+            writeln!(
+                f,
+                "  until {until} the history does not say whose its alarms are: they are taken for the running scripts'"
+            )?;
+        }
+        for (script, other) in &self.others {
+            if let Some(until_ns) = other.until_ns {
+                let until = utc(until_ns);
+                writeln!(
+                    f,
+                    "  until {until} {script} was another one or not in charge: compared is what it does over the stored samples"
+                )?;
+            }
+            if other.alarms > 0 {
+                writeln!(f, "  not compared: {} alarms of another {script} in the history", other.alarms)?;
+            }
+        }
+        if self.more {
+            writeln!(f, "  the history has more alarms than are compared, the newest: take a shorter stretch")?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (from, to, hours) = (utc(self.from_ns), utc(self.to_ns), self.covered_s / 3600.0);
         writeln!(f, "{from} to {to}: {} samples, {hours:.2} h ({:.0} samples/s)", self.rows, self.rows_per_s())?;
         let [lost, gained, shifted] = ["lost", "gained", "shifted"].map(|word| self.count(word));
         writeln!(f, "alarms and stops: {lost} lost, {gained} gained, {shifted} at another time")?;
+        write!(f, "{}", self.recorded)?;
         for difference in self.differences.iter().take(SHOWN) {
             match difference {
-                Difference::Lost(spell) => writeln!(f, "  lost    {}", line(spell))?,
+                Difference::Lost(spell, evidence) => writeln!(f, "  lost    {}{}", line(spell), remark(*evidence))?,
                 Difference::Gained(spell) => writeln!(f, "  gained  {}", line(spell))?,
                 Difference::Shifted(running, edited) => {
                     let later_s = seconds(edited.from_ns - running.from_ns);

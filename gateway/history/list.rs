@@ -4,7 +4,7 @@ use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::record::{Command, Decision, Diagnosis, Event, Model, Part};
 use adapters::clock::TimeNs;
-use rusqlite::{Row, params};
+use rusqlite::{Params, Row, params};
 use serde::Serialize;
 
 /// Which records: those that touch the time from `from_ns` to before `to_ns`, the newest `limit` of them.
@@ -85,6 +85,10 @@ fn text(row: &Row<'_>, column: usize) -> Result<String, rusqlite::Error> {
     Ok(row.get::<_, Option<String>>(column)?.unwrap_or_default())
 }
 
+fn event(row: &Row<'_>) -> Result<Event, rusqlite::Error> {
+    Ok(Event { at_ns: row.get(0)?, kind: row.get(1)?, source: row.get(2)?, text: row.get(3)?, detail: text(row, 4)? })
+}
+
 impl Reader {
     /// Intervals of machine states that touch the range.
     ///
@@ -143,15 +147,17 @@ impl Reader {
     pub fn events(&self, span: Span) -> Result<Vec<Event>, HistoryError> {
         let select = "SELECT at_ns, kind, source, text, detail FROM events
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
-        self.list(select, span, |row| {
-            Ok(Event {
-                at_ns: row.get(0)?,
-                kind: row.get(1)?,
-                source: row.get(2)?,
-                text: row.get(3)?,
-                detail: text(row, 4)?,
-            })
-        })
+        self.list(select, span, event)
+    }
+
+    /// Events of this kind in the range.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn events_of(&self, kind: &str, span: Span) -> Result<Vec<Event>, HistoryError> {
+        let select = "SELECT at_ns, kind, source, text, detail FROM events
+            WHERE at_ns >= ?1 AND at_ns < ?2 AND kind = ?4 ORDER BY at_ns DESC, id DESC LIMIT ?3";
+        self.list_with(select, params![span.from_ns, span.to_ns, span.limit, kind], event)
     }
 
     /// Parts finished in the range.
@@ -259,8 +265,17 @@ impl Reader {
         span: Span,
         read: impl FnMut(&Row<'_>) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<T>, HistoryError> {
+        self.list_with(select, params![span.from_ns, span.to_ns, span.limit], read)
+    }
+
+    fn list_with<T>(
+        &self,
+        select: &str,
+        values: impl Params,
+        read: impl FnMut(&Row<'_>) -> Result<T, rusqlite::Error>,
+    ) -> Result<Vec<T>, HistoryError> {
         let mut statement = self.db.prepare_cached(select).doing("reading records")?;
-        let rows = statement.query_map(params![span.from_ns, span.to_ns, span.limit], read);
+        let rows = statement.query_map(values, read);
         let mut records: Vec<T> = rows.and_then(Iterator::collect).doing("reading records")?;
         records.reverse();
         Ok(records)

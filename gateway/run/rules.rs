@@ -50,8 +50,8 @@ pub fn load(config: &Config) -> (Host, Watched) {
         let text = format!("changed scripts will not be noticed ({error}); start the box again after a change");
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
-    let watched =
-        Watched { reloader: reloader.ok(), data_dir: config.gateway.data_dir.clone(), told, failed: BTreeMap::new() };
+    let (reloader, data_dir) = (reloader.ok(), config.gateway.data_dir.clone());
+    let watched = Watched { reloader, data_dir, told, told_of: None, failed: BTreeMap::new() };
     watched.keep(&host);
     (host, watched)
 }
@@ -73,6 +73,8 @@ pub struct Watched {
     reloader: Option<Reloader>,
     data_dir: PathBuf,
     told: Vec<Notice>,
+    /// The generation whose versions the history has been told.
+    told_of: Option<u64>,
     /// What each script has last failed with, since the last reload.
     failed: BTreeMap<String, String>,
 }
@@ -97,8 +99,23 @@ impl Watched {
         }
     }
 
-    /// Takes what has been found on disk since the last tick. Costs nothing when there is nothing.
-    pub fn step(&mut self, pipeline: &mut Pipeline, health: &mut Health, wishes: &Wishes, now_ns: TimeNs) {
+    /// Takes what has been found on disk since the last tick, whose sample is of `at_ns`. Costs nothing when there is nothing.
+    pub fn step(
+        &mut self,
+        pipeline: &mut Pipeline,
+        health: &mut Health,
+        wishes: &Wishes,
+        (now_ns, at_ns): (TimeNs, TimeNs),
+    ) {
+        self.take(pipeline, health, wishes, now_ns);
+        let host = pipeline.scripts();
+        if self.told_of.replace(host.generation()) != Some(host.generation()) {
+            // By the time of the sample, which is that of the alarms.
+            health.keep(in_charge::event(host, at_ns).into());
+        }
+    }
+
+    fn take(&mut self, pipeline: &mut Pipeline, health: &mut Health, wishes: &Wishes, now_ns: TimeNs) {
         for notice in self.told.drain(..) {
             health.event(now_ns, "scripts", &notice);
         }

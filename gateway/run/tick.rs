@@ -99,7 +99,7 @@ impl Ticker {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.complete(&mut sample, now_ns);
-            self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, now_ns);
+            self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, (now_ns, sample.at_ns));
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
             let inferred = *self.pipeline.infer(&sample);
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);

@@ -76,6 +76,11 @@ impl ScriptSet {
         &self.files
     }
 
+    /// Every script with its version, which is another one for another text.
+    pub fn versions(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.scripts.iter().map(|script| (&*script.file, script.version))
+    }
+
     /// How many scripts there are.
     #[must_use]
     pub fn len(&self) -> usize {

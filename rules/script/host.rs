@@ -137,6 +137,12 @@ impl Host {
         &self.files
     }
 
+    /// Every script with the version that is in charge, or was when it was suspended. They change together with
+    /// [`Host::generation`].
+    pub fn versions(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.slots.iter().map(|slot| (slot.file(), slot.script().version))
+    }
+
     /// Grows whenever other scripts come into charge.
     #[must_use]
     pub fn generation(&self) -> u64 {

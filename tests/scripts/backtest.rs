@@ -102,6 +102,7 @@ fn every_lost_alarm_is_named(directory: &Path, more: &[&str], near_ms: i64) -> V
     );
     let names: BTreeSet<&str> = lost.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, BTreeSet::from(["heavy", "turning"]));
+    println!("{} of {} lost alarms named", gone.len(), gone.len());
     report
 }
 
@@ -130,10 +131,101 @@ fn a_worse_script_loses_alarms_and_each_of_them_is_named() {
         assert_eq!(apart[what], report[what], "{what}");
     }
     assert_eq!(apart["running"], report["running"]);
+    assert_eq!(report["recorded"]["unknown_until"], Value::Null, "the history says which scripts were in charge");
+    assert_eq!(report["recorded"]["others"], Value::Array(Vec::new()), "and they are the running ones");
 
     let unchanged = program(&["rules", "backtest", "--config", "cnc-gateway.toml", "--since", "30d"], directory.path());
     assert_eq!(unchanged.status.code(), Some(0), "{}", said(&unchanged));
     assert!(said(&unchanged).contains("0 lost, 0 gained, 0 at another time"), "{}", said(&unchanged));
+}
+
+/// Evidence of the lost alarms, in the order of time.
+fn evidence(report: &Value) -> Vec<&str> {
+    report["lost"].as_array().expect("a list").iter().filter_map(|it| it["evidence"].as_str()).collect()
+}
+
+/// One sample is a hair above the threshold and is stored as exactly the threshold: no set raises that alarm again.
+#[test]
+fn an_alarm_that_the_rounding_of_storage_hides_is_lost_all_the_same() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let directory = directory.path();
+    let load = |second: u32| match second {
+        20..25 => "30.000000000001",
+        40..45 => "35",
+        _ => "20",
+    };
+    let rows: String = (0..60).map(|second| format!("{second},{}\n", load(second))).collect();
+    fs::write(directory.join("load.csv"), format!("time_s,spindle_load_pct\n{rows}")).expect("written");
+    let watch = |name: &str, above: f64| {
+        fs::create_dir_all(directory.join(name)).expect("created");
+        let text = format!("alarm_above(\"heavy\", spindle_load_pct, {above:?}, 25.0, 0.0, \"heavy\");\n");
+        fs::write(directory.join(name).join("watch.rhai"), text).expect("written");
+    };
+    [("running", 30.0), ("worse", 400.0), ("finer", 29.0)].into_iter().for_each(|(name, above)| watch(name, above));
+    let replayed = program(&["replay", "load.csv", "--history", "h.db", "--scripts", "running"], directory);
+    assert!(replayed.status.success(), "{}", said(&replayed));
+    let compared = |edited: &str| {
+        let from = ["--history", "h.db", "--since", "30d", "--running", "running", "--scripts", edited];
+        let told = program(&[&["rules", "backtest"][..], &from].concat(), directory);
+        let json = program(&[&["rules", "backtest", "--json"][..], &from].concat(), directory);
+        let report: Value = serde_json::from_slice(&json.stdout).unwrap_or_else(|_| panic!("{}", said(&json)));
+        (report, told.status.code(), said(&told))
+    };
+    let (report, code, text) = compared("worse");
+    assert_eq!((evidence(&report), code), (vec!["history", "both"], Some(1)), "{text}");
+    assert!(text.contains("the running scripts do not raise it either"), "{text}");
+    assert!(text.contains("the history does not say whose its alarms are"), "a replay does not: {text}");
+    for (edited, what) in [("finer", "raises both"), ("running", "no edit, so nothing is lost by it")] {
+        let (report, code, text) = compared(edited);
+        assert_eq!(code, Some(0), "{what}: {text}");
+        assert_eq!(
+            (evidence(&report).len(), report["gained"].as_array().map(Vec::len)),
+            (0, Some(0)),
+            "{what}: {text}"
+        );
+    }
+}
+
+/// The running script was edited on the way: its alarms from before are those of another one.
+#[test]
+fn alarms_of_another_version_are_not_compared_and_the_report_says_until_when() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let directory = directory.path();
+    machine(directory, 3600, 2.0);
+    let before = recorded(directory);
+    let running = format!("{WATCH}// edited\n");
+    fs::write(directory.join("data/scripts/watch.rhai"), running).expect("written");
+    fs::write(directory.join("data/scripts/gone.rhai"), "alarm(\"there\", \"for a while\");\n").expect("written");
+    let output = program(&["run", "--config", "cnc-gateway.toml", "--speed", "max", "--for", "3600"], directory);
+    assert!(output.status.success(), "{}", said(&output));
+    fs::remove_file(directory.join("data/scripts/gone.rhai")).expect("removed");
+    let output = program(&["run", "--config", "cnc-gateway.toml", "--speed", "max", "--for", "60"], directory);
+    assert!(output.status.success(), "{}", said(&output));
+    let (report, code) = backtest(directory, &[]);
+    assert_eq!(code, Some(1), "{report}");
+    let other = |script: &str| {
+        let others = report["recorded"]["others"].as_array().expect("a list").clone();
+        others
+            .into_iter()
+            .find(|it| it["script"] == script)
+            .unwrap_or_else(|| panic!("{script}: {}", report["recorded"]))
+    };
+    assert_eq!(other("watch.rhai")["alarms"], before.len(), "{}", report["recorded"]);
+    assert_eq!(other("gone.rhai")["alarms"], 1, "{}", report["recorded"]);
+    let until_ms = milliseconds(&other("watch.rhai")["until"]);
+    let (mut then, mut since) = (BTreeSet::new(), BTreeSet::new());
+    for (lost, evidence) in report["lost"].as_array().expect("a list").iter().zip(evidence(&report)) {
+        let set = if milliseconds(&lost["from"]) < until_ms { &mut then } else { &mut since };
+        set.insert(evidence);
+    }
+    assert_eq!((then, since), (BTreeSet::from(["samples"]), BTreeSet::from(["both"])), "{}", report["lost"]);
+    let told = program(
+        &["rules", "backtest", "--config", "cnc-gateway.toml", "--since", "30d", "--scripts", "edited"],
+        directory,
+    );
+    let text = said(&told);
+    assert!(text.contains("watch.rhai was another one or not in charge"), "{text}");
+    assert!(text.contains("alarms of another gone.rhai"), "{text}");
 }
 
 /// A week at 10 Hz: `cargo test --release --test scripts a_stored_week -- --ignored --nocapture`
