@@ -135,7 +135,9 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match dispatch(arguments) {
+    let done = dispatch(arguments);
+    log::flush();
+    match done {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::No) => ExitCode::from(1),
         Err(cannot) => {

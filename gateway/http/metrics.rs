@@ -187,6 +187,11 @@ fn own(page: &mut Page, status: &Status) {
     page.gauge("cncgw_history_size_bytes", "Bytes of the history on disk", status.history.bytes as f64);
     let scripts = status.scripts.iter().map(|s| (label("script", &s.file), f64::from(u8::from(s.error.is_none()))));
     page.family("cncgw_script_current", "gauge", "1 when the newest text of the script is in charge", scripts);
+    page.counter(
+        "cncgw_log_lines_dropped_total",
+        "Lines for standard output and standard error left out because nobody read them",
+        crate::log::dropped(),
+    );
     page.gauge("cncgw_problems", "Things that do not work while the box goes on", status.problems.len() as f64);
     if let Some(usage) = crate::usage::read() {
         page.gauge("process_resident_memory_bytes", "Resident memory", usage.resident_bytes as f64);

@@ -16,3 +16,4 @@ mod running;
 #[allow(dead_code, reason = "the suite of FANUC uses more of it")]
 mod served;
 mod shifting;
+mod unread;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// A configuration that may be armed, with one script that always asks for 70 %.
-fn prepared(directory: &Path, address: &str) -> PathBuf {
+pub(crate) fn prepared(directory: &Path, address: &str) -> PathBuf {
     let scripts = directory.join("data/scripts");
     std::fs::create_dir_all(&scripts).expect("a directory");
     std::fs::write(scripts.join("slow.rhai"), "request_feed_override(70, \"test\");").expect("a script");
@@ -28,23 +28,23 @@ fn start(config: &Path, speed: &str) -> (Gateway, String) {
     (gateway, address)
 }
 
-fn order(config: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+pub(crate) fn order(config: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let told = run(&[arguments, &["--config", text(config)]].concat());
     (told.status.code(), format!("{}{}", stdout(&told), stderr(&told)))
 }
 
-fn gate(address: &str) -> Value {
+pub(crate) fn gate(address: &str) -> Value {
     get(address, "/api/v1/status").json()["gate"].clone()
 }
 
-fn audit(directory: &Path) -> Vec<Value> {
+pub(crate) fn audit(directory: &Path) -> Vec<Value> {
     let database = directory.join("data/history.db");
     let told = run(&["history", "audit", "--json", "--history", text(&database)]);
     let document: Value = serde_json::from_str(&stdout(&told)).expect("JSON");
     document["rows"].as_array().expect("rows").clone()
 }
 
-fn has(rows: &[Value], kind: &str, outcome: &str) -> bool {
+pub(crate) fn has(rows: &[Value], kind: &str, outcome: &str) -> bool {
     rows.iter().any(|row| row["kind"] == kind && row["outcome"] == outcome)
 }
 

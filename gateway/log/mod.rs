@@ -2,13 +2,45 @@
 //!
 //! A [`Notice`] carries both. The operator's line says what happened and what to do; the detail names the code, the
 //! address and the numbers, as text or as one JSON object per line.
+//!
+//! Neither stream keeps anybody waiting: a thread of its own writes to each, see `outlet`.
 
+mod outlet;
+
+use outlet::Outlet;
 use std::io::Write;
+use std::sync::OnceLock;
+use std::time::Duration;
 use tracing::Level;
 use tracing_subscriber::Layer;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
+
+/// A stream that is not read is not waited for at the end.
+const FLUSH_WITHIN: Duration = Duration::from_secs(1);
+
+static OPERATOR: OnceLock<Outlet> = OnceLock::new();
+static ENGINEER: OnceLock<Outlet> = OnceLock::new();
+
+fn operator() -> &'static Outlet {
+    OPERATOR.get_or_init(|| Outlet::start("told", Box::new(std::io::stdout())))
+}
+
+fn engineer() -> &'static Outlet {
+    ENGINEER.get_or_init(|| Outlet::start("log", Box::new(std::io::stderr())))
+}
+
+/// Lines of both streams that were left out because nobody was reading.
+#[must_use]
+pub fn dropped() -> u64 {
+    [&OPERATOR, &ENGINEER].into_iter().filter_map(OnceLock::get).map(Outlet::dropped).sum()
+}
+
+/// Returns when everything said so far is written, or soon after where a stream is not read.
+pub fn flush() {
+    [&OPERATOR, &ENGINEER].into_iter().filter_map(OnceLock::get).for_each(|outlet| outlet.flush(FLUSH_WITHIN));
+}
 
 /// The form of the engineer's log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -70,16 +102,38 @@ impl Notice {
         self
     }
 
-    /// Prints both texts: a line with the time for the operator, an event for the engineer.
+    /// Prints both texts: a line with the time for the operator, an event for the engineer. Never waits for either stream.
     pub fn say(&self) {
         let Self { code, operator, detail, .. } = self;
         let mark = if self.severity == Severity::Info { " " } else { "!" };
-        // An operator who closed the terminal is no reason to stop the box.
-        let _closed = writeln!(std::io::stdout(), "{} {mark} {operator}", clock_text());
+        self::operator().put(format!("{} {mark} {operator}\n", clock_text()).into_bytes());
         match self.severity {
             Severity::Info => tracing::info!(code, detail, "{operator}"),
             Severity::Warning => tracing::warn!(code, detail, "{operator}"),
             Severity::Error => tracing::error!(code, detail, "{operator}"),
+        }
+    }
+}
+
+/// One event of the engineer's log on its way to the outlet.
+#[derive(Debug, Default)]
+struct Line(Vec<u8>);
+
+impl Write for Line {
+    fn write(&mut self, part: &[u8]) -> std::io::Result<usize> {
+        self.0.extend_from_slice(part);
+        Ok(part.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        if !self.0.is_empty() {
+            engineer().put(std::mem::take(&mut self.0));
         }
     }
 }
@@ -92,7 +146,7 @@ fn clock_text() -> String {
 /// Starts the engineer's log. A second call in one process changes nothing.
 pub fn start(format: LogFormat, level: Level) {
     let wanted = filter_fn(move |event| *event.level() <= level);
-    let base = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(false);
+    let base = tracing_subscriber::fmt::layer().with_writer(Line::default).with_ansi(false);
     let layer = match format {
         LogFormat::Off => return,
         LogFormat::Text => base.with_filter(wanted).boxed(),
