@@ -128,7 +128,7 @@ impl Ticker {
         self.tell_writes(sample.at_ns);
         self.feed.stop();
         if let Some(twin) = &mut self.twin {
-            twin.save();
+            twin.save(&self.health);
         }
         self.health.close(&self.pipeline, sample.at_ns);
         self.wishes.stop.store(true, Ordering::SeqCst);

@@ -198,14 +198,14 @@ impl Twin {
             Some(live::Notice::Learned(regime)) => {
                 let text = format!("what is usual {} has been learned; it is watched from now on", regime.words().0);
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "twin_learned", text));
-                self.save();
+                self.save(health);
             }
             Some(live::Notice::Begins(mismatch)) => self.differs(&mismatch, health, now_ns),
             Some(live::Notice::Ends(regime)) => self.agrees(regime, health, now_ns),
         }
         self.ask_when_due(now_ns, health);
         if self.saved.elapsed() >= SAVE_EVERY {
-            self.save();
+            self.save(health);
         }
         if self.stored {
             health.beside(self.values());
@@ -231,7 +231,7 @@ impl Twin {
         let earliest_ns = self.begun_ns.map_or(now_ns, |begun_ns| begun_ns + APART_NS);
         let at_ns = (at_ns + AFTER_NS).max(now_ns).max(earliest_ns);
         self.due.get_or_insert(Due { at_ns, from_ns: low_ns - BEFORE_NS });
-        self.save();
+        self.save(health);
     }
 
     fn raise(&self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
@@ -247,7 +247,7 @@ impl Twin {
         if self.mismatches().is_empty() && !self.diagnosing {
             self.due = None;
         }
-        self.save();
+        self.save(health);
     }
 
     fn mismatches(&self) -> Vec<Mismatch> {
@@ -296,19 +296,17 @@ impl Twin {
         }
         let memory = self.in_charge.take().map(|before| before.live.memory()).unwrap_or_default();
         self.put_in_charge(loaded, Remembered { toml: String::new(), memory, due: None });
-        self.save();
+        self.save(health);
     }
 
-    /// Saves what was learned: a new file in the place of the old one.
-    pub fn save(&mut self) {
+    /// Saves what was learned, beside the tick: a slow disk delays neither it nor the sign of life at the machine.
+    pub fn save(&mut self, health: &Health) {
         self.saved = Instant::now();
         let Some(InCharge { live, loaded }) = &self.in_charge else { return };
         let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
-        let saved = serde_json::to_string(&remembered)
-            .map_err(|error| error.to_string())
-            .and_then(|text| crate::twin::put(&self.memory, &text));
-        if let Err(problem) = saved {
-            tracing::warn!("what the twin has learned could not be saved: {problem}");
+        match serde_json::to_string(&remembered) {
+            Ok(text) => health.put(&self.memory, text),
+            Err(error) => tracing::warn!("what the twin has learned could not be saved: {error}"),
         }
     }
 }
