@@ -6,6 +6,7 @@ mod day;
 mod decisions;
 mod killed;
 mod late;
+mod latency;
 mod offsets;
 mod outputs;
 #[path = "../box/process.rs"]

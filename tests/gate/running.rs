@@ -20,7 +20,7 @@ pub(crate) fn prepared(directory: &Path, address: &str) -> PathBuf {
     config
 }
 
-fn start(config: &Path, speed: &str) -> (Gateway, String) {
+pub(crate) fn start(config: &Path, speed: &str) -> (Gateway, String) {
     let mut command = program();
     command.args(["run", "--config", text(config), "--listen", "127.0.0.1:0", "--speed", speed]);
     let mut gateway = Gateway::spawn(command);
@@ -148,48 +148,6 @@ fn say(socket: &Path, line: &str) -> String {
     let mut reply = String::new();
     BufReader::new(stream).read_line(&mut reply).expect("answered");
     reply
-}
-
-/// What the gateway itself adds between a sample and the write that it leads to: the lateness of the tick, merge, estimates,
-/// scripts, gate, and the way to the thread that writes. A sample is one merge delay (one and a quarter of the slowest period, 125 ms) behind its
-/// tick by design; that is told apart.
-///
-/// `cargo test --release --test gate added_latency -- --ignored --nocapture`
-#[test]
-#[ignore = "a minute in real time; tight limits that a loaded computer does not keep"]
-fn added_latency_from_sample_to_issued_write() {
-    const MERGE_DELAY_MS: f64 = 125.0;
-    let directory = tempfile::tempdir().expect("a directory");
-    let config = prepared(directory.path(), "simulated://lathe?dropouts_per_h=0&begun_s=110");
-    let turning = "let n = memory.n ?? 0.0; memory.n = if n > 19.0 { 0.0 } else { n + 1.0 };\n\
-                   request_feed_override(if n < 10.0 { 70 } else { 95 }, \"to and fro\");";
-    std::fs::write(directory.path().join("data/scripts/slow.rhai"), turning).expect("a script");
-    let (gateway, address) = start(&config, "1");
-    wait_for("a decision", Duration::from_secs(60), || gate(&address)["permitted_pct"].is_number().then_some(()));
-    assert_eq!(order(&config, &["arm", "--by", "fitter"]).0, Some(0));
-    std::thread::sleep(Duration::from_secs(75));
-    gateway.stop();
-    let database = directory.path().join("data/history.db");
-    let sql = "SELECT sample_to_write_ms AS ms, write_to_seen_ms AS seen FROM reactions";
-    let told = stdout(&run(&["history", "query", "--history", text(&database), "--json", "--sql", sql]));
-    let document: Value = serde_json::from_str(&told).expect("JSON");
-    let column = |name: &str| {
-        let rows = document["rows"].as_array().expect("rows");
-        let mut values: Vec<f64> = rows.iter().filter_map(|row| row[name].as_f64()).collect();
-        values.sort_by(f64::total_cmp);
-        values
-    };
-    let at = |values: &[f64], share: f64| values[((values.len() as f64 * share) as usize).min(values.len() - 1)];
-    let (write, seen) = (column("ms"), column("seen"));
-    let (p50, p99) = (at(&write, 0.5) - MERGE_DELAY_MS, at(&write, 0.99) - MERGE_DELAY_MS);
-    println!(
-        "{} writes: added by the gateway p50 {p50:.3} ms, p99 {p99:.3} ms; from the write to the ladder showing it p50 {:.1} ms, p99 \
-         {:.1} ms",
-        write.len(),
-        at(&seen, 0.5),
-        at(&seen, 0.99)
-    );
-    assert!(write.len() > 50 && p99 <= 1.0, "{} writes, p99 {p99} ms", write.len());
 }
 
 #[test]
