@@ -7,6 +7,9 @@ use crate::units::OverridePct;
 use std::time::Duration;
 use thiserror::Error;
 
+/// What to do next where only the control itself can tell more.
+pub const SEE_DOCTOR: &str = "Look at what the control answers: cnc-gateway doctor with this address";
+
 /// Why a source gave nothing. A failed line, a refusing machine, an answer that makes no sense and a machine that is
 /// switched off are four different things to the person standing in front of it.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

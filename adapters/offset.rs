@@ -6,7 +6,7 @@
 //! control has taken it: the intent stays in the account until the control was read again.
 
 use crate::clock::Clock;
-use crate::driver::SourceError;
+use crate::driver::{SEE_DOCTOR, SourceError};
 use serde::{Deserialize, Serialize};
 
 /// An axis whose offset can be shifted.
@@ -72,6 +72,9 @@ pub trait OffsetSink: Send {
     /// The address, as in the configuration.
     fn name(&self) -> &str;
 
+    /// What the offset is called at this control: `the external work offset`.
+    fn called(&self) -> &'static str;
+
     /// The offset in force, um, where it may be moved now.
     ///
     /// # Errors
@@ -84,6 +87,40 @@ pub trait OffsetSink: Send {
     /// # Errors
     /// [`SourceError::Refused`] where the control says no. After any error the offset may have been taken or not.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError>;
+
+    /// The offset of this axis is not read or written, and why.
+    fn refused(&self, axis: Axis, what: &str, next: &str) -> SourceError {
+        SourceError::Refused {
+            source_name: self.name().to_owned(),
+            request: format!("{} of {}", self.called(), axis.word()),
+            what: what.to_owned(),
+            next: next.to_owned(),
+        }
+    }
+
+    /// May the offset be moved? `at_rest` is what the control says: nothing runs and nothing is held, or `None` where it
+    /// does not say.
+    ///
+    /// # Errors
+    /// [`SourceError::Refused`] while a program runs, or where nobody knows.
+    fn movable(&self, axis: Axis, at_rest: Option<bool>) -> Result<(), SourceError> {
+        match at_rest {
+            Some(true) => Ok(()),
+            Some(false) => Err(self.refused(axis, "a program runs", "It is done between two programs")),
+            None => Err(self.refused(axis, "the state of the control is unknown", SEE_DOCTOR)),
+        }
+    }
+
+    /// Is the offset, looked at once more before it is written, still the one that was found?
+    ///
+    /// # Errors
+    /// [`SourceError::Refused`] where somebody has set another one in between.
+    fn unchanged(&self, axis: Axis, now_um: f64, found_um: f64) -> Result<(), SourceError> {
+        if now_um == found_um {
+            return Ok(());
+        }
+        Err(self.refused(axis, "somebody has just changed it", "It is looked at again"))
+    }
 }
 
 /// What became of what was written last, by what is found.

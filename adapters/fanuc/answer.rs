@@ -1,6 +1,7 @@
 //! What a controller answers, typed. Numbers are in the unit that the question implies.
 
 use super::code::ReturnCode;
+use crate::driver::SEE_DOCTOR;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -158,9 +159,6 @@ impl ItemError {
         }
     }
 }
-
-/// Next step where what a control answers has to be looked at.
-pub(super) const SEE_DOCTOR: &str = "Look at what the control answers: cnc-gateway doctor with this address";
 
 /// What became of one item.
 pub type ItemResult = Result<Answer, ItemError>;

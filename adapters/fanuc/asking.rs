@@ -4,12 +4,12 @@
 //! acknowledged, and the gateway switches the bit off again. So a request counts once however often it is sent, a line
 //! that breaks in between leaves nothing that asks a second time, and a ladder without the rungs is found out.
 
-use super::answer::{Answer, SEE_DOCTOR};
+use super::answer::Answer;
 use super::item::{Area, Item, Stretch, Write};
 use super::line::Line;
 use super::server::ladder::request_bit;
 use crate::clock::Clock;
-use crate::driver::{LadderRequest, SourceError};
+use crate::driver::{LadderRequest, SEE_DOCTOR, SourceError};
 
 /// The ladder is looked at this often before it counts as silent.
 const LOOKS: u8 = 3;

@@ -6,11 +6,11 @@
 //! the gate's account ([`crate::offset::Ledger`]). Increment system IS-B in millimetres only, where an increment is a
 //! micrometre.
 
-use super::answer::{Answer, SEE_DOCTOR, Status};
+use super::answer::{Answer, Status};
 use super::item::{Item, Write};
 use super::line::{Asked, Line};
 use crate::clock::Clock;
-use crate::driver::SourceError;
+use crate::driver::{SEE_DOCTOR, SourceError};
 use crate::offset::{Axis, OffsetSink};
 
 /// The external offsets of the axes that the control names with the letters X, Y and Z.
@@ -51,20 +51,15 @@ impl ExternalOffsets {
         }
         Ok(um.round())
     }
-
-    fn refused(&self, axis: Axis, what: &str, next: &str) -> SourceError {
-        SourceError::Refused {
-            source_name: self.name.clone(),
-            request: format!("the external work offset of {}", axis.word()),
-            what: what.to_owned(),
-            next: next.to_owned(),
-        }
-    }
 }
 
 impl OffsetSink for ExternalOffsets {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn called(&self) -> &'static str {
+        "the external work offset"
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
@@ -77,18 +72,18 @@ impl OffsetSink for ExternalOffsets {
                 "Only machines in millimetres are shifted",
             ));
         }
-        match asked.of(Item::Status) {
-            Some(Ok(Answer::Status(Status { run: 0, .. }))) => self.offset_um(axis, item, &asked),
-            Some(Ok(Answer::Status(_))) => Err(self.refused(axis, "a program runs", "It is done between two programs")),
-            _ => Err(self.refused(axis, "the state of the control is unknown", SEE_DOCTOR)),
-        }
+        let at_rest = match asked.of(Item::Status) {
+            Some(Ok(Answer::Status(Status { run, .. }))) => Some(*run == 0),
+            _ => None,
+        };
+        self.movable(axis, at_rest)?;
+        self.offset_um(axis, item, &asked)
     }
 
     /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
-        if self.at_rest(clock, axis)? != found_um {
-            return Err(self.refused(axis, "somebody has just changed it", "It is looked at again"));
-        }
+        let now_um = self.at_rest(clock, axis)?;
+        self.unchanged(axis, now_um, found_um)?;
         let number = self.number(clock, axis)?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; an increment is a micrometre")]
         let value = wanted_um.round() as i32;

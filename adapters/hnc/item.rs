@@ -109,12 +109,11 @@ pub mod axis {
     pub const LOAD_CUR: i32 = 29;
 }
 
-/// Number of a register's kind (`HncRegType`), and the bytes that one register has.
+/// Number of a register's kind (`HncRegType`).
 #[must_use]
-pub fn register_type(at: Register) -> Option<(i32, usize)> {
-    let kinds = [('X', 1), ('Y', 1), ('F', 2), ('G', 2), ('R', 1), ('W', 2), ('D', 4), ('B', 4), ('P', 4)];
-    let at = kinds.iter().position(|(kind, _)| *kind == at.kind)?;
-    Some((i32::try_from(at).ok()?, kinds[at].1))
+pub fn register_type(at: Register) -> Option<i32> {
+    let at = ['X', 'Y', 'F', 'G', 'R', 'W', 'D', 'B', 'P'].iter().position(|kind| *kind == at.kind)?;
+    i32::try_from(at).ok()
 }
 
 #[cfg(test)]
@@ -124,10 +123,7 @@ mod tests {
     #[test]
     fn registers_have_the_numbers_of_the_header() {
         let of = |kind| register_type(Register { kind, index: 0 });
-        assert_eq!(
-            (of('X'), of('G'), of('R'), of('D'), of('P')),
-            (Some((0, 1)), Some((3, 2)), Some((4, 1)), Some((6, 4)), Some((8, 4)))
-        );
+        assert_eq!(['X', 'G', 'R', 'D', 'P'].map(of), [0, 3, 4, 6, 8].map(Some));
         assert_eq!(of('Q'), None);
     }
 }

@@ -138,7 +138,7 @@ impl Line {
         let mut inner = self.locked();
         for (at, value) in words {
             let request = format!("writing {at}");
-            let Some((kind, _)) = register_type(*at) else {
+            let Some(kind) = register_type(*at) else {
                 return Err(inner.refused(&request, "there is no such register".to_owned()));
             };
             let index = i32::try_from(at.index).unwrap_or(i32::MAX);

@@ -11,14 +11,13 @@ use super::decode::{text, whole};
 use super::item::{self, Item, Width, axis, channel, flag, register_type};
 use super::line::Line;
 use crate::clock::Clock;
-use crate::driver::SourceError;
+use crate::driver::{SEE_DOCTOR, SourceError};
 use crate::nclink::mailbox::Register;
 use crate::nclink::offset_mailbox::Registers;
 use crate::offset::{Axis, OffsetSink};
 
 /// Axes whose names are asked for.
 const AXES: i32 = 3;
-const DOCTOR: &str = "Look at what the control answers: cnc-gateway doctor with this address.";
 
 /// Nothing runs and nothing is held; `None` where the controller does not say.
 const STATE: [Item; 2] = [flag(channel::CYCLE), flag(channel::HOLD)];
@@ -37,7 +36,7 @@ impl Registers for HncRegisters {
     }
 
     fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
-        let (kind, _) = register_type(first).unwrap_or((-1, 0));
+        let kind = register_type(first).unwrap_or(-1);
         let registers =
             (first.index..first.index + count).map(|at| Item::Register(kind, i32::try_from(at).unwrap_or(-1)));
         let items: Vec<Item> = STATE.into_iter().chain(registers).collect();
@@ -57,22 +56,28 @@ pub(super) struct ZeroOffsets {
     line: Line,
     /// What a count is, µm.
     unit_um: f64,
+    /// Logical axes, once known.
+    numbers: [Option<i32>; Axis::ALL.len()],
 }
 
 impl ZeroOffsets {
     pub(super) fn new(line: Line, unit_um: f64) -> Self {
-        Self { line, unit_um }
+        Self { line, unit_um, numbers: Default::default() }
     }
 
-    /// The logical axis of this letter.
-    fn number(&self, axis: Axis) -> Result<i32, SourceError> {
+    /// The logical axis of this letter, which the control is asked for once.
+    fn number(&mut self, axis: Axis) -> Result<i32, SourceError> {
+        if let Some(number) = self.numbers[axis.index()] {
+            return Ok(number);
+        }
         let names: Vec<Item> = (0..AXES).map(|number| Item::Axis(axis::NAME, number, Width::Text)).collect();
         let found = self.line.read_each(&names)?;
         let named =
             |name: &ItemResult| text(name).is_ok_and(|name| Axis::of(name.get(..1).unwrap_or("")) == Some(axis));
         let number = found.iter().position(named).and_then(|at| i32::try_from(at).ok());
+        self.numbers[axis.index()] = number;
         number.ok_or_else(|| {
-            self.refused(axis, "the control has no axis of this name".to_owned(), "Correct `axes` under [gate.offset].")
+            self.refused(axis, "the control has no axis of this name", "Correct `axes` under [gate.offset].")
         })
     }
 
@@ -83,9 +88,9 @@ impl ZeroOffsets {
             Some(unit_um) if (unit_um / self.unit_um - 1.0).abs() < 1e-6 => Ok(()),
             Some(unit_um) => {
                 let what = format!("a count is {unit_um} µm for the control and {} µm in the address", self.unit_um);
-                Err(self.refused(axis, what, "Compare one shift at the panel and correct offset_unit_um=."))
+                Err(self.refused(axis, &what, "Compare one shift at the panel and correct offset_unit_um=."))
             }
-            None => Err(self.refused(axis, "the control does not say what a count is".to_owned(), DOCTOR)),
+            None => Err(self.refused(axis, "the control does not say what a count is", SEE_DOCTOR)),
         }
     }
 
@@ -95,7 +100,7 @@ impl ZeroOffsets {
             Err(ItemError::NotOffered) => "the library has no HNC_CrdsGetValue".to_owned(),
             other => format!("the external zero offset cannot be read ({other:?})"),
         };
-        Err(self.refused(axis, what, "Write offset=D110 in the address, with rungs in the ladder."))
+        Err(self.refused(axis, &what, "Write offset=D110 in the address, with rungs in the ladder."))
     }
 
     fn whole_um(&self, axis: Axis, counts: i32) -> Result<f64, SourceError> {
@@ -104,16 +109,7 @@ impl ZeroOffsets {
             return Ok(um.round());
         }
         let next = "Round the external zero offset to whole micrometres at the panel.";
-        Err(self.refused(axis, format!("the operator has set {um} µm, which is not whole"), next))
-    }
-
-    fn refused(&self, axis: Axis, what: String, next: &str) -> SourceError {
-        SourceError::Refused {
-            source_name: self.line.name().to_owned(),
-            request: format!("the external zero offset of {}", axis.word()),
-            what,
-            next: next.to_owned(),
-        }
+        Err(self.refused(axis, &format!("the operator has set {um} µm, which is not whole"), next))
     }
 }
 
@@ -122,29 +118,26 @@ impl OffsetSink for ZeroOffsets {
         self.line.name()
     }
 
+    fn called(&self) -> &'static str {
+        "the external zero offset"
+    }
+
     fn at_rest(&mut self, _: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
         let zero = Item::ExternalZero(self.number(axis)?);
         let [cycle, hold] = STATE;
         let found = self.line.read_each(&[cycle, hold, item::MOVE_UNIT, zero])?;
         let [state @ .., per_mm, zero] = found.as_slice() else {
-            return Err(self.refused(axis, "the control does not answer".to_owned(), DOCTOR));
+            return Err(self.refused(axis, "the control does not answer", SEE_DOCTOR));
         };
-        match at_rest(state) {
-            Some(true) => {}
-            Some(false) => {
-                return Err(self.refused(axis, "a program runs".to_owned(), "It is done between two programs."));
-            }
-            None => return Err(self.refused(axis, "the state of the control is unknown".to_owned(), DOCTOR)),
-        }
+        self.movable(axis, at_rest(state))?;
         self.same_unit(axis, per_mm)?;
         self.offset_um(axis, zero)
     }
 
     /// Looks once more before it writes: a program may have been started, and the operator may have set something else.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
-        if self.at_rest(clock, axis)? != found_um {
-            return Err(self.refused(axis, "somebody has just changed it".to_owned(), "It is looked at again."));
-        }
+        let now_um = self.at_rest(clock, axis)?;
+        self.unchanged(axis, now_um, found_um)?;
         let number = self.number(axis)?;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
         let counts = (wanted_um / self.unit_um).round() as i32;

@@ -155,41 +155,29 @@ impl<R: Registers> LadderOffsets<R> {
         }
         let [first, last] = self.mailbox.ends();
         let next = "Name eight free registers with offset= in the address.";
-        Err(self.refused(axis, format!("{first} to {last} cannot be read"), next))
+        Err(self.refused(axis, &format!("{first} to {last} cannot be read"), next))
     }
 
     /// What stands there while nothing runs.
     fn standing(&mut self, clock: &dyn Clock, axis: Axis) -> Result<Letters, SourceError> {
         let (letters, at_rest) = self.look(clock, axis)?;
-        match at_rest {
-            Some(true) => Ok(letters),
-            Some(false) => Err(self.refused(axis, "a program runs".to_owned(), "It is done between two programs.")),
-            None => {
-                let next = "Look at what the control answers: cnc-gateway doctor with this address.";
-                Err(self.refused(axis, "the state of the control is unknown".to_owned(), next))
-            }
-        }
-    }
-
-    fn refused(&self, axis: Axis, what: String, next: &str) -> SourceError {
-        SourceError::Refused {
-            source_name: self.registers.name().to_owned(),
-            request: format!("the offset of {}", axis.word()),
-            what,
-            next: next.to_owned(),
-        }
+        self.movable(axis, at_rest).map(|()| letters)
     }
 
     fn not_taken(&self, axis: Axis) -> SourceError {
         let [first, last] = self.mailbox.ends();
         let what = format!("not held: no ladder takes the letter in {first} to {last}");
-        self.refused(axis, what, "Let the machine's maker add the rungs, or compare offset= with the ladder.")
+        self.refused(axis, &what, "Let the machine's maker add the rungs, or compare offset= with the ladder.")
     }
 }
 
 impl<R: Registers> OffsetSink for LadderOffsets<R> {
     fn name(&self) -> &str {
         self.registers.name()
+    }
+
+    fn called(&self) -> &'static str {
+        "the offset"
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
@@ -199,9 +187,7 @@ impl<R: Registers> OffsetSink for LadderOffsets<R> {
     /// Looks once more before it writes: a program may have been started.
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
         let found = self.standing(clock, axis)?;
-        if micrometres(found.in_force_um[axis.index()]) != found_um {
-            return Err(self.refused(axis, "somebody has just changed it".to_owned(), "It is looked at again."));
-        }
+        self.unchanged(axis, micrometres(found.in_force_um[axis.index()]), found_um)?;
         let mut wanted = found.in_force_um;
         #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
         let whole_um = wanted_um.round() as i64;

@@ -16,15 +16,6 @@ impl SimulatedOffsets {
     pub(super) fn new(name: String, machine: Simulated) -> Self {
         Self { name, machine }
     }
-
-    fn refused(&self, axis: Axis, what: &str, next: &str) -> SourceError {
-        SourceError::Refused {
-            source_name: self.name.clone(),
-            request: format!("the external offset of {}", axis.word()),
-            what: what.to_owned(),
-            next: next.to_owned(),
-        }
-    }
 }
 
 impl OffsetSink for SimulatedOffsets {
@@ -32,21 +23,22 @@ impl OffsetSink for SimulatedOffsets {
         &self.name
     }
 
+    fn called(&self) -> &'static str {
+        "the external offset"
+    }
+
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
         let panel = self.machine.moment(clock.now_ns()).panel;
         if !panel.booted {
             return Err(SourceError::Off { source_name: self.name.clone() });
         }
-        if ![execution::READY, execution::PROGRAM_COMPLETED].contains(&panel.execution) {
-            return Err(self.refused(axis, "a program runs", "It is done between two programs"));
-        }
+        self.movable(axis, Some([execution::READY, execution::PROGRAM_COMPLETED].contains(&panel.execution)))?;
         Ok(self.machine.offset_um(axis))
     }
 
     fn write(&mut self, clock: &dyn Clock, axis: Axis, found_um: f64, wanted_um: f64) -> Result<f64, SourceError> {
-        if self.at_rest(clock, axis)? != found_um {
-            return Err(self.refused(axis, "somebody has just changed it", "It is looked at again"));
-        }
+        let now_um = self.at_rest(clock, axis)?;
+        self.unchanged(axis, now_um, found_um)?;
         self.machine.locked().write_offset(axis, wanted_um.round());
         Ok(self.machine.offset_um(axis))
     }

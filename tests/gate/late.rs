@@ -76,6 +76,10 @@ impl OffsetSink for Controller {
         "test"
     }
 
+    fn called(&self) -> &'static str {
+        "the offset"
+    }
+
     fn at_rest(&mut self, _: &dyn Clock, _: Axis) -> Result<f64, SourceError> {
         Ok(0.0)
     }

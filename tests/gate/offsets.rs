@@ -247,6 +247,10 @@ impl OffsetSink for Broken {
         self.sink.name()
     }
 
+    fn called(&self) -> &'static str {
+        self.sink.called()
+    }
+
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
         self.sink.at_rest(clock, axis)
     }

@@ -76,13 +76,18 @@ impl SimulatedControl {
     /// How the ladder combines the operator's dial and the mailbox.
     #[must_use]
     pub fn with_rule(mut self, rule: LadderRule) -> Self {
-        std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(|ladder| ladder.rule = rule);
+        self.every().for_each(|ladder| ladder.rule = rule);
         self
+    }
+
+    /// The rungs of every path.
+    fn every(&mut self) -> impl Iterator<Item = &mut Ladder> {
+        std::iter::once(&mut self.ladder).chain(&mut self.further)
     }
 
     /// The operator turns the dial of the feed override.
     pub fn turn_dial(&mut self, dial: OverridePct) {
-        std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(|ladder| ladder.dial = dial);
+        self.every().for_each(|ladder| ladder.dial = dial);
     }
 
     /// Every scan since the last look, and what they mean for the machine.
@@ -127,7 +132,7 @@ impl Served for SimulatedControl {
         let moment = self.machine.moment(now_ns);
         if !moment.panel.booted {
             self.controller.memory.power_off();
-            std::iter::once(&mut self.ladder).chain(&mut self.further).for_each(Ladder::power_off);
+            self.every().for_each(Ladder::power_off);
             self.scanned_ns = now_ns;
             return None;
         }
