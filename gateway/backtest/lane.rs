@@ -5,7 +5,7 @@ use super::seconds;
 use crate::pipeline::Tally;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::estimators::State;
-use rules::script::{Decision, Problem, Stop};
+use rules::script::{Decision, OverrideRequest, Problem, Stop};
 use std::sync::Arc;
 
 /// A longer step between two samples is a gap.
@@ -93,7 +93,8 @@ impl Lane {
         }
         self.stops(at_ns, decisions);
         let requests = decisions.iter().filter_map(|decision| decision.request.as_ref());
-        let before = std::mem::replace(&mut self.pct, least(requests.map(|request| request.pct)));
+        let pct = OverrideRequest::least(requests).map(|request| request.pct);
+        let before = std::mem::replace(&mut self.pct, pct);
         if at_ns >= self.from_ns {
             self.tally.step(at_ns, state);
             self.asked.add(self.pct, before, step_ns);
@@ -212,12 +213,6 @@ impl Lane {
     pub fn left_out(&self) -> u64 {
         self.left_out
     }
-}
-
-/// The least request, as the host takes it; one that is no number goes first.
-fn least(requests: impl Iterator<Item = f64>) -> Option<f64> {
-    let key = |pct: &f64| if pct.is_finite() { *pct } else { f64::NEG_INFINITY };
-    requests.min_by(|a, b| key(a).total_cmp(&key(b)))
 }
 
 /// Is it another request? No request is the programmed feed.

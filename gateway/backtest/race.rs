@@ -74,22 +74,20 @@ impl Batch {
 struct Split {
     /// What both have in common; where the settings differ, everything of the running set.
     first: Runner,
-    /// What only the running set has; none where `first` has it all.
+    /// What only the running set has. None where `first` has it all, and the edited scripts go by estimates of their own.
     running: Option<Runner>,
     edited: Runner,
-    /// Do the edited scripts go by the decisions and estimates of `first` too?
-    shared: bool,
 }
 
 impl Split {
     fn new(running: ScriptSet, edited: ScriptSet) -> Self {
         if running.settings() != edited.settings() {
             let (first, edited) = (Runner::new(running, true), Runner::new(edited, true));
-            return Self { first, running: None, edited, shared: false };
+            return Self { first, running: None, edited };
         }
         let (common, running, edited) = running.split(edited);
         let first = Runner::new(common, true);
-        Self { first, running: Some(Runner::new(running, false)), edited: Runner::new(edited, false), shared: true }
+        Self { first, running: Some(Runner::new(running, false)), edited: Runner::new(edited, false) }
     }
 }
 
@@ -115,8 +113,8 @@ pub(super) fn race(
     read: impl FnOnce(&mut dyn FnMut(&Sample)) -> Result<(), HistoryError>,
 ) -> Result<Raced, HistoryError> {
     let lanes = [&running, &edited].map(|set| Lane::new(from_ns, set.len()));
-    let Split { first, running, edited, shared } = Split::new(running, edited);
-    let mut finish = Finish::new(from_ns, lanes, running, edited, shared);
+    let Split { first, running, edited } = Split::new(running, edited);
+    let mut finish = Finish::new(from_ns, lanes, running, edited);
     let (to_first, of_reader) = sync_channel(BATCHES_MAX);
     let (to_last, of_first) = sync_channel(BATCHES_MAX);
     let (give_back, empty) = sync_channel(2 * BATCHES_MAX + 3);
@@ -178,7 +176,6 @@ struct Finish {
     lanes: [Lane; 2],
     running: Option<Runner>,
     edited: Runner,
-    shared: bool,
     rows: u64,
     first_ns: Option<TimeNs>,
     last_ns: Option<TimeNs>,
@@ -187,9 +184,9 @@ struct Finish {
 }
 
 impl Finish {
-    fn new(from_ns: TimeNs, lanes: [Lane; 2], running: Option<Runner>, edited: Runner, shared: bool) -> Self {
+    fn new(from_ns: TimeNs, lanes: [Lane; 2], running: Option<Runner>, edited: Runner) -> Self {
         let (first_ns, last_ns) = (None, None);
-        Self { from_ns, lanes, running, edited, shared, rows: 0, first_ns, last_ns, covered_ns: 0, differing_ns: 0 }
+        Self { from_ns, lanes, running, edited, rows: 0, first_ns, last_ns, covered_ns: 0, differing_ns: 0 }
     }
 
     fn take(&mut self, batch: &mut Batch) {
@@ -210,11 +207,13 @@ impl Finish {
             let both = [first, decision];
             lane.step(at_ns, step_ns, own.state, if shared { &both } else { &both[1..] });
         };
+        // Then the edited scripts go by the decisions and estimates of `first` too.
+        let shared = self.running.is_some();
         match &mut self.running {
             Some(runner) => of(runner, running, true),
             None => running.step(at_ns, step_ns, estimates.state, &[first]),
         }
-        of(&mut self.edited, edited, self.shared);
+        of(&mut self.edited, edited, shared);
         if at_ns < self.from_ns {
             return;
         }

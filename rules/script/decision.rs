@@ -39,6 +39,14 @@ pub struct OverrideRequest {
     pub version: u64,
 }
 
+impl OverrideRequest {
+    /// The least of several requests; one that is no number goes first, because the gate must see and refuse it.
+    pub fn least<'a>(requests: impl Iterator<Item = &'a Self>) -> Option<&'a Self> {
+        let key = |request: &Self| if request.pct.is_finite() { request.pct } else { f64::NEG_INFINITY };
+        requests.min_by(|a, b| key(a).total_cmp(&key(b)))
+    }
+}
+
 /// What a script can ask the operator's machine to do besides another feed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stop {

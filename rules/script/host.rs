@@ -177,7 +177,7 @@ impl Host {
     /// What the scripts ask for now.
     fn gather(&mut self) {
         let Decision { request, stops, offsets, .. } = &mut self.decision;
-        *request = least(self.slots.iter().filter_map(Slot::request)).cloned();
+        *request = OverrideRequest::least(self.slots.iter().filter_map(Slot::request)).cloned();
         stops.clear();
         offsets.clear();
         for slot in &self.slots {
@@ -249,10 +249,4 @@ impl Host {
         self.decision = Decision { at_ns, ..Decision::default() };
         self.slots.iter_mut().for_each(Slot::withdraw);
     }
-}
-
-/// The least of several requests; one that is no number goes first, because the gate must see and refuse it.
-fn least<'a>(requests: impl Iterator<Item = &'a OverrideRequest>) -> Option<&'a OverrideRequest> {
-    let key = |request: &OverrideRequest| if request.pct.is_finite() { request.pct } else { f64::NEG_INFINITY };
-    requests.min_by(|a, b| key(a).total_cmp(&key(b)))
 }
