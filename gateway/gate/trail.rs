@@ -154,20 +154,8 @@ impl Trail {
     /// The same for the table of commands.
     #[must_use]
     pub fn command(&self, written: &Written, target: &str) -> Option<Command> {
-        let Audit { at_ns, before, asked, after, unit, reason, script, script_version, .. } = self.write(written)?;
-        Some(Command {
-            at_ns,
-            command: "feed_override_pct".to_owned(),
-            target: target.to_owned(),
-            before,
-            asked,
-            after,
-            unit,
-            outcome: if written.fault.is_some() { "failed" } else { "done" }.to_owned(),
-            reason,
-            script,
-            script_version,
-        })
+        let outcome = if written.fault.is_some() { "failed" } else { "done" };
+        Some(self.write(written)?.as_command("feed_override_pct", target, outcome))
     }
 }
 

@@ -189,6 +189,14 @@ pub struct Audit {
 }
 
 impl Audit {
+    /// The same as a row of the table of commands: what was written to which machine, and what became of it there.
+    #[must_use]
+    pub fn as_command(&self, command: &str, target: &str, outcome: &str) -> Command {
+        let Self { at_ns, before, asked, after, unit, reason, script, script_version, .. } = self.clone();
+        let [command, target, outcome] = [command, target, outcome].map(str::to_owned);
+        Command { at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version }
+    }
+
     /// As it comes back from the file: numbers that are none become absent, and -0 becomes 0.
     pub(crate) fn storable(&self) -> Self {
         let number = |value: Option<f64>| value.filter(|value| value.is_finite()).map(|value| value + 0.0);

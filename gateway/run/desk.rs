@@ -29,11 +29,21 @@ const LIE_IN_WAIT: Duration = Duration::from_micros(900);
 #[derive(Debug, Default)]
 struct Paper {
     verdict: Option<(Instant, Verdict)>,
-    asks: VecDeque<(Instant, Ask)>,
-    orders: VecDeque<(Instant, Order)>,
+    asks: Waiting<Ask>,
+    orders: Waiting<Order>,
     closing: bool,
     /// When the last verdict came, if it was armed: the next is due a period later.
     armed_at: Option<Instant>,
+}
+
+/// What waits, and since when.
+type Waiting<T> = VecDeque<(Instant, T)>;
+
+/// Queues these from now on; gives those for which there is no room.
+fn queue<T: Clone>(waiting: &mut Waiting<T>, most: usize, new: &[T]) -> Vec<T> {
+    let (taken, left) = new.split_at(most.saturating_sub(waiting.len()).min(new.len()));
+    waiting.extend(taken.iter().map(|it| (Instant::now(), it.clone())));
+    left.to_vec()
 }
 
 /// See the [module](self).
@@ -74,13 +84,7 @@ impl Desk {
         if !verdict.armed {
             refused.extend(paper.asks.drain(..).map(|(_, ask)| ask));
         }
-        for ask in asks {
-            if paper.asks.len() < ASKS_MAX {
-                paper.asks.push_back((Instant::now(), ask.clone()));
-            } else {
-                refused.push(ask.clone());
-            }
-        }
+        refused.extend(queue(&mut paper.asks, ASKS_MAX, asks));
         drop(paper);
         self.told();
         refused
@@ -95,13 +99,7 @@ impl Desk {
             withdrawn.extend(paper.orders.iter().map(|(_, order)| *order).filter(is_step));
             paper.orders.retain(|(_, order)| !is_step(order));
         }
-        for order in orders {
-            if paper.orders.len() < ORDERS_MAX {
-                paper.orders.push_back((Instant::now(), *order));
-            } else {
-                withdrawn.push(*order);
-            }
-        }
+        withdrawn.extend(queue(&mut paper.orders, ORDERS_MAX, orders));
         drop(paper);
         if !orders.is_empty() {
             self.told();

@@ -158,8 +158,5 @@ pub fn command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
         "settled" | "replaced" => return None,
         _ => "failed",
     };
-    let Audit { at_ns, before, asked, after, unit, reason, script, script_version, .. } = row.clone();
-    let command = format!("{}_offset_{verb}", moved.order.axis().word());
-    let (target, outcome) = (target.to_owned(), outcome.to_owned());
-    Some(Command { at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version })
+    Some(row.as_command(&format!("{}_offset_{verb}", moved.order.axis().word()), target, outcome))
 }

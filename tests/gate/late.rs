@@ -12,6 +12,9 @@ use gateway::run::hand::{Hand, Said, Tools};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
+/// What waits for the controller beside the override.
+const SHIFT: Order = Order::Shift { axis: Axis::Z, from_um: 0.0, wanted_um: 5.0 };
+
 /// What a controller may do to whoever writes to it.
 #[derive(Default)]
 struct State {
@@ -104,6 +107,16 @@ fn hand(controller: &Controller, directory: &tempfile::TempDir) -> Hand {
         .expect("a thread")
 }
 
+/// A hand whose controller has begun to write 90 % and does not come back from it.
+fn stuck(directory: &tempfile::TempDir) -> (Controller, Hand) {
+    let controller = Controller::default();
+    let mut hand = hand(&controller, directory);
+    controller.set(|state| state.stuck = true);
+    lay(&mut hand, &verdict(90, true), &[]);
+    std::thread::sleep(Duration::from_millis(100));
+    (controller, hand)
+}
+
 /// Listens until something of this kind is told.
 fn told<T>(hand: &mut Hand, mut of: impl FnMut(Said) -> Option<T>) -> T {
     let until = Instant::now() + Duration::from_secs(20);
@@ -181,15 +194,10 @@ fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
 #[test]
 fn what_waits_for_a_slow_controller_goes_nowhere_once_the_gate_is_disarmed() {
     let directory = tempfile::tempdir().expect("a directory");
-    let controller = Controller::default();
-    let mut hand = hand(&controller, &directory);
-    controller.set(|state| state.stuck = true);
-    lay(&mut hand, &verdict(90, true), &[]);
-    std::thread::sleep(Duration::from_millis(100));
+    let (controller, mut hand) = stuck(&directory);
     let stop = Ask { request: LadderRequest::Stop, reason: "worn".into(), script: "a.rhai".into(), version: 1 };
     lay(&mut hand, &verdict(80, true), &[stop]);
-    let shift = Order::Shift { axis: Axis::Z, from_um: 0.0, wanted_um: 5.0 };
-    hand.shift(&[shift], true, 0, |_| {});
+    hand.shift(&[SHIFT], true, 0, |_| {});
     // Disarmed, by a person or because the time is over, while all that waits.
     let said = lay(&mut hand, &verdict(100, false), &[]);
     assert!(matches!(&said[..], [Said::Asked(_, Some(why))] if why.contains("disarmed")), "{said:?}");
@@ -204,14 +212,9 @@ fn what_waits_for_a_slow_controller_goes_nowhere_once_the_gate_is_disarmed() {
 #[test]
 fn what_has_waited_too_long_goes_nowhere_either() {
     let directory = tempfile::tempdir().expect("a directory");
-    let controller = Controller::default();
-    let mut hand = hand(&controller, &directory);
-    controller.set(|state| state.stuck = true);
-    lay(&mut hand, &verdict(90, true), &[]);
-    std::thread::sleep(Duration::from_millis(100));
+    let (controller, mut hand) = stuck(&directory);
     lay(&mut hand, &verdict(80, true), &[]);
-    let shift = Order::Shift { axis: Axis::Z, from_um: 0.0, wanted_um: 5.0 };
-    hand.shift(&[shift], true, 0, |_| {});
+    hand.shift(&[SHIFT], true, 0, |_| {});
     // The tick hangs from now on, and the controller for two seconds more.
     std::thread::sleep(Duration::from_millis(2300));
     controller.set(|state| state.stuck = false);
@@ -225,7 +228,7 @@ fn what_has_waited_too_long_goes_nowhere_either() {
         (fault.is_some() && withdrawn.is_some()).then_some(())
     });
     assert!(matches!(fault, Some(Fault::Late { silent_ms }) if silent_ms >= 2000), "{fault:?}");
-    assert_eq!(withdrawn, Some(shift));
+    assert_eq!(withdrawn, Some(SHIFT));
     hand.close(|_| {});
     assert_eq!(controller.log(), ["90", "100"], "neither the old verdict nor the old order");
 }
