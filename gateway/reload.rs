@@ -223,10 +223,7 @@ pub fn load_rest(directory: &Path, last: Option<ScriptSet>, problems: &[Problem]
         host.refuse(problems.to_vec());
         return Fallback::Last(count);
     }
-    let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
-    let files: Vec<ScriptFile> = read_directory(directory).unwrap_or_default();
-    let good: Vec<ScriptFile> = files.into_iter().filter(|file| !bad(file)).collect();
-    let fallback = match prepare(&good) {
+    let fallback = match right(directory, problems) {
         Ok(set) if !set.is_empty() => {
             let count = set.len();
             host.install(set);
@@ -240,6 +237,18 @@ pub fn load_rest(directory: &Path, last: Option<ScriptSet>, problems: &[Problem]
     };
     host.refuse(problems.to_vec());
     fallback
+}
+
+/// The scripts that can be read and have no problems. Where a file could not be read, nobody has looked at the others yet:
+/// those that are not right by themselves are left out too.
+fn right(directory: &Path, problems: &[Problem]) -> Loaded {
+    let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
+    let readable = paths(directory).unwrap_or_default().into_iter().filter_map(|path| read_script(&path).ok());
+    let mut files: Vec<ScriptFile> = readable.filter(|file| !bad(file)).collect();
+    prepare(&files).or_else(|_| {
+        files.retain(|file| prepare(std::slice::from_ref(file)).is_ok());
+        prepare(&files)
+    })
 }
 
 fn put_in_charge(loaded: Loaded, host: &mut Host) -> Result<usize, Vec<Problem>> {

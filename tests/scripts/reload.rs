@@ -137,6 +137,17 @@ fn a_start_with_a_broken_file_puts_the_others_in_charge_and_with_none_left_the_s
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
     assert_eq!(host.status().refused, problems, "and this is said");
 
+    fs::write(directory.path().join("c.rhai"), [0xff, 0xfe]).expect("written");
+    let mut host = Host::new();
+    let unreadable = load_now(directory.path(), &mut host).expect_err("c is no text");
+    assert_eq!(
+        load_rest(directory.path(), None, &unreadable, &mut host),
+        Fallback::Others(1),
+        "a, and neither b nor c"
+    );
+    assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
+    fs::remove_file(directory.path().join("c.rhai")).expect("removed");
+
     let last = compile(&[file("a.rhai", "request_feed_override(95, \"before\");")]).expect("it compiles");
     assert_eq!(load_rest(directory.path(), Some(last), &problems, &mut host), Fallback::Last(1));
     assert_eq!(request(&mut host, 0.1, &[]), Some(95.0), "what was in charge before goes first");
