@@ -1,7 +1,7 @@
 //! What is remembered besides samples: one struct per kind, one row each.
 
 use adapters::clock::TimeNs;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -161,7 +161,7 @@ pub struct Diagnosis {
 }
 
 /// A row of the gate's audit: what was asked for, what became of it, who or which script was behind it. See the table `audit`.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Audit {
     /// When.
     pub at_ns: TimeNs,

@@ -1,5 +1,6 @@
 //! The history of a running box: opened at the start, or again and again while the disk does not let it.
 
+use super::recent::{self, Recent};
 use crate::config;
 use crate::history::{
     self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Reader, Record, Retention, Span, Writer,
@@ -30,6 +31,8 @@ pub struct Kept {
     path: PathBuf,
     options: Options,
     writer: Option<Writer>,
+    /// The newest rows of the audit, for a start after a kill.
+    recent: Option<Recent>,
     /// Why there is no writer, and when to try again.
     closed: Option<(String, Instant)>,
     /// Rows in the file when it was opened.
@@ -52,6 +55,7 @@ impl Kept {
             path: config.path.clone(),
             options: options(config, beside),
             writer: None,
+            recent: None,
             closed: None,
             rows_before: 0,
             bytes_before: 0,
@@ -69,7 +73,14 @@ impl Kept {
     }
 
     fn try_open(&mut self) -> Result<(), HistoryError> {
+        recent::forget_without(&self.path);
         let writer = Writer::open(&self.path, self.options.clone())?;
+        let rows = recent::recover(&self.path, &writer);
+        if rows > 0 {
+            let text = format!("{rows} rows of the audit that the last end had cut off are in the history now");
+            Notice::new(Severity::Info, "audit_recovered", text).say();
+        }
+        self.recent = Some(Recent::start(&self.path));
         self.rows_before = rows_in(&self.path);
         end_alarms(&self.path, &writer);
         self.bytes_before = size(&self.path);
@@ -124,7 +135,11 @@ impl Kept {
 
     /// Hands in a row of the audit; false when it will not be stored.
     pub fn audit(&mut self, row: Audit) -> bool {
-        self.writer.as_ref().is_some_and(|writer| writer.record(row).is_some())
+        let stored = self.writer.as_ref().is_some_and(|writer| writer.record(row.clone()).is_some());
+        if let Some(recent) = self.recent.as_ref().filter(|_| stored) {
+            recent.put(row);
+        }
+        stored
     }
 
     /// Compacts and removes what is too old, in the background.
@@ -137,6 +152,7 @@ impl Kept {
     /// Makes everything durable and ends the writer.
     pub fn close(&mut self) {
         let Some(writer) = self.writer.take() else { return };
+        self.recent = None;
         let status = writer.close();
         let rows = self.rows_before + status.rows;
         match status.degraded {

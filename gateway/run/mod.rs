@@ -11,6 +11,7 @@ pub mod keep;
 pub mod open;
 pub mod pace;
 pub mod priority;
+pub mod recent;
 pub mod report;
 pub mod rules;
 pub mod save;

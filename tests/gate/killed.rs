@@ -73,3 +73,42 @@ fn a_killed_gateway_gives_the_machine_back_within_the_heartbeat_time() {
     );
     assert!(back < HEARTBEAT + Duration::from_secs(2), "{back:?}: heartbeat {HEARTBEAT:?}, and a loaded computer");
 }
+
+/// The history commits once a minute, so that the kill takes nearly all of the audit with it.
+#[test]
+fn a_kill_takes_no_row_of_the_audit() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let server = served();
+    let config = prepared(directory.path(), &server);
+    let written = std::fs::read_to_string(&config).expect("readable");
+    std::fs::write(&config, written + "[history]\ncommit_s = 60.0\n").expect("a configuration");
+    let start = || {
+        let mut command = program();
+        command.args(["run", "--config", text(&config), "--listen", "127.0.0.1:0"]);
+        let mut gateway = Gateway::spawn(command);
+        let address = gateway.address();
+        (gateway, address)
+    };
+    let database = directory.path().join("data/history.db");
+    let writes = || {
+        let told = stdout(&run(&["history", "audit", "--json", "--history", text(&database)]));
+        let document: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+        let rows = document["rows"].as_array().expect("rows").clone();
+        rows.into_iter().filter(|row| row["kind"] == "write" && row["outcome"] == "written").collect::<Vec<_>>()
+    };
+    let (gateway, address) = start();
+    let gate = |address: &str| get(address, "/api/v1/status").json()["gate"].clone();
+    wait_for("a decision", Duration::from_secs(60), || gate(&address)["permitted_pct"].is_number().then_some(()));
+    assert!(run(&["arm", "--by", "fitter", "--config", text(&config)]).status.success());
+    wait_for("70 % written", Duration::from_secs(100), || (gate(&address)["written_pct"] == 70.0).then_some(()));
+    gateway.kill();
+    let before = writes();
+    let (mut gateway, _) = start();
+    gateway.wait_said("rows of the audit that the last end had cut off");
+    gateway.stop();
+    let after = writes();
+    println!("write rows in the history: {} after the kill, {} after the next start", before.len(), after.len());
+    assert!(after.iter().any(|row| row["asked"] == 70.0), "the last one before the kill: {after:?}");
+    assert!(after.len() > before.len() && after[..before.len()] == before[..], "{before:?}; {after:?}");
+    assert!(run(&["history", "audit", "--verify", "--history", text(&database)]).status.success());
+}
