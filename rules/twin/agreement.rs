@@ -15,8 +15,8 @@ const DEVIATE: f64 = 1.96;
 /// Share of all that is known of a coefficient below which a unit tells nothing of it.
 const TELLS: f64 = 1e-3;
 
-/// Kinds whose coefficients belong to a tool, a lot, a stretch of time or a place, not to the machine.
-const OWN: [&str; 10] = [
+/// Kinds whose coefficients belong to a tool, a lot, a blank, a program, a stretch of time or a place, not to the machine.
+const OWN: [&str; 13] = [
     "flank_wear",
     "hardness_batch",
     "recipe_error",
@@ -27,6 +27,9 @@ const OWN: [&str; 10] = [
     "built_up_edge",
     "edge_force",
     "chatter",
+    "spindle_inertia",
+    "engagement_timing",
+    "entry_exit",
 ];
 
 /// Does no parameter of this part have one value for all runs?

@@ -52,6 +52,18 @@ pub struct Design {
     pub noise: Option<Arma>,
 }
 
+impl Design {
+    /// The name of the form where the forms of a kind are laws of their own that a scan, which moves no time constant,
+    /// hardly tells apart.
+    #[must_use]
+    pub fn law(&self) -> &'static str {
+        match &self.part.body {
+            Body::Effect(_, form) if self.kind == "meter_window" => form.name,
+            _ => "",
+        }
+    }
+}
+
 /// Every hypothesis that this scene, with the load and output simulated by the baseline, can tell anything about.
 #[must_use]
 pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {

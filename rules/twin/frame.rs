@@ -147,6 +147,12 @@ impl Frame {
             innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
     }
 
+    /// How many groups weigh less than the rest because their innovation is outlandish.
+    #[must_use]
+    pub fn heavy(&self) -> usize {
+        self.weights.iter().filter(|weight| **weight < 1.0).count()
+    }
+
     /// The usable rows of the units that `takes` accepts, in groups of `size`.
     #[must_use]
     pub fn new(scene: &Scene, units: &[Unit], size: usize, takes: impl Fn(usize) -> bool) -> Self {

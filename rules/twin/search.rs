@@ -147,14 +147,15 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut scores = self.bank.scan(&from.fit, self.ln_rows);
         scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
         let present: Vec<&str> = from.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect();
-        let mut kinds: Vec<&str> = Vec::new();
+        let mut laws: Vec<(&str, &str)> = Vec::new();
         let mut chosen: Vec<&Score> = Vec::new();
         for score in &scores {
             let kind = self.bank.designs[score.design].kind.as_str();
+            let law = (kind, self.bank.designs[score.design].law());
             let unseen = self.bank.designs[score.design].noise.is_some();
-            let wanted = unseen || chosen.len() < most && !kinds.contains(&kind);
+            let wanted = unseen || chosen.len() < most && !laws.contains(&law);
             if wanted && score.gain.is_finite() && !present.iter().any(|present| excludes(present, kind)) {
-                kinds.push(kind);
+                laws.push(law);
                 chosen.push(score);
             }
         }
@@ -243,12 +244,14 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 }
 
-/// Could this part be what its name says, beside the others? A lag below a quarter of the sampling period cannot be
-/// resolved; a lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess
+/// Sampling periods below which a lag cannot be resolved.
+const RESOLVED: f64 = 0.1;
+
+/// Could this part be what its name says, beside the others? A lag far below the sampling period cannot be resolved; a lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess
 /// over dry friction at creep speed.
 fn plausible(part: &Part, beside: &[Part], scene: &Scene) -> bool {
     let value = |name: &str| part.parameter(name).map(|parameter| parameter.value);
-    let resolved = |name: &str| value(name).is_none_or(|seconds| seconds.abs() >= 0.25 * scene.period_s());
+    let resolved = |name: &str| value(name).is_none_or(|seconds| seconds.abs() >= RESOLVED * scene.period_s());
     let acts = value("share").is_none_or(|share| share.abs() >= 0.2);
     match part.kind.as_str() {
         "clock_lag" | "engagement_timing" | "override_delay" => resolved("delay_s") && acts,

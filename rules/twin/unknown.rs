@@ -39,6 +39,9 @@ const SHARPENING: [f64; 3] = [0.15, 0.06, 0.02];
 const SHARPENINGS_MAX: usize = 4;
 /// Information that a move must bring.
 const SHARPER: f64 = 0.5;
+/// Share of what is named that a nameless form must explain before runs that disagree put the names in doubt: what
+/// explains much more than any form could is only not quite the same in every run.
+const CLOSE_SHARE: f64 = 0.7;
 /// Share of what is named that must be left without an effect, or that effect is most of it.
 const MOST: f64 = 0.5;
 
@@ -156,7 +159,8 @@ impl Case<'_> {
             && !self.is_friction(&alone.design, &found.best.fit);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
-        let unlike = anything && self.unlike(&found.best);
+        let close = alone.information > CLOSE_SHARE * named;
+        let unlike = anything && close && self.unlike(&found.best);
         let doubted = remains && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;

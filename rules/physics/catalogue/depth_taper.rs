@@ -3,6 +3,7 @@
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use std::ops::Range;
 
 /// Depth that changes along the pass.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +12,7 @@ pub struct DepthTaper;
 static DOC: EffectDoc = EffectDoc {
     kind: "depth_taper",
     family: "cutting",
-    law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by time",
+    law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by time; distance: y = (slope * d + curve * d^2) * L, d from the start of the pass in lengths of the longest one",
     parameters: &[
         ParameterDoc {
             name: "slope",
@@ -59,14 +60,20 @@ impl Effect for DepthTaper {
         if cut(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
             return Vec::new();
         }
-        vec![Form { name: "linear", ..Form::plain() }, Form { name: "quadratic", ..Form::plain() }]
+        let named = |name| Form { name, ..Form::plain() };
+        let mut forms = vec![named("linear"), named("quadratic")];
+        if lengths_differ(scene) {
+            forms.extend([named("distance"), named("distance_quadratic")]);
+        }
+        forms
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let along = along_pass(scene);
+        let by_distance = form.name.starts_with("distance");
+        let (along, middle) = if by_distance { (from_start(scene), 0.0) } else { (along_pass(scene), 1.0 / 12.0) };
         let mut columns = vec![("slope", cut_times(scene, |row| along[row].unwrap_or(0.0))?)];
-        if form.name == "quadratic" {
-            let curve = |row: usize| along[row].map_or(0.0, |s| s * s - 1.0 / 12.0);
+        if form.name.ends_with("quadratic") {
+            let curve = |row: usize| along[row].map_or(0.0, |s| s * s - middle);
             columns.push(("curve", cut_times(scene, curve)?));
         }
         Some(columns)
@@ -76,14 +83,42 @@ impl Effect for DepthTaper {
 /// Where each row stands along its pass, -1/2 to 1/2; `None` out of the cut.
 fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
-    let position = scene.role(Role::Position);
     for pass in scene.passes() {
-        let moved = position.map(|position| &position[pass.clone()]).filter(|position| varies(position));
-        let places = moved.unwrap_or(&scene.time_s()[pass.clone()]);
+        let places = places(scene, pass);
         let low = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let length = (high - low).max(f64::MIN_POSITIVE);
+        let length = length(places).max(f64::MIN_POSITIVE);
         along[pass.clone()].iter_mut().zip(places).for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
     }
     along
+}
+
+/// How far each row stands from the start of its pass, in lengths of the longest one; `None` out of the cut. A tool or a
+/// work piece that bends away does so by the place, not by the share of a pass.
+fn from_start(scene: &Scene) -> Vec<Option<f64>> {
+    let mut along = vec![None; scene.rows()];
+    let longest = scene.passes().iter().map(|pass| length(places(scene, pass))).fold(0.0, f64::max);
+    for pass in scene.passes() {
+        let places = places(scene, pass);
+        let from = |at: &f64| Some((at - places[0]).abs() / longest.max(f64::MIN_POSITIVE));
+        along[pass.clone()].iter_mut().zip(places).for_each(|(along, at)| *along = from(at));
+    }
+    along
+}
+
+/// Is there a pass that is shorter by more than a tenth than the longest?
+fn lengths_differ(scene: &Scene) -> bool {
+    let lengths: Vec<f64> = scene.passes().iter().map(|pass| length(places(scene, pass))).collect();
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    lengths.iter().any(|length| *length < 0.9 * longest)
+}
+
+/// Positions of a pass where the axis moves, else times.
+fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> &'s [f64] {
+    let position = scene.role(Role::Position).map(|position| &position[pass.clone()]);
+    position.filter(|position| varies(position)).unwrap_or(&scene.time_s()[pass.clone()])
+}
+
+fn length(places: &[f64]) -> f64 {
+    let low = places.iter().copied().fold(f64::INFINITY, f64::min);
+    places.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
 }
