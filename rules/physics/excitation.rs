@@ -22,10 +22,11 @@ pub(crate) fn visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
         .sum()
 }
 
-/// Speeds in rpm half-way between the levels at which the spindle stays, at most `most` of them.
-pub(crate) fn between_speeds(scene: &Scene, most: usize) -> Vec<f64> {
+/// Speeds in rpm half-way between the levels at which the spindle stays, which are apart by more than `gap_share` of the
+/// greatest; at most `most` of them.
+pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<f64> {
     let Some(speeds) = steady_speeds_rpm(scene) else { return Vec::new() };
-    let gap = 0.006 * greatest(&speeds);
+    let gap = gap_share * greatest(&speeds);
     let between: Vec<f64> =
         speeds.windows(2).filter(|pair| pair[1] - pair[0] > gap).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
     thinned(&between, most)

@@ -11,7 +11,9 @@ const SIZE_DEVIATIONS: f64 = 0.3;
 /// Size, as a share of the mean output, below which an effect is not claimed.
 const SIZE_SHARE: f64 = 0.005;
 /// Information from which even such a size is beyond doubt.
-const SMALL_INFORMATION: f64 = 100.0;
+const SMALL_INFORMATION: f64 = 60.0;
+/// Share of what is explained up to which a member on which the runs disagree is dropped: most of it is no imitation.
+const MINOR_SHARE: f64 = 0.5;
 /// Share of the mean output below which an output counts as that share.
 const OUTPUT_FLOOR: f64 = 0.1;
 
@@ -31,14 +33,12 @@ impl Case<'_> {
         let first = best.fit.parts.len() - best.members.len();
         let several = best.members.len() > 1;
         (0..best.members.len()).find(|position| {
-            if several && differs_by_run(&best.fit, &self.frame, first + position) {
-                return true;
-            }
-            let without =
-                if best.members.len() == 1 { Some(base.clone()) } else { self.without(best, *position).map(|h| h.fit) };
+            let without = if several { self.without(best, *position).map(|h| h.fit) } else { Some(base.clone()) };
             without.is_some_and(|without| {
                 let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
-                self.negligible(&without.residual, &best.fit.residual, deviation, gained)
+                let minor = several && gained < MINOR_SHARE * best.information;
+                minor && differs_by_run(&best.fit, &self.frame, first + position)
+                    || self.negligible(&without.residual, &best.fit.residual, deviation, gained)
             })
         })
     }

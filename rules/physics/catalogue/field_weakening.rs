@@ -67,7 +67,7 @@ impl Effect for FieldWeakening {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
-        let speeds = between_speeds(scene, 5);
+        let speeds = between_speeds(scene, 0.03, 5);
         let ln_choices = ln_count(speeds.len());
         let form = |speed: &f64| Form { ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
         speeds.iter().map(form).collect()

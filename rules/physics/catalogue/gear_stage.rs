@@ -59,6 +59,8 @@ static DOC: EffectDoc = EffectDoc {
     },
 };
 
+/// Share of the greatest speed by which two speeds differ between which the stage may change.
+const SPEEDS_APART: f64 = 0.006;
 /// Speeds tried for the change of stage where no column tells it.
 const STAGES_TRIED: usize = 20;
 
@@ -78,7 +80,7 @@ impl Effect for GearStage {
             let form = |stage: &i64| Form { name: "stage", place: place(stage), ln_choices, ..Form::default() };
             return stages.iter().skip(1).map(form).collect();
         }
-        let speeds = between_speeds(scene, STAGES_TRIED);
+        let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
         let form = |speed: &f64| Form { name: "speed", ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
         speeds.iter().map(form).collect()
