@@ -121,10 +121,12 @@ impl<'a> Case<'a> {
             return verdicts::cannot_tell(self, "a model that can be fitted to this recording".to_owned());
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
+        let base = self.unveil(base);
         let (mut found, mut designs) = self.search(&base, seed);
+        // What is found may itself have made rows outlandish, and been looked at through few of them.
         let veiled = self.frame.heavy();
         let mut base = self.settle(base, &mut found);
-        if unveiled(veiled, self.frame.heavy()) {
+        if super::veil::unveiled(veiled, self.frame.heavy()) {
             (found, designs) = self.search(&base, seed);
             base = self.settle(base, &mut found);
         }
@@ -259,15 +261,6 @@ impl<'a> Case<'a> {
             held_out_rmse: rmse(&told.scene, &told.held_frame, &prediction.total),
         }
     }
-}
-
-/// Rows that looked outlandish below which it makes no difference that they weighed little.
-const VEILED_MIN: usize = 10;
-
-/// Did an effect that is now there make rows look outlandish? Edges are few and tell lag, window, inertia and entry from
-/// one another; the search that weighed them down has hardly looked at them.
-fn unveiled(before: usize, now: usize) -> bool {
-    before >= VEILED_MIN && 2 * now <= before
 }
 
 /// Robust standard deviation of what remains, edges and spikes left aside.

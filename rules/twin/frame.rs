@@ -147,6 +147,11 @@ impl Frame {
             innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
     }
 
+    /// Gives every group its full weight again.
+    pub fn weigh_all_alike(&mut self) {
+        self.weights.clear();
+    }
+
     /// How many groups weigh less than the rest because their innovation is outlandish.
     #[must_use]
     pub fn heavy(&self) -> usize {

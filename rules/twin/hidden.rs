@@ -29,8 +29,12 @@ impl Case<'_> {
         }
         let found = latent::find(&base.residual, &self.frame, base.noise)?;
         let (change, cut) = self.pace_of_groups();
-        let acts =
-            found.stays() && found.by_itself(&change, &cut) && latent::steps(&found, &base.residual, &self.frame);
+        let by_itself = found.by_itself(&change, &cut)
+            && self.repeated_of_groups(&cut).iter().all(|channel| !found.follows(channel));
+        let acts = found.stays()
+            && by_itself
+            && latent::steps(&found, &base.residual, &self.frame)
+            && found.is_flat(&base.residual, &self.frame);
         if !acts {
             return None;
         }
@@ -79,6 +83,17 @@ impl Case<'_> {
         let engaged = self.scene.role(Role::Engaged);
         let cut = |group: usize| engaged.is_some_and(|engaged| engaged[row(group)] > 0.5);
         (change, (0..self.frame.len()).map(cut).collect())
+    }
+
+    /// Of each group in the cut: what the process goes through again and again.
+    fn repeated_of_groups(&self, cut: &[bool]) -> Vec<Vec<Option<f64>>> {
+        let in_cut = |values: &[f64]| {
+            let of = |(group, cut): (usize, &bool)| cut.then(|| values[self.frame.rows(group).start]);
+            cut.iter().enumerate().map(of).collect()
+        };
+        let time_in_cut = super::empirical::channel_values(&self.scene, super::empirical::TIME_IN_CUT);
+        let position = self.scene.role(Role::Position).map(<[f64]>::to_vec);
+        [position, time_in_cut].into_iter().flatten().map(|values| in_cut(&values)).collect()
     }
 
     /// The ripple of the mains folded by sampling, as a hypothesis, where what the baseline leaves has a wandering line.

@@ -51,6 +51,7 @@ pub mod table;
 pub mod term;
 pub mod text;
 pub mod unknown;
+mod veil;
 pub mod verdicts;
 pub mod wave;
 pub mod words;

@@ -165,6 +165,7 @@ impl Case<'_> {
         if !(doubted || better || unlike || outdone) {
             return None;
         }
+        let sure = better;
         let better = better || unlike || outdone;
         let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
@@ -173,7 +174,7 @@ impl Case<'_> {
             return None;
         }
         let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
-        if !better && p > P_MAX {
+        if !sure && p > P_MAX {
             return None;
         }
         Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })

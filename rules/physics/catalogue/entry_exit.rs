@@ -11,7 +11,7 @@ pub struct EntryExit;
 static DOC: EffectDoc = EffectDoc {
     kind: "entry_exit",
     family: "cutting",
-    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L",
+    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L",
     parameters: &[
         ParameterDoc {
             name: "entry",
@@ -44,6 +44,14 @@ static DOC: EffectDoc = EffectDoc {
             range: (0.05, 120.0),
             en: "how long entry and exit last",
             zh: "切入切出持续时间",
+        },
+        ParameterDoc {
+            name: "exit_length_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.05, 120.0),
+            en: "how long the exit lasts where it differs from the entry",
+            zh: "切出持续时间（与切入不同时）",
         },
     ],
     needs: &["engaged"],
@@ -79,6 +87,11 @@ impl Effect for EntryExit {
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
         let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
+        let ramps = |length_s: f64| {
+            let shares = [0.5, 1.0].into_iter();
+            shares.map(move |share| Form { name: "ramp", ..Form::of(&[("length_s", length_s), ("exit_length_s", share * length_s)]) })
+        };
+        forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(ramps));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
@@ -88,12 +101,14 @@ impl Effect for EntryExit {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let over_s = form.value("length_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+        let exit_over_s = form.value("exit_length_s").unwrap_or(over_s).max(f64::MIN_POSITIVE);
+        let fades = |s: f64, over_s: f64| if form.name == "ramp" { (1.0 - s / over_s).max(0.0) } else { (-s / over_s).exp() };
         let (mut entry, mut exit) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
         let time_s = scene.time_s();
         for pass in scene.passes() {
             for row in pass.clone() {
-                entry[row] = (-(time_s[row] - time_s[pass.start]) / over_s).exp();
-                exit[row] = (-(time_s[pass.end - 1] - time_s[row]) / over_s).exp();
+                entry[row] = fades(time_s[row] - time_s[pass.start], over_s);
+                exit[row] = fades(time_s[pass.end - 1] - time_s[row], exit_over_s);
             }
         }
         if form.name == "settling" {

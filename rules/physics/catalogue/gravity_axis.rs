@@ -1,7 +1,7 @@
 //! A vertical axis carries weight: up costs power, down gives it back.
 
-use crate::physics::drive::{in_si, is_displacement, is_power, rate};
-use crate::physics::excitation::varies;
+use crate::physics::drive::{in_si, is_displacement, is_power, motion, rate, soft_sign};
+use crate::physics::excitation::{greatest, varies};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
@@ -11,7 +11,7 @@ pub struct GravityAxis;
 static DOC: EffectDoc = EffectDoc {
     kind: "gravity_axis",
     family: "axis",
-    law: "P = weight * v, v in m/s, positive up; in a force or current: F = level wherever the drive holds the axis",
+    law: "P = weight * v, v in m/s, positive up; in a force or current: F = level wherever the drive holds the axis; braked: F = level * |sign(v)|, where a brake holds it at rest",
     parameters: &[
         ParameterDoc {
             name: "weight",
@@ -56,14 +56,22 @@ impl Effect for GravityAxis {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let acts = |columns: &Columns| !is_power(scene) || varies(&columns[0].1);
-        self.columns(scene, &Form::plain()).filter(acts).map(|_| Form::plain()).into_iter().collect()
+        let braked = Form { name: "braked", ..Form::plain() };
+        let forms = if is_power(scene) { vec![Form::plain()] } else { vec![Form::plain(), braked] };
+        let acts = |columns: Columns| !is_power(scene) || varies(&columns[0].1);
+        forms.into_iter().filter(|form| self.columns(scene, form).is_some_and(acts)).collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let declared = scene.role_name(Role::Vertical)?;
         if is_displacement(scene) {
             return None;
+        }
+        if form.name == "braked" {
+            // At rest the brake carries the weight.
+            let velocity = motion(scene)?;
+            let width = 0.01 * greatest(&velocity);
+            return Some(vec![("level", velocity.iter().map(|v| soft_sign(*v, width).abs()).collect())]);
         }
         if !is_power(scene) {
             let held = scene.column("drive_on").map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec);

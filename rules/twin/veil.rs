@@ -1,0 +1,74 @@
+//! Edges: a clock that lags, a meter that averages, an inertia or an entry nobody modelled leaves a few great innovations
+//! at every edge and nothing between. Rows that look outlandish weigh little, so that spikes say little - and then the
+//! whole effect says little. Before the search, therefore, the effects that act at edges are fitted with every row in
+//! full; where one of them makes most of the outlandish rows ordinary, the rows are weighed by what it leaves.
+
+use super::designs::{AT_EDGES, Design, designs};
+use super::diagnose::Case;
+use super::fit::{Fit, fit};
+use super::model::simulate;
+use super::scan::Bank;
+
+/// Outlandish rows below which it makes no difference that they weigh little.
+const VEILED_MIN: usize = 10;
+/// Effects fitted in full after the scan.
+const FITTED: usize = 6;
+/// Kinds that act at the edges of the speed.
+const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
+
+/// Did what is there now make half of the outlandish rows ordinary?
+pub(super) fn unveiled(before: usize, now: usize) -> bool {
+    before >= VEILED_MIN && 2 * now <= before
+}
+
+impl Case<'_> {
+    /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
+    pub(super) fn unveil(&mut self, base: Fit) -> Fit {
+        let veiled = self.frame.heavy();
+        if veiled < VEILED_MIN {
+            return base;
+        }
+        let weighed = self.frame.clone();
+        self.frame.weigh_all_alike();
+        match self.best_at_edges(&base) {
+            Some(best) => self.frame.weigh(&best.residual, best.noise),
+            None => self.frame = weighed.clone(),
+        }
+        if !unveiled(veiled, self.frame.heavy()) {
+            self.frame = weighed;
+            return base;
+        }
+        self.with_data(|data| fit(data, &base.parts, base.noise)).unwrap_or(base)
+    }
+
+    /// The likeliest fit with one effect that acts at edges, every row in full.
+    fn best_at_edges(&mut self, base: &Fit) -> Option<Fit> {
+        let base = self.with_data(|data| fit(data, &base.parts, base.noise))?;
+        let _ = simulate(&base.parts, &mut self.scene)?;
+        let mut at_edges = designs(&self.scene, &self.frame, self.model);
+        at_edges.retain(|design| {
+            AT_EDGES.contains(&design.kind.as_str()) || AT_EDGES_OF_SPEED.contains(&design.kind.as_str())
+        });
+        let frame = self.frame.clone();
+        let bank = Bank::new(&at_edges, &frame);
+        let mut scores = bank.scan(&base, self.ln_rows(&base));
+        scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
+        let mut laws: Vec<(&str, &str)> = Vec::new();
+        let mut best: Option<Fit> = None;
+        for score in scores.iter().filter(|score| score.gain > 0.0) {
+            let design: &Design = &at_edges[score.design];
+            let law = (design.kind.as_str(), design.law());
+            if laws.len() >= FITTED || laws.contains(&law) {
+                continue;
+            }
+            laws.push(law);
+            let mut parts = base.parts.clone();
+            parts.push(design.part.clone());
+            let Some(fitted) = self.with_data(|data| fit(data, &parts, base.noise)) else { continue };
+            if best.as_ref().is_none_or(|best| fitted.log_likelihood > best.log_likelihood) {
+                best = Some(fitted);
+            }
+        }
+        best
+    }
+}
