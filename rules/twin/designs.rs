@@ -124,14 +124,15 @@ fn weighs_acceleration(model: &Model) -> bool {
 pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &Frame) -> Option<Design> {
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
-    let part = Part::candidate(effect, form, &names);
+    let mut part = Part::candidate(effect, form, &names);
+    let known = fix_share(&mut part);
     let ranges = names.iter().map(|name| part.parameter(name).map_or(ANY, |parameter| parameter.range)).collect();
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
     let usable = columns.iter().all(|column| column.iter().all(|x| x.is_finite()));
     usable.then(|| Design {
         kind: effect.doc().kind.to_owned(),
         // That the tools wear is told by the feed drive already; only what it costs here is open.
-        freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() },
+        freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() - known },
         ln_choices: form.ln_choices,
         reluctance: reluctance(effect.doc().kind),
         noise: None,
@@ -140,6 +141,18 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
         ranges,
     })
 }
+
+/// A meter lags or averages, and a flag comes late, as a whole: the share is one. How many parameters are known thereby.
+fn fix_share(part: &mut Part) -> usize {
+    if !WHOLE.contains(&part.kind.as_str()) {
+        return 0;
+    }
+    let shares = part.parameters.iter_mut().filter(|parameter| parameter.name == "share");
+    shares.map(|share| (share.value, share.fixed) = (1.0, true)).count()
+}
+
+/// Kinds that act as a whole.
+const WHOLE: [&str; 3] = ["clock_lag", "meter_window", "engagement_timing"];
 
 const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 

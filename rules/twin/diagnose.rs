@@ -66,6 +66,8 @@ pub struct Case<'a> {
     pub ripple: Option<super::ripple::Ripple>,
     /// A hidden switch that was followed, where there is one.
     pub switching: Option<super::latent::Switching>,
+    /// The baseline beside an effect at the edges that bends it, where there is one.
+    pub unbent: Option<Vec<Part>>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -98,8 +100,8 @@ impl<'a> Case<'a> {
         let frame = Frame::new(&scene, &units, size, |unit| !held.contains(&unit));
         let held_frame = Frame::new(&scene, &units, size, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        let (ripple, switching, whole) = (None, None, None);
-        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, whole }
+        let (ripple, switching, unbent, whole) = (None, None, None, None);
+        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, unbent, whole }
     }
 
     /// The diagnosis found from an excerpt and told over the whole, and the whole again.
@@ -131,7 +133,7 @@ impl<'a> Case<'a> {
             base = self.settle(base, &mut found);
         }
         let doubt = self.doubt(&base, &mut found, &designs, seed);
-        let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base) } else { found };
+        let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);
         let outcome = Outcome::new(self, base, found, designs, doubt);
         verdicts::judge(self, outcome)
@@ -202,7 +204,7 @@ impl<'a> Case<'a> {
 
     fn search(&mut self, base: &Fit, seed: u64) -> (Found, Vec<Design>) {
         // Candidates see the load and the output that the fitted baseline simulates.
-        let _ = simulate(&base.parts, &mut self.scene);
+        let _ = simulate(self.unbent.as_ref().unwrap_or(&base.parts), &mut self.scene);
         let mut designs = designs(&self.scene, &self.frame, self.model);
         if self.frame.levels.is_some() {
             // What creeps over hours is in the levels of the tools; within one tool's life it is but a bend.
@@ -222,7 +224,8 @@ impl<'a> Case<'a> {
     fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> Found {
         let frame = self.frame.clone();
         let bank = Bank::new(designs, &frame);
-        self.with_data(|data| Search::new(data, base, &bank, seed).run())
+        let unbent = self.unbent.clone();
+        self.with_data(|data| Search::new(data, base, &bank, seed).beside(unbent).run())
     }
 
     /// The hypothesis with one member taken out and everything else refitted.

@@ -5,7 +5,7 @@ use super::linear::{Solution, dot, least_squares};
 use super::model::{Part, simulate};
 use super::noise::Arma;
 use crate::physics::{Entry, Scene};
-use crate::statistics::{count, rms};
+use crate::statistics::{count, median, rms};
 
 /// Gauss-Newton steps at most, per noise model.
 const STEPS_MAX: usize = 8;
@@ -38,6 +38,11 @@ pub struct Fit {
     pub tangent: Vec<Vec<f64>>,
 }
 
+/// Standard deviation over median of the size, for normal noise.
+const MEDIAN_TO_DEVIATION: f64 = 1.4826;
+/// Deviations beyond which an innovation counts as this many in the dispersion.
+const DISPERSION_CUT: f64 = 6.0;
+
 /// What is being fitted to.
 pub struct Data<'a> {
     /// The recording.
@@ -65,6 +70,17 @@ pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
     best
 }
 
+/// Fits `parts` to the levels alone: as if the noise had no memory.
+#[must_use]
+pub(super) fn fit_levels(data: &mut Data<'_>, parts: &[Part]) -> Option<Fit> {
+    let noise = Arma::WHITE;
+    let mut state = State::new(data, parts.to_vec())?;
+    state.descend(data, parts, noise)?;
+    let log_likelihood = data.frame.log_likelihood(state.cost(data, noise), noise);
+    let tangent = tangent(data, &state.parts, &state.free)?;
+    Some(Fit { log_likelihood, parts: state.parts, free: state.free, noise, residual: state.residual, tangent })
+}
+
 fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
     let mut state = State::new(data, nominal.to_vec())?;
     state.descend(data, nominal, start)?;
@@ -80,6 +96,19 @@ impl Fit {
     #[must_use]
     pub fn innovations(&self, frame: &Frame) -> Vec<f64> {
         frame.whiten(&self.residual, self.noise)
+    }
+
+    /// By how much the squares of the innovations, the few greatest cut off, exceed those of the noise between them: one
+    /// where the fit leaves nothing but noise; likelihoods mean that many times less where it leaves more (Wedderburn,
+    /// Biometrika 61, 1974).
+    #[must_use]
+    pub fn dispersion(&self, frame: &Frame) -> f64 {
+        let innovations = self.innovations(frame);
+        let middle = median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
+        let ordinary = (MEDIAN_TO_DEVIATION * middle).powi(2);
+        let cut = DISPERSION_CUT * DISPERSION_CUT * ordinary;
+        let mean = innovations.iter().map(|e| (e * e).min(cut)).sum::<f64>() / count(innovations.len().max(1));
+        if ordinary > 0.0 { (mean / ordinary).max(1.0) } else { 1.0 }
     }
 
     /// Variances of the free parameters: from the whitened tangent, or from how far the units of hold-out disagree

@@ -67,6 +67,8 @@ pub struct Search<'a, 'b> {
     pub(super) tried: Vec<Hypothesis>,
     /// How many of the first members stand already.
     standing: usize,
+    /// The baseline beside an effect at the edges, where that effect bends it: another place to start from.
+    unbent: Option<Vec<Part>>,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
@@ -75,7 +77,14 @@ impl<'a, 'b> Search<'a, 'b> {
     pub fn new(data: &'a mut Data<'b>, base: &'a Fit, bank: &'a Bank<'a>, seed: u64) -> Self {
         let rows = count(data.frame.len());
         let ln_rows = (rows / base.noise.inflation()).max(20.0).ln();
-        Self { data, base, bank, ln_rows, seed, tried: Vec::new(), standing: 0 }
+        Self { data, base, bank, ln_rows, seed, tried: Vec::new(), standing: 0, unbent: None }
+    }
+
+    /// The same search, with another baseline to start from: the one beside an effect at the edges that bends it.
+    #[must_use]
+    pub fn beside(mut self, unbent: Option<Vec<Part>>) -> Self {
+        self.unbent = unbent;
+        self
     }
 
     /// Runs the search: grows as far as information is gained, then lets the gate decide how much of it is real.
@@ -166,11 +175,16 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     pub(super) fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
-        let mut parts = from.fit.parts.clone();
-        parts.push(self.bank.designs[design].part.clone());
         let mut members = from.members.clone();
         members.push(design);
-        self.fitted(members, &parts, self.bank.designs[design].noise.unwrap_or(from.fit.noise))
+        let noise = self.bank.designs[design].noise.unwrap_or(from.fit.noise);
+        let added = self.bank.designs[design].part.clone();
+        let begun = |parts: &[Part]| parts.iter().cloned().chain([added.clone()]).collect::<Vec<_>>();
+        let known = self.fitted(members.clone(), &begun(&from.fit.parts), noise);
+        let unbent = self.unbent.clone().filter(|_| from.members.is_empty());
+        let other = unbent.and_then(|unbent| self.fitted(members, &begun(&unbent), noise));
+        let better = |a: &Hypothesis, b: &Hypothesis| a.information.total_cmp(&b.information);
+        known.into_iter().chain(other).max_by(better)
     }
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {

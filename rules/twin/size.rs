@@ -1,8 +1,10 @@
 //! Size: what is too small to be claimed, however surely it is there.
 
 use super::agreement::differs_by_run;
+use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::Fit;
+use super::scan::price;
 use super::search::{Found, Hypothesis};
 use crate::statistics::count;
 
@@ -12,15 +14,22 @@ const SIZE_DEVIATIONS: f64 = 0.3;
 const SIZE_SHARE: f64 = 0.005;
 /// Information from which even such a size is beyond doubt.
 const SMALL_INFORMATION: f64 = 60.0;
+/// The same beside an effect that explains more.
+const SMALL_INFORMATION_BESIDE: f64 = 100.0;
 /// Share of what is explained up to which a member on which the runs disagree is dropped: most of it is no imitation.
 const MINOR_SHARE: f64 = 0.5;
 /// Share of the mean output below which an output counts as that share.
 const OUTPUT_FLOOR: f64 = 0.1;
 
+/// What counts as the information of a member: beside what explains most, a small one has to be surer.
+fn beyond_doubt(minor: bool, gained: f64) -> f64 {
+    if minor { gained * SMALL_INFORMATION / SMALL_INFORMATION_BESIDE } else { gained }
+}
+
 impl Case<'_> {
     /// Drops members whose remaining part is too small to claim, and those beside others on which the runs disagree.
-    pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit) -> Found {
-        while let Some(position) = self.smallest_unclaimable(&found.best, base) {
+    pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit, designs: &[Design]) -> Found {
+        while let Some(position) = self.smallest_unclaimable(&found.best, base, designs) {
             let Some(less) = self.without(&found.best, position) else { break };
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
@@ -28,17 +37,20 @@ impl Case<'_> {
         found
     }
 
-    fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit) -> Option<usize> {
+    fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> Option<usize> {
         let deviation = ordinary_noise(&best.fit);
         let first = best.fit.parts.len() - best.members.len();
         let several = best.members.len() > 1;
+        let ln_rows = self.ln_rows(base);
         (0..best.members.len()).find(|position| {
             let without = if several { self.without(best, *position).map(|h| h.fit) } else { Some(base.clone()) };
             without.is_some_and(|without| {
                 let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
                 let minor = several && gained < MINOR_SHARE * best.information;
-                minor && differs_by_run(&best.fit, &self.frame, first + position)
-                    || self.negligible(&without.residual, &best.fit.residual, deviation, gained)
+                let paid = price(&designs[best.members[*position]], ln_rows);
+                several && gained < paid
+                    || minor && differs_by_run(&best.fit, &self.frame, first + position)
+                    || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt(minor, gained))
             })
         })
     }

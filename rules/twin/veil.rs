@@ -5,7 +5,7 @@
 
 use super::designs::{AT_EDGES, Design, designs};
 use super::diagnose::Case;
-use super::fit::{Fit, fit};
+use super::fit::{Fit, fit, fit_levels};
 use super::model::simulate;
 use super::scan::Bank;
 
@@ -30,20 +30,23 @@ impl Case<'_> {
         }
         let weighed = self.frame.clone();
         self.frame.weigh_all_alike();
-        match self.best_at_edges(&base) {
-            Some(best) => self.frame.weigh(&best.residual, best.noise),
-            None => self.frame = weighed.clone(),
+        let best = self.best_at_edges(&base);
+        if let Some(best) = &best {
+            self.frame.weigh(&best.residual, best.noise);
         }
-        if !unveiled(veiled, self.frame.heavy()) {
+        let Some(best) = best.filter(|_| unveiled(veiled, self.frame.heavy())) else {
             self.frame = weighed;
             return base;
-        }
+        };
+        self.unbent = Some(best.parts[..self.parts.len()].to_vec());
         self.with_data(|data| fit(data, &base.parts, base.noise)).unwrap_or(base)
     }
 
-    /// The likeliest fit with one effect that acts at edges, every row in full.
+    /// The likeliest fit with one effect that acts at edges, every row in full. It starts from levels: in noise with much
+    /// memory an edge that comes late has nothing in common with the simulated one, and the load fits best at nothing.
     fn best_at_edges(&mut self, base: &Fit) -> Option<Fit> {
-        let base = self.with_data(|data| fit(data, &base.parts, base.noise))?;
+        let nominal = self.parts.clone();
+        let base = self.with_data(|data| fit_levels(data, &nominal)).unwrap_or_else(|| base.clone());
         let _ = simulate(&base.parts, &mut self.scene)?;
         let mut at_edges = designs(&self.scene, &self.frame, self.model);
         at_edges.retain(|design| {

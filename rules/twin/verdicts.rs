@@ -67,7 +67,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         alternatives,
         data_quality: case.faults.clone(),
         model: extended(case, outcome.last()),
-        debug: debug(&outcome),
+        debug: debug(case, &outcome),
         rows: outcome.rows,
         unit,
     };
@@ -287,7 +287,7 @@ fn extended(case: &Case<'_>, fit: &Fit) -> Model {
 }
 
 /// The leading hypotheses with their information.
-fn debug(outcome: &Outcome) -> String {
+fn debug(case: &Case<'_>, outcome: &Outcome) -> String {
     let name =
         |members: &[usize]| members.iter().map(|m| outcome.designs[*m].kind.as_str()).collect::<Vec<_>>().join("+");
     let best = &outcome.found.best;
@@ -297,8 +297,10 @@ fn debug(outcome: &Outcome) -> String {
         outcome.unknown.as_ref().map(|u| format!("; unknown {:.1} p {}", u.information, u.p_value)).unwrap_or_default();
     let noise = (outcome.base.noise, best.fit.noise);
     let refused = outcome.found.refused_p;
+    let c = outcome.last().dispersion(&case.frame);
+    let fell = outcome.fits.after.held_out_rmse.zip(outcome.fits.before.held_out_rmse).map_or(-1.0, |(a, b)| a / b);
     format!(
-        "{} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
+        "C {c:.2} F {fell:.3} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
         name(&best.members),
         best.information,
         outcome.found.p_values,

@@ -18,7 +18,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "share",
             unit: "1",
             entry: Entry::Linear,
-            range: (0.85, 1.15),
+            range: (0.0, 1.5),
             en: "one, when the timing explains all",
             zh: "为1时时序可完全解释",
         },

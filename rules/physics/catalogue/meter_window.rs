@@ -16,7 +16,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "share",
             unit: "1",
             entry: Entry::Linear,
-            range: (0.85, 1.15),
+            range: (0.0, 1.5),
             en: "one, when the window explains all",
             zh: "为1时平均窗口可完全解释",
         },
