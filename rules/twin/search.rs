@@ -1,6 +1,6 @@
 //! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
 
-use super::designs::excludes;
+use super::designs::{AT_EDGES, excludes};
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
@@ -114,6 +114,7 @@ impl<'a, 'b> Search<'a, 'b> {
             best = next;
         }
         let best = self.pruned(best);
+        self.try_rivals_at_edges(&best);
         let best = self.meter_first(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
@@ -181,8 +182,11 @@ impl<'a, 'b> Search<'a, 'b> {
         let added = self.bank.designs[design].part.clone();
         let begun = |parts: &[Part]| parts.iter().cloned().chain([added.clone()]).collect::<Vec<_>>();
         let known = self.fitted(members.clone(), &begun(&from.fit.parts), noise);
-        let unbent = self.unbent.clone().filter(|_| from.members.is_empty());
-        let other = unbent.and_then(|unbent| self.fitted(members, &begun(&unbent), noise));
+        let at_edges = AT_EDGES.contains(&self.bank.designs[design].kind.as_str());
+        let unbent = self.unbent.clone().filter(|_| at_edges);
+        let beside = from.fit.parts[self.base.parts.len()..].iter();
+        let unbent = unbent.map(|baseline| begun(&baseline.into_iter().chain(beside.cloned()).collect::<Vec<_>>()));
+        let other = unbent.and_then(|parts| self.fitted(members, &parts, noise));
         let better = |a: &Hypothesis, b: &Hypothesis| a.information.total_cmp(&b.information);
         known.into_iter().chain(other).max_by(better)
     }
@@ -222,9 +226,19 @@ impl<'a, 'b> Search<'a, 'b> {
         self.fitted(members, &parts, from.fit.noise)
     }
 
+    /// Fits the other effects that act at edges in the place of one beside others: sampled seldom, they are much alike.
+    fn try_rivals_at_edges(&mut self, best: &Hypothesis) {
+        let at_edges = |member: &usize| AT_EDGES.contains(&self.bank.designs[*member].kind.as_str());
+        let Some(position) = best.members.iter().position(at_edges).filter(|_| best.members.len() > 1) else { return };
+        if let Some(rest) = self.without(best, position) {
+            let _ = self.extend(&rest, FITTED_SINGLES);
+        }
+    }
+
     /// Of two explanations that the recording does not tell apart, one a fault of the measurement and one of the machine,
     /// the measurement is named first: it is looked at sooner, and the other stands beside it.
     fn meter_first(&mut self, best: Hypothesis) -> Hypothesis {
+        let as_well = MEASURED_AS_WELL * best.fit.dispersion(self.data.frame);
         let kinds = |of: &Hypothesis| -> Vec<&str> {
             of.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect()
         };
@@ -235,7 +249,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let gone: Vec<&&str> = ours.iter().filter(|kind| !theirs.contains(kind)).collect();
             let swapped = matches!((new.as_slice(), gone.as_slice()), ([new], [gone])
                 if METER.contains(new) && !METER.contains(gone));
-            theirs.len() == ours.len() && swapped && best.information - other.information < MEASURED_AS_WELL
+            theirs.len() == ours.len() && swapped && best.information - other.information < as_well
         });
         let Some(other) = as_good.max_by(|a, b| a.information.total_cmp(&b.information)).cloned() else { return best };
         self.tried.push(best);

@@ -47,7 +47,7 @@ pub fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
 #[must_use]
 pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     let missing = missing(case, &outcome);
-    let mut alternatives = alternatives(&outcome);
+    let mut alternatives = alternatives(case, &outcome);
     // Not after all names were found too small to be worth claiming.
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
@@ -211,17 +211,19 @@ fn absorbed(case: &Case<'_>, outcome: &Outcome, part: &Part) -> f64 {
 }
 
 /// Explanations within the class of the best: one member replaced by another kind.
-fn alternatives(outcome: &Outcome) -> Vec<Alternative> {
+fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
     let best = &outcome.found.best;
     let kind = |member: &usize| outcome.designs[*member].kind.as_str();
     let kinds: Vec<&str> = best.members.iter().map(kind).collect();
     if outcome.unknown.is_some() {
         return kinds.iter().map(|name| alternative(name, "unknown", 0.0)).collect();
     }
+    // Where a fit leaves more than noise, likelihoods mean that much less.
+    let within = CLASS_INFORMATION * best.fit.dispersion(&case.frame);
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
         let delta = best.information - other.information;
-        if other.members.len() != best.members.len() || delta > CLASS_INFORMATION {
+        if other.members.len() != best.members.len() || delta > within {
             continue;
         }
         let theirs: Vec<&str> = other.members.iter().map(kind).collect();
