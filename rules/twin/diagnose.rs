@@ -135,7 +135,12 @@ impl<'a> Case<'a> {
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);
-        let outcome = Outcome::new(self, base, found, designs, doubt);
+        let mut outcome = Outcome::new(self, base, found, designs, doubt);
+        if outcome.is_alarm_without_a_name() && outcome.fits.rises() {
+            // On rows that took no part it explains nothing.
+            let Outcome { base, found, designs, .. } = outcome;
+            outcome = Outcome::new(self, base, found, designs, Doubt::NONE);
+        }
         verdicts::judge(self, outcome)
     }
 
@@ -326,6 +331,12 @@ impl Outcome {
             effects: added.clone(),
         };
         Self { base, found, designs, unknown, nameless, fits, rows, added }
+    }
+
+    /// Is something said to remain where nothing is named?
+    #[must_use]
+    fn is_alarm_without_a_name(&self) -> bool {
+        self.unknown.is_some() && self.found.best.members.is_empty()
     }
 
     /// The fit that is reported.

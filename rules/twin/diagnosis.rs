@@ -121,6 +121,18 @@ pub struct Fits {
     pub after: Quality,
 }
 
+/// Share of the error on held-out rows beyond which it has risen.
+const RISEN: f64 = 1.02;
+
+impl Fits {
+    /// Is the error on rows that took no part greater than before? Then something else is there than what is named.
+    #[must_use]
+    pub fn rises(&self) -> bool {
+        let both = self.after.held_out_rmse.zip(self.before.held_out_rmse);
+        both.is_some_and(|(after, before)| after > RISEN * before)
+    }
+}
+
 /// What to record next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {

@@ -90,6 +90,11 @@ pub struct Doubt {
     pub nameless: Option<Nameless>,
 }
 
+impl Doubt {
+    /// No doubt at all.
+    pub(super) const NONE: Self = Self { unknown: None, nameless: None };
+}
+
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
 pub(super) struct Yardsticks<'a> {
     pub(super) bank: Bank<'a>,

@@ -52,6 +52,9 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
     }
+    if alternatives.is_empty() && outcome.unknown.is_none() && outcome.fits.rises() {
+        alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
+    }
     let verdict = outcome.verdict(!alternatives.is_empty());
     let mismatch = regions(case, &outcome);
     let unit = unit_of(&case.model.output).to_owned();
@@ -302,7 +305,7 @@ fn debug(case: &Case<'_>, outcome: &Outcome) -> String {
     let c = outcome.last().dispersion(&case.frame);
     let fell = outcome.fits.after.held_out_rmse.zip(outcome.fits.before.held_out_rmse).map_or(-1.0, |(a, b)| a / b);
     format!(
-        "C {c:.2} F {fell:.3} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
+        "dispersion {c:.2} held-out {fell:.3} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
         name(&best.members),
         best.information,
         outcome.found.p_values,

@@ -3,6 +3,7 @@
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Depth that changes along the pass.
@@ -12,7 +13,7 @@ pub struct DepthTaper;
 static DOC: EffectDoc = EffectDoc {
     kind: "depth_taper",
     family: "cutting",
-    law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by time; distance: y = (slope * d + curve * d^2) * L, d from the start of the pass in lengths of the longest one",
+    law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by feed or time; distance: y = (slope * d + curve * d^2) * L, d from the start of the pass in lengths of the longest one",
     parameters: &[
         ParameterDoc {
             name: "slope",
@@ -62,7 +63,8 @@ impl Effect for DepthTaper {
         }
         let named = |name| Form { name, ..Form::plain() };
         let mut forms = vec![named("linear"), named("quadratic")];
-        if lengths_differ(scene) {
+        // Where another drive settles in each pass, what fades by the time in the pass has been asked for by name.
+        if lengths_differ(scene) && scene.feed_load_growth().is_none() {
             forms.extend([named("distance"), named("distance_quadratic")]);
         }
         forms
@@ -86,8 +88,8 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
     for pass in scene.passes() {
         let places = places(scene, pass);
         let low = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let length = length(places).max(f64::MIN_POSITIVE);
-        along[pass.clone()].iter_mut().zip(places).for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
+        let length = length(&places).max(f64::MIN_POSITIVE);
+        along[pass.clone()].iter_mut().zip(places.iter()).for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
     }
     along
 }
@@ -96,26 +98,42 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
 /// work piece that bends away does so by the place, not by the share of a pass.
 fn from_start(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
-    let longest = scene.passes().iter().map(|pass| length(places(scene, pass))).fold(0.0, f64::max);
+    let longest = scene.passes().iter().map(|pass| length(&places(scene, pass))).fold(0.0, f64::max);
     for pass in scene.passes() {
         let places = places(scene, pass);
-        let from = |at: &f64| Some((at - places[0]).abs() / longest.max(f64::MIN_POSITIVE));
-        along[pass.clone()].iter_mut().zip(places).for_each(|(along, at)| *along = from(at));
+        let start = places.first().copied().unwrap_or(0.0);
+        let from = |at: &f64| Some((at - start).abs() / longest.max(f64::MIN_POSITIVE));
+        along[pass.clone()].iter_mut().zip(places.iter()).for_each(|(along, at)| *along = from(at));
     }
     along
 }
 
 /// Is there a pass that is shorter by more than a tenth than the longest?
 fn lengths_differ(scene: &Scene) -> bool {
-    let lengths: Vec<f64> = scene.passes().iter().map(|pass| length(places(scene, pass))).collect();
+    let lengths: Vec<f64> = scene.passes().iter().map(|pass| length(&places(scene, pass))).collect();
     let longest = lengths.iter().copied().fold(0.0, f64::max);
     lengths.iter().any(|length| *length < 0.9 * longest)
 }
 
-/// Positions of a pass where the axis moves, else times.
-fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> &'s [f64] {
+/// Positions of a pass where the axis moves, else the way that the feed tells, else times.
+fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
     let position = scene.role(Role::Position).map(|position| &position[pass.clone()]);
-    position.filter(|position| varies(position)).unwrap_or(&scene.time_s()[pass.clone()])
+    let time_s = &scene.time_s()[pass.clone()];
+    match (position.filter(|position| varies(position)), scene.column("feed_mm_min")) {
+        (Some(position), _) => Cow::Borrowed(position),
+        (None, Some(feed)) if feed[pass.clone()].iter().all(|feed| *feed > 0.0) => way(time_s, &feed[pass.clone()]),
+        _ => Cow::Borrowed(time_s),
+    }
+}
+
+/// Way since the first row, mm.
+fn way<'s>(time_s: &[f64], feed_mm_min: &[f64]) -> Cow<'s, [f64]> {
+    let mut way_mm = vec![0.0; time_s.len()];
+    for row in 1..time_s.len() {
+        let mean_mm_min = 0.5 * (feed_mm_min[row] + feed_mm_min[row - 1]);
+        way_mm[row] = way_mm[row - 1] + mean_mm_min / 60.0 * (time_s[row] - time_s[row - 1]).max(0.0);
+    }
+    Cow::Owned(way_mm)
 }
 
 fn length(places: &[f64]) -> f64 {
