@@ -230,8 +230,14 @@ impl<'a, 'b> Search<'a, 'b> {
     fn try_rivals_at_edges(&mut self, best: &Hypothesis) {
         let at_edges = |member: &usize| AT_EDGES.contains(&self.bank.designs[*member].kind.as_str());
         let Some(position) = best.members.iter().position(at_edges).filter(|_| best.members.len() > 1) else { return };
-        if let Some(rest) = self.without(best, position) {
-            let _ = self.extend(&rest, FITTED_SINGLES);
+        let named = self.bank.designs[best.members[position]].kind.clone();
+        let Some(rest) = self.without(best, position) else { return };
+        for kind in AT_EDGES.into_iter().filter(|kind| *kind != named) {
+            let scores = self.bank.scan(&rest.fit, self.ln_rows).into_iter();
+            let of_kind = scores.filter(|score| self.bank.designs[score.design].kind == kind && score.gain.is_finite());
+            let likeliest = of_kind.max_by(|a, b| a.information.total_cmp(&b.information));
+            let rival = likeliest.and_then(|score| self.with(&rest, score.design));
+            self.tried.extend(rival);
         }
     }
 
