@@ -95,7 +95,7 @@ fn disagreement(fit: &Fit, frame: &Frame, own: &[f64], innovations: &[f64], inde
 }
 
 /// A parameter's whitened tangent with those of all others taken out.
-fn cleared(white: &[Vec<f64>], index: usize) -> Vec<f64> {
+pub(super) fn cleared(white: &[Vec<f64>], index: usize) -> Vec<f64> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for (_, column) in white.iter().enumerate().filter(|(other, _)| *other != index) {
         let _ = extend_basis(&mut basis, column.clone(), 1e-8);

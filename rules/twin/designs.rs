@@ -68,7 +68,7 @@ impl Design {
 #[must_use]
 pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
     let mut all = Vec::new();
-    let recursive = reads_output(model);
+    let recursive = reads_output(model) || repeats_output(model, scene);
     for effect in CATALOGUE {
         let shifts_time = ["clock_lag", "meter_window"].contains(&effect.doc().kind);
         if wanted(*effect, model) && !(recursive && shifts_time) {
@@ -87,6 +87,33 @@ fn reads_output(model: &Model) -> bool {
         _ => false,
     };
     model.parts.iter().any(reads)
+}
+
+/// Rows by which a column may repeat the output.
+const REPEATED_ROWS: usize = 3;
+/// Share of the rows in which it must.
+const REPEATED_SHARE: f64 = 0.98;
+
+/// Is a column that the model reads the output of a few rows before, under a name of its own?
+fn repeats_output(model: &Model, scene: &Scene) -> bool {
+    let read = model.parts.iter().flat_map(|part| -> Vec<String> {
+        match &part.body {
+            Body::Linear(terms) => terms.iter().filter_map(Term::input).map(str::to_owned).collect(),
+            Body::Expression(expression) => expression.inputs().to_vec(),
+            _ => Vec::new(),
+        }
+    });
+    let columns: Vec<String> = read.collect();
+    let repeats = |column: &[f64], by: usize| {
+        let rows = || scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
+        let known = || rows().filter(|row| scene.usable()[row - by] && scene.usable()[*row]);
+        let equal = |row: &usize| (column[*row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[*row].abs();
+        let changes = known().any(|row| column[row] != scene.recorded()[row]);
+        let (all, same) = (known().count(), known().filter(equal).count());
+        changes && all > 0 && crate::statistics::count(same) >= REPEATED_SHARE * crate::statistics::count(all)
+    };
+    let of = |name: &String| scene.column(name).is_some_and(|column| (1..=REPEATED_ROWS).any(|by| repeats(column, by)));
+    columns.iter().any(of)
 }
 
 /// May the search propose this effect beside this model?

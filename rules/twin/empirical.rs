@@ -29,6 +29,10 @@ pub enum Factor {
 pub enum Shape {
     /// A line that bends at these values, increasing.
     Bent(Vec<f64>),
+    /// Nothing up to this value, a line from there upwards.
+    Above(f64),
+    /// Nothing down to this value, a line from there downwards.
+    Below(f64),
     /// A peak at one value, of this half width: the power that a resonance takes over the speed that excites it.
     Peak(f64, f64),
     /// What is there at first and fades over this distance.
@@ -71,7 +75,7 @@ impl Empirical {
     /// Is it one height of a given shape, rather than a line that bends where the recording asks for it?
     #[must_use]
     pub fn is_simple(&self) -> bool {
-        !matches!(self.shape, Shape::Bent(_))
+        !matches!(self.shape, Shape::Bent(_) | Shape::Above(_) | Shape::Below(_))
     }
 
     /// The same form with its place, width or time constant moved by this share of itself; nothing for a bent line.
@@ -79,7 +83,7 @@ impl Empirical {
     pub(super) fn neighbours(&self, step: f64) -> Vec<Self> {
         let (up, down) = (1.0 + step, 1.0 / (1.0 + step));
         let shapes = match self.shape {
-            Shape::Bent(_) => Vec::new(),
+            Shape::Bent(_) | Shape::Above(_) | Shape::Below(_) => Vec::new(),
             Shape::Peak(centre, width) => vec![
                 Shape::Peak(centre + step * width.max(0.2 * centre), width),
                 Shape::Peak(centre - step * width.max(0.2 * centre), width),
@@ -106,6 +110,8 @@ impl Empirical {
             |law: &dyn Fn(f64) -> f64| values.iter().zip(&factor).map(|(x, factor)| factor * law(along(*x))).collect();
         let knots = match &self.shape {
             Shape::Bent(knots) => knots,
+            Shape::Above(knot) => return Some(vec![("slope".to_owned(), column(&|x| (x - along(*knot)).max(0.0)))]),
+            Shape::Below(knot) => return Some(vec![("slope".to_owned(), column(&|x| (along(*knot) - x).max(0.0)))]),
             Shape::Peak(centre, width) => {
                 let (centre, width) = (along(*centre), width / self.scale);
                 return Some(vec![("level".to_owned(), column(&|x| 1.0 / (1.0 + ((x - centre) / width).powi(2))))]);
@@ -145,6 +151,8 @@ impl Empirical {
                 let knots: Vec<String> = knots.iter().map(|knot| format!("{knot:.4}")).collect();
                 format!("bent line over {} with bends at {}", self.channel, knots.join(", "))
             }
+            Shape::Above(knot) => format!("line over {} above {knot:.4}, nothing below", self.channel),
+            Shape::Below(knot) => format!("line over {} below {knot:.4}, nothing above", self.channel),
             Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
             Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
             Shape::Wave(period, _) => format!("wave over {} with a period of {period:.4}", self.channel),
@@ -170,6 +178,14 @@ impl Empirical {
         let along = |value: f64| (value - self.origin) / self.scale;
         let knots = match &self.shape {
             Shape::Bent(knots) => knots,
+            Shape::Above(knot) => {
+                let knot = along(*knot);
+                return format!("slope * (if {x} > {knot:?} {{ {x} - {knot:?} }} else {{ 0.0 }})");
+            }
+            Shape::Below(knot) => {
+                let knot = along(*knot);
+                return format!("slope * (if {x} < {knot:?} {{ {knot:?} - {x} }} else {{ 0.0 }})");
+            }
             Shape::Peak(centre, width) => {
                 return format!("level / (1.0 + (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
             }
@@ -242,8 +258,7 @@ pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
 /// Every empirical form this scene offers.
 #[must_use]
 pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
-    let mut channels: Vec<String> =
-        scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect();
+    let mut channels = empirical_channels(scene);
     channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, LOAD, TORQUE].map(str::to_owned));
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
     let bent = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
@@ -252,6 +267,11 @@ pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Des
     let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
     let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
     forms.flatten().filter(unnamed).filter_map(|form| as_design(form, scene, frame)).collect()
+}
+
+/// The recorded channels over which a form may be drawn.
+pub(super) fn empirical_channels(scene: &Scene) -> Vec<String> {
+    scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect()
 }
 
 /// Measured outputs beside the simulated one must not explain it.
@@ -330,7 +350,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
     let chosen = match form.shape {
         Shape::Bent(_) => 0,
         Shape::Peak(..) => 2,
-        Shape::Fading(_) | Shape::Wave(..) => 1,
+        Shape::Above(_) | Shape::Below(_) | Shape::Fading(_) | Shape::Wave(..) => 1,
     };
     let among = if let Shape::Wave(_, among) = form.shape { among } else { 1 };
     let parameters = columns.iter().map(|(name, _)| Parameter {

@@ -69,7 +69,11 @@ impl Say<'_> {
     /// The name of an effect: its kind, which `effects show` takes, and what it is called.
     fn name(&self, kind: &str) -> String {
         let Some(effect) = effect(kind) else {
-            return if kind == "unknown" { self.pick("unknown", "未知效应").to_owned() } else { kind.to_owned() };
+            return if kind.starts_with("unknown") {
+                self.pick("unknown", "未知效应").to_owned()
+            } else {
+                kind.to_owned()
+            };
         };
         format!("{} ({kind})", effect.doc().texts(self.language).name)
     }

@@ -23,7 +23,7 @@ const UNKNOWN_SHARE: f64 = 0.12;
 /// The same in units of information.
 const UNKNOWN_INFORMATION: f64 = 8.0;
 /// The same where nothing is named: an alarm without a name must not be a false one either.
-const NOTHING_NAMED_INFORMATION: f64 = 20.0;
+pub(super) const NOTHING_NAMED_INFORMATION: f64 = 20.0;
 /// Share of what is named that must be left to the names when an empirical form stands beside them.
 pub(super) const STANDS_SHARE: f64 = 0.6;
 /// By how much a bent line over one channel must explain more than all that is named, as a share of it, before the
@@ -79,7 +79,7 @@ pub(super) struct Form {
     pub(super) design: Design,
     pub(super) fit: Fit,
     /// Information over what it was fitted on top of.
-    information: f64,
+    pub(super) information: f64,
 }
 
 /// Why the names that a search found may not be right.
@@ -109,6 +109,9 @@ impl Case<'_> {
         let left = [base, &found.best.fit].map(|fit| waves(&self.scene, &self.frame, &fit.residual, fit.noise));
         let left = left.into_iter().flatten();
         forms.extend(left.filter_map(|form| as_design(form, &self.scene, &self.frame)));
+        if found.best.members.is_empty() {
+            forms.extend(super::localised::end_designs(&self.scene, &self.frame));
+        }
         let frame = self.frame.clone();
         let bank = Bank::new(&forms, &frame);
         let of_base = bank.scan(base, self.ln_rows(base));
@@ -182,6 +185,7 @@ impl Case<'_> {
         if !sure && p > P_MAX {
             return None;
         }
+        let alone = self.localised(base, alone);
         Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
     }
 

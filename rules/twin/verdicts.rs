@@ -2,20 +2,14 @@
 
 use super::diagnose::{Case, Outcome};
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
+use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
-use super::ripple::Ripple;
-use crate::physics::{effect, unit_in};
-use crate::statistics::count;
+use crate::physics::effect;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
-/// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
-/// 95 %: a share that no amount of rows makes smaller (GUM, type B).
-const LAW_SHARE: f64 = 0.05;
-/// Normal quantile of a 95 % interval.
-const INTERVAL: f64 = 1.96;
 
 /// The diagnosis of a recording that does not suffice.
 #[must_use]
@@ -106,6 +100,12 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
     if let Some(unknown) = &outcome.unknown {
         let part = &unknown.fit.parts[case.parts.len()];
         let mut found = vec![described(case, outcome, &unknown.fit, part, case.parts.len())];
+        for (number, part) in unknown.fit.parts.iter().enumerate().skip(case.parts.len() + 1) {
+            let more = described(case, outcome, &unknown.fit, part, number);
+            found[0].equation = format!("{}; {}", found[0].equation, more.equation);
+            let named = |e: Estimate| Estimate { name: format!("{}.{}", part.label(), e.name), ..e };
+            found[0].parameters.extend(more.parameters.into_iter().map(named));
+        }
         found[0].delta_ic = unknown.information;
         found[0].p_value = unknown.p_value;
         found[0].held_out_rmse_before = outcome.fits.before.held_out_rmse;
@@ -160,48 +160,6 @@ fn texts(part: &Part) -> (String, String) {
         }
         Body::Linear(_) | Body::Table(_) => (part.kind.clone(), part.kind.clone()),
     }
-}
-
-fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
-    let variances = fit.variances(&case.frame);
-    let followed = case
-        .ripple
-        .iter()
-        .filter(|_| fit.parts[part].kind == "ripple_alias")
-        .flat_map(|ripple| wave_estimates(case, ripple));
-    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
-    of_part
-        .map(|(index, free)| {
-            let parameter = &fit.parts[part].parameters[free.parameter];
-            let half = INTERVAL * variances[index].max(0.0).sqrt().hypot(LAW_SHARE * parameter.value / INTERVAL);
-            Estimate {
-                name: parameter.name.clone(),
-                value: parameter.value,
-                low: (parameter.value - half).max(parameter.range.0),
-                high: (parameter.value + half).min(parameter.range.1),
-                unit: unit_in(&parameter.unit, &case.scene),
-            }
-        })
-        .chain(followed)
-        .collect()
-}
-
-/// Frequency and size of a wave that was followed.
-fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
-    let per_s = 1.0 / case.scene.period_s();
-    let (hz, half_hz) = (ripple.wave.frequency * per_s, INTERVAL * ripple.frequency_error * per_s);
-    let amplitude = std::f64::consts::SQRT_2 * ripple.deviation;
-    // A wave that renews itself over `turns` rows has been seen that many times less often than there are rows.
-    let seen = count(case.frame.len()) * (1.0 - ripple.wave.rho.powi(2));
-    let half = INTERVAL * amplitude / (2.0 * seen.max(1.0)).sqrt();
-    let estimate = |name: &str, value: f64, half: f64, unit: &str| Estimate {
-        name: name.to_owned(),
-        value,
-        low: value - half,
-        high: value + half,
-        unit: unit.to_owned(),
-    };
-    [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
 }
 
 /// Share of a contribution's variance that the baseline can imitate.

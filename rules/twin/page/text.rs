@@ -93,7 +93,7 @@ impl Tongue {
 
     /// The name of an effect in plain words, escaped.
     pub(super) fn effect(self, kind: &str) -> String {
-        if kind == "unknown" {
+        if kind.starts_with("unknown") {
             return self.say("an unknown effect", "未知影响").to_owned();
         }
         let plain = || escape(&kind.replace('_', " "));

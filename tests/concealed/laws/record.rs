@@ -23,7 +23,8 @@ pub(crate) fn engagement_timing(dice: &mut Dice, _: &Plan, strength: f64) -> Pla
             }
         }
     })
-    .with("late_s", steps as f64 * STEP_S)
+    // How much later than flagged the tool really cuts.
+    .with("delay_s", -(steps as f64) * STEP_S)
 }
 
 /// The flag passes a debounce of the controller: late on and later off, by times of its own.

@@ -198,7 +198,7 @@ pub(crate) fn area(claimed: &[f64], truth: &[f64]) -> Option<f64> {
 const SAME: [(&str, &[&str]); 8] = [
     ("inertia_kg_m2", &["inertia_kg_m2"]),
     ("lag_s", &["lag_s", "delay_s"]),
-    ("late_s", &["delay_s"]),
+    ("delay_s", &["delay_s"]),
     ("level", &["level"]),
     ("weight", &["weight"]),
     ("gain", &["gain"]),

@@ -1,0 +1,229 @@
+//! How well the parameters of what was found are known: intervals of 95 %.
+//!
+//! Four things make a parameter uncertain, and none of them stands for another:
+//! 1. The noise: generalised least squares over everything that is fitted together, shapes included, so that what a shape
+//!    leaves open is in the intervals of the sizes too (delta method).
+//! 2. The runs: innovations are never quite white, so the sandwich by units of hold-out counts where it is wider (Liang
+//!    and Zeger, Biometrika 73, 1986; both in `Fit::variances`).
+//! 3. The law: where the machine does not follow it, its coefficient is another one where the law is small than where it
+//!    is large, or for one sign than for the other. How far the coefficient differs between these *levels* beyond their
+//!    noise is measured in the recording (DerSimonian and Laird, Controlled Clinical Trials 7, 1986), and the interval
+//!    holds for a level that was not asked (prediction interval: Higgins, Thompson and Spiegelhalter, J. R. Statist. Soc. A
+//!    172, 2009).
+//! 4. What no recording shows: every law is a little wrong in proportion (GUM, type B), and an effect in the cut may or
+//!    may not pass through the load loss that the model knows.
+
+use super::agreement::cleared;
+use super::diagnose::Case;
+use super::diagnosis::Estimate;
+use super::fit::Fit;
+use super::linear::dot;
+use super::model::{Body, Part};
+use super::ripple::Ripple;
+use super::verdicts::unit_of;
+use crate::physics::{Entry, unit_in};
+use crate::statistics::count;
+
+/// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
+/// 95 %: a share that no amount of rows makes smaller (GUM, type B).
+const LAW_SHARE: f64 = 0.05;
+/// Normal quantile of a 95 % interval.
+const INTERVAL: f64 = 1.96;
+/// Levels at which a coefficient is compared with itself; each carries the same sum of squares of its column.
+const LEVELS: usize = 4;
+/// Share of a column's greatest value below which a row tells nothing of the law.
+const NOTICED: f64 = 0.05;
+/// Share of all that is known of a coefficient below which a level tells nothing of it.
+const TELLS: f64 = 0.01;
+/// Kinds outside the family of the cut that mis-state it.
+const OF_THE_CUT: [&str; 3] = ["recipe_error", "engagement_timing", "override_delay"];
+
+/// The parameters of part number `part` of a fit, with intervals in their own units.
+#[must_use]
+pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
+    let variances = fit.variances(&case.frame);
+    let differences = differences(case, fit, part);
+    let passed_on = passed_on(case, fit, part);
+    let followed = case
+        .ripple
+        .iter()
+        .filter(|_| fit.parts[part].kind == "ripple_alias")
+        .flat_map(|ripple| wave_estimates(case, ripple));
+    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
+    of_part
+        .zip(differences)
+        .map(|((index, free), between)| {
+            let parameter = &fit.parts[part].parameters[free.parameter];
+            let told = (variances[index].max(0.0) + between).sqrt();
+            let half = INTERVAL * told.hypot(LAW_SHARE * parameter.value / INTERVAL);
+            let (low, high) = (parameter.value - half, parameter.value + half);
+            let (low, high) = match parameter.entry {
+                Entry::Linear => (low.min(low / passed_on), high.max(high / passed_on)),
+                Entry::Shape => (low, high),
+            };
+            Estimate {
+                name: parameter.name.clone(),
+                value: parameter.value,
+                low: low.max(parameter.range.0),
+                high: high.min(parameter.range.1),
+                unit: unit_in(&parameter.unit, &case.scene),
+            }
+        })
+        .chain(followed)
+        .collect()
+}
+
+/// Variance between levels of each free parameter of a part: zero for shapes, whose tangent is no law by itself.
+fn differences(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<f64> {
+    let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| case.frame.whiten(column, fit.noise)).collect();
+    let innovations = fit.innovations(&case.frame);
+    let freedom = count(case.frame.len().saturating_sub(fit.free.len()).max(1));
+    let variance = dot(&innovations, &innovations) / freedom;
+    let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
+    of_part
+        .map(|(index, free)| match fit.parts[part].parameters[free.parameter].entry {
+            Entry::Linear => {
+                let levels = levels(&fit.tangent[index]);
+                between(&cleared(&white, index), &innovations, &levels, variance)
+            }
+            Entry::Shape => 0.0,
+        })
+        .collect()
+}
+
+/// The level of each row by the value of a column, from the lowest to the highest; none where the column is next to
+/// nothing. Equal values share a level, so a column of one value has one.
+fn levels(column: &[f64]) -> Vec<Option<usize>> {
+    let top = column.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
+    let mut rows: Vec<usize> = (0..column.len()).filter(|row| column[*row].abs() > NOTICED * top).collect();
+    rows.sort_by(|a, b| column[*a].total_cmp(&column[*b]));
+    let total: f64 = rows.iter().map(|row| column[*row] * column[*row]).sum();
+    let mut levels = vec![None; column.len()];
+    let (mut sum, mut level, mut last) = (0.0, 0, f64::NEG_INFINITY);
+    for row in rows {
+        let reached = (0..LEVELS).rev().find(|level| sum >= total * count(*level) / count(LEVELS)).unwrap_or(0);
+        if reached > level && column[row] - last > 1e-9 * top {
+            level = reached;
+        }
+        sum += column[row] * column[row];
+        last = column[row];
+        levels[row] = Some(level);
+    }
+    levels
+}
+
+/// Variance of a coefficient between levels beyond what the noise makes of it (DerSimonian and Laird); zero for fewer than
+/// two levels. `own` is its whitened tangent clear of all others, `variance` that of one innovation.
+fn between(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
+    let mut told = [(0.0, 0.0); LEVELS];
+    for (row, level) in levels.iter().enumerate() {
+        if let Some(level) = level {
+            told[*level].0 += own[row] * own[row];
+            told[*level].1 += own[row] * innovations[row];
+        }
+    }
+    let all: f64 = told.iter().map(|(weight, _)| weight).sum();
+    let told: Vec<(f64, f64)> = told.into_iter().filter(|(weight, _)| *weight > TELLS * all).collect();
+    let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
+    let spread = sum - told.iter().map(|(weight, _)| weight * weight).sum::<f64>() / sum;
+    if told.len() < 2 || variance <= 0.0 || spread <= 0.0 {
+        return 0.0;
+    }
+    let mean = told.iter().map(|(_, score)| score).sum::<f64>() / sum;
+    let q = told.iter().map(|(weight, score)| weight * (score / weight - mean).powi(2)).sum::<f64>() / variance;
+    ((q - count(told.len() - 1)) * variance / spread).max(0.0)
+}
+
+/// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one
+/// for a part that does not change the cut.
+fn passed_on(case: &Case<'_>, fit: &Fit, part: usize) -> f64 {
+    let in_the_cut = |part: &Part| match &part.body {
+        Body::Effect(effect, _) => effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str()),
+        _ => false,
+    };
+    let losses: Vec<&Part> = fit.parts[..case.parts.len()].iter().filter(|part| part.kind == "load_loss").collect();
+    if losses.is_empty() || !in_the_cut(&fit.parts[part]) {
+        return 1.0;
+    }
+    let Some(load) = case.scene.load() else { return 1.0 };
+    let size: f64 = load.iter().map(|load| load.abs()).sum();
+    let typical = if size > 0.0 { dot(load, load) / size } else { 0.0 };
+    let value = |part: &Part, name: &str| part.parameter(name).map_or(0.0, |parameter| parameter.value);
+    let slope = |part: &&Part| value(part, "linear") + 2.0 * value(part, "quadratic_per_w") * typical;
+    (1.0 + losses.iter().map(slope).sum::<f64>()).max(0.5)
+}
+
+/// Frequency and size of a wave that was followed.
+fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
+    let per_s = 1.0 / case.scene.period_s();
+    let (hz, half_hz) = (ripple.wave.frequency * per_s, INTERVAL * ripple.frequency_error * per_s);
+    let amplitude = std::f64::consts::SQRT_2 * ripple.deviation;
+    // A wave that renews itself over `turns` rows has been seen that many times less often than there are rows.
+    let seen = count(case.frame.len()) * (1.0 - ripple.wave.rho.powi(2));
+    let half = INTERVAL * amplitude / (2.0 * seen.max(1.0)).sqrt();
+    let estimate = |name: &str, value: f64, half: f64, unit: &str| Estimate {
+        name: name.to_owned(),
+        value,
+        low: value - half,
+        high: value + half,
+        unit: unit.to_owned(),
+    };
+    [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const ROWS: usize = 800;
+
+    fn noise(seed: u64) -> Vec<f64> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+        (0..ROWS).map(|_| StandardNormal.sample(&mut rng)).collect()
+    }
+
+    /// What one coefficient leaves of `y`.
+    fn left(column: &[f64], y: &[f64]) -> Vec<f64> {
+        let coefficient = dot(column, y) / dot(column, column);
+        y.iter().zip(column).map(|(y, x)| y - coefficient * x).collect()
+    }
+
+    fn difference(column: &[f64], y: &[f64]) -> f64 {
+        between(column, &left(column, y), &levels(column), 1.0).sqrt()
+    }
+
+    #[test]
+    fn a_law_that_is_followed_has_one_coefficient_at_every_level() {
+        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count(row) * 0.37).sin()).collect();
+        let mean = (0..20).map(|seed| {
+            let y: Vec<f64> = column.iter().zip(noise(seed)).map(|(x, e)| 2.0 * x + e).collect();
+            difference(&column, &y)
+        });
+        assert!(mean.sum::<f64>() / 20.0 < 0.03);
+    }
+
+    #[test]
+    fn what_is_more_upwards_than_downwards_differs_by_level() {
+        let column: Vec<f64> = (0..ROWS).map(|row| 3.0 * (count(row) * 0.37).sin()).collect();
+        let law = |x: f64| if x > 0.0 { 2.2 * x } else { 1.8 * x };
+        let y: Vec<f64> = column.iter().zip(noise(1)).map(|(x, e)| law(*x) + e).collect();
+        let found = difference(&column, &y);
+        assert!((0.15..0.35).contains(&found), "0.2 each way: {found}");
+    }
+
+    #[test]
+    fn a_switch_has_one_level_and_a_ramp_has_all() {
+        let switch: Vec<f64> = (0..ROWS).map(|row| f64::from(u8::from(row % 3 == 0))).collect();
+        assert!(levels(&switch).iter().flatten().all(|level| *level == 0));
+        let ramp: Vec<f64> = (0..ROWS).map(count).collect();
+        let found = levels(&ramp);
+        assert_eq!((found[0], found[ROWS - 1]), (None, Some(LEVELS - 1)));
+        let squares = |wanted: usize| -> f64 {
+            ramp.iter().zip(&found).filter(|(_, level)| **level == Some(wanted)).map(|(x, _)| x * x).sum()
+        };
+        let total = dot(&ramp, &ramp);
+        assert!((0..LEVELS).all(|level| (squares(level) / total - 0.25).abs() < 0.01));
+    }
+}
