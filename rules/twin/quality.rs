@@ -33,7 +33,7 @@ pub fn clean(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     note("duplicate_time", "time_s", duplicates(scene));
     note("quantisation", &output, quantised(scene));
     let mut dropped = absent(scene);
-    let held = held(scene);
+    let held = held(scene, &at_stop(scene));
     let zeros = zeros(scene, simulated);
     dropped.extend(held.iter().chain(&zeros));
     dropped.sort_unstable();
@@ -57,8 +57,33 @@ fn absent(scene: &Scene) -> Vec<usize> {
     (0..scene.rows()).filter(|row| !scene.usable()[*row]).collect()
 }
 
-/// Rows in which the output repeats exactly, where that is unusual.
-fn held(scene: &Scene) -> Vec<usize> {
+/// Rows in which the output stands at the end of its range again and again: for several rows at a time, more than once,
+/// and in few rows of all. Zero is what a meter reads that gives nothing.
+fn at_stop(scene: &Scene) -> Vec<bool> {
+    let mut stands = vec![false; scene.rows()];
+    let recorded = scene.recorded();
+    let known = || (0..scene.rows()).filter(|row| scene.usable()[*row]);
+    let low = known().map(|row| recorded[row]).fold(f64::INFINITY, f64::min);
+    let high = known().map(|row| recorded[row]).fold(f64::NEG_INFINITY, f64::max);
+    for end in [low, high].into_iter().filter(|end| *end != 0.0) {
+        let mut stretches: Vec<std::ops::Range<usize>> = Vec::new();
+        for row in known().filter(|row| recorded[*row] == end) {
+            match stretches.last_mut() {
+                Some(last) if last.end == row => last.end = row + 1,
+                _ => stretches.push(row..row + 1),
+            }
+        }
+        stretches.retain(|stretch| stretch.len() >= HELD_ROWS);
+        if stretches.len() > 1 {
+            stretches.into_iter().flatten().for_each(|row| stands[row] = true);
+        }
+    }
+    stands
+}
+
+/// Rows in which the output repeats exactly, where that is unusual and nothing stands at a stop: what a full vessel, a
+/// limit or a meter at its end holds is no dropout.
+fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
     let recorded = scene.recorded();
     let equal = (1..scene.rows()).filter(|row| recorded[*row] == recorded[row - 1]).count();
     let mut rows = Vec::new();
@@ -68,7 +93,7 @@ fn held(scene: &Scene) -> Vec<usize> {
     let mut start = 0;
     for row in 1..=scene.rows() {
         if row == scene.rows() || recorded[row] != recorded[start] {
-            if row - start >= HELD_ROWS {
+            if row - start >= HELD_ROWS && !at_stop[start] {
                 // The first of them was measured.
                 rows.extend(start + 1..row);
             }
@@ -130,4 +155,41 @@ fn quantised(scene: &Scene) -> usize {
     values.sort_by(f64::total_cmp);
     values.dedup();
     if rows > 200 && values.len() * 20 < rows { rows } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::recording::read_csv;
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    /// A level that rises and falls below a brim; held rows where the meter slept.
+    fn scene(brim: f64, asleep: std::ops::Range<u32>) -> Scene {
+        let mut text = String::from("time_s,level_v\n");
+        let level = |row: u32| (6.0 + 5.0 * (f64::from(row) / 40.0).sin()).min(brim);
+        for row in 0..600_u32 {
+            let here = if asleep.contains(&row) { asleep.start } else { row };
+            writeln!(text, "{row},{:.6}", level(here)).expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        Scene::new(&recording, "level_v", &BTreeMap::new()).expect("recorded")
+    }
+
+    fn dropped(brim: f64, asleep: std::ops::Range<u32>) -> usize {
+        let mut scene = scene(brim, asleep);
+        let simulated = vec![1.0; scene.rows()];
+        clean(&mut scene, &simulated).iter().filter(|fault| fault.fault == "dropouts").map(|fault| fault.rows).sum()
+    }
+
+    #[test]
+    fn what_stands_at_a_stop_is_no_dropout() {
+        assert_eq!(dropped(10.9, 0..0), 0);
+    }
+
+    #[test]
+    fn a_meter_that_sleeps_is_one() {
+        assert_eq!(dropped(20.0, 100..112), 11);
+        assert_eq!(dropped(10.9, 100..112), 11);
+    }
 }
