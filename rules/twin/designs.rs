@@ -213,3 +213,32 @@ fn derivative(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {
     let ahead = moved.contribution(scene)?;
     Some(ahead.iter().zip(&base).map(|(ahead, base)| (ahead - base) / step).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::parse_model;
+    use adapters::recording::read_csv;
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    /// A level, and beside it the level of the row before under another name, or one that only resembles it.
+    fn repeats(share: f64) -> bool {
+        let level = |row: u32| 5.0 + (f64::from(row) / 9.0).sin();
+        let mut text = String::from("time_s,before_v,level_v\n");
+        for row in 1..200_u32 {
+            writeln!(text, "{row},{:.6},{:.6}", share * level(row - 1), level(row)).expect("a string takes it");
+        }
+        let model =
+            "schema = \"model/1\"\noutput = \"level_v\"\n[[effect]]\nkind = \"linear\"\ncolumns = { before_v = 1.0 }\n";
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let scene = Scene::new(&recording, "level_v", &BTreeMap::new()).expect("recorded");
+        repeats_output(&parse_model(model).expect("fine"), &scene)
+    }
+
+    #[test]
+    fn the_past_of_the_output_is_known_by_its_values() {
+        assert!(repeats(1.0));
+        assert!(!repeats(1.01));
+    }
+}
