@@ -19,6 +19,8 @@ use crate::statistics::{count, median};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
+/// Information from which something real remains even where a form without a name does not carry over to rows held out.
+const BEYOND_DOUBT_INFORMATION: f64 = 60.0;
 /// Rows below which nothing is claimed.
 const ROWS_MIN: usize = 60;
 /// Kinds that change over minutes to hours, whatever tool is in use.
@@ -136,7 +138,7 @@ impl<'a> Case<'a> {
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);
         let mut outcome = Outcome::new(self, base, found, designs, doubt);
-        if outcome.is_alarm_without_a_name() && outcome.fits.rises() {
+        if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
             // On rows that took no part it explains nothing.
             let Outcome { base, found, designs, .. } = outcome;
             outcome = Outcome::new(self, base, found, designs, Doubt::NONE);
@@ -333,10 +335,11 @@ impl Outcome {
         Self { base, found, designs, unknown, nameless, fits, rows, added }
     }
 
-    /// Is something said to remain where nothing is named?
+    /// Is something said to remain where nothing is named, and not beyond doubt?
     #[must_use]
-    fn is_alarm_without_a_name(&self) -> bool {
-        self.unknown.is_some() && self.found.best.members.is_empty()
+    fn is_weak_alarm_without_a_name(&self) -> bool {
+        let weak = self.unknown.as_ref().is_some_and(|unknown| unknown.information < BEYOND_DOUBT_INFORMATION);
+        weak && self.found.best.members.is_empty()
     }
 
     /// The fit that is reported.
