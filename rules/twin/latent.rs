@@ -14,7 +14,7 @@ use crate::statistics::{count, median};
 use std::ops::Range;
 
 /// Switchings that must be seen, those between runs included.
-const SWITCHINGS_MIN: usize = 4;
+pub(super) const SWITCHINGS_MIN: usize = 4;
 /// Switchings that the first sequence is priced for.
 const SWITCHINGS_FIRST: usize = 10;
 /// Share of the rows that each of the two levels must have.
@@ -45,16 +45,6 @@ const SETTLED: usize = 3;
 const SURPRISE_MAX: f64 = 25.0;
 /// Chance that a switch stays as it is from one row to the next, where it is followed.
 const STAYS: f64 = 0.99;
-
-/// Places of a channel at which switchings are counted, and how many must be seen there.
-const PLACES: usize = 10;
-const SWITCHINGS_TOLD: usize = 8;
-/// Spells that tell whether they are flat, rows of a third of one, and what counts as a slope: in deviations, and as a
-/// share of the level.
-const SPELLS_TOLD: usize = 5;
-const THIRD_ROWS_MIN: usize = 3;
-const SLOPE_DEVIATE: f64 = 4.0;
-const SLOPE_SHARE: f64 = 0.4;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,61 +164,6 @@ impl Switching {
         };
         let apart = share(true).zip(share(false)).map_or(0.0, |(cut, rest)| (cut - rest).abs());
         !own_doing && apart <= SHARES_APART_MAX
-    }
-}
-
-impl Switching {
-    /// Does it switch at certain places of something that the process goes through again and again, such as the position
-    /// of an axis or the time in the cut? `channel` holds its value where it has one.
-    #[must_use]
-    pub fn follows(&self, channel: &[Option<f64>]) -> bool {
-        let mut sorted: Vec<f64> = channel.iter().copied().flatten().collect();
-        sorted.sort_by(f64::total_cmp);
-        if sorted.len() < PLACES * SWITCHINGS_MIN {
-            return false;
-        }
-        let edges: Vec<f64> = (1..PLACES).map(|place| sorted[place * sorted.len() / PLACES]).collect();
-        let mut switchings = [0_usize; PLACES];
-        for row in (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]) {
-            if let Some(value) = channel[row] {
-                switchings[edges.partition_point(|edge| *edge <= value)] += 1;
-            }
-        }
-        let here: usize = switchings.iter().sum();
-        switchings.sort_unstable_by(|a, b| b.cmp(a));
-        here >= SWITCHINGS_TOLD && 2 * here >= self.switchings && 2 * (switchings[0] + switchings[1]) > here
-    }
-
-    /// Does it stay at its two levels? What recovers after each step, or grows until the next, is no consumer.
-    #[must_use]
-    pub fn is_flat(&self, residual: &[f64], frame: &Frame) -> bool {
-        [1.0, 0.0].into_iter().all(|level| {
-            let changes = self.changes_within_spells(residual, frame, level);
-            let spells = count(changes.len());
-            let mean = changes.iter().sum::<f64>() / spells.max(1.0);
-            let variance = changes.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (spells - 1.0).max(1.0);
-            let deviate = mean.abs() / (variance / spells.max(1.0)).sqrt().max(f64::MIN_POSITIVE);
-            changes.len() < SPELLS_TOLD || deviate < SLOPE_DEVIATE || mean.abs() < SLOPE_SHARE * self.level
-        })
-    }
-
-    /// Last third less first third of every spell at a level that is long enough.
-    fn changes_within_spells(&self, residual: &[f64], frame: &Frame, level: f64) -> Vec<f64> {
-        let mut changes = Vec::new();
-        for stretch in &frame.stretches {
-            let mut start = stretch.start;
-            for spell in self.state[stretch.clone()].chunk_by(|a, b| a == b) {
-                // The rows at either end may be on for a part.
-                let inner = start + 1..(start + spell.len()).saturating_sub(1);
-                start += spell.len();
-                if spell[0] == level && inner.len() >= 3 * THIRD_ROWS_MIN {
-                    let third = inner.len() / 3;
-                    let mean = |rows: Range<usize>| residual[rows].iter().sum::<f64>() / count(third);
-                    changes.push(mean(inner.end - third..inner.end) - mean(inner.start..inner.start + third));
-                }
-            }
-        }
-        changes
     }
 }
 

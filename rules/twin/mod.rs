@@ -13,6 +13,7 @@
 
 mod agreement;
 pub mod bind;
+mod consumer;
 mod corroborated;
 pub mod designs;
 pub mod diagnose;

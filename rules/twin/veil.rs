@@ -75,3 +75,62 @@ impl Case<'_> {
         best
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{diagnose, parse_model};
+    use adapters::Recording;
+    use adapters::recording::{Cells, Numbers, Words};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const ROWS: usize = 960;
+    const MODEL: &str = r#"
+schema = "model/1"
+name = "lathe"
+output = "spindle_power_w"
+[[effect]]
+kind = "linear"
+columns = { one = 200.0, spindle_speed_rpm = 0.2, "engaged * feed_mm_min" = 8.0 }
+"#;
+
+    /// Cuts of twenty rows at 2 Hz at other speeds and feeds each; the meter reports 0.7 s late, and its noise is small
+    /// beside an edge.
+    fn late_meter() -> Recording {
+        let pass = |row: usize| row / 30;
+        let speed = |row: usize| 600.0 + 130.0 * (pass(row) * 7 % 9) as f64;
+        let feed = |row: usize| 80.0 + 12.0 * (pass(row) * 5 % 11) as f64;
+        let engaged = |row: usize| if row % 30 >= 8 && row % 30 < 28 { 1.0 } else { 0.0 };
+        let power = |row: usize| 200.0 + 0.2 * speed(row) + 8.0 * engaged(row) * feed(row);
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        let mut slow = 0.0;
+        let mut recorded = |row: usize| {
+            let e: f64 = StandardNormal.sample(&mut rng);
+            slow = 0.9 * slow + 5.0 * e;
+            let e: f64 = StandardNormal.sample(&mut rng);
+            // 1.4 rows late, and never from the run before.
+            let (one, two) = (row.saturating_sub(1).max(row / 120 * 120), row.saturating_sub(2).max(row / 120 * 120));
+            0.6 * power(one) + 0.4 * power(two) + slow + 6.0 * e
+        };
+        let mut recording = Recording::new("late", (0..ROWS).map(|row| 0.5 * row as f64).collect(), None);
+        let mut put = |name: &str, values: Vec<f64>| recording.set_column(name, Cells::Numbers(Numbers::full(values)));
+        put("spindle_speed_rpm", (0..ROWS).map(speed).collect());
+        put("feed_mm_min", (0..ROWS).map(feed).collect());
+        put("engaged", (0..ROWS).map(engaged).collect());
+        put("spindle_power_w", (0..ROWS).map(&mut recorded).collect());
+        let mut runs = Words::default();
+        (0..ROWS).for_each(|row| runs.push(&(row / 120).to_string()));
+        recording.set_column("run", Cells::Words(runs));
+        recording
+    }
+
+    #[test]
+    fn a_late_meter_is_named_though_its_edges_look_outlandish() {
+        let model = parse_model(MODEL).expect("a model");
+        let diagnosis = diagnose(&late_meter(), &model, 1).expect("a diagnosis");
+        let found = diagnosis.missing.first().expect("something is missing");
+        let delay = found.parameters.iter().find(|parameter| parameter.name == "delay_s").map(|delay| delay.value);
+        assert_eq!(found.effect, "clock_lag", "{}", diagnosis.summary);
+        assert!(delay.is_some_and(|delay_s| (delay_s - 0.7).abs() < 0.05), "{delay:?}");
+    }
+}

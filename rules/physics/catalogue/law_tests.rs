@@ -215,3 +215,21 @@ fn thermal_effects_speak_of_displacements_only() {
         assert!(forms(kind, &displaced).is_empty(), "{kind}");
     }
 }
+
+#[test]
+fn a_taper_by_distance_is_the_same_at_the_same_place_of_every_pass() {
+    let mut recording = Recording::new("passes", (0..120).map(f64::from).collect(), None);
+    // A long pass of 60 rows and a short one of 30, both at 60 mm/min: a millimetre per row.
+    let place = |row: usize| if row < 60 { Some(row) } else { row.checked_sub(80).filter(|row| *row < 30) };
+    set(&mut recording, "engaged", |row| f64::from(u8::from(place(row).is_some())));
+    set(&mut recording, "feed_mm_min", |_| 60.0);
+    set(&mut recording, "spindle_power_w", |_| 1000.0);
+    let mut scene = scene(&recording, "spindle_power_w");
+    scene.set_load(Some(vec![500.0; 120]));
+    let names: Vec<&str> = effect("depth_taper").expect("known").forms(&scene).iter().map(|form| form.name).collect();
+    assert_eq!(names, ["linear", "quadratic", "distance", "distance_quadratic"]);
+    let taper = column("depth_taper", &scene, &Form { name: "distance", ..Form::plain() });
+    assert!(taper[20] > 0.0 && (taper[20] - taper[100]).abs() < 1e-9, "{} {}", taper[20], taper[100]);
+    let share = column("depth_taper", &scene, &Form { name: "linear", ..Form::plain() });
+    assert!((share[59] - share[109]).abs() < 1e-9, "by share the ends of both passes are alike");
+}
