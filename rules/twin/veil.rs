@@ -91,7 +91,7 @@ name = "lathe"
 output = "spindle_power_w"
 [[effect]]
 kind = "linear"
-columns = { one = 200.0, spindle_speed_rpm = 0.2, "engaged * feed_mm_min" = 8.0 }
+columns = { one = 200.0, spindle_speed_rpm = 0.2, feed_mm_min = 8.0 }
 "#;
 
     /// Cuts of twenty rows at 2 Hz at other speeds and feeds each; the meter reports 0.7 s late, and its noise is small
@@ -115,7 +115,7 @@ columns = { one = 200.0, spindle_speed_rpm = 0.2, "engaged * feed_mm_min" = 8.0 
         let mut recording = Recording::new("late", (0..ROWS).map(|row| 0.5 * row as f64).collect(), None);
         let mut put = |name: &str, values: Vec<f64>| recording.set_column(name, Cells::Numbers(Numbers::full(values)));
         put("spindle_speed_rpm", (0..ROWS).map(speed).collect());
-        put("feed_mm_min", (0..ROWS).map(feed).collect());
+        put("feed_mm_min", (0..ROWS).map(|row| engaged(row) * feed(row)).collect());
         put("engaged", (0..ROWS).map(engaged).collect());
         put("spindle_power_w", (0..ROWS).map(&mut recorded).collect());
         let mut runs = Words::default();
