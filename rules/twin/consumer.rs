@@ -3,7 +3,7 @@
 
 use super::frame::Frame;
 use super::latent::{SWITCHINGS_MIN, Switching};
-use crate::statistics::{count, mean};
+use crate::statistics::count;
 use std::ops::Range;
 
 /// Places of a channel at which switchings are counted, and how many must be seen there.
