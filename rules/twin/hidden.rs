@@ -1,7 +1,7 @@
 //! Hypotheses whose state nobody records: it is read from what the baseline leaves where rows are fitted, and followed
 //! from earlier rows in held-out runs.
 
-use super::designs::Design;
+use super::designs::{AT_EDGES, Design};
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::latent::{self, Switching};
@@ -48,9 +48,11 @@ impl Case<'_> {
 
     /// Looks for the switch again beside what was found, which may have covered it; says whether there is one, and then
     /// puts it into the place of one that showed before. Not for the ripple: a wave that is followed row by row explains
-    /// a little of everything, and what it seems to gain beside others is no gain.
+    /// a little of everything, and what it seems to gain beside others is no gain. Not beside what acts at edges either:
+    /// what a late clock leaves of every edge goes on and off with it.
     pub(super) fn shows_switch_beside(&mut self, best: &Hypothesis, designs: &mut Vec<Design>) -> bool {
-        let named = best.members.iter().any(|member| designs[*member].kind == "auxiliary_switch");
+        let covered = |kind: &str| kind == "auxiliary_switch" || AT_EDGES.contains(&kind);
+        let named = best.members.iter().any(|member| covered(&designs[*member].kind));
         if named || best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
             return false;
         }

@@ -27,7 +27,7 @@ pub const P_MAX: f64 = 0.02;
 /// Information by which a fault of the measurement may explain less than a cause in the machine and still be named first.
 const MEASURED_AS_WELL: f64 = 3.0;
 /// Faults of a meter.
-const METER: [&str; 6] = ["sensor_gain", "zero_drift", "offset", "clock_lag", "meter_window", "saturation"];
+pub(super) const METER: [&str; 6] = ["sensor_gain", "zero_drift", "offset", "clock_lag", "meter_window", "saturation"];
 
 /// A set of effects on top of the baseline, fitted together with it.
 #[derive(Clone)]

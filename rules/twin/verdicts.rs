@@ -6,6 +6,7 @@ use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
+use super::search::{Hypothesis, METER};
 use crate::physics::effect;
 
 /// Information within which two explanations cannot be told apart.
@@ -183,7 +184,7 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
     let within = CLASS_INFORMATION * best.fit.dispersion(&case.frame);
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
-        let delta = best.information - other.information;
+        let delta = best.information - other.information - forgiven(outcome, other);
         if other.members.len() != best.members.len() || delta > within {
             continue;
         }
@@ -197,6 +198,14 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
         }
     }
     all
+}
+
+/// Reluctance to name a fault of a meter, where one stands in the place of something else: it guards against false alarms
+/// and is no evidence between two explanations of what is there.
+fn forgiven(outcome: &Outcome, other: &Hypothesis) -> f64 {
+    let new = other.members.iter().filter(|member| !outcome.found.best.members.contains(member));
+    let designs = new.map(|member| &outcome.designs[*member]);
+    designs.filter(|design| METER.contains(&design.kind.as_str())).map(|design| design.reluctance).sum()
 }
 
 fn alternative(other: &str, instead_of: &str, delta_ic: f64) -> Alternative {
