@@ -126,14 +126,8 @@ impl<'a> Case<'a> {
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let base = self.unveil(base);
-        let (mut found, mut designs) = self.search(&base, seed);
-        // What is found may itself have made rows outlandish, and been looked at through few of them.
-        let veiled = self.frame.heavy();
-        let mut base = self.settle(base, &mut found);
-        if super::veil::unveiled(veiled, self.frame.heavy()) {
-            (found, designs) = self.search(&base, seed);
-            base = self.settle(base, &mut found);
-        }
+        let (mut found, designs) = self.search(&base, seed);
+        let base = self.settle(base, &mut found);
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);

@@ -17,7 +17,7 @@ const FITTED: usize = 6;
 const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
 
 /// Did what is there now make half of the outlandish rows ordinary?
-pub(super) fn unveiled(before: usize, now: usize) -> bool {
+fn unveiled(before: usize, now: usize) -> bool {
     before >= VEILED_MIN && 2 * now <= before
 }
 
