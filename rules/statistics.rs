@@ -35,6 +35,13 @@ pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Opt
     values.get(at).copied()
 }
 
+/// The standard deviation of normal noise about zero, told by the middle of its sizes: whatever the few greatest are.
+/// `None` for no values.
+#[must_use]
+pub(crate) fn robust_deviation(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    median(values.into_iter().map(f64::abs).collect()).map(|middle| 1.4826 * middle)
+}
+
 /// The root of the mean square; zero for no values.
 #[must_use]
 pub(crate) fn rms(values: &[f64]) -> f64 {

@@ -15,7 +15,7 @@ use super::search::{Found, Hypothesis, Search};
 use super::unknown::{Doubt, Nameless, Unknown};
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
-use crate::statistics::{count, median};
+use crate::statistics::{count, median, robust_deviation};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
@@ -271,7 +271,7 @@ impl<'a> Case<'a> {
 #[must_use]
 pub fn ordinary_noise(fit: &Fit) -> f64 {
     let middle = median(fit.residual.clone()).unwrap_or(0.0);
-    1.4826 * median(fit.residual.iter().map(|x| (x - middle).abs()).collect()).unwrap_or(0.0)
+    robust_deviation(fit.residual.iter().map(|x| x - middle)).unwrap_or(0.0)
 }
 
 /// Root mean square distance.

@@ -5,7 +5,7 @@ use super::linear::{Solution, dot, least_squares};
 use super::model::{Part, simulate};
 use super::noise::Arma;
 use crate::physics::{Entry, Scene};
-use crate::statistics::{count, median, rms};
+use crate::statistics::{count, rms, robust_deviation};
 
 /// Gauss-Newton steps at most, per noise model.
 const STEPS_MAX: usize = 8;
@@ -38,8 +38,6 @@ pub struct Fit {
     pub tangent: Vec<Vec<f64>>,
 }
 
-/// Standard deviation over median of the size, for normal noise.
-const MEDIAN_TO_DEVIATION: f64 = 1.4826;
 /// Deviations beyond which an innovation counts as this many in the dispersion.
 const DISPERSION_CUT: f64 = 6.0;
 
@@ -104,8 +102,7 @@ impl Fit {
     #[must_use]
     pub fn dispersion(&self, frame: &Frame) -> f64 {
         let innovations = self.innovations(frame);
-        let middle = median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
-        let ordinary = (MEDIAN_TO_DEVIATION * middle).powi(2);
+        let ordinary = robust_deviation(innovations.iter().copied()).unwrap_or(0.0).powi(2);
         let cut = DISPERSION_CUT * DISPERSION_CUT * ordinary;
         let mean = innovations.iter().map(|e| (e * e).min(cut)).sum::<f64>() / count(innovations.len().max(1));
         if ordinary > 0.0 { (mean / ordinary).max(1.0) } else { 1.0 }

@@ -6,7 +6,7 @@
 use super::levels::Levels;
 use super::noise::{Arma, log_likelihood, whiten};
 use crate::physics::Scene;
-use crate::statistics::{mean, median};
+use crate::statistics::{mean, robust_deviation};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -141,7 +141,7 @@ impl Frame {
     /// falling beyond, so that a single row can say only so much for or against anything.
     pub fn weigh(&mut self, residual: &[f64], noise: Arma) {
         let innovations = self.unweighted(residual, noise);
-        let spread = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
+        let spread = robust_deviation(innovations.iter().copied()).unwrap_or(0.0);
         let limit = HEAVY_DEVIATIONS * spread;
         self.weights =
             innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();

@@ -10,7 +10,7 @@
 use super::frame::Frame;
 use super::linear::dot;
 use super::noise::{Arma, fit_near};
-use crate::statistics::{count, median};
+use crate::statistics::{count, median, robust_deviation};
 use std::ops::Range;
 
 /// Switchings that must be seen, those between runs included.
@@ -204,8 +204,7 @@ pub fn price(switching: &Switching) -> f64 {
 
 /// Standard deviation of innovations, whatever the few greatest are.
 fn deviation(innovations: &[f64]) -> Option<f64> {
-    let deviation = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect())?;
-    (deviation > 0.0).then_some(deviation)
+    robust_deviation(innovations.iter().copied()).filter(|deviation| *deviation > 0.0)
 }
 
 /// One of the two sequences that are still in the race.

@@ -1,7 +1,7 @@
 //! Faults of a recording that do not bias the comparison: they are noted, and their rows are left out.
 
 use crate::physics::Scene;
-use crate::statistics::median;
+use crate::statistics::{median, robust_deviation};
 
 /// One kind of fault found in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,7 +119,7 @@ fn spikes(scene: &Scene, simulated: &[f64]) -> Vec<usize> {
         scene.recorded().iter().zip(simulated).map(|(recorded, simulated)| recorded - simulated).collect();
     let jumps: Vec<(usize, f64, f64)> =
         scene.runs().iter().flat_map(|run| jumps_of(scene, &residual, simulated, run)).collect();
-    let Some(spread) = median(jumps.iter().map(|(_, jump, _)| jump.abs()).collect()).map(|mad| 1.4826 * mad) else {
+    let Some(spread) = robust_deviation(jumps.iter().map(|(_, jump, _)| *jump)) else {
         return Vec::new();
     };
     let spike = |(_, jump, moved): &&(usize, f64, f64)| jump.abs() > SPIKE_DEVIATIONS * spread && *moved < spread;

@@ -4,7 +4,7 @@
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
 use super::orthogonal::product;
-use crate::statistics::{count, median};
+use crate::statistics::{count, median, robust_deviation};
 use serde::Serialize;
 
 /// What a trend leaves of slow noise is corrected by no more than the inverse of this.
@@ -65,7 +65,7 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
 #[must_use]
 pub fn without_pulses(time_s: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let middle = median(values.to_vec()).unwrap_or(0.0);
-    let sd = 1.4826 * median(values.iter().map(|value| (value - middle).abs()).collect()).unwrap_or(0.0);
+    let sd = robust_deviation(values.iter().map(|value| value - middle)).unwrap_or(0.0);
     let near = |(_, value): &(&f64, &f64)| sd <= 0.0 || (*value - middle).abs() <= PULSE_SD * sd;
     time_s.iter().zip(values).filter(near).map(|(time_s, value)| (*time_s, *value)).unzip()
 }

@@ -4,7 +4,7 @@
 //! fits one cut better than another; the noise around it is shared within the regime.
 
 use super::chart::{Healthy, Point};
-use crate::statistics::{count, median};
+use crate::statistics::{count, robust_deviation};
 use crate::twin::noise::{self, Arma, PHI_MAX};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -109,7 +109,7 @@ fn healthy(deviations: &[f64], expected: f64, works: f64) -> Healthy {
     let noise = cautious(noise::fit(deviations, &all), n);
     let innovations = noise::whiten(deviations, &all, noise);
     let rms = (innovations.iter().map(|e| e * e).sum::<f64>() / (n - works).max(1.0)).sqrt();
-    let robust = 1.4826 * median(innovations.iter().map(|e| e.abs()).collect()).unwrap_or(0.0);
+    let robust = robust_deviation(innovations.iter().copied()).unwrap_or(0.0);
     let level = deviations.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     // Never nothing: a series that is constant to the last digit has the resolution of its meter.
     let floor = (1e-6 * expected.abs()).max(1e-9 * level).max(f64::MIN_POSITIVE);
