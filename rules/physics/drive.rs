@@ -1,5 +1,6 @@
 //! Which drive an output belongs to, and how that drive moves, in SI units or thousands of revolutions.
 
+use super::excitation::greatest;
 use super::{OutputKind, Role, Scene};
 use std::f64::consts::PI;
 
@@ -132,6 +133,12 @@ pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
     let forward = motion.iter().filter(|v| **v > 0.0).count();
     let backward = motion.iter().filter(|v| **v < 0.0).count();
     forward.min(backward) >= least.max(2)
+}
+
+/// The direction of a motion, -1 to 1: a reversal passes through zero within a hundredth of the greatest velocity.
+pub(crate) fn directions(motion: &[f64]) -> impl Iterator<Item = f64> {
+    let width = 0.01 * greatest(motion);
+    motion.iter().map(move |v| soft_sign(*v, width))
 }
 
 /// A sign that passes smoothly through zero within `width`.

@@ -89,7 +89,10 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
         let places = places(scene, pass);
         let low = places.iter().copied().fold(f64::INFINITY, f64::min);
         let length = length(&places).max(f64::MIN_POSITIVE);
-        along[pass.clone()].iter_mut().zip(places.iter()).for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
+        along[pass.clone()]
+            .iter_mut()
+            .zip(places.iter())
+            .for_each(|(along, at)| *along = Some((at - low) / length - 0.5));
     }
     along
 }
@@ -98,7 +101,7 @@ fn along_pass(scene: &Scene) -> Vec<Option<f64>> {
 /// work piece that bends away does so by the place, not by the share of a pass.
 fn from_start(scene: &Scene) -> Vec<Option<f64>> {
     let mut along = vec![None; scene.rows()];
-    let longest = scene.passes().iter().map(|pass| length(&places(scene, pass))).fold(0.0, f64::max);
+    let longest = lengths(scene).into_iter().fold(0.0, f64::max);
     for pass in scene.passes() {
         let places = places(scene, pass);
         let start = places.first().copied().unwrap_or(0.0);
@@ -110,9 +113,14 @@ fn from_start(scene: &Scene) -> Vec<Option<f64>> {
 
 /// Is there a pass that is shorter by more than a tenth than the longest?
 fn lengths_differ(scene: &Scene) -> bool {
-    let lengths: Vec<f64> = scene.passes().iter().map(|pass| length(&places(scene, pass))).collect();
+    let lengths = lengths(scene);
     let longest = lengths.iter().copied().fold(0.0, f64::max);
     lengths.iter().any(|length| *length < 0.9 * longest)
+}
+
+/// How long each pass is.
+fn lengths(scene: &Scene) -> Vec<f64> {
+    scene.passes().iter().map(|pass| length(&places(scene, pass))).collect()
 }
 
 /// Positions of a pass where the axis moves, else the way that the feed tells, else times.

@@ -1,7 +1,6 @@
 //! Friction differs between the two directions of motion.
 
-use crate::physics::drive::{goes_both_ways, is_power, motion, soft_sign};
-use crate::physics::excitation::greatest;
+use crate::physics::drive::{directions, goes_both_ways, is_power, motion};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Friction that differs between directions.
@@ -65,15 +64,13 @@ impl Effect for DirectionAsymmetry {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let velocity = motion(scene)?;
-        let width = 0.01 * greatest(&velocity);
-        let power = is_power(scene);
-        let (name, law): (_, &dyn Fn(&f64) -> f64) = match form.name {
-            "step" => ("level", &|v| soft_sign(*v, width)),
-            "viscous" => ("slope", &|v| v.abs()),
-            _ if power => ("slope", &|v| *v),
-            _ => ("level", &|v| soft_sign(*v, width).abs()),
+        let (name, column) = match form.name {
+            "step" => ("level", directions(&velocity).collect()),
+            "viscous" => ("slope", velocity.iter().map(|v| v.abs()).collect()),
+            _ if is_power(scene) => ("slope", velocity),
+            _ => ("level", directions(&velocity).map(f64::abs).collect()),
         };
-        Some(vec![(name, velocity.iter().map(law).collect())])
+        Some(vec![(name, column)])
     }
 
     fn default_form(&self, scene: &Scene) -> Form {

@@ -89,7 +89,10 @@ impl Effect for EntryExit {
         let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
         let ramps = |length_s: f64| {
             let shares = [0.5, 1.0].into_iter();
-            shares.map(move |share| Form { name: "ramp", ..Form::of(&[("length_s", length_s), ("exit_length_s", share * length_s)]) })
+            shares.map(move |share| Form {
+                name: "ramp",
+                ..Form::of(&[("length_s", length_s), ("exit_length_s", share * length_s)])
+            })
         };
         forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(ramps));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
@@ -102,7 +105,8 @@ impl Effect for EntryExit {
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let over_s = form.value("length_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
         let exit_over_s = form.value("exit_length_s").unwrap_or(over_s).max(f64::MIN_POSITIVE);
-        let fades = |s: f64, over_s: f64| if form.name == "ramp" { (1.0 - s / over_s).max(0.0) } else { (-s / over_s).exp() };
+        let fades =
+            |s: f64, over_s: f64| if form.name == "ramp" { (1.0 - s / over_s).max(0.0) } else { (-s / over_s).exp() };
         let (mut entry, mut exit) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
         let time_s = scene.time_s();
         for pass in scene.passes() {

@@ -58,6 +58,11 @@ static DOC: EffectDoc = EffectDoc {
     },
 };
 
+/// Share of the greatest speed by which two speeds differ between which the bend may lie.
+const SPEEDS_APART: f64 = 0.03;
+/// Speeds tried for the bend.
+const BENDS_TRIED: usize = 5;
+
 impl Effect for FieldWeakening {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
@@ -67,7 +72,7 @@ impl Effect for FieldWeakening {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
-        let speeds = between_speeds(scene, 0.03, 5);
+        let speeds = between_speeds(scene, SPEEDS_APART, BENDS_TRIED);
         let ln_choices = ln_count(speeds.len());
         let form = |speed: &f64| Form { ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
         speeds.iter().map(form).collect()

@@ -1,7 +1,7 @@
 //! A vertical axis carries weight: up costs power, down gives it back.
 
-use crate::physics::drive::{in_si, is_displacement, is_power, motion, rate, soft_sign};
-use crate::physics::excitation::{greatest, varies};
+use crate::physics::drive::{directions, in_si, is_displacement, is_power, motion, rate};
+use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
@@ -69,9 +69,7 @@ impl Effect for GravityAxis {
         }
         if form.name == "braked" {
             // At rest the brake carries the weight.
-            let velocity = motion(scene)?;
-            let width = 0.01 * greatest(&velocity);
-            return Some(vec![("level", velocity.iter().map(|v| soft_sign(*v, width).abs()).collect())]);
+            return Some(vec![("level", directions(&motion(scene)?).map(f64::abs).collect())]);
         }
         if !is_power(scene) {
             let held = scene.column("drive_on").map_or_else(|| vec![1.0; scene.rows()], <[f64]>::to_vec);
