@@ -3,7 +3,7 @@
 
 use super::fit::{Fit, UNITS_MIN};
 use super::frame::Frame;
-use super::linear::{dot, extend_basis, project_out};
+use super::linear::{extend_basis, project_out};
 use super::model::{Body, Part};
 use crate::statistics::count;
 
@@ -68,11 +68,9 @@ impl Disagreement {
     }
 }
 
-/// `None` for fewer units than can disagree. Everything else in the fit moves along; the deviation is that of DerSimonian
-/// and Laird, Controlled Clinical Trials 7 (1986).
+/// `None` for fewer units than can disagree.
 fn disagreement(fit: &Fit, frame: &Frame, own: &[f64], innovations: &[f64], index: usize) -> Option<Disagreement> {
-    let rows = count(frame.len().saturating_sub(fit.free.len()).max(1));
-    let variance = dot(innovations, innovations) / rows;
+    let variance = fit.innovation_variance(innovations);
     let units = frame.unit.last().map_or(0, |last| last + 1);
     let mut told = vec![(0.0, 0.0); units];
     for (row, unit) in frame.unit.iter().enumerate() {
@@ -86,12 +84,18 @@ fn disagreement(fit: &Fit, frame: &Frame, own: &[f64], innovations: &[f64], inde
     if told.len() < UNITS_MIN || variance <= 0.0 || value <= 0.0 {
         return None;
     }
+    // Everything else in the fit moves along: the common value has a score of zero.
     let q = told.iter().map(|(weight, score)| score * score / weight).sum::<f64>() / variance;
-    let freedom = count(told.len() - 1);
+    let between = between(&told, q, variance);
+    Some(Disagreement { share: between.sqrt() / value, q, freedom: count(told.len() - 1) })
+}
+
+/// Variance of a coefficient between groups beyond what the noise makes of it: DerSimonian and Laird, Controlled Clinical
+/// Trials 7 (1986) 177. `told` holds what each group knows of it (weight, score), `variance` is that of one innovation.
+pub(super) fn between(told: &[(f64, f64)], q: f64, variance: f64) -> f64 {
     let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
     let squares: f64 = told.iter().map(|(weight, _)| weight * weight).sum();
-    let between = ((q - freedom) * variance / (sum - squares / sum)).max(0.0);
-    Some(Disagreement { share: between.sqrt() / value, q, freedom })
+    ((q - count(told.len().saturating_sub(1))) * variance / (sum - squares / sum)).max(0.0)
 }
 
 /// A parameter's whitened tangent with those of all others taken out.

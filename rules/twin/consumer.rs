@@ -3,7 +3,7 @@
 
 use super::frame::Frame;
 use super::latent::{SWITCHINGS_MIN, Switching};
-use crate::statistics::count;
+use crate::statistics::{count, mean};
 use std::ops::Range;
 
 /// Places of a channel at which switchings are counted, and how many must be seen there.
@@ -44,7 +44,7 @@ impl Switching {
         [1.0, 0.0].into_iter().all(|level| {
             let changes = self.changes_within_spells(residual, frame, level);
             let spells = count(changes.len());
-            let mean = changes.iter().sum::<f64>() / spells.max(1.0);
+            let mean = mean(&changes);
             let variance = changes.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (spells - 1.0).max(1.0);
             let deviate = mean.abs() / (variance / spells.max(1.0)).sqrt().max(f64::MIN_POSITIVE);
             changes.len() < SPELLS_TOLD || deviate < SLOPE_DEVIATE || mean.abs() < SLOPE_SHARE * self.level
@@ -62,8 +62,8 @@ impl Switching {
                 start += spell.len();
                 if spell[0] == level && inner.len() >= 3 * THIRD_ROWS_MIN {
                     let third = inner.len() / 3;
-                    let mean = |rows: Range<usize>| residual[rows].iter().sum::<f64>() / count(third);
-                    changes.push(mean(inner.end - third..inner.end) - mean(inner.start..inner.start + third));
+                    let level = |rows: Range<usize>| mean(&residual[rows]);
+                    changes.push(level(inner.end - third..inner.end) - level(inner.start..inner.start + third));
                 }
             }
         }

@@ -67,15 +67,21 @@ impl Design {
 /// Every hypothesis that this scene, with the load and output simulated by the baseline, can tell anything about.
 #[must_use]
 pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
+    let mut all = designs_of(scene, frame, model, |_| true);
+    all.extend(model.hypotheses.iter().filter_map(|part| hypothesis(part, scene, frame)));
+    all
+}
+
+/// The same of some kinds of the catalogue only.
+pub(super) fn designs_of(scene: &Scene, frame: &Frame, model: &Model, takes: impl Fn(&str) -> bool) -> Vec<Design> {
     let mut all = Vec::new();
     let recursive = reads_output(model) || repeats_output(model, scene);
-    for effect in CATALOGUE {
+    for effect in CATALOGUE.iter().filter(|effect| takes(effect.doc().kind)) {
         let shifts_time = ["clock_lag", "meter_window"].contains(&effect.doc().kind);
         if wanted(*effect, model) && !(recursive && shifts_time) {
             all.extend(effect.forms(scene).iter().filter_map(|form| design(*effect, form, scene, frame)));
         }
     }
-    all.extend(model.hypotheses.iter().filter_map(|part| hypothesis(part, scene, frame)));
     all
 }
 
@@ -96,14 +102,13 @@ const REPEATED_SHARE: f64 = 0.98;
 
 /// Is a column that the model reads the output of a few rows before, under a name of its own?
 fn repeats_output(model: &Model, scene: &Scene) -> bool {
-    let read = model.parts.iter().flat_map(|part| -> Vec<String> {
+    let columns = model.parts.iter().flat_map(|part| -> Vec<&str> {
         match &part.body {
-            Body::Linear(terms) => terms.iter().filter_map(Term::input).map(str::to_owned).collect(),
-            Body::Expression(expression) => expression.inputs().to_vec(),
+            Body::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
+            Body::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
             _ => Vec::new(),
         }
     });
-    let columns: Vec<String> = read.collect();
     let repeats = |column: &[f64], by: usize| {
         let rows = || scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
         let known = || rows().filter(|row| scene.usable()[row - by] && scene.usable()[*row]);
@@ -112,8 +117,8 @@ fn repeats_output(model: &Model, scene: &Scene) -> bool {
         let (all, same) = (known().count(), known().filter(equal).count());
         changes && all > 0 && crate::statistics::count(same) >= REPEATED_SHARE * crate::statistics::count(all)
     };
-    let of = |name: &String| scene.column(name).is_some_and(|column| (1..=REPEATED_ROWS).any(|by| repeats(column, by)));
-    columns.iter().any(of)
+    let of = |name: &str| scene.column(name).is_some_and(|column| (1..=REPEATED_ROWS).any(|by| repeats(column, by)));
+    columns.into_iter().any(of)
 }
 
 /// May the search propose this effect beside this model?

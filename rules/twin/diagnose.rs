@@ -12,6 +12,7 @@ use super::noise::Arma;
 use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
+use super::size::BEYOND_DOUBT_INFORMATION;
 use super::unknown::{Doubt, Nameless, Unknown};
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
@@ -19,8 +20,6 @@ use crate::statistics::{count, median, robust_deviation};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
-/// Information from which something real remains even where a form without a name does not carry over to rows held out.
-const BEYOND_DOUBT_INFORMATION: f64 = 60.0;
 /// Rows below which nothing is claimed.
 const ROWS_MIN: usize = 60;
 /// Kinds that change over minutes to hours, whatever tool is in use.

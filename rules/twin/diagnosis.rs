@@ -128,8 +128,13 @@ impl Fits {
     /// Is the error on rows that took no part greater than before? Then something else is there than what is named.
     #[must_use]
     pub fn rises(&self) -> bool {
-        let both = self.after.held_out_rmse.zip(self.before.held_out_rmse);
-        both.is_some_and(|(after, before)| after > RISEN * before)
+        self.held_out_share().is_some_and(|share| share > RISEN)
+    }
+
+    /// The error on those rows as a share of what it was before; `None` where none were held out.
+    #[must_use]
+    pub fn held_out_share(&self) -> Option<f64> {
+        self.after.held_out_rmse.zip(self.before.held_out_rmse).map(|(after, before)| after / before)
     }
 }
 

@@ -13,7 +13,7 @@
 //! 4. What no recording shows: every law is a little wrong in proportion (GUM, type B), and an effect in the cut may or
 //!    may not pass through the load loss that the model knows.
 
-use super::agreement::cleared;
+use super::agreement::{between, cleared};
 use super::diagnose::Case;
 use super::diagnosis::Estimate;
 use super::fit::Fit;
@@ -77,14 +77,13 @@ pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate
 fn differences(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<f64> {
     let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| case.frame.whiten(column, fit.noise)).collect();
     let innovations = fit.innovations(&case.frame);
-    let freedom = count(case.frame.len().saturating_sub(fit.free.len()).max(1));
-    let variance = dot(&innovations, &innovations) / freedom;
+    let variance = fit.innovation_variance(&innovations);
     let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
     of_part
         .map(|(index, free)| match fit.parts[part].parameters[free.parameter].entry {
             Entry::Linear => {
                 let levels = levels(&fit.tangent[index]);
-                between(&cleared(&white, index), &innovations, &levels, variance)
+                between_levels(&cleared(&white, index), &innovations, &levels, variance)
             }
             Entry::Shape => 0.0,
         })
@@ -112,9 +111,8 @@ fn levels(column: &[f64]) -> Vec<Option<usize>> {
     levels
 }
 
-/// Variance of a coefficient between levels beyond what the noise makes of it (DerSimonian and Laird); zero for fewer than
-/// two levels. `own` is its whitened tangent clear of all others, `variance` that of one innovation.
-fn between(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
+/// Variance of a coefficient between levels beyond what the noise makes of it; zero for fewer than two levels. `own` is its whitened tangent clear of all others, `variance` that of one innovation.
+fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
     let mut told = [(0.0, 0.0); LEVELS];
     for (row, level) in levels.iter().enumerate() {
         if let Some(level) = level {
@@ -125,13 +123,12 @@ fn between(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance:
     let all: f64 = told.iter().map(|(weight, _)| weight).sum();
     let told: Vec<(f64, f64)> = told.into_iter().filter(|(weight, _)| *weight > TELLS * all).collect();
     let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
-    let spread = sum - told.iter().map(|(weight, _)| weight * weight).sum::<f64>() / sum;
-    if told.len() < 2 || variance <= 0.0 || spread <= 0.0 {
+    if told.len() < 2 || variance <= 0.0 || sum <= 0.0 {
         return 0.0;
     }
     let mean = told.iter().map(|(_, score)| score).sum::<f64>() / sum;
     let q = told.iter().map(|(weight, score)| weight * (score / weight - mean).powi(2)).sum::<f64>() / variance;
-    ((q - count(told.len() - 1)) * variance / spread).max(0.0)
+    between(&told, q, variance)
 }
 
 /// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one
@@ -191,7 +188,7 @@ mod tests {
     }
 
     fn difference(column: &[f64], y: &[f64]) -> f64 {
-        between(column, &left(column, y), &levels(column), 1.0).sqrt()
+        between_levels(column, &left(column, y), &levels(column), 1.0).sqrt()
     }
 
     #[test]

@@ -116,10 +116,15 @@ impl Fit {
         let columns: Vec<Vec<f64>> = self.tangent.iter().map(|column| frame.whiten(column, self.noise)).collect();
         let innovations = self.innovations(frame);
         let inverse = least_squares(&columns, &innovations).inverse;
-        let freedom = count(frame.len().saturating_sub(self.free.len()).max(1));
-        let variance = dot(&innovations, &innovations) / freedom;
+        let variance = self.innovation_variance(&innovations);
         let among_units = disagreement(&columns, &innovations, &inverse, &frame.unit);
         (0..columns.len()).map(|index| (inverse[index][index] * variance).max(among_units[index])).collect()
+    }
+
+    /// Variance of one innovation, the freedom of the fit taken off.
+    #[must_use]
+    pub(super) fn innovation_variance(&self, innovations: &[f64]) -> f64 {
+        dot(innovations, innovations) / count(innovations.len().saturating_sub(self.free.len()).max(1))
     }
 }
 

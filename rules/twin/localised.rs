@@ -11,7 +11,7 @@ use super::empirical::{Empirical, Factor, Shape, as_design, channel_values, empi
 use super::fit::{Fit, fit};
 use super::frame::Frame;
 use super::model::{Body, Part};
-use super::scan::{Bank, price};
+use super::scan::{self, Bank, price};
 use super::unknown::{Form, NOTHING_NAMED_INFORMATION};
 use super::verdicts::CLASS_INFORMATION;
 use crate::physics::Scene;
@@ -101,8 +101,12 @@ impl Case<'_> {
 
     /// What is described, and lines over other ends on top of it that are as good as alarms of their own.
     fn with_further_ends(&mut self, mut form: Form) -> Form {
+        let mut designs = end_designs(&self.scene, &self.frame);
         for number in 2..2 + FURTHER_MAX {
-            let more = self.best_end(&form.fit, Some(number));
+            let name = format!("unknown_{number}");
+            designs.iter_mut().for_each(|design| design.part.name = Some(name.clone()));
+            let Some(best) = self.likeliest(&form.fit, &designs) else { break };
+            let more = self.with_form(&form.fit, &designs[best]);
             let Some(more) = more.filter(|more| more.information > NOTHING_NAMED_INFORMATION) else { break };
             form = Form { design: form.design, fit: more.fit, information: form.information + more.information };
         }
@@ -123,20 +127,10 @@ impl Case<'_> {
         fitted.filter(|end| end.information + CLASS_INFORMATION > whole.information).unwrap_or(whole)
     }
 
-    /// The line over an end of some channel that explains most on top of a fit; further ones are told apart by number.
-    fn best_end(&mut self, from: &Fit, number: Option<usize>) -> Option<Form> {
-        let mut designs = end_designs(&self.scene, &self.frame);
-        let name = number.map(|number| format!("unknown_{number}"));
-        designs.iter_mut().for_each(|design| design.part.name.clone_from(&name));
-        let best = self.likeliest(from, &designs)?;
-        self.with_form(from, &designs[best])
-    }
-
     /// The design that explains most on top of a fit.
     fn likeliest(&self, from: &Fit, designs: &[Design]) -> Option<usize> {
         let scores = Bank::new(designs, &self.frame).scan(from, self.ln_rows(from));
-        let known = scores.iter().filter(|score| score.information.is_finite());
-        known.max_by(|a, b| a.information.total_cmp(&b.information)).map(|score| score.design)
+        scan::likeliest(&scores).map(|score| score.design)
     }
 }
 

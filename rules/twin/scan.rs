@@ -38,6 +38,13 @@ pub struct Score {
     pub information: f64,
 }
 
+/// The design of most information; `None` where none is known.
+#[must_use]
+pub fn likeliest<'s>(scores: impl IntoIterator<Item = &'s Score>) -> Option<&'s Score> {
+    let known = scores.into_iter().filter(|score| score.information.is_finite());
+    known.max_by(|a, b| a.information.total_cmp(&b.information))
+}
+
 /// The price of a design: its parameters, and having been chosen among like ones.
 #[must_use]
 pub fn price(design: &Design, ln_rows: f64) -> f64 {

@@ -4,7 +4,7 @@ use super::designs::{AT_EDGES, excludes};
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::scan::{Bank, Score, price};
+use super::scan::{Bank, Score, likeliest, price};
 use crate::physics::{OutputKind, Scene};
 use crate::statistics::count;
 
@@ -179,13 +179,12 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut members = from.members.clone();
         members.push(design);
         let noise = self.bank.designs[design].noise.unwrap_or(from.fit.noise);
-        let added = self.bank.designs[design].part.clone();
-        let begun = |parts: &[Part]| parts.iter().cloned().chain([added.clone()]).collect::<Vec<_>>();
-        let known = self.fitted(members.clone(), &begun(&from.fit.parts), noise);
+        let added = std::slice::from_ref(&self.bank.designs[design].part);
+        let beside = &from.fit.parts[self.base.parts.len()..];
+        let known = self.fitted(members.clone(), &[&from.fit.parts, added].concat(), noise);
         let at_edges = AT_EDGES.contains(&self.bank.designs[design].kind.as_str());
-        let unbent = self.unbent.clone().filter(|_| at_edges);
-        let beside = from.fit.parts[self.base.parts.len()..].iter();
-        let unbent = unbent.map(|baseline| begun(&baseline.into_iter().chain(beside.cloned()).collect::<Vec<_>>()));
+        let unbent = self.unbent.as_ref().filter(|_| at_edges);
+        let unbent = unbent.map(|baseline| [baseline.as_slice(), beside, added].concat());
         let other = unbent.and_then(|parts| self.fitted(members, &parts, noise));
         let better = |a: &Hypothesis, b: &Hypothesis| a.information.total_cmp(&b.information);
         known.into_iter().chain(other).max_by(better)
@@ -232,11 +231,10 @@ impl<'a, 'b> Search<'a, 'b> {
         let Some(position) = best.members.iter().position(at_edges).filter(|_| best.members.len() > 1) else { return };
         let named = self.bank.designs[best.members[position]].kind.clone();
         let Some(rest) = self.without(best, position) else { return };
+        let scores = self.bank.scan(&rest.fit, self.ln_rows);
         for kind in AT_EDGES.into_iter().filter(|kind| *kind != named) {
-            let scores = self.bank.scan(&rest.fit, self.ln_rows).into_iter();
-            let of_kind = scores.filter(|score| self.bank.designs[score.design].kind == kind && score.gain.is_finite());
-            let likeliest = of_kind.max_by(|a, b| a.information.total_cmp(&b.information));
-            let rival = likeliest.and_then(|score| self.with(&rest, score.design));
+            let rival = likeliest(scores.iter().filter(|score| self.bank.designs[score.design].kind == kind));
+            let rival = rival.and_then(|score| self.with(&rest, score.design));
             self.tried.extend(rival);
         }
     }
@@ -281,8 +279,9 @@ impl<'a, 'b> Search<'a, 'b> {
 /// Sampling periods below which a lag cannot be resolved.
 const RESOLVED: f64 = 0.1;
 
-/// Could this part be what its name says, beside the others? A lag far below the sampling period cannot be resolved; a lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess
-/// over dry friction at creep speed.
+/// Could this part be what its name says, beside the others? A lag far below the sampling period cannot be resolved; a
+/// lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess over dry
+/// friction at creep speed.
 fn plausible(part: &Part, beside: &[Part], scene: &Scene) -> bool {
     let value = |name: &str| part.parameter(name).map(|parameter| parameter.value);
     let resolved = |name: &str| value(name).is_none_or(|seconds| seconds.abs() >= RESOLVED * scene.period_s());

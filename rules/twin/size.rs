@@ -12,19 +12,15 @@ use crate::statistics::count;
 const SIZE_DEVIATIONS: f64 = 0.3;
 /// Size, as a share of the mean output, below which an effect is not claimed.
 const SIZE_SHARE: f64 = 0.005;
-/// Information from which even such a size is beyond doubt.
-const SMALL_INFORMATION: f64 = 60.0;
+/// Information from which something is beyond doubt, however small it is, and even where a form without a name does not
+/// carry over to rows held out.
+pub(super) const BEYOND_DOUBT_INFORMATION: f64 = 60.0;
 /// The same beside an effect that explains more.
-const SMALL_INFORMATION_BESIDE: f64 = 100.0;
+const BEYOND_DOUBT_BESIDE: f64 = 100.0;
 /// Share of what is explained up to which a member on which the runs disagree is dropped: most of it is no imitation.
 const MINOR_SHARE: f64 = 0.5;
 /// Share of the mean output below which an output counts as that share.
 const OUTPUT_FLOOR: f64 = 0.1;
-
-/// What counts as the information of a member: beside what explains most, a small one has to be surer.
-fn beyond_doubt(minor: bool, gained: f64) -> f64 {
-    if minor { gained * SMALL_INFORMATION / SMALL_INFORMATION_BESIDE } else { gained }
-}
 
 impl Case<'_> {
     /// Drops members whose remaining part is too small to claim, and those beside others on which the runs disagree.
@@ -48,16 +44,17 @@ impl Case<'_> {
                 let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
                 let minor = several && gained < MINOR_SHARE * best.information;
                 let paid = price(&designs[best.members[*position]], ln_rows);
+                let beyond_doubt = gained >= if minor { BEYOND_DOUBT_BESIDE } else { BEYOND_DOUBT_INFORMATION };
                 several && gained < paid
                     || minor && differs_by_run(&best.fit, &self.frame, first + position)
-                    || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt(minor, gained))
+                    || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt)
             })
         })
     }
 
     /// Is the difference of two residuals too small to claim: everywhere a share of the output by which a model or a
     /// class 0.5 meter is wrong anyway, and not beyond all doubt, or small on the whole and lost in the noise?
-    pub(super) fn negligible(&self, one: &[f64], other: &[f64], deviation: f64, information: f64) -> bool {
+    pub(super) fn negligible(&self, one: &[f64], other: &[f64], deviation: f64, beyond_doubt: bool) -> bool {
         let mean = self.recorded.iter().map(|x| x.abs()).sum::<f64>() / count(self.recorded.len().max(1));
         let of_output = |x: f64| x.abs() + OUTPUT_FLOOR * mean;
         let mut shares: Vec<f64> =
@@ -67,7 +64,6 @@ impl Case<'_> {
         // On the whole, in the fifth and in the twentieth of the rows where it is greatest.
         let sizes = [(1, 1.0), (5, 1.6), (20, 2.2)];
         let small = sizes.iter().all(|(part, times)| size((shares.len() / part).max(1)) < times * SIZE_SHARE);
-        small && information < SMALL_INFORMATION
-            || distance(one, other) < (SIZE_DEVIATIONS * deviation).min(SIZE_SHARE * mean)
+        small && !beyond_doubt || distance(one, other) < (SIZE_DEVIATIONS * deviation).min(SIZE_SHARE * mean)
     }
 }

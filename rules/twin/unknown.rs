@@ -14,8 +14,9 @@ use super::gate::p_value;
 use super::model::{Body, simulate};
 use super::outdone::LEADING_SHARE;
 use super::periodic::waves;
-use super::scan::{Bank, Score, price};
+use super::scan::{Bank, Score, likeliest, price};
 use super::search::{Found, Hypothesis, P_MAX};
+use super::size::BEYOND_DOUBT_INFORMATION;
 use crate::physics::Role;
 
 /// What an empirical form must explain on top, as a share of what is named, before the name is withdrawn.
@@ -173,16 +174,16 @@ impl Case<'_> {
         if !(doubted || better || unlike || outdone) {
             return None;
         }
-        let sure = better;
-        let better = better || unlike || outdone;
-        let (from, to) = if better { (base, &alone) } else { (&found.best.fit, &on_top) };
+        let instead = better || unlike || outdone;
+        let (from, to) = if instead { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
-        let small = self.negligible(&from.residual, &to.fit.residual, noise, to.information);
+        let small =
+            self.negligible(&from.residual, &to.fit.residual, noise, to.information >= BEYOND_DOUBT_INFORMATION);
         if small {
             return None;
         }
         let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
-        if !sure && p > P_MAX {
+        if !better && p > P_MAX {
             return None;
         }
         let alone = self.localised(base, alone);
@@ -237,8 +238,7 @@ impl Case<'_> {
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
     pub(super) fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<Form> {
-        let known = scores.iter().filter(|score| score.information.is_finite());
-        let best = known.max_by(|a, b| a.information.total_cmp(&b.information))?;
+        let best = likeliest(scores)?;
         let design = self.sharpened(from, &forms.bank.designs[best.design], best.gain);
         self.with_form(from, &design)
     }

@@ -3,7 +3,7 @@
 //! whole effect says little. Before the search, therefore, the effects that act at edges are fitted with every row in
 //! full; where one of them makes most of the outlandish rows ordinary, the rows are weighed by what it leaves.
 
-use super::designs::{AT_EDGES, Design, designs};
+use super::designs::{AT_EDGES, Design, designs_of};
 use super::diagnose::Case;
 use super::fit::{Fit, fit, fit_levels};
 use super::model::simulate;
@@ -15,11 +15,6 @@ const VEILED_MIN: usize = 10;
 const FITTED: usize = 6;
 /// Kinds that act at the edges of the speed.
 const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
-
-/// Did what is there now make half of the outlandish rows ordinary?
-fn unveiled(before: usize, now: usize) -> bool {
-    before >= VEILED_MIN && 2 * now <= before
-}
 
 impl Case<'_> {
     /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
@@ -34,7 +29,8 @@ impl Case<'_> {
         if let Some(best) = &best {
             self.frame.weigh(&best.residual, best.noise);
         }
-        let Some(best) = best.filter(|_| unveiled(veiled, self.frame.heavy())) else {
+        // It must make half of the outlandish rows ordinary.
+        let Some(best) = best.filter(|_| 2 * self.frame.heavy() <= veiled) else {
             self.frame = weighed;
             return base;
         };
@@ -48,10 +44,8 @@ impl Case<'_> {
         let nominal = self.parts.clone();
         let base = self.with_data(|data| fit_levels(data, &nominal)).unwrap_or_else(|| base.clone());
         let _ = simulate(&base.parts, &mut self.scene)?;
-        let mut at_edges = designs(&self.scene, &self.frame, self.model);
-        at_edges.retain(|design| {
-            AT_EDGES.contains(&design.kind.as_str()) || AT_EDGES_OF_SPEED.contains(&design.kind.as_str())
-        });
+        let at_edges = |kind: &str| AT_EDGES.contains(&kind) || AT_EDGES_OF_SPEED.contains(&kind);
+        let at_edges = designs_of(&self.scene, &self.frame, self.model, at_edges);
         let frame = self.frame.clone();
         let bank = Bank::new(&at_edges, &frame);
         let mut scores = bank.scan(&base, self.ln_rows(&base));

@@ -270,9 +270,9 @@ fn debug(case: &Case<'_>, outcome: &Outcome) -> String {
     let noise = (outcome.base.noise, best.fit.noise);
     let refused = outcome.found.refused_p;
     let c = outcome.last().dispersion(&case.frame);
-    let fell = outcome.fits.after.held_out_rmse.zip(outcome.fits.before.held_out_rmse).map_or(-1.0, |(a, b)| a / b);
+    let held_out = outcome.fits.held_out_share();
     format!(
-        "dispersion {c:.2} held-out {fell:.3} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
+        "dispersion {c:.2} held-out {held_out:.3?} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
         name(&best.members),
         best.information,
         outcome.found.p_values,
