@@ -157,7 +157,7 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
     let mut part = Part::candidate(effect, form, &names);
-    let known = fix_share(&mut part);
+    let known = fix_known(&mut part);
     let ranges = names.iter().map(|name| part.parameter(name).map_or(ANY, |parameter| parameter.range)).collect();
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
     let usable = columns.iter().all(|column| column.iter().all(|x| x.is_finite()));
@@ -174,13 +174,20 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
     })
 }
 
-/// A meter lags or averages, and a flag comes late, as a whole: the share is one. How many parameters are known thereby.
-fn fix_share(part: &mut Part) -> usize {
-    if !WHOLE.contains(&part.kind.as_str()) {
-        return 0;
+/// A meter lags or averages, and a flag comes late, as a whole: the share is one; and about which speed a slope is told
+/// is a choice. How many parameters are known thereby.
+fn fix_known(part: &mut Part) -> usize {
+    let whole = WHOLE.contains(&part.kind.as_str());
+    let mut known = 0;
+    for parameter in &mut part.parameters {
+        match parameter.name.as_str() {
+            "share" if whole => (parameter.value, parameter.fixed) = (1.0, true),
+            "about" => parameter.fixed = true,
+            _ => continue,
+        }
+        known += 1;
     }
-    let shares = part.parameters.iter_mut().filter(|parameter| parameter.name == "share");
-    shares.map(|share| (share.value, share.fixed) = (1.0, true)).count()
+    known
 }
 
 /// Kinds that act as a whole.

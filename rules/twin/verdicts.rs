@@ -4,6 +4,7 @@ use super::diagnose::{Case, Outcome};
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
 use super::estimate::estimates;
 use super::fit::Fit;
+use super::linear::dot;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
 use super::search::{Hypothesis, METER};
@@ -115,7 +116,7 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
     }
     let best = outcome.found.best.clone();
     let first = case.parts.len();
-    let mut found: Vec<Missing> = Vec::new();
+    let mut found: Vec<(f64, Missing)> = Vec::new();
     for position in 0..best.members.len() {
         let mut missing = described(case, outcome, &best.fit, &best.fit.parts[first + position], first + position);
         missing.p_value = outcome.found.p_values.get(position).copied().unwrap_or(super::search::P_MAX);
@@ -126,10 +127,16 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
         missing.held_out_rmse_before =
             case.predict(&fit).and_then(|prediction| case.quality(&prediction).held_out_rmse);
         missing.held_out_rmse_after = outcome.fits.after.held_out_rmse;
-        found.push(missing);
+        found.push((left_by(case, &fit, &best.fit), missing));
     }
-    found.sort_by(|a, b| b.delta_ic.total_cmp(&a.delta_ic));
-    found
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().map(|(_, missing)| missing).collect()
+}
+
+/// What a fit leaves in the noise of another: in its own, what is missing poses as slow noise.
+fn left_by(case: &Case<'_>, fit: &Fit, other: &Fit) -> f64 {
+    let left = case.frame.whiten(&fit.residual, other.noise);
+    dot(&left, &left)
 }
 
 /// A missing effect with its texts and parameters.

@@ -1,7 +1,9 @@
 //! Friction differs between the two directions of motion.
 
 use crate::physics::drive::{directions, goes_both_ways, is_power, motion};
+use crate::physics::excitation::greatest;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::{count, mean};
 
 /// Friction that differs between directions.
 #[derive(Debug, Clone, Copy)]
@@ -10,7 +12,7 @@ pub struct DirectionAsymmetry;
 static DOC: EffectDoc = EffectDoc {
     kind: "direction_asymmetry",
     family: "axis",
-    law: "F = level * |sign(v)|; viscous: F = slope * |v|; in a power: P = slope * v, step: P = level * sign(v); v in m/s, of a spindle in rad/s",
+    law: "F = level * |sign(v)|; viscous: F = slope * (|v| - about); in a power: P = slope * v, step: P = level * sign(v); v in m/s, of a spindle in rad/s",
     parameters: &[
         ParameterDoc {
             name: "level",
@@ -27,6 +29,14 @@ static DOC: EffectDoc = EffectDoc {
             range: (f64::NEG_INFINITY, f64::INFINITY),
             en: "half the difference per speed; of a spindle per rad/s",
             zh: "单位速度下两方向之差的一半；主轴按rad/s",
+        },
+        ParameterDoc {
+            name: "about",
+            unit: "velocity",
+            entry: Entry::Shape,
+            range: (0.0, f64::INFINITY),
+            en: "speed at which the slope adds nothing: zero, or the mean speed of an axis that is never at rest, for which a difference at that speed is an offset",
+            zh: "斜率不起作用的速度：零；轴从不静止时为平均速度，该速度下的差值即为偏置",
         },
     ],
     needs: &["velocity | speed"],
@@ -59,14 +69,19 @@ impl Effect for DirectionAsymmetry {
             return Vec::new();
         }
         let names = if is_power(scene) { ["slope", "step"] } else { ["level", "viscous"] };
-        names.into_iter().map(|name| Form { name, ..Form::plain() }).collect()
+        let about = motion(scene).and_then(|motion| mean_of_restless(&motion));
+        let shape = |name| if name == "viscous" { about.map(|about| ("about", about)) } else { None };
+        names.into_iter().map(|name| Form { name, shape: shape(name).into_iter().collect(), ..Form::plain() }).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let velocity = motion(scene)?;
         let (name, column) = match form.name {
             "step" => ("level", directions(&velocity).collect()),
-            "viscous" => ("slope", velocity.iter().map(|v| v.abs()).collect()),
+            "viscous" => {
+                let about = form.value("about").unwrap_or(0.0);
+                ("slope", velocity.iter().map(|v| v.abs() - about).collect())
+            }
             _ if is_power(scene) => ("slope", velocity),
             _ => ("level", directions(&velocity).map(f64::abs).collect()),
         };
@@ -76,4 +91,15 @@ impl Effect for DirectionAsymmetry {
     fn default_form(&self, scene: &Scene) -> Form {
         Form { name: if is_power(scene) { "slope" } else { "level" }, ..Form::plain() }
     }
+}
+
+/// Share of the rows from which an axis counts as resting at times.
+const RESTS: f64 = 0.03;
+
+/// The mean speed of an axis that never rests. Another level in each direction is then the same as a constant, and a
+/// constant has a name of its own: the slope alone is told, about the middle of what was seen.
+fn mean_of_restless(motion: &[f64]) -> Option<f64> {
+    let slow = 0.01 * greatest(motion);
+    let resting = count(motion.iter().filter(|v| v.abs() < slow).count());
+    (resting < RESTS * count(motion.len())).then(|| mean(&motion.iter().map(|v| v.abs()).collect::<Vec<_>>()))
 }
