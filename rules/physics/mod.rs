@@ -140,6 +140,11 @@ pub trait Effect: Sync + Send {
     /// what the effect needs or never excites it.
     fn forms(&self, scene: &Scene) -> Vec<Form>;
 
+    /// Names of its forms, as a model file gives them; none for an effect of one form.
+    fn form_names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// The columns of this form, `None` when the scene lacks an input.
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns>;
 

@@ -85,7 +85,7 @@ fn channels(need: &str) -> String {
 fn missing_input(part: &Part, scene: &Scene) -> String {
     let place = format!("{} (line {})", part.label(), part.line);
     let absent = |names: &mut dyn Iterator<Item = &str>| {
-        let missing: Vec<&str> = names.filter(|name| scene.column(name).is_none()).collect();
+        let missing: Vec<&str> = names.filter(|name| super::channel::channel(scene, name).is_none()).collect();
         missing.join(", ")
     };
     match &part.body {

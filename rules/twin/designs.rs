@@ -99,8 +99,11 @@ fn reads_output(model: &Model) -> bool {
 const REPEATED_ROWS: usize = 3;
 /// Share of the rows in which it must.
 const REPEATED_SHARE: f64 = 0.98;
+/// Share of the greatest rate by which an output that is a rate may miss it: both are rounded.
+const RATE_SHARE: f64 = 1e-3;
 
-/// Is a column that the model reads the output of a few rows before, under a name of its own?
+/// Is a column that the model reads the output of a few rows before, under a name of its own - or is the output nothing
+/// but the rate at which such a column changes? A meter that is late would be late in both.
 fn repeats_output(model: &Model, scene: &Scene) -> bool {
     let columns = model.parts.iter().flat_map(|part| -> Vec<&str> {
         match &part.body {
@@ -109,16 +112,38 @@ fn repeats_output(model: &Model, scene: &Scene) -> bool {
             _ => Vec::new(),
         }
     });
-    let repeats = |column: &[f64], by: usize| {
-        let rows = || scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
-        let known = || rows().filter(|row| scene.usable()[row - by] && scene.usable()[*row]);
-        let equal = |row: &usize| (column[*row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[*row].abs();
-        let changes = known().any(|row| column[row] != scene.recorded()[row]);
-        let (all, same) = (known().count(), known().filter(equal).count());
-        changes && all > 0 && crate::statistics::count(same) >= REPEATED_SHARE * crate::statistics::count(all)
+    let of = |name: &str| {
+        let Some(column) = scene.column(name) else { return false };
+        (1..=REPEATED_ROWS).any(|by| repeats(scene, column, by)) || is_rate_of(scene, column)
     };
-    let of = |name: &str| scene.column(name).is_some_and(|column| (1..=REPEATED_ROWS).any(|by| repeats(column, by)));
     columns.into_iter().any(of)
+}
+
+/// Is a column the output of so many rows before?
+fn repeats(scene: &Scene, column: &[f64], by: usize) -> bool {
+    let rows = || scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
+    let known = || rows().filter(|row| scene.usable()[row - by] && scene.usable()[*row]);
+    let equal = |row: &usize| (column[*row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[*row].abs();
+    let changes = known().any(|row| column[row] != scene.recorded()[row]);
+    is_most(known().filter(equal).count(), known().count()) && changes
+}
+
+/// Is the output the difference quotient of a column, over the row before or the row after?
+fn is_rate_of(scene: &Scene, column: &[f64]) -> bool {
+    let (time_s, output) = (scene.time_s(), scene.recorded());
+    let pairs = || scene.runs().iter().flat_map(|run| run.start + 1..run.end.max(run.start + 1));
+    let known = || pairs().filter(|row| scene.usable()[row - 1] && scene.usable()[*row]);
+    let rate = |row: usize| (column[row] - column[row - 1]) / (time_s[row] - time_s[row - 1]);
+    let size = known().map(rate).fold(0.0_f64, |most, rate| most.max(rate.abs()));
+    let is_of = |at: usize| {
+        let equal = |row: &usize| (output[*row - at] - rate(*row)).abs() <= RATE_SHARE * size;
+        is_most(known().filter(equal).count(), known().count())
+    };
+    size > 0.0 && size.is_finite() && (is_of(0) || is_of(1))
+}
+
+fn is_most(some: usize, all: usize) -> bool {
+    all > 0 && crate::statistics::count(some) >= REPEATED_SHARE * crate::statistics::count(all)
 }
 
 /// May the search propose this effect beside this model?
@@ -154,6 +179,7 @@ fn weighs_acceleration(model: &Model) -> bool {
 /// The columns of one form.
 #[must_use]
 pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &Frame) -> Option<Design> {
+    debug_assert!(form.name.is_empty() || effect.form_names().contains(&form.name), "{:?}", form.name);
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
     let mut part = Part::candidate(effect, form, &names);

@@ -5,6 +5,7 @@
 //! in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no
 //! candidate explains".
 
+use super::channel::{SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel};
 use super::designs::Design;
 use super::frame::Frame;
 use super::model::{Body, Model, Parameter, Part};
@@ -44,7 +45,7 @@ pub enum Shape {
 /// A shape over one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Empirical {
-    /// The channel, or one of the words `time in the run`, `time`.
+    /// The name of the channel, which need not have been recorded (`channel.rs`).
     pub channel: String,
     /// What is drawn over the channel.
     pub shape: Shape,
@@ -60,16 +61,6 @@ pub struct Empirical {
 const PEAKS: usize = 12;
 /// Sampling periods below which what fades is an edge.
 const FADING_PERIODS: f64 = 4.0;
-/// Seconds since the first row of the run.
-const TIME_IN_RUN: &str = "time_in_run_s";
-/// Seconds since the tool went into the cut; zero outside it.
-pub(super) const TIME_IN_CUT: &str = "time_in_cut_s";
-/// The cut as the model simulates it, in the unit of the output.
-const LOAD: &str = "simulated_cut";
-/// The same over the speed in thousands of turns a minute.
-const TORQUE: &str = "simulated_cut_per_krpm";
-/// Seconds as recorded.
-const TIME: &str = "time_s";
 
 impl Empirical {
     /// Is it one height of a given shape, rather than a line that bends where the recording asks for it?
@@ -103,7 +94,7 @@ impl Empirical {
     /// One column per coefficient: level, slope and hinges.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
-        let values = channel_values(scene, &self.channel)?;
+        let values = channel(scene, &self.channel)?;
         let factor = factor_values(scene, self.factor)?;
         let along = |x: f64| (x - self.origin) / self.scale;
         let column =
@@ -207,41 +198,6 @@ impl Empirical {
     }
 }
 
-pub(super) fn channel_values(scene: &Scene, channel: &str) -> Option<Vec<f64>> {
-    match channel {
-        TIME => Some(scene.clock_s().to_vec()),
-        TIME_IN_RUN => {
-            let mut values = scene.time_s().to_vec();
-            for run in scene.runs() {
-                let start = scene.time_s()[run.start];
-                values[run.clone()].iter_mut().for_each(|x| *x -= start);
-            }
-            Some(values)
-        }
-        TIME_IN_CUT => time_in_cut_s(scene),
-        LOAD => scene.load().map(<[f64]>::to_vec),
-        TORQUE => {
-            let (load, speed) = (scene.load()?, scene.role(Role::Speed)?);
-            let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
-            Some(load.iter().zip(speed).map(per_krpm).collect())
-        }
-        _ => scene.column(channel).map(<[f64]>::to_vec),
-    }
-}
-
-fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
-    let engaged = scene.role(Role::Engaged)?;
-    let mut values = vec![0.0; scene.rows()];
-    for run in scene.runs() {
-        let mut since = None;
-        for row in run.clone() {
-            since = if engaged[row] > 0.5 { since.or(Some(scene.time_s()[row])) } else { None };
-            values[row] = since.map_or(0.0, |since| scene.time_s()[row] - since);
-        }
-    }
-    Some(values)
-}
-
 pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
     let speed = || scene.role(Role::Speed);
     match factor {
@@ -259,7 +215,7 @@ pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
 #[must_use]
 pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
     let mut channels = empirical_channels(scene);
-    channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, LOAD, TORQUE].map(str::to_owned));
+    channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].map(str::to_owned));
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
     let bent = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
     let forms = bent.chain(peaks(scene).into_iter().map(Some)).chain(fading(scene).into_iter().map(Some));
@@ -280,9 +236,9 @@ fn is_output(scene: &Scene, name: &str) -> bool {
     name == scene.output() || measured.iter().any(|word| name.contains(word))
 }
 
-fn form(scene: &Scene, frame: &Frame, channel: &str, factor: Factor) -> Option<Empirical> {
+fn form(scene: &Scene, frame: &Frame, name: &str, factor: Factor) -> Option<Empirical> {
     let weights = frame.reduce(&factor_values(scene, factor)?);
-    let values = frame.reduce(&channel_values(scene, channel)?);
+    let values = frame.reduce(&channel(scene, name)?);
     let mut inside: Vec<f64> =
         values.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(x, _)| *x).collect();
     inside.sort_by(f64::total_cmp);
@@ -298,12 +254,12 @@ fn form(scene: &Scene, frame: &Frame, channel: &str, factor: Factor) -> Option<E
     let mut knots: Vec<f64> =
         [0.25, 0.5, 0.75].iter().filter_map(|share| at(*share)).filter(|knot| *knot > low && *knot < high).collect();
     knots.dedup();
-    Some(Empirical { channel: channel.to_owned(), shape: Shape::Bent(knots), origin: low, scale: high - low, factor })
+    Some(Empirical { channel: name.to_owned(), shape: Shape::Bent(knots), origin: low, scale: high - low, factor })
 }
 
 /// Peaks over the spindle speed, at the speeds that the recording visits.
 fn peaks(scene: &Scene) -> Vec<Empirical> {
-    let (Some(channel), Some(speed)) = (scene.role_name(Role::Speed), scene.role(Role::Speed)) else {
+    let (Some(name), Some(speed)) = (scene.role_name(Role::Speed), scene.role(Role::Speed)) else {
         return Vec::new();
     };
     let mut turning: Vec<f64> = speed.iter().map(|n| n.abs()).filter(|n| *n > 1.0).collect();
@@ -312,7 +268,7 @@ fn peaks(scene: &Scene) -> Vec<Empirical> {
     let mut centres: Vec<f64> = (0..PEAKS).map(|k| turning[k * (turning.len() - 1) / (PEAKS - 1)]).collect();
     centres.dedup_by(|a, b| (*a - *b).abs() < 0.04 * *b);
     let one = |centre: f64, share: f64, factor: Factor| Empirical {
-        channel: channel.to_owned(),
+        channel: name.to_owned(),
         shape: Shape::Peak(centre, share * centre),
         origin: 0.0,
         scale: top,

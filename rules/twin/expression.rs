@@ -1,8 +1,10 @@
 //! A user's hypothesis as a rhai expression over columns and its own parameters.
 
+use super::channel::{channel, is_simulated};
 use super::model::Parameter;
 use crate::physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
@@ -57,7 +59,9 @@ impl Expression {
     /// parameters is run through the script engine once only.
     #[must_use]
     pub fn evaluate(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        match scene.linear_law(&self.text, || self.linear_law(scene, parameters)) {
+        let kept = !self.inputs.iter().any(|input| is_simulated(input));
+        let law = kept.then(|| scene.linear_law(&self.text, || self.linear_law(scene, parameters))).flatten();
+        match law {
             Some(law) => {
                 let mut sum = law.first()?.clone();
                 for (parameter, column) in parameters.iter().zip(&law[1..]) {
@@ -100,8 +104,8 @@ impl Expression {
 
     /// Runs the script engine over every row.
     fn run(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        let inputs: Vec<(&str, &[f64])> =
-            self.inputs.iter().map(|name| Some((name.as_str(), scene.column(name)?))).collect::<Option<_>>()?;
+        let inputs: Vec<(&str, Cow<'_, [f64]>)> =
+            self.inputs.iter().map(|name| Some((name.as_str(), channel(scene, name)?))).collect::<Option<_>>()?;
         let mut scope = Scope::new();
         for parameter in parameters {
             scope.push(parameter.name.clone(), parameter.value);

@@ -13,6 +13,7 @@
 
 mod agreement;
 pub mod bind;
+mod channel;
 mod consumer;
 mod corroborated;
 pub mod designs;

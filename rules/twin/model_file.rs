@@ -261,11 +261,13 @@ impl<'t> Reader<'t> {
         let mut form = Form::plain();
         let chosen = table.get("form").or_else(|| table.get("process"));
         if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
-            match form_name(name) {
+            match effect.form_names().iter().find(|known| **known == name) {
                 Some(name) => form.name = name,
                 None => {
                     let offset = chosen.map_or(0, |name| name.span().start);
-                    self.wrong(offset, format!("{} has no form {name}", effect.doc().kind));
+                    let known = effect.form_names();
+                    let forms = if known.is_empty() { "only one".to_owned() } else { known.join(", ") };
+                    self.wrong(offset, format!("{} has no form {name}; its forms: {forms}", effect.doc().kind));
                 }
             }
         }
@@ -344,46 +346,6 @@ impl<'t> Reader<'t> {
     }
 }
 
-/// Names of forms are static; a file names one of those that effects offer.
-fn form_name(name: &str) -> Option<&'static str> {
-    FORM_NAMES.iter().chain(&MORE_FORM_NAMES).copied().find(|known| *known == name)
-}
-
-/// Form names beside [`FORM_NAMES`]: of states, delays and places.
-const MORE_FORM_NAMES: [&str; 12] =
-    ["lag", "delay", "direct", "flag", "lots", "stretch", "stretches", "one", "speed", "clipped", "mean", "slope"];
-
-/// Every form name that an effect of the catalogue uses.
-pub(super) const FORM_NAMES: [&str; 27] = [
-    "turning",
-    "milling",
-    "drilling",
-    "quadratic",
-    "level",
-    "viscous",
-    "measured",
-    "gradient",
-    "step",
-    "drift",
-    "lot",
-    "linear",
-    "settling",
-    "wander",
-    "restless",
-    "bent",
-    "constant",
-    "small",
-    "boxcar",
-    "coulomb",
-    "two",
-    "latent",
-    "by_position",
-    "both",
-    "stage",
-    "threshold",
-    "followed",
-];
-
 fn has_table(table: &Table<'_>) -> bool {
     let inside = table.get("parameters").and_then(|parameters| parameters.get_ref().as_table());
     inside.is_some_and(|inside| inside.contains_key("speeds_rpm") || inside.contains_key("power_w"))
@@ -451,7 +413,8 @@ fn write_part(part: &Part) -> String {
         }
         Body::Empirical(form) => {
             let expression = quoted(&form.expression());
-            text = "\n[[effect]]\nkind = \"expression\"\nname = \"unknown\"\n".to_owned();
+            text = "\n[[effect]]\nkind = \"expression\"\n".to_owned();
+            text.push_str(&format!("name = {}\n", quoted(part.label())));
             text.push_str(&format!("expression = {expression}\nparameters = {{ {numbers} }}\n"));
         }
         Body::Effect(_, form) => {
@@ -520,6 +483,35 @@ mod tests {
         let once = write_model(&parse_model(text).expect("reads"));
         let twice = write_model(&parse_model(&once).expect("reads again"));
         assert_eq!(once, twice);
+    }
+
+    /// What a diagnosis may accept into a model must be a model again, whatever form was found.
+    #[test]
+    fn every_form_of_every_effect_survives_being_written_and_read() {
+        for effect in CATALOGUE {
+            let parameters = effect.doc().parameters.iter();
+            let linear: Vec<&str> = parameters.filter(|p| p.entry == Entry::Linear).map(|p| p.name).collect();
+            for name in effect.form_names() {
+                let offset = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"offset\"\n";
+                let mut model = parse_model(offset).expect("reads");
+                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::plain() }, &linear)];
+                let read = parse_model(&write_model(&model));
+                let read = read.unwrap_or_else(|problems| panic!("{}: {problems:?}", effect.doc().kind));
+                assert_eq!(read.parts[0].parameters.len(), linear.len());
+                assert!(matches!(&read.parts[0].body, Body::Effect(_, form) if form.name == *name));
+            }
+        }
+    }
+
+    #[test]
+    fn a_form_of_another_effect_is_refused_with_the_right_ones() {
+        let text = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"meter_window\"\nform = \"ramp\"\n";
+        let problems = parse_model(text).expect_err("no such form");
+        assert!(
+            problems[0].to_string().contains("meter_window has no form ramp; its forms: lag, mean"),
+            "{}",
+            problems[0]
+        );
     }
 
     proptest::proptest! {

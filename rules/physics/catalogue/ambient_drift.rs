@@ -56,6 +56,10 @@ impl Effect for AmbientDrift {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["direct", "lag"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let known = scene.role(Role::Ambient).is_some_and(|ambient| spread(ambient) > 0.2);
         if !known || !is_displacement(scene) {

@@ -45,6 +45,10 @@ impl Effect for AuxiliarySwitch {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["flag", "latent"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_power(scene) || is_axis_output(scene) {
             return Vec::new();

@@ -55,6 +55,10 @@ impl Effect for AxisFriction {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["coulomb", "viscous", "both"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let named = ["coulomb", "viscous"].map(|name| Form { name, ..Form::plain() });
         let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));

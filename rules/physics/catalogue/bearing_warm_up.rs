@@ -72,6 +72,10 @@ impl Effect for BearingWarmUp {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["lag", "measured"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
             return Vec::new();

@@ -64,6 +64,10 @@ impl Effect for ClockLag {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["delay", "small"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();

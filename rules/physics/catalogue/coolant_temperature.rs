@@ -56,6 +56,10 @@ impl Effect for CoolantTemperature {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["direct", "lag"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let known = scene.column("coolant_temperature_c").is_some_and(|coolant| spread(coolant) > 0.2);
         if !known || !is_displacement(scene) {

@@ -55,6 +55,10 @@ impl Effect for CuttingPower {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["turning", "milling", "drilling"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let milled = scene.column("width_of_cut_mm").is_some();
         let names = if milled { ["milling", "turning", "drilling"] } else { ["turning", "milling", "drilling"] };

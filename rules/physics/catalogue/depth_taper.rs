@@ -57,6 +57,10 @@ impl Effect for DepthTaper {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["linear", "quadratic", "distance", "distance_quadratic"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
             return Vec::new();

@@ -64,6 +64,10 @@ impl Effect for DirectionAsymmetry {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["slope", "step", "level", "viscous"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !motion(scene).is_some_and(|motion| goes_both_ways(&motion)) {
             return Vec::new();

@@ -79,6 +79,10 @@ impl Effect for EntryExit {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["ramp", "settling"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();

@@ -63,6 +63,10 @@ impl Effect for FlankWear {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["followed"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if is_displacement(scene) || scene.role(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
             return Vec::new();

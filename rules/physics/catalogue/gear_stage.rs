@@ -69,6 +69,10 @@ impl Effect for GearStage {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["stage", "speed"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();

@@ -55,6 +55,10 @@ impl Effect for GravityAxis {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["braked"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let braked = Form { name: "braked", ..Form::plain() };
         let forms = if is_power(scene) { vec![Form::plain()] } else { vec![Form::plain(), braked] };

@@ -97,6 +97,10 @@ impl Effect for HardnessBatch {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["lot", "lots", "step", "stretch", "stretches"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() {
             return Vec::new();

@@ -55,6 +55,10 @@ impl Effect for InverterLoss {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["conduction", "both"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
         let known = turns && is_power(scene) && scene.load().is_some_and(varies);

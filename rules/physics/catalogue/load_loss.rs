@@ -55,6 +55,10 @@ impl Effect for LoadLoss {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["quadratic", "both"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let loaded = !is_displacement(scene) && scene.load().is_some_and(varies);
         let named = |name| Form { name, ..Form::plain() };

@@ -54,6 +54,10 @@ impl Effect for MeterWindow {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["lag", "mean"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();

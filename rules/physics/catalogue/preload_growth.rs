@@ -64,6 +64,10 @@ impl Effect for PreloadGrowth {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["lag", "gradient"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
             return Vec::new();

@@ -45,6 +45,10 @@ impl Effect for RecipeError {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["word"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() {
             return Vec::new();

@@ -55,6 +55,10 @@ impl Effect for Regeneration {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["braking", "clipped"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         ["braking", "clipped"]
             .into_iter()

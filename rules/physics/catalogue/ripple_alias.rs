@@ -70,6 +70,10 @@ impl Effect for RippleAlias {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["latent"]
+    }
+
     fn forms(&self, _scene: &Scene) -> Vec<Form> {
         Vec::new()
     }

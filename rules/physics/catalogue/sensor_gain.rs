@@ -44,6 +44,10 @@ impl Effect for SensorGain {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["constant", "drift", "step"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();

@@ -96,6 +96,10 @@ impl Effect for SpindleGrowth {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["one", "two", "measured"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_displacement(scene) {
             return Vec::new();

@@ -94,6 +94,10 @@ impl Effect for ZeroDrift {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["linear", "settling", "bent", "wander", "restless"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.rows() < 20 {
             return Vec::new();

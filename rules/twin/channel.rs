@@ -1,0 +1,140 @@
+//! Channels by name: those of the recording, and those that nobody records but that forms without a name and formulas may
+//! be drawn over - the time in the run and in the cut, and what the model itself simulates.
+
+use crate::physics::{Role, Scene};
+use std::borrow::Cow;
+
+/// Seconds as recorded.
+pub(super) const TIME: &str = "time_s";
+/// Seconds since the first row of the run.
+pub(super) const TIME_IN_RUN: &str = "time_in_run_s";
+/// Seconds since the tool went into the cut; zero outside it.
+pub(super) const TIME_IN_CUT: &str = "time_in_cut_s";
+/// The cut as the model simulates it, in the unit of the output.
+pub(super) const SIMULATED_CUT: &str = "simulated_cut";
+/// The same over the speed in thousands of turns a minute.
+pub(super) const SIMULATED_CUT_PER_KRPM: &str = "simulated_cut_per_krpm";
+
+/// The values of a channel, one per row; `None` where this scene has no such channel.
+pub(super) fn channel<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
+    match name {
+        TIME => Some(Cow::Borrowed(scene.clock_s())),
+        TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),
+        TIME_IN_CUT => time_in_cut_s(scene).map(Cow::Owned),
+        SIMULATED_CUT => scene.load().map(Cow::Borrowed),
+        SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
+        _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed),
+    }
+}
+
+/// Does this channel follow the parameters of the model?
+pub(super) fn is_simulated(name: &str) -> bool {
+    [SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].contains(&name)
+}
+
+/// What a recording may call otherwise.
+fn by_role<'s>(scene: &'s Scene, name: &str) -> Option<&'s [f64]> {
+    match name {
+        "engaged" => scene.role(Role::Engaged),
+        "spindle_speed_rpm" => scene.role(Role::Speed),
+        _ => None,
+    }
+}
+
+fn time_in_run_s(scene: &Scene) -> Vec<f64> {
+    let mut values = scene.time_s().to_vec();
+    for run in scene.runs() {
+        let start = scene.time_s()[run.start];
+        values[run.clone()].iter_mut().for_each(|x| *x -= start);
+    }
+    values
+}
+
+fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
+    let engaged = scene.role(Role::Engaged)?;
+    let mut values = vec![0.0; scene.rows()];
+    for run in scene.runs() {
+        let mut since = None;
+        for row in run.clone() {
+            since = if engaged[row] > 0.5 { since.or(Some(scene.time_s()[row])) } else { None };
+            values[row] = since.map_or(0.0, |since| scene.time_s()[row] - since);
+        }
+    }
+    Some(values)
+}
+
+fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
+    let (load, speed) = (scene.load()?, scene.role(Role::Speed)?);
+    let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
+    Some(load.iter().zip(speed).map(per_krpm).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::Entry;
+    use crate::twin::empirical::{Empirical, Factor, Shape};
+    use crate::twin::expression::Expression;
+    use crate::twin::model::{Parameter, simulate};
+    use crate::twin::parse_model;
+    use adapters::recording::read_csv;
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    const MODEL: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n[[effect]]\nkind = \"cutting_power\"\n\
+                         parameters = { kc11_n_per_mm2 = 1800.0, mc = 0.25 }\n";
+
+    /// Passes of twelve seconds at a depth that changes, simulated.
+    fn cut() -> Scene {
+        let mut text = String::from(
+            "time_s,run,spindle_power_w,spindle_speed_rpm,engaged,depth_of_cut_mm,feed_per_rev_mm,cutting_speed_m_min\n",
+        );
+        for row in 0..80_u32 {
+            let (engaged, depth) = (u8::from(row % 20 >= 8), 1.0 + 0.1 * f64::from(row / 20));
+            writeln!(text, "{row},a{},500,900,{engaged},{depth:.1},0.2,150", row / 40).expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let mut scene = Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("recorded");
+        simulate(&parse_model(MODEL).expect("fine").parts, &mut scene).expect("simulated");
+        scene
+    }
+
+    /// What a model that carries a form without a name makes of it is what the form was.
+    #[test]
+    fn a_form_is_the_same_as_a_formula() {
+        let scene = cut();
+        let shapes = || {
+            vec![
+                Shape::Bent(vec![2.0, 5.0]),
+                Shape::Above(3.0),
+                Shape::Below(4.0),
+                Shape::Peak(900.0, 80.0),
+                Shape::Fading(3.0),
+                Shape::Wave(7.0, 3),
+            ]
+        };
+        let channels = [TIME_IN_RUN, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, "spindle_speed_rpm"];
+        for (name, shape) in channels.into_iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape)))
+        {
+            let form =
+                Empirical { channel: name.to_owned(), shape, origin: 1.5, scale: 20.0, factor: Factor::InTheCut };
+            let columns = form.columns(&scene).expect("there");
+            let parameters = columns.iter().enumerate().map(|(k, (name, _))| Parameter {
+                name: name.clone(),
+                value: 1.0 + crate::statistics::count(k),
+                fixed: false,
+                entry: Entry::Linear,
+                range: (f64::NEG_INFINITY, f64::INFINITY),
+                unit: "output".to_owned(),
+            });
+            let parameters: Vec<Parameter> = parameters.collect();
+            let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
+            let formula = Expression::compile(&form.expression(), &names).expect("compiles");
+            let got = formula.evaluate(&scene, &parameters).expect("evaluates");
+            for (row, got) in got.iter().enumerate() {
+                let sum: f64 = columns.iter().zip(&parameters).map(|((_, column), p)| p.value * column[row]).sum();
+                assert!((got - sum).abs() < 1e-6 * sum.abs().max(1.0), "{}: {got} {sum}", form.equation());
+            }
+        }
+    }
+}
