@@ -55,6 +55,6 @@ impl Search<'_, '_> {
     fn p_of(&self, from: &Hypothesis, best: &Hypothesis, designs: &[usize]) -> f64 {
         let designs: Vec<_> = designs.iter().map(|index| self.bank.designs[*index].clone()).collect();
         let bank = Bank::new(&designs, self.bank.frame());
-        p_value(&bank, &from.fit, &best.fit, self.ln_rows, self.seed, false)
+        p_value(&bank, &from.fit, &best.fit, None, self.ln_rows, self.seed, false)
     }
 }

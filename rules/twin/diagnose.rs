@@ -164,8 +164,9 @@ impl<'a> Case<'a> {
     fn fit_baseline(&mut self) -> Option<Fit> {
         let parts = self.parts.clone();
         let plain = self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))?;
-        self.frame.weigh(&plain.residual, plain.noise);
-        self.with_data(|data| fit(data, &plain.parts, plain.noise))
+        let noise = self.frame.noise_between_outliers(&plain.residual, plain.noise);
+        self.frame.weigh(&plain.residual, noise);
+        self.with_data(|data| fit(data, &plain.parts, noise))
     }
 
     /// Weighs the rows by what the best hypothesis leaves, and fits it and the baseline again: rows that looked

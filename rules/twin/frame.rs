@@ -4,9 +4,9 @@
 //! rate, so that edges keep their shape.
 
 use super::levels::Levels;
-use super::noise::{Arma, log_likelihood, whiten};
+use super::noise::{Arma, GRID, log_likelihood, whiten};
 use crate::physics::Scene;
-use crate::statistics::{mean, robust_deviation};
+use crate::statistics::{count, mean, robust_deviation};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -78,6 +78,15 @@ pub struct Frame {
 
 /// Innovations beyond this many robust standard deviations lose weight.
 const HEAVY_DEVIATIONS: f64 = 6.0;
+/// Share of the rows up to which outlandish ones are few.
+const FEW_SHARE: f64 = 0.005;
+/// By how much another noise must be likelier between outliers than the likeliest over all rows.
+const CLEARLY_LIKELIER: f64 = 20.0;
+
+/// Loss of a deviation: whatever is outlandish loses the same, however far out it is (Hampel's skipped mean).
+fn bounded(deviation: f64) -> f64 {
+    0.5 * deviation.abs().min(HEAVY_DEVIATIONS).powi(2)
+}
 
 impl Frame {
     /// Innovations of a column within unbroken stretches, weighted.
@@ -145,6 +154,27 @@ impl Frame {
         let limit = HEAVY_DEVIATIONS * spread;
         self.weights =
             innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
+    }
+
+    /// The noise of what lies between outlandish rows: a few of them, each alone, make noise with a memory look white.
+    /// The start stays unless another of the grid is clearly likelier where no row can lose much; and where outlandish
+    /// rows are more than a few, which tells of an effect at edges rather than of spikes.
+    #[must_use]
+    pub(super) fn noise_between_outliers(&self, residual: &[f64], start: Arma) -> Arma {
+        // Likelihood, and whether outlandish rows are few.
+        let judged = |noise: Arma| {
+            let innovations = self.unweighted(residual, noise);
+            let spread = robust_deviation(innovations.iter().copied()).unwrap_or(0.0).max(f64::MIN_POSITIVE);
+            let loss: f64 = innovations.iter().map(|e| bounded(e / spread)).sum();
+            let outlandish = innovations.iter().filter(|e| e.abs() > HEAVY_DEVIATIONS * spread).count();
+            let (rows, stretches) = (count(innovations.len()), count(self.stretches.len()));
+            let likelihood = stretches * noise.first_weight().ln() - loss - rows * spread.ln();
+            (likelihood, count(outlandish) <= FEW_SHARE * rows)
+        };
+        let scored = GRID.iter().map(|noise| (judged(*noise), *noise));
+        let best = scored.max_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
+        let clearly = |likelihood: f64| likelihood > judged(start).0 + CLEARLY_LIKELIER;
+        best.filter(|((likelihood, few), _)| *few && clearly(*likelihood)).map_or(start, |(_, noise)| noise)
     }
 
     /// Gives every group its full weight again.
@@ -235,4 +265,48 @@ fn unbroken(scene: &Scene, rows: Range<usize>) -> Vec<Range<usize>> {
         }
     }
     stretches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::recording::read_csv;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    const ROWS: usize = 3000;
+
+    /// Noise with a memory, and a spike of many deviations every so many rows.
+    fn residual(every: usize) -> Vec<f64> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        let mut slow = 0.0;
+        let mut row_of = |row: usize| {
+            let e: f64 = StandardNormal.sample(&mut rng);
+            slow = 0.85 * slow + e;
+            slow + if row % every == every / 2 { 600.0 } else { 0.0 }
+        };
+        (0..ROWS).map(&mut row_of).collect()
+    }
+
+    fn frame() -> Frame {
+        let mut text = String::from("time_s,y_w\n");
+        (0..ROWS).for_each(|row| writeln!(text, "{row},{}", row % 7).expect("a string takes it"));
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let scene = Scene::new(&recording, "y_w", &BTreeMap::new()).expect("recorded");
+        Frame::new(&scene, &units(&scene), 1, |_| true)
+    }
+
+    #[test]
+    fn a_few_spikes_do_not_make_noise_with_a_memory_look_white() {
+        let frame = frame();
+        let spiked = residual(1000);
+        let over_all = super::super::noise::fit(&spiked, &frame.stretches);
+        assert!(over_all.phi < 0.3, "{over_all:?}");
+        let between = frame.noise_between_outliers(&spiked, over_all);
+        assert!((0.7..0.95).contains(&between.phi), "{between:?}");
+        let at_every_edge = residual(60);
+        assert_eq!(frame.noise_between_outliers(&at_every_edge, over_all), over_all, "an effect at edges");
+    }
 }

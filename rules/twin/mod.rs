@@ -19,6 +19,7 @@ mod corroborated;
 pub mod designs;
 pub mod diagnose;
 pub mod diagnosis;
+mod drift;
 pub mod empirical;
 mod estimate;
 pub mod examine;

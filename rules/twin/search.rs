@@ -1,6 +1,7 @@
 //! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
 
 use super::designs::{AT_EDGES, excludes};
+use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
@@ -17,7 +18,7 @@ const LEADERS: usize = 3;
 /// Partners fitted in full per leader.
 const PARTNERS: usize = 2;
 /// Information the first effect must bring.
-const FIRST_INFORMATION: f64 = 10.0;
+pub(super) const FIRST_INFORMATION: f64 = 10.0;
 /// Information a further effect must bring.
 const STEP_INFORMATION: f64 = 6.0;
 /// The same as a share of what is already explained: below it a further effect more likely mends the form of another.
@@ -105,7 +106,9 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut best = path[0].clone();
         for next in path.drain(1..) {
             let first = best.members.is_empty();
-            let p = p_value(self.bank, &best.fit, &deepest.fit, self.ln_rows, self.seed, first);
+            let paid = self.price_of(&next.members) - self.price_of(&best.members);
+            let tested = Some((&next.fit, paid));
+            let p = p_value(self.bank, &best.fit, &deepest.fit, tested, self.ln_rows, self.seed, first);
             if p > P_MAX {
                 refused_p = best.members.is_empty().then_some(p);
                 break;
@@ -192,12 +195,19 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
-        if !fit.parts[self.base.parts.len()..].iter().all(|part| plausible(part, &fit.parts, self.data.scene)) {
+        let added = &fit.parts[self.base.parts.len()..];
+        let drifts = || added.iter().filter(|part| part.kind == "zero_drift");
+        if !added.iter().all(|part| plausible(part, &fit.parts, self.data.scene))
+            || !drifts().all(|drift| stands_out(drift, &fit, self.data))
+        {
             return None;
         }
-        let prices: f64 = members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum();
-        let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - prices;
+        let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - self.price_of(&members);
         information.is_finite().then_some(Hypothesis { members, fit, information })
+    }
+
+    fn price_of(&self, members: &[usize]) -> f64 {
+        members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum()
     }
 
     /// Replaces members one by one where another explains more beside the rest.

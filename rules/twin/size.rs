@@ -5,7 +5,7 @@ use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::Fit;
 use super::scan::price;
-use super::search::{Found, Hypothesis};
+use super::search::{FIRST_INFORMATION, Found, Hypothesis};
 use crate::statistics::count;
 
 /// Size, in deviations of the ordinary noise, below which an effect is not claimed.
@@ -30,7 +30,20 @@ impl Case<'_> {
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
         }
+        let needed = FIRST_INFORMATION * found.best.fit.dispersion(&self.frame);
+        if self.information(&found.best, base, designs) < needed {
+            // What was dropped, here or before, carried the rest.
+            found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
+            found.p_values.clear();
+        }
         found
+    }
+
+    /// What a hypothesis explains beyond the baseline, its price paid.
+    fn information(&self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> f64 {
+        let ln_rows = self.ln_rows(base);
+        let paid: f64 = best.members.iter().map(|member| price(&designs[*member], ln_rows)).sum();
+        2.0 * (best.fit.log_likelihood - base.log_likelihood) - paid
     }
 
     fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> Option<usize> {

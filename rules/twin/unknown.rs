@@ -182,7 +182,7 @@ impl Case<'_> {
         if small {
             return None;
         }
-        let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, self.ln_rows(base), seed, !anything);
+        let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, None, self.ln_rows(base), seed, !anything);
         if !better && p > P_MAX {
             return None;
         }

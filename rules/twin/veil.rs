@@ -26,14 +26,16 @@ impl Case<'_> {
         let weighed = self.frame.clone();
         self.frame.weigh_all_alike();
         let best = self.best_at_edges(&base);
-        if let Some(best) = &best {
-            self.frame.weigh(&best.residual, best.noise);
-        }
-        // It must make half of the outlandish rows ordinary.
-        let Some(best) = best.filter(|_| 2 * self.frame.heavy() <= veiled) else {
+        let Some(best) = best.filter(|best| {
+            // It must make half of the outlandish rows ordinary, in noise that a few others do not make look white.
+            let noise = self.frame.noise_between_outliers(&best.residual, best.noise);
+            self.frame.weigh(&best.residual, noise);
+            2 * self.frame.heavy() <= veiled
+        }) else {
             self.frame = weighed;
             return base;
         };
+        self.frame.weigh(&best.residual, best.noise);
         self.unbent = Some(best.parts[..self.parts.len()].to_vec());
         self.with_data(|data| fit(data, &base.parts, base.noise)).unwrap_or(base)
     }
