@@ -34,7 +34,7 @@ static DOC: EffectDoc = EffectDoc {
             name: "about",
             unit: "velocity",
             entry: Entry::Shape,
-            range: (0.0, f64::INFINITY),
+            range: (0.0, 3000.0),
             en: "speed at which the slope adds nothing: zero, or the mean speed of an axis that is never at rest, for which a difference at that speed is an offset",
             zh: "斜率不起作用的速度：零；轴从不静止时为平均速度，该速度下的差值即为偏置",
         },
