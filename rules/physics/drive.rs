@@ -137,8 +137,13 @@ pub(crate) fn goes_both_ways(motion: &[f64]) -> bool {
 
 /// The direction of a motion, -1 to 1: a reversal passes through zero within a hundredth of the greatest velocity.
 pub(crate) fn directions(motion: &[f64]) -> impl Iterator<Item = f64> {
-    let width = 0.01 * greatest(motion);
+    let width = rest_width(motion);
     motion.iter().map(move |v| soft_sign(*v, width))
+}
+
+/// Speed below which a motion counts as resting, in its own unit: a hundredth of the greatest.
+pub(crate) fn rest_width(motion: &[f64]) -> f64 {
+    0.01 * greatest(motion)
 }
 
 /// A sign that passes smoothly through zero within `width`.

@@ -100,6 +100,8 @@ pub struct Form {
     pub name: &'static str,
     /// Shape parameters with their values.
     pub shape: Vec<(&'static str, f64)>,
+    /// Parameters, proportional or shaping, that a candidate of this form takes for known, with their values.
+    pub known: Vec<(&'static str, f64)>,
     /// A text condition, such as an operation or the run since when: column and word.
     pub place: Option<(String, String)>,
     /// Natural logarithm of how many alternatives of the same freedom are tried (steps at any run, any operation,
@@ -118,6 +120,12 @@ impl Form {
     #[must_use]
     pub fn plain() -> Self {
         Self::default()
+    }
+
+    /// The same form acting as a whole: its share is known to be one.
+    #[must_use]
+    pub fn whole(self) -> Self {
+        Self { known: vec![("share", 1.0)], ..self }
     }
 
     /// The value of a shape parameter.

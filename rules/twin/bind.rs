@@ -84,25 +84,14 @@ fn channels(need: &str) -> String {
 
 fn missing_input(part: &Part, scene: &Scene) -> String {
     let place = format!("{} (line {})", part.label(), part.line);
-    let absent = |names: &mut dyn Iterator<Item = &str>| {
-        let missing: Vec<&str> = names.filter(|name| super::channel::channel(scene, name).is_none()).collect();
-        missing.join(", ")
-    };
+    let unknown = |name: &&str| super::channel::channel_values(scene, name).is_none();
+    let absent = part.inputs().into_iter().filter(unknown).collect::<Vec<_>>().join(", ");
     match &part.body {
-        Body::Linear(terms) => {
-            format!(
-                "{place} needs the columns {}: record them",
-                absent(&mut terms.iter().filter_map(super::term::Term::input))
-            )
+        Body::Linear(_) => format!("{place} needs the columns {absent}: record them"),
+        Body::Expression(_) if absent.is_empty() => {
+            format!("{place}: the expression fails on this recording (a result that is no finite number)")
         }
-        Body::Expression(expression) => {
-            let missing = absent(&mut expression.inputs().iter().map(String::as_str));
-            if missing.is_empty() {
-                format!("{place}: the expression fails on this recording (a result that is no finite number)")
-            } else {
-                format!("{place} needs {missing}: record these columns or give them as parameters")
-            }
-        }
+        Body::Expression(_) => format!("{place} needs {absent}: record these columns or give them as parameters"),
         Body::Empirical(form) => format!("{place} needs {}: record it", form.channel),
         Body::Table(_) => {
             format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")

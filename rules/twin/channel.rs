@@ -4,7 +4,7 @@
 use crate::physics::{Role, Scene};
 use std::borrow::Cow;
 
-/// Seconds as recorded.
+/// Seconds of the recording's clock.
 pub(super) const TIME: &str = "time_s";
 /// Seconds since the first row of the run.
 pub(super) const TIME_IN_RUN: &str = "time_in_run_s";
@@ -16,7 +16,7 @@ pub(super) const SIMULATED_CUT: &str = "simulated_cut";
 pub(super) const SIMULATED_CUT_PER_KRPM: &str = "simulated_cut_per_krpm";
 
 /// The values of a channel, one per row; `None` where this scene has no such channel.
-pub(super) fn channel<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
+pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     match name {
         TIME => Some(Cow::Borrowed(scene.clock_s())),
         TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),

@@ -5,6 +5,7 @@ use super::model::{Body, Model, Parameter, Part};
 use super::noise::Arma;
 use super::term::Term;
 use crate::physics::{CATALOGUE, Effect, Form, Role, Scene};
+use crate::statistics::count;
 
 /// Kinds that build a model and are never a finding by themselves.
 const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
@@ -87,12 +88,7 @@ pub(super) fn designs_of(scene: &Scene, frame: &Frame, model: &Model, takes: imp
 
 /// Does the model predict the output from its own past? Then a shift in time explains anything and means nothing.
 fn reads_output(model: &Model) -> bool {
-    let reads = |part: &Part| match &part.body {
-        Body::Linear(terms) => terms.iter().any(|term| term.input() == Some(model.output.as_str())),
-        Body::Expression(expression) => expression.inputs().contains(&model.output),
-        _ => false,
-    };
-    model.parts.iter().any(reads)
+    model.parts.iter().any(|part| part.inputs().contains(&model.output.as_str()))
 }
 
 /// Rows by which a column may repeat the output.
@@ -105,45 +101,41 @@ const RATE_SHARE: f64 = 1e-3;
 /// Is a column that the model reads the output of a few rows before, under a name of its own - or is the output nothing
 /// but the rate at which such a column changes? A meter that is late would be late in both.
 fn repeats_output(model: &Model, scene: &Scene) -> bool {
-    let columns = model.parts.iter().flat_map(|part| -> Vec<&str> {
-        match &part.body {
-            Body::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
-            Body::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
-            _ => Vec::new(),
-        }
-    });
     let of = |name: &str| {
         let Some(column) = scene.column(name) else { return false };
         (1..=REPEATED_ROWS).any(|by| repeats(scene, column, by)) || is_rate_of(scene, column)
     };
-    columns.into_iter().any(of)
+    model.parts.iter().flat_map(Part::inputs).any(of)
+}
+
+/// Rows of which the row so many before, in the same run, is known too.
+fn known_after(scene: &Scene, by: usize) -> Vec<usize> {
+    let rows = scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
+    rows.filter(|row| scene.usable()[row - by] && scene.usable()[*row]).collect()
+}
+
+/// Does it hold for nearly all of these rows, of which there are some?
+fn holds_in_most(rows: &[usize], holds: impl Fn(usize) -> bool) -> bool {
+    let held = count(rows.iter().filter(|row| holds(**row)).count());
+    !rows.is_empty() && held >= REPEATED_SHARE * count(rows.len())
 }
 
 /// Is a column the output of so many rows before?
 fn repeats(scene: &Scene, column: &[f64], by: usize) -> bool {
-    let rows = || scene.runs().iter().flat_map(|run| run.start + by..run.end.max(run.start + by));
-    let known = || rows().filter(|row| scene.usable()[row - by] && scene.usable()[*row]);
-    let equal = |row: &usize| (column[*row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[*row].abs();
-    let changes = known().any(|row| column[row] != scene.recorded()[row]);
-    is_most(known().filter(equal).count(), known().count()) && changes
+    let known = known_after(scene, by);
+    let equal = |row: usize| (column[row] - scene.recorded()[row - by]).abs() <= 1e-6 * column[row].abs();
+    let changes = known.iter().any(|row| column[*row] != scene.recorded()[*row]);
+    holds_in_most(&known, equal) && changes
 }
 
 /// Is the output the difference quotient of a column, over the row before or the row after?
 fn is_rate_of(scene: &Scene, column: &[f64]) -> bool {
     let (time_s, output) = (scene.time_s(), scene.recorded());
-    let pairs = || scene.runs().iter().flat_map(|run| run.start + 1..run.end.max(run.start + 1));
-    let known = || pairs().filter(|row| scene.usable()[row - 1] && scene.usable()[*row]);
+    let known = known_after(scene, 1);
     let rate = |row: usize| (column[row] - column[row - 1]) / (time_s[row] - time_s[row - 1]);
-    let size = known().map(rate).fold(0.0_f64, |most, rate| most.max(rate.abs()));
-    let is_of = |at: usize| {
-        let equal = |row: &usize| (output[*row - at] - rate(*row)).abs() <= RATE_SHARE * size;
-        is_most(known().filter(equal).count(), known().count())
-    };
+    let size = known.iter().map(|row| rate(*row)).fold(0.0_f64, |most, rate| most.max(rate.abs()));
+    let is_of = |at: usize| holds_in_most(&known, |row| (output[row - at] - rate(row)).abs() <= RATE_SHARE * size);
     size > 0.0 && size.is_finite() && (is_of(0) || is_of(1))
-}
-
-fn is_most(some: usize, all: usize) -> bool {
-    all > 0 && crate::statistics::count(some) >= REPEATED_SHARE * crate::statistics::count(all)
 }
 
 /// May the search propose this effect beside this model?
@@ -182,15 +174,14 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
     debug_assert!(form.name.is_empty() || effect.form_names().contains(&form.name), "{:?}", form.name);
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
-    let mut part = Part::candidate(effect, form, &names);
-    let known = fix_known(&mut part);
+    let part = Part::candidate(effect, form, &names);
     let ranges = names.iter().map(|name| part.parameter(name).map_or(ANY, |parameter| parameter.range)).collect();
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
     let usable = columns.iter().all(|column| column.iter().all(|x| x.is_finite()));
     usable.then(|| Design {
         kind: effect.doc().kind.to_owned(),
         // That the tools wear is told by the feed drive already; only what it costs here is open.
-        freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() - known },
+        freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() - form.known.len() },
         ln_choices: form.ln_choices,
         reluctance: reluctance(effect.doc().kind),
         noise: None,
@@ -199,25 +190,6 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
         ranges,
     })
 }
-
-/// A meter lags or averages, and a flag comes late, as a whole: the share is one; and about which speed a slope is told
-/// is a choice. How many parameters are known thereby.
-fn fix_known(part: &mut Part) -> usize {
-    let whole = WHOLE.contains(&part.kind.as_str());
-    let mut known = 0;
-    for parameter in &mut part.parameters {
-        match parameter.name.as_str() {
-            "share" if whole => (parameter.value, parameter.fixed) = (1.0, true),
-            "about" => parameter.fixed = true,
-            _ => continue,
-        }
-        known += 1;
-    }
-    known
-}
-
-/// Kinds that act as a whole.
-const WHOLE: [&str; 3] = ["clock_lag", "meter_window", "engagement_timing"];
 
 const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 

@@ -5,7 +5,7 @@
 //! in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no
 //! candidate explains".
 
-use super::channel::{SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel};
+use super::channel::{SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel_values};
 use super::designs::Design;
 use super::frame::Frame;
 use super::model::{Body, Model, Parameter, Part};
@@ -94,7 +94,7 @@ impl Empirical {
     /// One column per coefficient: level, slope and hinges.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
-        let values = channel(scene, &self.channel)?;
+        let values = channel_values(scene, &self.channel)?;
         let factor = factor_values(scene, self.factor)?;
         let along = |x: f64| (x - self.origin) / self.scale;
         let column =
@@ -238,7 +238,7 @@ fn is_output(scene: &Scene, name: &str) -> bool {
 
 fn form(scene: &Scene, frame: &Frame, name: &str, factor: Factor) -> Option<Empirical> {
     let weights = frame.reduce(&factor_values(scene, factor)?);
-    let values = frame.reduce(&channel(scene, name)?);
+    let values = frame.reduce(&channel_values(scene, name)?);
     let mut inside: Vec<f64> =
         values.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(x, _)| *x).collect();
     inside.sort_by(f64::total_cmp);

@@ -111,7 +111,8 @@ fn levels(column: &[f64]) -> Vec<Option<usize>> {
     levels
 }
 
-/// Variance of a coefficient between levels beyond what the noise makes of it; zero for fewer than two levels. `own` is its whitened tangent clear of all others, `variance` that of one innovation.
+/// Variance of a coefficient between levels beyond what the noise makes of it; zero for fewer than two levels. `own` is
+/// its whitened tangent clear of all others, `variance` that of one innovation.
 fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], variance: f64) -> f64 {
     let mut told = [(0.0, 0.0); LEVELS];
     for (row, level) in levels.iter().enumerate() {

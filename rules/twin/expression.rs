@@ -1,6 +1,6 @@
 //! A user's hypothesis as a rhai expression over columns and its own parameters.
 
-use super::channel::{channel, is_simulated};
+use super::channel::{channel_values, is_simulated};
 use super::model::Parameter;
 use crate::physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
@@ -104,8 +104,9 @@ impl Expression {
 
     /// Runs the script engine over every row.
     fn run(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        let inputs: Vec<(&str, Cow<'_, [f64]>)> =
-            self.inputs.iter().map(|name| Some((name.as_str(), channel(scene, name)?))).collect::<Option<_>>()?;
+        let known = |name: &String| channel_values(scene, name);
+        let values = self.inputs.iter().map(known).collect::<Option<Vec<_>>>()?;
+        let inputs: Vec<(&str, Cow<'_, [f64]>)> = self.inputs.iter().map(String::as_str).zip(values).collect();
         let mut scope = Scope::new();
         for parameter in parameters {
             scope.push(parameter.name.clone(), parameter.value);

@@ -96,6 +96,13 @@ impl Fit {
         frame.whiten(&self.residual, self.noise)
     }
 
+    /// Sum of squares that the fit leaves in this noise: in its own, what is missing poses as slow noise.
+    #[must_use]
+    pub fn left_in(&self, frame: &Frame, noise: Arma) -> f64 {
+        let left = frame.whiten(&self.residual, noise);
+        dot(&left, &left)
+    }
+
     /// By how much the squares of the innovations, the few greatest cut off, exceed those of the noise between them: one
     /// where the fit leaves nothing but noise; likelihoods mean that many times less where it leaves more (Wedderburn,
     /// Biometrika 61, 1974).

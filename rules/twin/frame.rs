@@ -83,6 +83,11 @@ const FEW_SHARE: f64 = 0.005;
 /// By how much another noise must be likelier between outliers than the likeliest over all rows.
 const CLEARLY_LIKELIER: f64 = 20.0;
 
+/// An innovation beyond what so wide a spread makes ordinary; none where there is no spread.
+fn is_outlandish(innovation: f64, spread: f64) -> bool {
+    spread > 0.0 && innovation.abs() > HEAVY_DEVIATIONS * spread
+}
+
 /// Loss of a deviation: whatever is outlandish loses the same, however far out it is (Hampel's skipped mean).
 fn bounded(deviation: f64) -> f64 {
     0.5 * deviation.abs().min(HEAVY_DEVIATIONS).powi(2)
@@ -149,11 +154,24 @@ impl Frame {
     /// Gives every group the weight that Huber's rule gives its innovation: one within six robust standard deviations,
     /// falling beyond, so that a single row can say only so much for or against anything.
     pub fn weigh(&mut self, residual: &[f64], noise: Arma) {
+        let (innovations, spread) = self.spread_of(residual, noise);
+        let limit = HEAVY_DEVIATIONS * spread;
+        let weight = |e: &f64| if is_outlandish(*e, spread) { limit / e.abs() } else { 1.0 };
+        self.weights = innovations.iter().map(weight).collect();
+    }
+
+    /// How many groups would weigh less by this residual in this noise.
+    #[must_use]
+    pub(super) fn outlandish_in(&self, residual: &[f64], noise: Arma) -> usize {
+        let (innovations, spread) = self.spread_of(residual, noise);
+        innovations.iter().filter(|e| is_outlandish(**e, spread)).count()
+    }
+
+    /// Unweighted innovations and their robust standard deviation.
+    fn spread_of(&self, residual: &[f64], noise: Arma) -> (Vec<f64>, f64) {
         let innovations = self.unweighted(residual, noise);
         let spread = robust_deviation(innovations.iter().copied()).unwrap_or(0.0);
-        let limit = HEAVY_DEVIATIONS * spread;
-        self.weights =
-            innovations.iter().map(|e| if e.abs() > limit && limit > 0.0 { limit / e.abs() } else { 1.0 }).collect();
+        (innovations, spread)
     }
 
     /// The noise of what lies between outlandish rows: a few of them, each alone, make noise with a memory look white.
@@ -163,10 +181,10 @@ impl Frame {
     pub(super) fn noise_between_outliers(&self, residual: &[f64], start: Arma) -> Arma {
         // Likelihood, and whether outlandish rows are few.
         let judged = |noise: Arma| {
-            let innovations = self.unweighted(residual, noise);
-            let spread = robust_deviation(innovations.iter().copied()).unwrap_or(0.0).max(f64::MIN_POSITIVE);
+            let (innovations, spread) = self.spread_of(residual, noise);
+            let spread = spread.max(f64::MIN_POSITIVE);
+            let outlandish = innovations.iter().filter(|e| is_outlandish(**e, spread)).count();
             let loss: f64 = innovations.iter().map(|e| bounded(e / spread)).sum();
-            let outlandish = innovations.iter().filter(|e| e.abs() > HEAVY_DEVIATIONS * spread).count();
             let (rows, stretches) = (count(innovations.len()), count(self.stretches.len()));
             let likelihood = stretches * noise.first_weight().ln() - loss - rows * spread.ln();
             (likelihood, count(outlandish) <= FEW_SHARE * rows)

@@ -37,8 +37,8 @@ pub fn p_value(
     let stage = bank.through(base, best.noise);
     let innovations = best.innovations(bank.frame());
     let in_full = |(fit, price): (&Fit, f64)| {
-        let left = bank.frame().whiten(&fit.residual, best.noise);
-        count(left.len()) * (stage.rss / dot(&left, &left).max(f64::MIN_POSITIVE)).ln() - price - REFINED
+        let left = fit.left_in(bank.frame(), best.noise).max(f64::MIN_POSITIVE);
+        count(bank.frame().len()) * (stage.rss / left).ln() - price - REFINED
     };
     let scanned = best_score(bank, &stage, &stage.residual, ln_rows);
     let observed = tested.map_or(scanned, |tested| scanned.max(in_full(tested)));

@@ -93,7 +93,7 @@ impl Case<'_> {
             let of = |(group, cut): (usize, &bool)| cut.then(|| values[self.frame.rows(group).start]);
             cut.iter().enumerate().map(of).collect()
         };
-        let time_in_cut = super::channel::channel(&self.scene, super::channel::TIME_IN_CUT);
+        let time_in_cut = super::channel::channel_values(&self.scene, super::channel::TIME_IN_CUT);
         let position = self.scene.role(Role::Position).map(std::borrow::Cow::Borrowed);
         [position, time_in_cut].into_iter().flatten().map(|values| in_cut(&values)).collect()
     }

@@ -5,7 +5,7 @@
 //! channel where the recording does not tell the two apart; and further ends, of any channel, are described beside it
 //! where something real happens there as well.
 
-use super::channel::channel;
+use super::channel::channel_values;
 use super::designs::Design;
 use super::diagnose::Case;
 use super::empirical::{Empirical, Factor, Shape, as_design, empirical_channels, factor_values};
@@ -41,7 +41,7 @@ pub(super) fn end_designs(scene: &Scene, frame: &Frame) -> Vec<Design> {
 
 /// Lines over either end of a form's channel, where that was visited often enough.
 fn ends(form: &Empirical, scene: &Scene, frame: &Frame, beginnings: &[f64]) -> Vec<Empirical> {
-    let (Some(values), Some(factor)) = (channel(scene, &form.channel), factor_values(scene, form.factor)) else {
+    let (Some(values), Some(factor)) = (channel_values(scene, &form.channel), factor_values(scene, form.factor)) else {
         return Vec::new();
     };
     let (values, factor) = (frame.reduce(&values), frame.reduce(&factor));

@@ -67,24 +67,36 @@ pub struct Part {
 }
 
 impl Part {
-    /// A candidate as a part, its linear parameters at zero.
+    /// A candidate as a part, its linear parameters at zero where they are not known.
     #[must_use]
     pub fn candidate(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
         let shape = form.shape.iter().map(|(name, value)| parameter(effect, name, *value, Entry::Shape));
         let linear = linear.iter().map(|name| parameter(effect, name, 0.0, Entry::Linear));
-        Self {
-            kind: effect.doc().kind.to_owned(),
-            name: None,
-            body: Body::Effect(effect, form.clone()),
-            parameters: linear.chain(shape).collect(),
-            line: 0,
+        let mut parameters: Vec<Parameter> = linear.chain(shape).collect();
+        for parameter in &mut parameters {
+            if let Some((_, value)) = form.known.iter().find(|(name, _)| *name == parameter.name) {
+                (parameter.value, parameter.fixed) = (*value, true);
+            }
         }
+        let body = Body::Effect(effect, form.clone());
+        Self { kind: effect.doc().kind.to_owned(), name: None, body, parameters, line: 0 }
     }
 
     /// The name reports use: the user's, or the kind.
     #[must_use]
     pub fn label(&self) -> &str {
         self.name.as_deref().unwrap_or(&self.kind)
+    }
+
+    /// The columns that a formula or form names; none of an effect or a table, whose inputs follow from what they are.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<&str> {
+        match &self.body {
+            Body::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
+            Body::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
+            Body::Empirical(form) => vec![&form.channel],
+            Body::Effect(..) | Body::Table(_) => Vec::new(),
+        }
     }
 
     /// The form with the present shape values.

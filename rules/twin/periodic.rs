@@ -5,7 +5,7 @@
 //! The periods that stand out in what a fit leaves over are found by a periodogram over the position (Lomb,
 //! Astrophysics and Space Science 39 (1976)), the noise's own colour taken into account, and become empirical forms.
 
-use super::channel::{TIME_IN_CUT, channel};
+use super::channel::{TIME_IN_CUT, channel_values};
 use super::empirical::{Empirical, Factor, Shape, factor_values};
 use super::frame::Frame;
 use super::linear::dot;
@@ -67,7 +67,7 @@ struct Track<'a> {
 impl<'a> Track<'a> {
     /// `None` where there are too few rows to tell a wave.
     fn new(scene: &Scene, frame: &Frame, position: &'a str, factor: Factor) -> Option<Self> {
-        let at = frame.reduce(&channel(scene, position)?);
+        let at = frame.reduce(&channel_values(scene, position)?);
         let acts = frame.reduce(&factor_values(scene, factor)?);
         let inside = |group: &usize| acts[*group] != 0.0;
         let low = (0..at.len()).filter(inside).map(|group| at[group]).fold(f64::INFINITY, f64::min);

@@ -51,6 +51,12 @@ pub fn price(design: &Design, ln_rows: f64) -> f64 {
     count(design.freedom) * ln_rows + 2.0 * design.ln_choices + design.reluctance
 }
 
+/// The price of several designs together.
+#[must_use]
+pub fn price_of(designs: &[Design], members: &[usize], ln_rows: f64) -> f64 {
+    members.iter().map(|member| price(&designs[*member], ln_rows)).sum()
+}
+
 /// Every hypothesis, whitened at the settings that have been asked for.
 pub struct Bank<'a> {
     /// The hypotheses.
@@ -89,10 +95,7 @@ impl<'a> Bank<'a> {
 
     /// The setting at which the fit's residual is likeliest.
     fn nearest(&self, fit: &Fit) -> usize {
-        let likelihood = |noise: Arma| {
-            let e = self.frame.whiten(&fit.residual, noise);
-            self.frame.log_likelihood(dot(&e, &e), noise)
-        };
+        let likelihood = |noise: Arma| self.frame.log_likelihood(fit.left_in(self.frame, noise), noise);
         let scored = SETTINGS.iter().map(|noise| likelihood(*noise)).enumerate();
         scored.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best }).0
     }

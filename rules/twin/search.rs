@@ -5,8 +5,8 @@ use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::scan::{Bank, Score, likeliest, price};
-use crate::physics::{OutputKind, Scene};
+use super::scan::{Bank, Score, likeliest, price_of};
+use crate::physics::OutputKind;
 use crate::statistics::count;
 
 /// Effects that may be found at once.
@@ -196,10 +196,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
         let added = &fit.parts[self.base.parts.len()..];
-        let drifts = || added.iter().filter(|part| part.kind == "zero_drift");
-        if !added.iter().all(|part| plausible(part, &fit.parts, self.data.scene))
-            || !drifts().all(|drift| stands_out(drift, &fit, self.data))
-        {
+        if !added.iter().all(|part| plausible(part, &fit, self.data)) {
             return None;
         }
         let information = 2.0 * (fit.log_likelihood - self.base.log_likelihood) - self.price_of(&members);
@@ -207,7 +204,7 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn price_of(&self, members: &[usize]) -> f64 {
-        members.iter().map(|member| price(&self.bank.designs[*member], self.ln_rows)).sum()
+        price_of(self.bank.designs, members, self.ln_rows)
     }
 
     /// Replaces members one by one where another explains more beside the rest.
@@ -289,10 +286,11 @@ impl<'a, 'b> Search<'a, 'b> {
 /// Sampling periods below which a lag cannot be resolved.
 const RESOLVED: f64 = 0.1;
 
-/// Could this part be what its name says, beside the others? A lag far below the sampling period cannot be resolved; a
-/// lag, window or ceiling that acts by less than a fifth is something else; Stribeck friction is an excess over dry
-/// friction at creep speed.
-fn plausible(part: &Part, beside: &[Part], scene: &Scene) -> bool {
+/// Could this part of a fit be what its name says? A lag far below the sampling period cannot be resolved; a lag, window
+/// or ceiling that acts by less than a fifth is something else; a drift is more than slow noise; Stribeck friction is an
+/// excess over dry friction at creep speed.
+fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
+    let scene = &*data.scene;
     let value = |name: &str| part.parameter(name).map(|parameter| parameter.value);
     let resolved = |name: &str| value(name).is_none_or(|seconds| seconds.abs() >= RESOLVED * scene.period_s());
     let acts = value("share").is_none_or(|share| share.abs() >= 0.2);
@@ -300,7 +298,8 @@ fn plausible(part: &Part, beside: &[Part], scene: &Scene) -> bool {
         "clock_lag" | "engagement_timing" | "override_delay" => resolved("delay_s") && acts,
         "meter_window" => resolved("window_s") && acts,
         "saturation" => acts,
-        "stribeck" if scene.output_kind() == OutputKind::Force => has_dry_friction(beside),
+        "zero_drift" => stands_out(part, fit, data),
+        "stribeck" if scene.output_kind() == OutputKind::Force => has_dry_friction(&fit.parts),
         _ => true,
     }
 }

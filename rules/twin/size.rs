@@ -4,7 +4,7 @@ use super::agreement::differs_by_run;
 use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::Fit;
-use super::scan::price;
+use super::scan::{price, price_of};
 use super::search::{FIRST_INFORMATION, Found, Hypothesis};
 use crate::statistics::count;
 
@@ -30,8 +30,7 @@ impl Case<'_> {
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
         }
-        let needed = FIRST_INFORMATION * found.best.fit.dispersion(&self.frame);
-        if self.information(&found.best, base, designs) < needed {
+        if found.best.members.is_empty() || !self.is_worth_its_noise(&found.best, base, designs) {
             // What was dropped, here or before, carried the rest.
             found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
             found.p_values.clear();
@@ -39,11 +38,11 @@ impl Case<'_> {
         found
     }
 
-    /// What a hypothesis explains beyond the baseline, its price paid.
-    fn information(&self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> f64 {
-        let ln_rows = self.ln_rows(base);
-        let paid: f64 = best.members.iter().map(|member| price(&designs[*member], ln_rows)).sum();
-        2.0 * (best.fit.log_likelihood - base.log_likelihood) - paid
+    /// Does a hypothesis explain enough beyond the baseline, its price paid, for what it leaves besides noise?
+    fn is_worth_its_noise(&self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> bool {
+        let gained = 2.0 * (best.fit.log_likelihood - base.log_likelihood);
+        let information = gained - price_of(designs, &best.members, self.ln_rows(base));
+        information >= FIRST_INFORMATION * best.fit.dispersion(&self.frame)
     }
 
     fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> Option<usize> {

@@ -29,8 +29,7 @@ impl Case<'_> {
         let Some(best) = best.filter(|best| {
             // It must make half of the outlandish rows ordinary, in noise that a few others do not make look white.
             let noise = self.frame.noise_between_outliers(&best.residual, best.noise);
-            self.frame.weigh(&best.residual, noise);
-            2 * self.frame.heavy() <= veiled
+            2 * self.frame.outlandish_in(&best.residual, noise) <= veiled
         }) else {
             self.frame = weighed;
             return base;

@@ -4,7 +4,6 @@ use super::diagnose::{Case, Outcome};
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
 use super::estimate::estimates;
 use super::fit::Fit;
-use super::linear::dot;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
 use super::search::{Hypothesis, METER};
@@ -127,16 +126,10 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
         missing.held_out_rmse_before =
             case.predict(&fit).and_then(|prediction| case.quality(&prediction).held_out_rmse);
         missing.held_out_rmse_after = outcome.fits.after.held_out_rmse;
-        found.push((left_by(case, &fit, &best.fit), missing));
+        found.push((fit.left_in(&case.frame, best.fit.noise), missing));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, missing)| missing).collect()
-}
-
-/// What a fit leaves in the noise of another: in its own, what is missing poses as slow noise.
-fn left_by(case: &Case<'_>, fit: &Fit, other: &Fit) -> f64 {
-    let left = case.frame.whiten(&fit.residual, other.noise);
-    dot(&left, &left)
 }
 
 /// A missing effect with its texts and parameters.

@@ -74,8 +74,8 @@ impl Effect for ClockLag {
         }
         let delays = delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
         let both = delays.iter().flat_map(|delay| [*delay, -delay]);
-        let late = both.map(|delay| Form { name: "delay", ..Form::of(&[("delay_s", delay)]) });
-        late.collect()
+        let late = |delay| Form { name: "delay", ..Form::of(&[("delay_s", delay)]) }.whole();
+        both.map(late).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {

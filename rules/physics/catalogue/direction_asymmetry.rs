@@ -1,7 +1,6 @@
 //! Friction differs between the two directions of motion.
 
-use crate::physics::drive::{directions, goes_both_ways, is_power, motion};
-use crate::physics::excitation::greatest;
+use crate::physics::drive::{directions, goes_both_ways, is_power, motion, rest_width};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, mean};
 
@@ -69,13 +68,14 @@ impl Effect for DirectionAsymmetry {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if !motion(scene).is_some_and(|motion| goes_both_ways(&motion)) {
-            return Vec::new();
+        let Some(motion) = motion(scene).filter(|motion| goes_both_ways(motion)) else { return Vec::new() };
+        let named = |name| Form { name, ..Form::plain() };
+        if is_power(scene) {
+            return ["slope", "step"].map(named).into();
         }
-        let names = if is_power(scene) { ["slope", "step"] } else { ["level", "viscous"] };
-        let about = motion(scene).and_then(|motion| mean_of_restless(&motion));
-        let shape = |name| if name == "viscous" { about.map(|about| ("about", about)) } else { None };
-        names.into_iter().map(|name| Form { name, shape: shape(name).into_iter().collect(), ..Form::plain() }).collect()
+        // About which speed a slope is told is a choice.
+        let about: Vec<_> = mean_of_restless(&motion).map(|about| ("about", about)).into_iter().collect();
+        vec![named("level"), Form { name: "viscous", shape: about.clone(), known: about, ..Form::plain() }]
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -103,7 +103,7 @@ const RESTS: f64 = 0.03;
 /// The mean speed of an axis that never rests. Another level in each direction is then the same as a constant, and a
 /// constant has a name of its own: the slope alone is told, about the middle of what was seen.
 fn mean_of_restless(motion: &[f64]) -> Option<f64> {
-    let slow = 0.01 * greatest(motion);
-    let resting = count(motion.iter().filter(|v| v.abs() < slow).count());
+    let rest = rest_width(motion);
+    let resting = count(motion.iter().filter(|v| v.abs() < rest).count());
     (resting < RESTS * count(motion.len())).then(|| mean(&motion.iter().map(|v| v.abs()).collect::<Vec<_>>()))
 }

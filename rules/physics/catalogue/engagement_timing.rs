@@ -61,7 +61,8 @@ impl Effect for EngagementTiming {
             return Vec::new();
         }
         let delays = delays(scene, &[0.5, 1.0, 2.0, 3.0, 5.0]);
-        delays.iter().flat_map(|delay| [*delay, -delay]).map(|delay| Form::of(&[("delay_s", delay)])).collect()
+        let both = delays.iter().flat_map(|delay| [*delay, -delay]);
+        both.map(|delay| Form::of(&[("delay_s", delay)]).whole()).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {

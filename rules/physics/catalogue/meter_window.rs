@@ -63,7 +63,7 @@ impl Effect for MeterWindow {
             return Vec::new();
         }
         let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);
-        let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) };
+        let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) }.whole();
         windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).collect()
     }
 
