@@ -28,11 +28,10 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
 #[must_use]
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count lies within it")]
     let at = (count(last) * share).round() as usize;
-    values.get(at).copied()
+    (at <= last).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// The standard deviation of normal noise about zero, told by the middle of its sizes: whatever the few greatest are.

@@ -51,6 +51,21 @@ pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
     Some(krpm.iter().zip(speed).map(law).collect())
 }
 
+/// The same law of a feed drive over its velocity in m/s: in a power, or with the direction in a force.
+pub(crate) fn slide_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
+    let velocity = sliding(scene)?;
+    if scene.output_kind() != OutputKind::Force {
+        return Some(velocity.iter().map(|v| v.abs().powf(exponent)).collect());
+    }
+    let law = |(v, direction): (&f64, f64)| v.abs().powf(exponent - 1.0) * direction;
+    Some(velocity.iter().zip(directions(&velocity)).map(law).collect())
+}
+
+/// The velocity of the slide in m/s where the output is that of its feed drive.
+pub(crate) fn sliding(scene: &Scene) -> Option<Vec<f64>> {
+    if turns(scene) { None } else { motion(scene) }
+}
+
 /// Does the output change its sign with the direction of motion? A true rms current of the spindle does not.
 pub(crate) fn is_signed(scene: &Scene) -> bool {
     !scene.output().contains("spindle")

@@ -63,9 +63,19 @@ pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Ve
     time_constants(scene, grid_s).into_iter().map(form).collect()
 }
 
-/// Delays worth trying, in seconds: none below a quarter of the sampling period.
+/// Shortest delay, in sampling periods, that is worth trying where rows are recorded faster than the grid is fine.
+const SHORTEST_PERIODS: f64 = 0.35;
+/// Ratio of the delays between that one and the grid.
+const DELAY_RATIO: f64 = 2.2;
+
+/// Delays worth trying, in seconds: those of the grid, none below a quarter of the sampling period; and shorter ones,
+/// down to part of a row, where the recording is fast enough to tell them.
 pub(crate) fn delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
-    let mut delays: Vec<f64> = grid_s.iter().map(|delay| delay.max(0.25 * scene.period_s())).collect();
+    let (period_s, finest_s) = (scene.period_s(), grid_s.first().copied().unwrap_or(0.0));
+    let short = |delay: &f64| Some(delay * DELAY_RATIO);
+    let short = std::iter::successors(Some(SHORTEST_PERIODS * period_s), short);
+    let short = short.take_while(|delay| *delay > 0.0 && *delay < 0.7 * finest_s);
+    let mut delays: Vec<f64> = short.chain(grid_s.iter().map(|delay| delay.max(0.25 * period_s))).collect();
     delays.dedup();
     delays
 }

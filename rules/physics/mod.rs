@@ -6,7 +6,7 @@
 
 pub mod catalogue;
 mod cut;
-mod drive;
+pub(crate) mod drive;
 mod excitation;
 pub mod explain;
 mod scene;

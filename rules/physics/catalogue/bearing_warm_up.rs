@@ -1,6 +1,6 @@
 //! Grease and bearings get thinner and freer as they warm: no-load power falls.
 
-use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
+use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
@@ -12,31 +12,31 @@ pub struct BearingWarmUp;
 static DOC: EffectDoc = EffectDoc {
     kind: "bearing_warm_up",
     family: "spindle",
-    law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), dw/dt = (g - w) / tau; measured: P = -drop_per_k * g * (T - T0)",
+    law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), of a feed drive (v / 1 m/s)^(5/3), dw/dt = (g - w) / tau; in a force g / v; measured: P = -drop_per_k * g * (T - T0)",
     parameters: &[
         ParameterDoc {
             name: "drop",
             unit: "output",
             entry: Entry::Linear,
             range: (0.0, f64::INFINITY),
-            en: "fall of power at 1000 rpm once warm from 1000 rpm",
-            zh: "在1000 rpm下热透后功率的下降量",
+            en: "fall of power at 1000 rpm once warm from 1000 rpm; of a feed drive, of power or force at 1 m/s",
+            zh: "在1000 rpm下热透后功率的下降量；进给轴按1 m/s的功率或力",
         },
         ParameterDoc {
             name: "initial",
             unit: "output",
             entry: Entry::Linear,
             range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "what the warmth at the start of the recording changes at 1000 rpm",
-            zh: "记录开始时的热状态在1000 rpm下的影响",
+            en: "what the warmth at the start of the recording changes at 1000 rpm or 1 m/s",
+            zh: "记录开始时的热状态在1000 rpm或1 m/s下的影响",
         },
         ParameterDoc {
             name: "drop_per_k",
             unit: "output/K",
             entry: Entry::Linear,
             range: (0.0, f64::INFINITY),
-            en: "fall of power at 1000 rpm per kelvin of the bearing",
-            zh: "轴承温度每升高1 K，1000 rpm下功率的下降量",
+            en: "fall at 1000 rpm or 1 m/s per kelvin of the bearing",
+            zh: "轴承温度每升高1 K，1000 rpm或1 m/s下的下降量",
         },
         ParameterDoc {
             name: "tau_s",
@@ -47,20 +47,20 @@ static DOC: EffectDoc = EffectDoc {
             zh: "升温时间常数",
         },
     ],
-    needs: &["speed"],
+    needs: &["speed | velocity"],
     source: "Palmgren: friction moment grows with (viscosity * n)^(2/3), viscosity falls with temperature (Walther); idle power 10-40 % lower warm",
     experiment_minutes: 20.0,
     rivals: &["preload_growth", "zero_drift", "flank_wear", "viscous_friction"],
     en: Texts {
         name: "bearing warm-up",
-        statement: "Cold bearings turn heavily: the no-load power falls as the spindle warms, and rises again after a pause",
+        statement: "Cold bearings and grease turn heavily: power or force without load falls as the drive warms, and rises again after a pause",
         absence: "at the start of a shift or after a pause idle takes more than later, in proportion to speed",
         confused_with: "zero drift of the meter (does not grow with speed), preload growth (opposite sign)",
         experiment: "run idle at one high speed for twenty minutes from cold, and again warm",
     },
     zh: Texts {
         name: "轴承热机",
-        statement: "冷态轴承阻力大：空载功率随主轴升温下降，停机后又回升",
+        statement: "冷态轴承和润滑脂阻力大：空载功率或力随驱动升温下降，停机后又回升",
         absence: "开班或停机后空转功率比之后大，且与转速相关",
         confused_with: "仪表零点漂移（不随转速增长）、预紧力增长（符号相反）",
         experiment: "从冷态起以某一高转速空转二十分钟，热态再重复一次",
@@ -77,17 +77,20 @@ impl Effect for BearingWarmUp {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
+        let Some((friction, _)) = friction_and_heat(scene) else { return Vec::new() };
+        if friction.iter().all(|g| *g == 0.0) {
             return Vec::new();
         }
-        let mut forms = lag_forms(scene, "lag", &[300.0, 600.0, 1200.0, 2400.0]);
+        // A nut warms faster than a spindle.
+        let fast: &[f64] = if sliding(scene).is_some() { &[75.0, 150.0] } else { &[] };
+        let mut forms = lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
         let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
         forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
         forms
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let friction = speed_to_the(scene, EXPONENT)?;
+        let (friction, heat) = friction_and_heat(scene)?;
         if form.name == "measured" {
             let temperature = scene.role(Role::Temperature)?;
             let first = *temperature.first()?;
@@ -95,7 +98,6 @@ impl Effect for BearingWarmUp {
             return Some(vec![("drop_per_k", friction.iter().zip(temperature).map(law).collect())]);
         }
         let tau_s = form.value("tau_s").unwrap_or(900.0);
-        let heat: Vec<f64> = krpm(scene)?.iter().map(|n| n.powf(EXPONENT)).collect();
         let warmth = first_order(scene, &heat, tau_s);
         let left = decay(scene, tau_s);
         Some(vec![
@@ -106,6 +108,15 @@ impl Effect for BearingWarmUp {
 
     fn default_form(&self, _scene: &Scene) -> Form {
         Form { name: "lag", ..Form::of(&[("tau_s", 900.0)]) }
+    }
+}
+
+/// Friction in the output, and the heat it makes: of the spindle over thousands of rpm, of a feed drive over m/s.
+fn friction_and_heat(scene: &Scene) -> Option<(Vec<f64>, Vec<f64>)> {
+    let heat = |speeds: &[f64]| speeds.iter().map(|speed| speed.abs().powf(EXPONENT)).collect();
+    match sliding(scene) {
+        Some(velocity) => Some((slide_to_the(scene, EXPONENT)?, heat(&velocity))),
+        None => Some((speed_to_the(scene, EXPONENT)?, heat(&krpm(scene)?))),
     }
 }
 

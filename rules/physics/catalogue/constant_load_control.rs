@@ -1,9 +1,9 @@
 //! A controller holds the load by turning the feed: what the cut gains, the feed loses.
 
-use crate::physics::cut::engaged;
+use crate::physics::cut::{cutting_rows, engaged};
 use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
-use crate::statistics::quantile;
+use crate::statistics::{count, quantile};
 
 /// Feed that a load controller turns down.
 #[derive(Debug, Clone, Copy)]
@@ -12,31 +12,57 @@ pub struct ConstantLoadControl;
 static DOC: EffectDoc = EffectDoc {
     kind: "constant_load_control",
     family: "control",
-    law: "y = -response * ln(L / L0) * y0 in the cut; L0, y0 medians in the cut; the output is a feed or its override",
-    parameters: &[ParameterDoc {
-        name: "response",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (0.0, 2.0),
-        en: "relative fall of the feed per relative rise of the load",
-        zh: "负载相对上升时进给的相对下降",
-    }],
+    law: "of a feed or its override: y = -response * ln(L / L0) * y0 in the cut; unseen, of a power: y = share * L * g, g = (L / L0)^-exponent - 1 in the cut behind a lag tau, zero when the cut begins; L0, y0 medians in the cut",
+    parameters: &[
+        ParameterDoc {
+            name: "response",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 2.0),
+            en: "relative fall of the feed per relative rise of the load",
+            zh: "负载相对上升时进给的相对下降",
+        },
+        ParameterDoc {
+            name: "share",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 2.0),
+            en: "1: the controller acts as a whole",
+            zh: "1：控制器完全起作用",
+        },
+        ParameterDoc {
+            name: "exponent",
+            unit: "1",
+            entry: Entry::Shape,
+            range: (0.01, 1.5),
+            en: "relative fall of the load per relative rise of the load that the program asks for",
+            zh: "程序要求的负载相对上升时实际负载的相对下降",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.2, 30.0),
+            en: "time constant of the controller",
+            zh: "控制器时间常数",
+        },
+    ],
     needs: &["load", "engaged"],
     source: "f = f0 (P0 / P)^(1 / (1 - mc)): adaptive feed control at constant power",
     experiment_minutes: 4.0,
-    rivals: &["override_delay", "flank_wear", "hardness_batch"],
+    rivals: &["override_delay", "flank_wear", "hardness_batch", "load_loss", "chip_thinning"],
     en: Texts {
         name: "constant-load control",
         statement: "A controller turns the feed down where the cut is heavy, so power stays flat and the change hides in the feed",
-        absence: "power agrees although the tool is worn; the feed falls instead",
-        confused_with: "wear, hardness and depth themselves: look for them in the feed",
+        absence: "power agrees although the tool is worn; the feed falls instead; where only the program's feed is recorded, heavy cuts take less than simulated, after a few seconds",
+        confused_with: "wear, hardness and depth themselves: look for them in the feed; unseen, any law by which heavy cuts take less",
         experiment: "fix the feed override at 100 % for one part",
     },
     zh: Texts {
         name: "恒负载控制",
         statement: "控制器在负载大时降低进给，功率保持平稳，变化隐藏在进给中",
-        absence: "刀具已磨损但功率一致，进给却下降",
-        confused_with: "磨损、硬度和切深本身：应在进给中寻找",
+        absence: "刀具已磨损但功率一致，进给却下降；仅记录程序进给时，重切削在数秒后功率低于仿真",
+        confused_with: "磨损、硬度和切深本身：应在进给中寻找；未记录时，任何使重切削功率偏低的规律",
         experiment: "将进给倍率固定为100%加工一个工件",
     },
 };
@@ -46,21 +72,80 @@ impl Effect for ConstantLoadControl {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+    fn form_names(&self) -> &'static [&'static str] {
+        &["feed", "unseen"]
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
-        if !["feed_override_pct", "feed_mm_min", "feed_per_rev_mm"].contains(&scene.output()) {
-            return None;
-        }
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let tried = if is_feed(scene) {
+            vec![Form { name: "feed", ..Form::plain() }]
+        } else if knows_the_program_only(scene) {
+            let unseen = |(exponent, tau_s)| unseen(exponent, tau_s).whole();
+            [(0.1, 1.0), (0.1, 3.0), (0.5, 1.0), (0.5, 3.0)].map(unseen).into()
+        } else {
+            Vec::new()
+        };
+        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+        tried.into_iter().filter(acts).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let load = scene.load()?;
         let engaged = engaged(scene);
         let cutting = |row: &usize| engaged[*row] > 0.5 && load[*row] > 0.0;
         let reference = quantile((0..scene.rows()).filter(cutting).map(|row| load[row]), 0.5)?;
+        if form.name == "unseen" {
+            let exponent = form.value("exponent").unwrap_or(0.1);
+            let wanted = |row: usize| if cutting(&row) { (load[row] / reference).powf(-exponent) - 1.0 } else { 0.0 };
+            let turned = from_each_cut(scene, &(0..scene.rows()).map(wanted).collect::<Vec<_>>(), form);
+            return Some(vec![("share", load.iter().zip(&turned).map(|(load, turned)| load * turned).collect())]);
+        }
+        if !is_feed(scene) {
+            return None;
+        }
         let level = quantile((0..scene.rows()).filter(cutting).map(|row| scene.recorded()[row]), 0.5)?;
         let law = |row: usize| if cutting(&row) { -level * (load[row] / reference).ln() } else { 0.0 };
         Some(vec![("response", (0..scene.rows()).map(law).collect())])
     }
+
+    fn default_form(&self, scene: &Scene) -> Form {
+        if is_feed(scene) { Form { name: "feed", ..Form::plain() } } else { unseen(0.1, 1.0) }
+    }
+}
+
+fn unseen(exponent: f64, tau_s: f64) -> Form {
+    Form { name: "unseen", ..Form::of(&[("exponent", exponent), ("tau_s", tau_s)]) }
+}
+
+/// Is the output what such a controller turns?
+fn is_feed(scene: &Scene) -> bool {
+    ["feed_override_pct", "feed_mm_min", "feed_per_rev_mm"].contains(&scene.output())
+}
+
+/// Share of the rows in the cut in which a feed may differ from the program's.
+const DIFFERS: f64 = 0.02;
+
+/// Is the feed that the program asks for recorded, and nothing of what became of it? Then a controller acts unseen.
+fn knows_the_program_only(scene: &Scene) -> bool {
+    let Some(program) = scene.column("feed_programmed_mm_min") else { return false };
+    let Some(actual) = scene.column("feed_mm_min") else { return true };
+    let cutting = cutting_rows(scene);
+    let rows: Vec<usize> = (0..scene.rows()).filter(|row| cutting[*row]).collect();
+    let differs = |row: &&usize| (actual[**row] - program[**row]).abs() > 0.01 * program[**row].abs();
+    count(rows.iter().filter(differs).count()) <= DIFFERS * count(rows.len())
+}
+
+/// A first-order lag that starts at zero with every cut: a controller lets go where nothing is cut.
+fn from_each_cut(scene: &Scene, wanted: &[f64], form: &Form) -> Vec<f64> {
+    let tau_s = form.value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+    let mut turned = vec![0.0; wanted.len()];
+    for pass in scene.passes() {
+        let mut state = 0.0;
+        for row in pass.clone() {
+            let dt_s = if row > pass.start { scene.time_s()[row] - scene.time_s()[row - 1] } else { 0.0 };
+            state = wanted[row] + (state - wanted[row]) * (-dt_s.max(0.0) / tau_s).exp();
+            turned[row] = state;
+        }
+    }
+    turned
 }

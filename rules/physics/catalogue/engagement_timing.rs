@@ -78,7 +78,7 @@ impl Effect for EngagementTiming {
     }
 }
 
-/// The load; out of the cut that of the nearest row of the run in the cut.
+/// The load of a tool fully in the work; where it is not, that of the nearest row of the run in which it nearly is.
 fn held_from_cut(scene: &Scene, load: &[f64], engaged: &[f64]) -> Vec<f64> {
     let time_s = scene.time_s();
     let mut held = load.to_vec();
@@ -92,7 +92,7 @@ fn held_from_cut(scene: &Scene, load: &[f64], engaged: &[f64]) -> Vec<f64> {
                 let away_s = (time_s[row] - time_s[near]).abs();
                 if away_s < distance_s[row - run.start] {
                     distance_s[row - run.start] = away_s;
-                    held[row] = load[near];
+                    held[row] = load[near] / engaged[near];
                 }
             }
         }

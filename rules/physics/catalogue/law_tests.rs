@@ -233,3 +233,62 @@ fn a_taper_by_distance_is_the_same_at_the_same_place_of_every_pass() {
     let share = column("depth_taper", &scene, &Form { name: "linear", ..Form::plain() });
     assert!((share[59] - share[109]).abs() < 1e-9, "by share the ends of both passes are alike");
 }
+
+#[test]
+fn a_flag_that_is_late_within_a_row_moves_the_whole_cut() {
+    // A row in which the tool was in the work for three quarters shows three quarters of the load.
+    let share = |row: usize| if row == 10 { 0.75 } else { f64::from(u8::from(row > 10)) };
+    let scene = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &share), ("depth_of_cut_mm", &|_| 1.0)]);
+    let moved = column("engagement_timing", &scene, &Form::of(&[("delay_s", -0.5)]));
+    let whole = 800.0;
+    assert!((moved[9] - 0.375 * whole).abs() < 1e-9, "{}", moved[9]);
+    assert!((moved[10] - 0.125 * whole).abs() < 1e-9, "{}", moved[10]);
+}
+
+#[test]
+fn delays_of_part_of_a_row_are_tried_where_rows_are_fast() {
+    let delays_at = |period_s: f64| -> Vec<f64> {
+        let mut scene = with_inputs(40, period_s, "axis_force_n", &[]);
+        scene.set_simulated(Some((0..40).map(|row| f64::from(row % 7)).collect()));
+        forms("clock_lag", &scene).iter().filter_map(|form| form.value("delay_s")).filter(|s| *s > 0.0).collect()
+    };
+    assert_eq!(delays_at(1.0), [0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
+    let fast = delays_at(0.02);
+    assert!(fast.iter().filter(|delay_s| **delay_s < 0.02).count() == 2, "{fast:?}");
+    assert!(fast.windows(2).all(|pair| pair[0] < pair[1] && pair[1] < 3.0 * pair[0]), "no gaps: {fast:?}");
+}
+
+#[test]
+fn a_controller_unseen_takes_from_heavy_cuts_after_a_while() {
+    let engaged = |row: usize| f64::from(u8::from(row % 20 >= 5));
+    let depth = |row: usize| 1.0 + (row / 20 % 3) as f64;
+    let program = |_: usize| 200.0;
+    let inputs: [(&str, &dyn Fn(usize) -> f64); 3] =
+        [("engaged", &engaged), ("depth_of_cut_mm", &depth), ("feed_programmed_mm_min", &program)];
+    let scene = with_inputs(120, 1.0, "spindle_power_w", &inputs);
+    let tried = forms("constant_load_control", &scene);
+    assert!(!tried.is_empty() && tried.iter().all(|form| form.name == "unseen"), "{tried:?}");
+    let form = Form { name: "unseen", ..Form::of(&[("exponent", 0.5), ("tau_s", 2.0)]) };
+    let taken = column("constant_load_control", &scene, &form);
+    // Three times the depth is heavy, one is light, two is the median.
+    assert!(taken[45].abs() < 1e-9 && taken[59] < -100.0 && taken[50] > taken[59], "{:?}", &taken[40..60]);
+    assert!(taken[19] > 100.0 && taken[39].abs() < 1e-9, "{} {}", taken[19], taken[39]);
+    let with_actual = |actual: &dyn Fn(usize) -> f64| {
+        let inputs = [inputs[0], inputs[1], inputs[2], ("feed_mm_min", actual)];
+        forms("constant_load_control", &with_inputs(120, 1.0, "spindle_power_w", &inputs)).len()
+    };
+    assert_eq!(with_actual(&|row| if row % 2 == 0 { 200.0 } else { 150.0 }), 0, "what the feed became is known");
+    assert_eq!(with_actual(&program), tried.len());
+}
+
+#[test]
+fn the_friction_of_a_feed_drive_falls_as_it_warms() {
+    let velocity = |row: usize| 6000.0 * (row as f64 / 9.0).sin();
+    let scene = with_inputs(1200, 1.0, "axis_force_n", &[("axis_velocity_mm_min", &velocity)]);
+    let tried = forms("bearing_warm_up", &scene);
+    assert!(tried.iter().any(|form| form.value("tau_s") == Some(150.0)), "{tried:?}");
+    let fall = column("bearing_warm_up", &scene, &Form { name: "lag", ..Form::of(&[("tau_s", 150.0)]) });
+    assert!((0..1200).all(|row| fall[row] * velocity(row) <= 0.0), "against the friction, whatever the direction");
+    let size = |rows: std::ops::Range<usize>| fall[rows].iter().map(|x| x.abs()).fold(0.0, f64::max);
+    assert!(size(1000..1200) > 5.0 * size(0..20));
+}
