@@ -1,6 +1,7 @@
 //! Channels by name: those of the recording, and those that nobody records but that forms without a name and formulas may
-//! be drawn over - the time in the run and in the cut, and what the model itself simulates.
+//! be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
+use crate::physics::drive::{directions, goes_both_ways, sliding};
 use crate::physics::{Role, Scene};
 use std::borrow::Cow;
 
@@ -15,12 +16,16 @@ pub(super) const SIMULATED_CUT: &str = "simulated_cut";
 /// The same over the speed in thousands of turns a minute.
 pub(super) const SIMULATED_CUT_PER_KRPM: &str = "simulated_cut_per_krpm";
 
+/// Direction in which the slide of a feed drive moves, -1 to 1.
+pub(super) const DIRECTION: &str = "direction_of_motion";
+
 /// The values of a channel, one per row; `None` where this scene has no such channel.
 pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     match name {
         TIME => Some(Cow::Borrowed(scene.clock_s())),
         TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),
         TIME_IN_CUT => time_in_cut_s(scene).map(Cow::Owned),
+        DIRECTION => direction(scene).map(Cow::Owned),
         SIMULATED_CUT => scene.load().map(Cow::Borrowed),
         SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
         _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed),
@@ -63,6 +68,11 @@ fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
     Some(values)
 }
 
+fn direction(scene: &Scene) -> Option<Vec<f64>> {
+    let velocity = sliding(scene).filter(|velocity| goes_both_ways(velocity))?;
+    Some(directions(&velocity).collect())
+}
+
 fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
     let (load, speed) = (scene.load()?, scene.role(Role::Speed)?);
     let per_krpm = |(load, rpm): (&f64, &f64)| if rpm.abs() > 1.0 { 1000.0 * load / rpm.abs() } else { 0.0 };
@@ -99,10 +109,27 @@ mod tests {
         scene
     }
 
+    /// A slide that goes to and fro.
+    fn slide() -> Scene {
+        let mut text = String::from("time_s,axis_force_n,axis_velocity_mm_min,axis_position_mm\n");
+        for row in 0..200_u32 {
+            let (sin, cos) = (f64::from(row) / 9.0).sin_cos();
+            writeln!(text, "{row},{},{:.1},{:.2}", 80.0 * sin.signum(), 900.0 * sin, 100.0 - 130.0 * cos)
+                .expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        Scene::new(&recording, "axis_force_n", &BTreeMap::new()).expect("recorded")
+    }
+
     /// What a model that carries a form without a name makes of it is what the form was.
     #[test]
     fn a_form_is_the_same_as_a_formula() {
-        let scene = cut();
+        let channels = [TIME_IN_RUN, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, "spindle_speed_rpm"];
+        same_as_formulas(&cut(), &channels, Factor::InTheCut);
+        same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION], Factor::AgainstMotion);
+    }
+
+    fn same_as_formulas(scene: &Scene, channels: &[&str], factor: Factor) {
         let shapes = || {
             vec![
                 Shape::Bent(vec![2.0, 5.0]),
@@ -113,12 +140,9 @@ mod tests {
                 Shape::Wave(7.0, 3),
             ]
         };
-        let channels = [TIME_IN_RUN, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, "spindle_speed_rpm"];
-        for (name, shape) in channels.into_iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape)))
-        {
-            let form =
-                Empirical { channel: name.to_owned(), shape, origin: 1.5, scale: 20.0, factor: Factor::InTheCut };
-            let columns = form.columns(&scene).expect("there");
+        for (name, shape) in channels.iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape))) {
+            let form = Empirical { channel: (*name).to_owned(), shape, origin: 1.5, scale: 20.0, factor };
+            let columns = form.columns(scene).expect("there");
             let parameters = columns.iter().enumerate().map(|(k, (name, _))| Parameter {
                 name: name.clone(),
                 value: 1.0 + crate::statistics::count(k),
@@ -130,7 +154,7 @@ mod tests {
             let parameters: Vec<Parameter> = parameters.collect();
             let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
             let formula = Expression::compile(&form.expression(), &names).expect("compiles");
-            let got = formula.evaluate(&scene, &parameters).expect("evaluates");
+            let got = formula.evaluate(scene, &parameters).expect("evaluates");
             for (row, got) in got.iter().enumerate() {
                 let sum: f64 = columns.iter().zip(&parameters).map(|((_, column), p)| p.value * column[row]).sum();
                 assert!((got - sum).abs() < 1e-6 * sum.abs().max(1.0), "{}: {got} {sum}", form.equation());

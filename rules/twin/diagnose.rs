@@ -14,6 +14,7 @@ use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
 use super::size::BEYOND_DOUBT_INFORMATION;
 use super::unknown::{Doubt, Nameless, Unknown};
+use super::veil::SeenForm;
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median, robust_deviation};
@@ -69,6 +70,8 @@ pub struct Case<'a> {
     pub switching: Option<super::latent::Switching>,
     /// The baseline beside an effect at the edges that bends it, where there is one.
     pub unbent: Option<Vec<Part>>,
+    /// Effects at edges that show with every row in full.
+    pub seen_at_edges: Vec<SeenForm>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -101,8 +104,22 @@ impl<'a> Case<'a> {
         let frame = Frame::new(&scene, &units, size, |unit| !held.contains(&unit));
         let held_frame = Frame::new(&scene, &units, size, |unit| held.contains(&unit));
         let recorded = frame.reduce(scene.recorded());
-        let (ripple, switching, unbent, whole) = (None, None, None, None);
-        Self { model, scene, parts, units, held, frame, held_frame, recorded, faults, ripple, switching, unbent, whole }
+        Self {
+            model,
+            scene,
+            parts,
+            units,
+            held,
+            frame,
+            held_frame,
+            recorded,
+            faults,
+            ripple: None,
+            switching: None,
+            unbent: None,
+            seen_at_edges: Vec::new(),
+            whole: None,
+        }
     }
 
     /// The diagnosis found from an excerpt and told over the whole, and the whole again.
@@ -211,6 +228,7 @@ impl<'a> Case<'a> {
             // What creeps over hours is in the levels of the tools; within one tool's life it is but a bend.
             designs.retain(|design| !CREEPING.contains(&design.kind.as_str()));
         }
+        designs.extend(self.designs_seen_at_edges());
         designs.extend(self.hidden_lots(base));
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));

@@ -121,14 +121,11 @@ pub struct Fits {
     pub after: Quality,
 }
 
-/// Share of the error on held-out rows beyond which it has risen.
-const RISEN: f64 = 1.02;
-
 impl Fits {
     /// Is the error on rows that took no part greater than before? Then something else is there than what is named.
     #[must_use]
     pub fn rises(&self) -> bool {
-        self.held_out_share().is_some_and(|share| share > RISEN)
+        self.held_out_share().is_some_and(|share| share > 1.0)
     }
 
     /// The error on those rows as a share of what it was before; `None` where none were held out.

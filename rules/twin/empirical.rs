@@ -5,11 +5,14 @@
 //! in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no
 //! candidate explains".
 
-use super::channel::{SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel_values};
+use super::channel::{
+    DIRECTION, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel_values,
+};
 use super::designs::Design;
 use super::frame::Frame;
 use super::model::{Body, Model, Parameter, Part};
-use crate::physics::{Entry, Role, Scene};
+use crate::physics::{Entry, OutputKind, Role, Scene};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// By what the bent line is multiplied.
@@ -23,6 +26,8 @@ pub enum Factor {
     WithTheCut,
     /// Running spindle.
     Turning,
+    /// Direction in which a slide moves: it is a friction.
+    AgainstMotion,
 }
 
 /// What is drawn over a channel.
@@ -136,6 +141,7 @@ impl Empirical {
             Factor::InTheCut => "engaged * ",
             Factor::WithTheCut => "removal rate * ",
             Factor::Turning => "(spindle turning) * ",
+            Factor::AgainstMotion => "(direction of motion) * ",
         };
         let shape = match &self.shape {
             Shape::Bent(knots) => {
@@ -161,6 +167,7 @@ impl Empirical {
             Factor::InTheCut => "engaged",
             Factor::WithTheCut => "engaged * removal_rate_cm3_min",
             Factor::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
+            Factor::AgainstMotion => DIRECTION,
         };
         format!("({factor}) * ({form})")
     }
@@ -203,6 +210,10 @@ pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
     match factor {
         Factor::Always => Some(vec![1.0; scene.rows()]),
         Factor::InTheCut => scene.role(Role::Engaged).map(<[f64]>::to_vec),
+        Factor::AgainstMotion => {
+            let force = scene.output_kind() == OutputKind::Force;
+            force.then(|| channel_values(scene, DIRECTION))?.map(Cow::into_owned)
+        }
         Factor::Turning => speed().map(|n| n.iter().map(|n| f64::from(u8::from(n.abs() > 1.0))).collect()),
         Factor::WithTheCut => {
             let (engaged, rate) = (scene.role(Role::Engaged)?, scene.column("removal_rate_cm3_min")?);
@@ -218,7 +229,12 @@ pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Des
     channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].map(str::to_owned));
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
     let bent = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
-    let forms = bent.chain(peaks(scene).into_iter().map(Some)).chain(fading(scene).into_iter().map(Some));
+    // How friction bends over the speed has names.
+    let of_motion = [Role::Velocity, Role::Acceleration].map(|role| scene.role_name(role));
+    let elsewhere = channels.iter().filter(|channel| !of_motion.contains(&Some(channel.as_str())));
+    let friction = elsewhere.map(|channel| form(scene, frame, channel, Factor::AgainstMotion));
+    let forms =
+        bent.chain(friction).chain(peaks(scene).into_iter().map(Some)).chain(fading(scene).into_iter().map(Some));
     // What always drifts has a name.
     let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
     let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
@@ -240,7 +256,7 @@ fn form(scene: &Scene, frame: &Frame, name: &str, factor: Factor) -> Option<Empi
     let weights = frame.reduce(&factor_values(scene, factor)?);
     let values = frame.reduce(&channel_values(scene, name)?);
     let mut inside: Vec<f64> =
-        values.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(x, _)| *x).collect();
+        values.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0).map(|(x, _)| *x).collect();
     inside.sort_by(f64::total_cmp);
     let at = |share: f64| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]

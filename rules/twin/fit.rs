@@ -2,7 +2,7 @@
 
 use super::frame::Frame;
 use super::linear::{Solution, dot, least_squares};
-use super::model::{Part, simulate};
+use super::model::{Part, Simulated, simulate, simulate_changed};
 use super::noise::Arma;
 use crate::physics::{Entry, Scene};
 use crate::statistics::{count, rms, robust_deviation};
@@ -289,7 +289,7 @@ pub fn residual(data: &mut Data<'_>, parts: &[Part]) -> Option<Vec<f64>> {
 
 /// Derivatives of the simulated output by each free parameter, per group.
 pub fn tangent(data: &mut Data<'_>, parts: &[Part], free: &[Free]) -> Option<Vec<Vec<f64>>> {
-    let base = simulate(parts, data.scene)?.total;
+    let base = simulate(parts, data.scene)?;
     let direct = |free: &Free| is_direct(parts, *free);
     let mut columns = vec![Vec::new(); free.len()];
     // The direct columns first: they read the load and output that were just simulated.
@@ -320,7 +320,7 @@ fn is_direct(parts: &[Part], free: Free) -> bool {
     linear && !coupled && !load_read
 }
 
-fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &[f64]) -> Option<Vec<f64>> {
+fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
     let mut parts = parts.to_vec();
     let parameter = &mut parts[free.part].parameters[free.parameter];
     let mut step = 1e-4 * parameter.value.abs().max(1e-3);
@@ -328,7 +328,7 @@ fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &[f64]) -> 
         step = -step;
     }
     parameter.value += step;
-    let moved = simulate(&parts, data.scene)?.total;
-    let slope: Vec<f64> = moved.iter().zip(base).map(|(moved, base)| (moved - base) / step).collect();
+    let moved = simulate_changed(&parts, data.scene, base, free.part)?.total;
+    let slope: Vec<f64> = moved.iter().zip(&base.total).map(|(moved, base)| (moved - base) / step).collect();
     Some(data.frame.reduce(&slope))
 }

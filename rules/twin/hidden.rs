@@ -9,6 +9,7 @@ use super::model::{Body, simulate};
 use super::ripple;
 use super::search::Hypothesis;
 use super::wave::{self, Wave};
+use crate::physics::drive::is_axis_output;
 use crate::physics::{Form, OutputKind, Role};
 use crate::statistics::{count, median};
 use std::ops::Range;
@@ -62,9 +63,11 @@ impl Case<'_> {
         true
     }
 
-    /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else.
+    /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else, and not in the
+    /// current of a feed drive.
     fn electric(&self) -> bool {
-        self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a")
+        let metered = self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a");
+        metered && !is_axis_output(&self.scene)
     }
 
     /// Of each group that is fitted: does the machine change its pace there or nearby, and does it cut?

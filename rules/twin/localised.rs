@@ -45,7 +45,7 @@ fn ends(form: &Empirical, scene: &Scene, frame: &Frame, beginnings: &[f64]) -> V
         return Vec::new();
     };
     let (values, factor) = (frame.reduce(&values), frame.reduce(&factor));
-    let mut groups: Vec<usize> = (0..values.len()).filter(|group| factor[*group] > 0.0).collect();
+    let mut groups: Vec<usize> = (0..values.len()).filter(|group| factor[*group] != 0.0).collect();
     groups.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let (Some(first), Some(last)) = (groups.first(), groups.last()) else { return Vec::new() };
     let (origin, scale) = (values[*first], values[*last] - values[*first]);

@@ -99,6 +99,15 @@ impl Part {
         }
     }
 
+    /// The effect of the catalogue with the form as it is now; `None` of any other part.
+    #[must_use]
+    pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, Form)> {
+        match &self.body {
+            Body::Effect(effect, form) => Some((*effect, self.form(form))),
+            _ => None,
+        }
+    }
+
     /// The form with the present shape values.
     fn form(&self, form: &Form) -> Form {
         let mut form = form.clone();
@@ -167,6 +176,16 @@ impl Part {
         }
     }
 
+    /// May its contribution change with the load? Of a sum over columns it cannot.
+    fn may_read_load(&self) -> bool {
+        !matches!(self.body, Body::Linear(_) | Body::Table(_)) && self.kind != "no_load_power"
+    }
+
+    /// Does this part have to be simulated again after that one of the same model has changed?
+    fn follows(&self, changed: &Self) -> bool {
+        self.acts_on_output() && !changed.acts_on_output() || changed.is_cut() && self.may_read_load()
+    }
+
     /// Is it the cut, whose contribution is the load for the others?
     #[must_use]
     pub fn is_cut(&self) -> bool {
@@ -224,18 +243,33 @@ pub struct Simulated {
 /// those that act on the output as a whole. The scene keeps load and simulated output for candidates. `None` when a
 /// part lacks an input.
 pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
+    simulate_again(parts, scene, None)
+}
+
+/// The same where one part has changed since all were simulated: what does not follow from it is taken from there.
+pub(super) fn simulate_changed(
+    parts: &[Part],
+    scene: &mut Scene,
+    before: &Simulated,
+    changed: usize,
+) -> Option<Simulated> {
+    simulate_again(parts, scene, Some((before, changed)))
+}
+
+fn simulate_again(parts: &[Part], scene: &mut Scene, before: Option<(&Simulated, usize)>) -> Option<Simulated> {
     let mut contributions: Vec<Vec<f64>> = vec![Vec::new(); parts.len()];
     let mut total = vec![0.0; scene.rows()];
     scene.set_load(None);
     scene.set_simulated(None);
     if parts.iter().any(Part::is_cut) {
-        run_stage(parts, scene, &mut contributions, &mut total, Part::is_cut)?;
+        run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_cut)?;
         scene.set_load(Some(total.clone()));
     }
-    run_stage(parts, scene, &mut contributions, &mut total, |part| !part.is_cut() && !part.acts_on_output())?;
+    let in_between = |part: &Part| !part.is_cut() && !part.acts_on_output();
+    run_stage(parts, scene, before, &mut contributions, &mut total, in_between)?;
     scene.set_simulated(Some(total.clone()));
     if parts.iter().any(Part::acts_on_output) {
-        run_stage(parts, scene, &mut contributions, &mut total, Part::acts_on_output)?;
+        run_stage(parts, scene, before, &mut contributions, &mut total, Part::acts_on_output)?;
         scene.set_simulated(Some(total.clone()));
     }
     Some(Simulated { total, contributions })
@@ -244,13 +278,61 @@ pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
 fn run_stage(
     parts: &[Part],
     scene: &Scene,
+    before: Option<(&Simulated, usize)>,
     contributions: &mut [Vec<f64>],
     total: &mut [f64],
     belongs: impl Fn(&Part) -> bool,
 ) -> Option<()> {
-    for (part, slot) in parts.iter().zip(contributions).filter(|(part, _)| belongs(part)) {
-        *slot = part.contribution(scene)?;
+    for (index, part) in parts.iter().enumerate().filter(|(_, part)| belongs(part)) {
+        let known = before.filter(|(_, changed)| index != *changed && !part.follows(&parts[*changed]));
+        let slot = &mut contributions[index];
+        *slot = match known {
+            Some((before, _)) => before.contributions[index].clone(),
+            None => part.contribution(scene)?,
+        };
         total.iter_mut().zip(slot.iter()).for_each(|(total, x)| *total += x);
     }
     Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::parse_model;
+    use adapters::recording::read_csv;
+    use std::fmt::Write;
+
+    const MODEL: &str = "schema = \"model/1\"\noutput = \"spindle_power_w\"\n\
+        [[effect]]\nkind = \"no_load_power\"\nparameters = { p0_w = 100.0, p1_w_per_rpm = 0.2, p2_w_per_rpm2 = 1e-5 }\n\
+        [[effect]]\nkind = \"cutting_power\"\nparameters = { kc11_n_per_mm2 = 1800.0, mc = 0.25 }\n\
+        [[effect]]\nkind = \"load_loss\"\nparameters = { linear = 0.1 }\n\
+        [[effect]]\nkind = \"clock_lag\"\nparameters = { share = 1.0, delay_s = 0.4 }\n";
+
+    fn scene() -> Scene {
+        let mut text = String::from(
+            "time_s,spindle_power_w,spindle_speed_rpm,engaged,depth_of_cut_mm,feed_per_rev_mm,cutting_speed_m_min\n",
+        );
+        for row in 0..80_u32 {
+            let (engaged, speed) = (u8::from(row % 20 >= 8), 900 + 100 * (row / 20));
+            writeln!(text, "{row},500,{speed},{engaged},1.5,0.2,150").expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("recorded")
+    }
+
+    /// Whichever part changes, what is simulated again is what everything simulated anew gives.
+    #[test]
+    fn what_follows_from_a_change_is_simulated_again() {
+        let mut scene = scene();
+        let parts = parse_model(MODEL).expect("fine").parts;
+        let before = simulate(&parts, &mut scene).expect("simulated");
+        for changed in 0..parts.len() {
+            for parameter in 0..parts[changed].parameters.len() {
+                let mut moved = parts.clone();
+                moved[changed].parameters[parameter].value *= 1.1;
+                let again = simulate_changed(&moved, &mut scene, &before, changed).expect("simulated");
+                assert_eq!(again, simulate(&moved, &mut scene).expect("simulated"), "{changed} {parameter}");
+            }
+        }
+    }
 }

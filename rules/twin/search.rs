@@ -181,6 +181,9 @@ impl<'a, 'b> Search<'a, 'b> {
     pub(super) fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
         let mut members = from.members.clone();
         members.push(design);
+        if let Some(known) = self.tried.iter().find(|tried| are_the_same(&tried.members, &members)) {
+            return Some(known.clone());
+        }
         let noise = self.bank.designs[design].noise.unwrap_or(from.fit.noise);
         let added = std::slice::from_ref(&self.bank.designs[design].part);
         let beside = &from.fit.parts[self.base.parts.len()..];
@@ -281,6 +284,11 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         best
     }
+}
+
+/// The same designs, in whatever order?
+fn are_the_same(some: &[usize], others: &[usize]) -> bool {
+    some.len() == others.len() && some.iter().all(|member| others.contains(member))
 }
 
 /// Sampling periods below which a lag cannot be resolved.

@@ -3,9 +3,10 @@
 use super::agreement::differs_by_run;
 use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
-use super::fit::Fit;
+use super::fit::{Fit, fit};
 use super::scan::{price, price_of};
 use super::search::{FIRST_INFORMATION, Found, Hypothesis};
+use super::verdicts::CLASS_INFORMATION;
 use crate::statistics::count;
 
 /// Size, in deviations of the ordinary noise, below which an effect is not claimed.
@@ -25,10 +26,16 @@ const OUTPUT_FLOOR: f64 = 0.1;
 impl Case<'_> {
     /// Drops members whose remaining part is too small to claim, and those beside others on which the runs disagree.
     pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit, designs: &[Design]) -> Found {
+        let ln_rows = self.ln_rows(base);
+        let mut refunded = 0.0;
         while let Some(position) = self.smallest_unclaimable(&found.best, base, designs) {
             let Some(less) = self.without(&found.best, position) else { break };
+            refunded += price(&designs[found.best.members[position]], ln_rows);
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
+        }
+        if refunded > 0.0 {
+            self.take_likelier_of_as_many(&mut found, refunded);
         }
         if found.best.members.is_empty() || !self.is_worth_its_noise(&found.best, base, designs) {
             // What was dropped, here or before, carried the rest.
@@ -36,6 +43,18 @@ impl Case<'_> {
             found.p_values.clear();
         }
         found
+    }
+
+    /// What is left after members were dropped need not be the best of its size: then the best stands in its place. Its
+    /// information has the price of the dropped ones taken off still, for what was close to it before stays so.
+    fn take_likelier_of_as_many(&mut self, found: &mut Found, refunded: f64) {
+        let as_many = found.others.iter().filter(|other| other.members.len() == found.best.members.len());
+        let likeliest = as_many.max_by(|a, b| a.information.total_cmp(&b.information));
+        let clearly = found.best.information + refunded + CLASS_INFORMATION;
+        let Some(other) = likeliest.filter(|other| other.information > clearly).cloned() else { return };
+        let Some(fit) = self.with_data(|data| fit(data, &other.fit.parts, other.fit.noise)) else { return };
+        let left = std::mem::replace(&mut found.best, Hypothesis { fit, ..other });
+        found.others.push(left);
     }
 
     /// Does a hypothesis explain enough beyond the baseline, its price paid, for what it leaves besides noise?
@@ -50,18 +69,19 @@ impl Case<'_> {
         let first = best.fit.parts.len() - best.members.len();
         let several = best.members.len() > 1;
         let ln_rows = self.ln_rows(base);
-        (0..best.members.len()).find(|position| {
-            let without = if several { self.without(best, *position).map(|h| h.fit) } else { Some(base.clone()) };
-            without.is_some_and(|without| {
-                let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
-                let minor = several && gained < MINOR_SHARE * best.information;
-                let paid = price(&designs[best.members[*position]], ln_rows);
-                let beyond_doubt = gained >= if minor { BEYOND_DOUBT_BESIDE } else { BEYOND_DOUBT_INFORMATION };
-                several && gained < paid
-                    || minor && differs_by_run(&best.fit, &self.frame, first + position)
-                    || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt)
-            })
-        })
+        let unclaimable = |position: usize| {
+            let without = if several { self.without(best, position)?.fit } else { base.clone() };
+            let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
+            let minor = several && gained < MINOR_SHARE * best.information;
+            let paid = price(&designs[best.members[position]], ln_rows);
+            let beyond_doubt = gained >= if minor { BEYOND_DOUBT_BESIDE } else { BEYOND_DOUBT_INFORMATION };
+            let drops = several && gained < paid
+                || minor && differs_by_run(&best.fit, &self.frame, first + position)
+                || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt);
+            drops.then_some((position, gained))
+        };
+        let all = (0..best.members.len()).filter_map(unclaimable);
+        all.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(position, _)| position)
     }
 
     /// Is the difference of two residuals too small to claim: everywhere a share of the output by which a model or a

@@ -8,7 +8,7 @@
 use super::agreement::differs_by_run;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
-use super::empirical::{as_design, empirical_designs};
+use super::empirical::{Factor, as_design, empirical_designs};
 use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::model::{Body, simulate};
@@ -72,6 +72,11 @@ pub(super) fn margin(form: &Design, named: f64) -> f64 {
         Body::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
         _ => (BETTER_SHARE * named).max(BETTER_INFORMATION),
     }
+}
+
+/// Is it a friction over something, of which a friction that is the same everywhere is part?
+fn is_against_motion(design: &Design) -> bool {
+    matches!(&design.part.body, Body::Empirical(form) if form.factor == Factor::AgainstMotion)
 }
 
 /// An empirical form fitted on top of something.
@@ -170,7 +175,8 @@ impl Case<'_> {
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
         let unlike = anything && close && self.unlike(&found.best);
-        let doubted = remains && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
+        let refined = is_against_motion(&on_top.design) && self.is_friction(&on_top.design, &found.best.fit);
+        let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;
         }
@@ -225,15 +231,16 @@ impl Case<'_> {
         })
     }
 
-    /// Is a bent line over the velocity of the axis no more than the shape of a friction that has been named? No law of
-    /// friction fits a real axis to its noise.
+    /// Is a bent line over the velocity of the axis, or one against the motion over whatever else, no more than the shape
+    /// of a friction that has been named? No law of friction fits a real axis to its noise.
     pub(super) fn is_friction(&self, empirical: &Design, named: &Fit) -> bool {
         let friction = ["dry_friction", "viscous_friction", "stribeck", "axis_friction"];
         let of_velocity = match &empirical.part.body {
             Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
             _ => false,
         };
-        of_velocity && named.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
+        (of_velocity || is_against_motion(empirical))
+            && named.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.

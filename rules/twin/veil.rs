@@ -3,11 +3,14 @@
 //! whole effect says little. Before the search, therefore, the effects that act at edges are fitted with every row in
 //! full; where one of them makes most of the outlandish rows ordinary, the rows are weighed by what it leaves.
 
-use super::designs::{AT_EDGES, Design, designs_of};
+use super::designs::{AT_EDGES, Design, design, designs_of};
 use super::diagnose::Case;
 use super::fit::{Fit, fit, fit_levels};
-use super::model::simulate;
+use super::model::{Part, simulate};
+use super::noise::Arma;
 use super::scan::Bank;
+use super::search::FIRST_INFORMATION;
+use crate::physics::{Effect, Form};
 
 /// Outlandish rows below which it makes no difference that they weigh little.
 const VEILED_MIN: usize = 10;
@@ -15,6 +18,13 @@ const VEILED_MIN: usize = 10;
 const FITTED: usize = 6;
 /// Kinds that act at the edges of the speed.
 const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
+
+/// A form of an effect at edges as fitted with every row in full, and the noise beside it.
+pub struct SeenForm {
+    effect: &'static dyn Effect,
+    form: Form,
+    noise: Arma,
+}
 
 impl Case<'_> {
     /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
@@ -25,8 +35,10 @@ impl Case<'_> {
         }
         let weighed = self.frame.clone();
         self.frame.weigh_all_alike();
-        let best = self.best_at_edges(&base);
-        let Some(best) = best.filter(|best| {
+        let fits = self.fits_at_edges(&base);
+        self.seen_in_full(&base, &fits);
+        let likelihood = |a: &&Fit, b: &&Fit| a.log_likelihood.total_cmp(&b.log_likelihood);
+        let Some(best) = fits.iter().max_by(likelihood).filter(|best| {
             // It must make half of the outlandish rows ordinary, in noise that a few others do not make look white.
             let noise = self.frame.noise_between_outliers(&best.residual, best.noise);
             2 * self.frame.outlandish_in(&best.residual, noise) <= veiled
@@ -39,12 +51,39 @@ impl Case<'_> {
         self.with_data(|data| fit(data, &base.parts, base.noise)).unwrap_or(base)
     }
 
-    /// The likeliest fit with one effect that acts at edges, every row in full. It starts from levels: in noise with much
-    /// memory an edge that comes late has nothing in common with the simulated one, and the load fits best at nothing.
-    fn best_at_edges(&mut self, base: &Fit) -> Option<Fit> {
+    /// Keeps the forms of the effects at edges that explain something with every row in full, for the search to fit: its
+    /// own scan, of rows that weigh little, sees nothing of them.
+    fn seen_in_full(&mut self, base: &Fit, fits: &[Fit]) {
+        let Some(plain) = self.with_data(|data| fit(data, &base.parts, base.noise)) else { return };
+        let ln_rows = self.ln_rows(&plain);
+        let seen = fits.iter().filter(|fit| {
+            let gained = 2.0 * (fit.log_likelihood - plain.log_likelihood);
+            gained > FIRST_INFORMATION + ln_rows
+        });
+        let form = |fit: &Fit| {
+            let form = fit.parts.last().and_then(Part::effect_and_form);
+            form.map(|(effect, form)| SeenForm { effect, form, noise: fit.noise })
+        };
+        self.seen_at_edges = seen.filter_map(form).collect();
+    }
+
+    /// The same as hypotheses that are fitted whatever a scan shows of them.
+    pub(super) fn designs_seen_at_edges(&self) -> Vec<Design> {
+        let design_of = |seen: &SeenForm| {
+            let design = design(seen.effect, &seen.form, &self.scene, &self.frame)?;
+            Some(Design { noise: Some(seen.noise), ..design })
+        };
+        self.seen_at_edges.iter().filter_map(design_of).collect()
+    }
+
+    /// Fits with one effect that acts at edges each, every row in full. They start from levels: in noise with much memory
+    /// an edge that comes late has nothing in common with the simulated one, and the load fits best at nothing.
+    fn fits_at_edges(&mut self, base: &Fit) -> Vec<Fit> {
         let nominal = self.parts.clone();
         let base = self.with_data(|data| fit_levels(data, &nominal)).unwrap_or_else(|| base.clone());
-        let _ = simulate(&base.parts, &mut self.scene)?;
+        if simulate(&base.parts, &mut self.scene).is_none() {
+            return Vec::new();
+        }
         let at_edges = |kind: &str| AT_EDGES.contains(&kind) || AT_EDGES_OF_SPEED.contains(&kind);
         let at_edges = designs_of(&self.scene, &self.frame, self.model, at_edges);
         let frame = self.frame.clone();
@@ -52,7 +91,7 @@ impl Case<'_> {
         let mut scores = bank.scan(&base, self.ln_rows(&base));
         scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
         let mut laws: Vec<(&str, &str)> = Vec::new();
-        let mut best: Option<Fit> = None;
+        let mut fits = Vec::new();
         for score in scores.iter().filter(|score| score.gain > 0.0) {
             let design: &Design = &at_edges[score.design];
             let law = (design.kind.as_str(), design.law());
@@ -62,12 +101,9 @@ impl Case<'_> {
             laws.push(law);
             let mut parts = base.parts.clone();
             parts.push(design.part.clone());
-            let Some(fitted) = self.with_data(|data| fit(data, &parts, base.noise)) else { continue };
-            if best.as_ref().is_none_or(|best| fitted.log_likelihood > best.log_likelihood) {
-                best = Some(fitted);
-            }
+            fits.extend(self.with_data(|data| fit(data, &parts, base.noise)));
         }
-        best
+        fits
     }
 }
 
