@@ -12,8 +12,10 @@ const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 
 /// What a flexible or seldom cause must explain beyond the price of its parameters, in units of information: whoever
 /// bends at a threshold, steps at any word or acts at edges only imitates others easily.
-fn reluctance(kind: &str) -> f64 {
+fn reluctance(kind: &str, form: &Form) -> f64 {
     match kind {
+        // A stage that is recorded has not been chosen to fit.
+        "gear_stage" if form.place.is_some() => 0.0,
         "gear_stage" | "field_weakening" | "entry_exit" | "chatter" | "recipe_error" => 6.0,
         "zero_drift" => 14.0,
         "saturation" => 10.0,
@@ -183,7 +185,7 @@ pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &F
         // That the tools wear is told by the feed drive already; only what it costs here is open.
         freedom: if form.name == "followed" { 0 } else { names.len() + form.shape.len() - form.known.len() },
         ln_choices: form.ln_choices,
-        reluctance: reluctance(effect.doc().kind),
+        reluctance: reluctance(effect.doc().kind, form),
         noise: None,
         part,
         columns,

@@ -12,7 +12,7 @@ pub struct GearStage;
 static DOC: EffectDoc = EffectDoc {
     kind: "gear_stage",
     family: "drive",
-    law: "y = step + share * L in one stage; without the channel gear_stage: below a switching speed",
+    law: "y = step + share * L in one stage while it turns; without the channel gear_stage: below a switching speed",
     parameters: &[
         ParameterDoc {
             name: "step",
@@ -82,7 +82,7 @@ impl Effect for GearStage {
         if stages.len() > 1 {
             let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
             let form = |stage: &i64| Form { name: "stage", place: place(stage), ln_choices, ..Form::default() };
-            return stages.iter().skip(1).map(form).collect();
+            return stages.iter().map(form).collect();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
@@ -93,9 +93,11 @@ impl Effect for GearStage {
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let krpm = driven_krpm(scene)?;
         let here: Vec<bool> = match &form.place {
+            // Wheels that stand take nothing, whatever stage is engaged.
             Some((column, stage)) => {
                 let stage: i64 = stage.parse().ok()?;
-                scene.column(column)?.iter().map(|now| now.round() as i64 == stage).collect()
+                let turning = |(now, n): (&f64, &f64)| now.round() as i64 == stage && *n > 0.001;
+                scene.column(column)?.iter().zip(&krpm).map(turning).collect()
             }
             None => {
                 let switch = form.value("switch_rpm").unwrap_or(1000.0) / 1000.0;
