@@ -17,11 +17,14 @@ use std::time::{Duration, Instant};
 /// The ladder's own patience with the sign of life, and a few scans.
 const HEARTBEAT: Duration = Duration::from_millis(1500);
 
-/// A control that has been on for a minute and a half.
+/// How long the control has been on: a quarter of a minute later its spindle turns free for three seconds, so that the gate
+/// knows the state of the machine from the start of a gateway that has learned nothing yet.
+const ON_NS: i64 = 260_000_000_000;
+
 fn served() -> Server {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock::new());
     let settings = SimulatedSettings { machine: SimulatedMachine::Lathe, ..SimulatedSettings::default() };
-    let machine = Simulated::new("simulated://lathe", settings, clock.now_ns() - 90_000_000_000);
+    let machine = Simulated::new("simulated://lathe", settings, clock.now_ns() - ON_NS);
     let control = SimulatedControl::new(machine, clock, 4);
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     Server::start(listener, Box::new(control), ServerSettings::default()).expect("threads")
@@ -100,7 +103,10 @@ fn a_kill_takes_no_row_of_the_audit() {
     let gate = |address: &str| get(address, "/api/v1/status").json()["gate"].clone();
     wait_for("a decision", Duration::from_secs(60), || gate(&address)["permitted_pct"].is_number().then_some(()));
     assert!(run(&["arm", "--by", "fitter", "--config", text(&config)]).status.success());
-    wait_for("70 % written", Duration::from_secs(100), || (gate(&address)["written_pct"] == 70.0).then_some(()));
+    let low = |pct: &serde_json::Value| pct.as_f64().is_some_and(|pct| pct <= 80.0);
+    wait_for("an override below the dial", Duration::from_secs(100), || {
+        low(&gate(&address)["written_pct"]).then_some(())
+    });
     gateway.kill();
     let before = writes();
     let (mut gateway, _) = start();
@@ -108,7 +114,7 @@ fn a_kill_takes_no_row_of_the_audit() {
     gateway.stop();
     let after = writes();
     println!("write rows in the history: {} after the kill, {} after the next start", before.len(), after.len());
-    assert!(after.iter().any(|row| row["asked"] == 70.0), "the last one before the kill: {after:?}");
+    assert!(after.iter().any(|row| low(&row["asked"])), "the last one before the kill: {after:?}");
     assert!(after.len() > before.len() && after[..before.len()] == before[..], "{before:?}; {after:?}");
     assert!(run(&["history", "audit", "--verify", "--history", text(&database)]).status.success());
 }
