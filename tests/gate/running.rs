@@ -48,11 +48,12 @@ pub(crate) fn has(rows: &[Value], kind: &str, outcome: &str) -> bool {
     rows.iter().any(|row| row["kind"] == kind && row["outcome"] == outcome)
 }
 
-/// In real time, with sources and hand on threads of their own. The machine is in its first part.
+/// In real time, with sources and hand on threads of their own. A quarter of a minute after the start the spindle turns free
+/// for three seconds.
 #[test]
 fn a_person_arms_the_gate_and_the_machine_follows_until_somebody_disarms_it() {
     let directory = tempfile::tempdir().expect("a directory");
-    let config = prepared(directory.path(), "simulated://lathe?dropouts_per_h=0&begun_s=90");
+    let config = prepared(directory.path(), "simulated://lathe?dropouts_per_h=0&begun_s=260");
     let (gateway, address) = start(&config, "1");
     wait_for("a decision", Duration::from_secs(60), || gate(&address)["permitted_pct"].is_number().then_some(()));
     assert_eq!(gate(&address)["written_pct"], Value::Null, "disarmed after the start");
