@@ -42,23 +42,24 @@ pub(crate) fn driven_krpm(scene: &Scene) -> Option<Vec<f64>> {
 /// `(n / 1000 rpm)^exponent` in a power; one exponent less, with the sign of rotation, in a torque, current or load.
 pub(crate) fn speed_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
     let krpm = driven_krpm(scene)?;
-    if scene.output_kind() != OutputKind::Force {
-        return Some(krpm.iter().map(|n| n.powf(exponent)).collect());
-    }
     let signed = is_signed(scene);
-    let speed = scene.role(Role::Speed)?;
-    let law = |(n, rpm): (&f64, &f64)| if *n > 0.0 { n.powf(exponent - 1.0) * side(*rpm, signed) } else { 0.0 };
-    Some(krpm.iter().zip(speed).map(law).collect())
+    let sides = scene.role(Role::Speed)?.iter().map(|rpm| side(*rpm, signed));
+    Some(pace_to_the(scene, &krpm, sides, exponent))
 }
 
 /// The same law of a feed drive over its velocity in m/s: in a power, or with the direction in a force.
-pub(crate) fn slide_to_the(scene: &Scene, exponent: f64) -> Option<Vec<f64>> {
-    let velocity = sliding(scene)?;
+pub(crate) fn slide_to_the(scene: &Scene, velocity: &[f64], exponent: f64) -> Vec<f64> {
+    let pace: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
+    pace_to_the(scene, &pace, directions(velocity), exponent)
+}
+
+/// `pace^exponent` in a power; one exponent less, with the side of the motion, in a torque, force, current or load.
+fn pace_to_the(scene: &Scene, pace: &[f64], sides: impl Iterator<Item = f64>, exponent: f64) -> Vec<f64> {
     if scene.output_kind() != OutputKind::Force {
-        return Some(velocity.iter().map(|v| v.abs().powf(exponent)).collect());
+        return pace.iter().map(|n| n.powf(exponent)).collect();
     }
-    let law = |(v, direction): (&f64, f64)| v.abs().powf(exponent - 1.0) * direction;
-    Some(velocity.iter().zip(directions(&velocity)).map(law).collect())
+    let law = |(n, side): (&f64, f64)| if *n > 0.0 { n.powf(exponent - 1.0) * side } else { 0.0 };
+    pace.iter().zip(sides).map(law).collect()
 }
 
 /// The velocity of the slide in m/s where the output is that of its feed drive.

@@ -16,8 +16,26 @@ pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
 fn advance(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
     let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
     let driven_s = scene.driven_s(row).min(dt_s);
-    let x = input + (x - input) * (-driven_s / tau_s).exp();
-    x * (-(dt_s - driven_s) / tau_s).exp()
+    relaxed(relaxed(x, input, driven_s, tau_s), 0.0, dt_s - driven_s, tau_s)
+}
+
+/// Where a first-order state has come after `dt_s` with a constant input.
+fn relaxed(x: f64, input: f64, dt_s: f64, tau_s: f64) -> f64 {
+    input + (x - input) * (-dt_s / tau_s).exp()
+}
+
+/// A first-order lag that starts from zero with every pass and follows the input of the row it stands at: what acts on the
+/// cut lets go where nothing is cut.
+#[must_use]
+pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut state = vec![0.0; input.len()];
+    for pass in scene.passes() {
+        for row in pass.clone().skip(1) {
+            let dt_s = (scene.time_s()[row] - scene.time_s()[row - 1]).max(0.0);
+            state[row] = relaxed(state[row - 1], input[row], dt_s, tau_s);
+        }
+    }
+    state
 }
 
 /// What is left of an initial state of one: `exp(-t / tau_s)` since the first row.

@@ -47,7 +47,6 @@ impl Search<'_, '_> {
 
     fn best_of(&mut self, from: &Hypothesis, designs: &[usize]) -> Option<Hypothesis> {
         let fitted: Vec<Hypothesis> = designs.iter().filter_map(|design| self.with(from, *design)).collect();
-        self.tried.extend(fitted.iter().cloned());
         fitted.into_iter().max_by(|a, b| a.information.total_cmp(&b.information))
     }
 

@@ -328,7 +328,7 @@ fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &Simulated)
         step = -step;
     }
     parameter.value += step;
-    let moved = simulate_changed(&parts, data.scene, base, free.part)?.total;
+    let moved = simulate_changed(&parts, data.scene, base, free.part)?;
     let slope: Vec<f64> = moved.iter().zip(&base.total).map(|(moved, base)| (moved - base) / step).collect();
     Some(data.frame.reduce(&slope))
 }

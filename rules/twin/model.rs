@@ -4,6 +4,7 @@ use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
 use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -243,21 +244,25 @@ pub struct Simulated {
 /// those that act on the output as a whole. The scene keeps load and simulated output for candidates. `None` when a
 /// part lacks an input.
 pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
-    simulate_again(parts, scene, None)
+    let (total, contributions) = simulate_again(parts, scene, None)?;
+    Some(Simulated { total, contributions: contributions.into_iter().map(Cow::into_owned).collect() })
 }
 
-/// The same where one part has changed since all were simulated: what does not follow from it is taken from there.
+/// The total where one part has changed since all were simulated: what does not follow from it is taken from there.
 pub(super) fn simulate_changed(
     parts: &[Part],
     scene: &mut Scene,
     before: &Simulated,
     changed: usize,
-) -> Option<Simulated> {
-    simulate_again(parts, scene, Some((before, changed)))
+) -> Option<Vec<f64>> {
+    simulate_again(parts, scene, Some((before, changed))).map(|(total, _)| total)
 }
 
-fn simulate_again(parts: &[Part], scene: &mut Scene, before: Option<(&Simulated, usize)>) -> Option<Simulated> {
-    let mut contributions: Vec<Vec<f64>> = vec![Vec::new(); parts.len()];
+/// The total and what each part adds to it.
+type Sums<'a> = (Vec<f64>, Vec<Cow<'a, [f64]>>);
+
+fn simulate_again<'a>(parts: &[Part], scene: &mut Scene, before: Option<(&'a Simulated, usize)>) -> Option<Sums<'a>> {
+    let mut contributions: Vec<Cow<'a, [f64]>> = vec![Cow::Borrowed(&[]); parts.len()];
     let mut total = vec![0.0; scene.rows()];
     scene.set_load(None);
     scene.set_simulated(None);
@@ -272,14 +277,14 @@ fn simulate_again(parts: &[Part], scene: &mut Scene, before: Option<(&Simulated,
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::acts_on_output)?;
         scene.set_simulated(Some(total.clone()));
     }
-    Some(Simulated { total, contributions })
+    Some((total, contributions))
 }
 
-fn run_stage(
+fn run_stage<'a>(
     parts: &[Part],
     scene: &Scene,
-    before: Option<(&Simulated, usize)>,
-    contributions: &mut [Vec<f64>],
+    before: Option<(&'a Simulated, usize)>,
+    contributions: &mut [Cow<'a, [f64]>],
     total: &mut [f64],
     belongs: impl Fn(&Part) -> bool,
 ) -> Option<()> {
@@ -287,8 +292,8 @@ fn run_stage(
         let known = before.filter(|(_, changed)| index != *changed && !part.follows(&parts[*changed]));
         let slot = &mut contributions[index];
         *slot = match known {
-            Some((before, _)) => before.contributions[index].clone(),
-            None => part.contribution(scene)?,
+            Some((before, _)) => Cow::Borrowed(&before.contributions[index]),
+            None => Cow::Owned(part.contribution(scene)?),
         };
         total.iter_mut().zip(slot.iter()).for_each(|(total, x)| *total += x);
     }
@@ -331,7 +336,7 @@ mod tests {
                 let mut moved = parts.clone();
                 moved[changed].parameters[parameter].value *= 1.1;
                 let again = simulate_changed(&moved, &mut scene, &before, changed).expect("simulated");
-                assert_eq!(again, simulate(&moved, &mut scene).expect("simulated"), "{changed} {parameter}");
+                assert_eq!(again, simulate(&moved, &mut scene).expect("simulated").total, "{changed} {parameter}");
             }
         }
     }

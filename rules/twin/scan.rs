@@ -45,6 +45,23 @@ pub fn likeliest<'s>(scores: impl IntoIterator<Item = &'s Score>) -> Option<&'s 
     known.max_by(|a, b| a.information.total_cmp(&b.information))
 }
 
+/// The likeliest of the scores given, best first, at most `most` of them and one of each law of a kind; and whatever only
+/// shows with every row in full, which no scan can rank.
+#[must_use]
+pub fn best_of_each_law<'s>(scores: &'s [Score], designs: &[Design], most: usize) -> Vec<&'s Score> {
+    let mut ranked: Vec<&Score> = scores.iter().collect();
+    ranked.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
+    let mut laws: Vec<(&str, &str)> = Vec::new();
+    ranked.retain(|score| {
+        let design = &designs[score.design];
+        let law = (design.kind.as_str(), design.law());
+        let wanted = design.noise.is_some() || laws.len() < most && !laws.contains(&law);
+        laws.extend(wanted.then_some(law));
+        wanted
+    });
+    ranked
+}
+
 /// The price of a design: its parameters, and having been chosen among like ones.
 #[must_use]
 pub fn price(design: &Design, ln_rows: f64) -> f64 {

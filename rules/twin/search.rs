@@ -5,7 +5,7 @@ use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::scan::{Bank, Score, likeliest, price_of};
+use super::scan::{Bank, best_of_each_law, likeliest, price_of};
 use crate::physics::OutputKind;
 use crate::statistics::count;
 
@@ -158,26 +158,18 @@ impl<'a, 'b> Search<'a, 'b> {
     /// likeliest kinds.
     fn extend(&mut self, from: &Hypothesis, most: usize) -> Vec<Hypothesis> {
         let mut scores = self.bank.scan(&from.fit, self.ln_rows);
-        scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
         let present: Vec<&str> = from.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect();
-        let mut laws: Vec<(&str, &str)> = Vec::new();
-        let mut chosen: Vec<&Score> = Vec::new();
-        for score in &scores {
+        scores.retain(|score| {
             let kind = self.bank.designs[score.design].kind.as_str();
-            let law = (kind, self.bank.designs[score.design].law());
-            let unseen = self.bank.designs[score.design].noise.is_some();
-            let wanted = unseen || chosen.len() < most && !laws.contains(&law);
-            if wanted && score.gain.is_finite() && !present.iter().any(|present| excludes(present, kind)) {
-                laws.push(law);
-                chosen.push(score);
-            }
-        }
+            score.gain.is_finite() && !present.iter().any(|present| excludes(present, kind))
+        });
+        let chosen = best_of_each_law(&scores, self.bank.designs, most);
         let mut fitted: Vec<Hypothesis> = chosen.iter().filter_map(|score| self.with(from, score.design)).collect();
         fitted.sort_by(|a, b| b.information.total_cmp(&a.information));
-        self.tried.extend(fitted.iter().cloned());
         fitted
     }
 
+    /// A hypothesis with one design more, fitted; one that has been tried before is not fitted again.
     pub(super) fn with(&mut self, from: &Hypothesis, design: usize) -> Option<Hypothesis> {
         let mut members = from.members.clone();
         members.push(design);
@@ -193,7 +185,9 @@ impl<'a, 'b> Search<'a, 'b> {
         let unbent = unbent.map(|baseline| [baseline.as_slice(), beside, added].concat());
         let other = unbent.and_then(|parts| self.fitted(members, &parts, noise));
         let better = |a: &Hypothesis, b: &Hypothesis| a.information.total_cmp(&b.information);
-        known.into_iter().chain(other).max_by(better)
+        let best = known.into_iter().chain(other).max_by(better);
+        self.tried.extend(best.clone());
+        best
     }
 
     fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
@@ -244,8 +238,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let scores = self.bank.scan(&rest.fit, self.ln_rows);
         for kind in AT_EDGES.into_iter().filter(|kind| *kind != named) {
             let rival = likeliest(scores.iter().filter(|score| self.bank.designs[score.design].kind == kind));
-            let rival = rival.and_then(|score| self.with(&rest, score.design));
-            self.tried.extend(rival);
+            let _tried = rival.and_then(|score| self.with(&rest, score.design));
         }
     }
 

@@ -79,6 +79,12 @@ fn is_against_motion(design: &Design) -> bool {
     matches!(&design.part.body, Body::Empirical(form) if form.factor == Factor::AgainstMotion)
 }
 
+/// Is a friction among the parts of a fit?
+pub(super) fn has_friction(fit: &Fit) -> bool {
+    let friction = ["dry_friction", "viscous_friction", "stribeck", "axis_friction"];
+    fit.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
+}
+
 /// An empirical form fitted on top of something.
 #[derive(Clone)]
 pub(super) struct Form {
@@ -170,12 +176,12 @@ impl Case<'_> {
         let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
         let better = anything
             && alone.information > named + margin(&alone.design, named)
-            && !self.is_friction(&alone.design, &found.best.fit);
+            && !(self.may_be_friction(&alone.design) && has_friction(&found.best.fit));
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
         let unlike = anything && close && self.unlike(&found.best);
-        let refined = is_against_motion(&on_top.design) && self.is_friction(&on_top.design, &found.best.fit);
+        let refined = is_against_motion(&on_top.design) && has_friction(&found.best.fit);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;
@@ -231,16 +237,14 @@ impl Case<'_> {
         })
     }
 
-    /// Is a bent line over the velocity of the axis, or one against the motion over whatever else, no more than the shape
-    /// of a friction that has been named? No law of friction fits a real axis to its noise.
-    pub(super) fn is_friction(&self, empirical: &Design, named: &Fit) -> bool {
-        let friction = ["dry_friction", "viscous_friction", "stribeck", "axis_friction"];
+    /// A bent line over the velocity of the axis, or one against the motion over whatever else, is no more than the shape of
+    /// a friction where one has been named: no law of friction fits a real axis to its noise.
+    pub(super) fn may_be_friction(&self, empirical: &Design) -> bool {
         let of_velocity = match &empirical.part.body {
             Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
             _ => false,
         };
-        (of_velocity || is_against_motion(empirical))
-            && named.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
+        of_velocity || is_against_motion(empirical)
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.

@@ -8,7 +8,7 @@ use super::diagnose::Case;
 use super::fit::{Fit, fit, fit_levels};
 use super::model::{Part, simulate};
 use super::noise::Arma;
-use super::scan::Bank;
+use super::scan::{Bank, best_of_each_law};
 use super::search::FIRST_INFORMATION;
 use crate::physics::{Effect, Form};
 
@@ -89,21 +89,13 @@ impl Case<'_> {
         let frame = self.frame.clone();
         let bank = Bank::new(&at_edges, &frame);
         let mut scores = bank.scan(&base, self.ln_rows(&base));
-        scores.sort_by(|a, b| b.information.total_cmp(&a.information).then(a.design.cmp(&b.design)));
-        let mut laws: Vec<(&str, &str)> = Vec::new();
-        let mut fits = Vec::new();
-        for score in scores.iter().filter(|score| score.gain > 0.0) {
-            let design: &Design = &at_edges[score.design];
-            let law = (design.kind.as_str(), design.law());
-            if laws.len() >= FITTED || laws.contains(&law) {
-                continue;
-            }
-            laws.push(law);
-            let mut parts = base.parts.clone();
-            parts.push(design.part.clone());
-            fits.extend(self.with_data(|data| fit(data, &parts, base.noise)));
-        }
-        fits
+        scores.retain(|score| score.gain > 0.0);
+        let chosen = best_of_each_law(&scores, &at_edges, FITTED);
+        let fitted = chosen.iter().filter_map(|score| {
+            let parts = [base.parts.as_slice(), std::slice::from_ref(&at_edges[score.design].part)].concat();
+            self.with_data(|data| fit(data, &parts, base.noise))
+        });
+        fitted.collect()
     }
 }
 

@@ -77,12 +77,12 @@ impl Effect for BearingWarmUp {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some((friction, _)) = friction_and_heat(scene) else { return Vec::new() };
-        if friction.iter().all(|g| *g == 0.0) {
+        let velocity = sliding(scene);
+        if friction(scene, velocity.as_deref()).is_none_or(|friction| friction.iter().all(|g| *g == 0.0)) {
             return Vec::new();
         }
         // A nut warms faster than a spindle.
-        let fast: &[f64] = if sliding(scene).is_some() { &[75.0, 150.0] } else { &[] };
+        let fast: &[f64] = if velocity.is_some() { &[75.0, 150.0] } else { &[] };
         let mut forms = lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
         let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
         forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
@@ -90,7 +90,8 @@ impl Effect for BearingWarmUp {
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let (friction, heat) = friction_and_heat(scene)?;
+        let velocity = sliding(scene);
+        let friction = friction(scene, velocity.as_deref())?;
         if form.name == "measured" {
             let temperature = scene.role(Role::Temperature)?;
             let first = *temperature.first()?;
@@ -98,7 +99,7 @@ impl Effect for BearingWarmUp {
             return Some(vec![("drop_per_k", friction.iter().zip(temperature).map(law).collect())]);
         }
         let tau_s = form.value("tau_s").unwrap_or(900.0);
-        let warmth = first_order(scene, &heat, tau_s);
+        let warmth = first_order(scene, &heat(scene, velocity.as_deref())?, tau_s);
         let left = decay(scene, tau_s);
         Some(vec![
             ("drop", friction.iter().zip(&warmth).map(|(g, w)| -g * w).collect()),
@@ -111,13 +112,18 @@ impl Effect for BearingWarmUp {
     }
 }
 
-/// Friction in the output, and the heat it makes: of the spindle over thousands of rpm, of a feed drive over m/s.
-fn friction_and_heat(scene: &Scene) -> Option<(Vec<f64>, Vec<f64>)> {
-    let heat = |speeds: &[f64]| speeds.iter().map(|speed| speed.abs().powf(EXPONENT)).collect();
-    match sliding(scene) {
-        Some(velocity) => Some((slide_to_the(scene, EXPONENT)?, heat(&velocity))),
-        None => Some((speed_to_the(scene, EXPONENT)?, heat(&krpm(scene)?))),
+/// Friction in the output: of a feed drive over its velocity in m/s, else of the spindle over thousands of rpm.
+fn friction(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
+    match velocity {
+        Some(velocity) => Some(slide_to_the(scene, velocity, EXPONENT)),
+        None => speed_to_the(scene, EXPONENT),
     }
+}
+
+/// The heat that friction makes, whatever the output.
+fn heat(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
+    let heat = |speeds: &[f64]| speeds.iter().map(|speed| speed.abs().powf(EXPONENT)).collect();
+    velocity.map(heat).or_else(|| Some(heat(&krpm(scene)?)))
 }
 
 /// Power of friction over speed: torque with the power 2/3.

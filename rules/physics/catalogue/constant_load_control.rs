@@ -2,6 +2,7 @@
 
 use crate::physics::cut::{cutting_rows, engaged};
 use crate::physics::excitation::varies;
+use crate::physics::state::first_order_in_each_pass;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, quantile};
 
@@ -97,7 +98,9 @@ impl Effect for ConstantLoadControl {
         if form.name == "unseen" {
             let exponent = form.value("exponent").unwrap_or(0.1);
             let wanted = |row: usize| if cutting(&row) { (load[row] / reference).powf(-exponent) - 1.0 } else { 0.0 };
-            let turned = from_each_cut(scene, &(0..scene.rows()).map(wanted).collect::<Vec<_>>(), form);
+            let wanted: Vec<f64> = (0..scene.rows()).map(wanted).collect();
+            let tau_s = form.value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            let turned = first_order_in_each_pass(scene, &wanted, tau_s);
             return Some(vec![("share", load.iter().zip(&turned).map(|(load, turned)| load * turned).collect())]);
         }
         if !is_feed(scene) {
@@ -133,19 +136,4 @@ fn knows_the_program_only(scene: &Scene) -> bool {
     let rows: Vec<usize> = (0..scene.rows()).filter(|row| cutting[*row]).collect();
     let differs = |row: &&usize| (actual[**row] - program[**row]).abs() > 0.01 * program[**row].abs();
     count(rows.iter().filter(differs).count()) <= DIFFERS * count(rows.len())
-}
-
-/// A first-order lag that starts at zero with every cut: a controller lets go where nothing is cut.
-fn from_each_cut(scene: &Scene, wanted: &[f64], form: &Form) -> Vec<f64> {
-    let tau_s = form.value("tau_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
-    let mut turned = vec![0.0; wanted.len()];
-    for pass in scene.passes() {
-        let mut state = 0.0;
-        for row in pass.clone() {
-            let dt_s = if row > pass.start { scene.time_s()[row] - scene.time_s()[row - 1] } else { 0.0 };
-            state = wanted[row] + (state - wanted[row]) * (-dt_s.max(0.0) / tau_s).exp();
-            turned[row] = state;
-        }
-    }
-    turned
 }
