@@ -161,6 +161,11 @@ pub trait Effect: Sync + Send {
         self.forms(scene).into_iter().next().unwrap_or_default()
     }
 
+    /// Do its columns change with the load that the cut simulates?
+    fn reads_load(&self) -> bool {
+        self.doc().needs.iter().flat_map(|need| need.split('|')).any(|need| need.trim() == "load")
+    }
+
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {

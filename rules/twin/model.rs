@@ -1,5 +1,6 @@
 //! A model: a list of effects with parameters, whose sum is the simulated output (`model/1`).
 
+use super::channel::is_simulated;
 use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
@@ -172,19 +173,16 @@ impl Part {
     #[must_use]
     pub fn reads_load(&self) -> bool {
         match &self.body {
-            Body::Effect(effect, _) => !self.is_cut() && effect.doc().needs.iter().any(|need| need.contains("load")),
-            _ => false,
+            Body::Effect(effect, _) => effect.reads_load(),
+            Body::Empirical(form) => is_simulated(&form.channel),
+            Body::Expression(expression) => expression.inputs().iter().any(|input| is_simulated(input)),
+            Body::Linear(_) | Body::Table(_) => false,
         }
-    }
-
-    /// May its contribution change with the load? Of a sum over columns it cannot.
-    fn may_read_load(&self) -> bool {
-        !matches!(self.body, Body::Linear(_) | Body::Table(_)) && self.kind != "no_load_power"
     }
 
     /// Does this part have to be simulated again after that one of the same model has changed?
     fn follows(&self, changed: &Self) -> bool {
-        self.acts_on_output() && !changed.acts_on_output() || changed.is_cut() && self.may_read_load()
+        self.acts_on_output() && !changed.acts_on_output() || changed.is_cut() && self.reads_load()
     }
 
     /// Is it the cut, whose contribution is the load for the others?

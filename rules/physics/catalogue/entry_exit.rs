@@ -125,6 +125,10 @@ impl Effect for EntryExit {
         Some(vec![("entry", cut_times(scene, |row| entry[row])?), ("exit", cut_times(scene, |row| exit[row])?)])
     }
 
+    fn reads_load(&self) -> bool {
+        true
+    }
+
     fn default_form(&self, _scene: &Scene) -> Form {
         Form::of(&[("length_s", 1.0)])
     }

@@ -89,6 +89,10 @@ impl Effect for FieldWeakening {
         Some(columns)
     }
 
+    fn reads_load(&self) -> bool {
+        true
+    }
+
     fn default_form(&self, _scene: &Scene) -> Form {
         Form::of(&[("base_speed_rpm", 1500.0)])
     }

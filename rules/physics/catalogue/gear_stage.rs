@@ -112,6 +112,10 @@ impl Effect for GearStage {
         Some(columns)
     }
 
+    fn reads_load(&self) -> bool {
+        true
+    }
+
     fn default_form(&self, scene: &Scene) -> Form {
         let speed = Form { name: "speed", ..Form::of(&[("switch_rpm", 1000.0)]) };
         self.forms(scene).into_iter().next().unwrap_or(speed)

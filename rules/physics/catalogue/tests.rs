@@ -168,6 +168,22 @@ fn shapes_of_forms_are_declared_and_in_range() {
     }
 }
 
+/// What does not say that it reads the load is not simulated again when the load changes.
+#[test]
+fn whatever_changes_with_the_load_says_so() {
+    for output in ["total_power_w", "axis_current_a", "thermal_error_um", "feed_override_pct", "cutting_force_n"] {
+        let scene = rich(output);
+        let mut heavier = scene.clone();
+        heavier.set_load(scene.load().map(|load| load.iter().map(|load| 1.3 * load + load.signum()).collect()));
+        for effect in CATALOGUE {
+            for form in effect.forms(&scene).iter().chain([&effect.default_form(&scene)]) {
+                let changes = effect.columns(&scene, form) != effect.columns(&heavier, form);
+                assert!(!changes || effect.reads_load(), "{} {form:?}", effect.doc().kind);
+            }
+        }
+    }
+}
+
 #[test]
 fn a_rich_recording_offers_every_effect_somewhere() {
     let outputs = ["total_power_w", "axis_current_a", "thermal_error_um", "feed_override_pct", "cutting_force_n"];
