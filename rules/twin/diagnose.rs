@@ -230,7 +230,7 @@ impl<'a> Case<'a> {
         }
         designs.extend(self.designs_seen_at_edges());
         designs.extend(self.hidden_lots(base));
-        designs.extend(self.hidden_switch(base));
+        designs.extend(self.hidden_switch(base, true));
         designs.extend(self.hidden_ripple(base));
         let found = self.searched(base, &designs, seed);
         if self.shows_switch_beside(&found.best, &mut designs) {

@@ -23,12 +23,12 @@ const SPELL_ROWS_MIN: usize = 8;
 
 impl Case<'_> {
     /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
-    pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
+    pub(super) fn hidden_switch(&mut self, base: &Fit, alone: bool) -> Option<Design> {
         let effect = crate::physics::effect("auxiliary_switch")?;
         if !self.electric() || !super::designs::wanted(effect, self.model) {
             return None;
         }
-        let found = latent::find(&base.residual, &self.frame, base.noise)?;
+        let found = latent::find(&base.residual, &self.frame, base.noise, alone)?;
         let (change, cut) = self.pace_of_groups();
         let by_itself = found.by_itself(&change, &cut)
             && self.repeated_of_groups(&cut).iter().all(|channel| !found.follows(channel));
@@ -42,7 +42,11 @@ impl Case<'_> {
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
         self.switching = Some(found.clone());
-        let form = Form { name: "latent", ln_choices: 0.5 * latent::price(&found), ..Form::default() };
+        let form = Form {
+            name: "latent",
+            ln_choices: 0.5 * latent::price(&found, &base.residual, &self.frame),
+            ..Form::default()
+        };
         let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         Some(Design { noise: Some(found.noise), ..design })
     }
@@ -57,7 +61,7 @@ impl Case<'_> {
         if named || best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
             return false;
         }
-        let Some(switch) = self.hidden_switch(&best.fit) else { return false };
+        let Some(switch) = self.hidden_switch(&best.fit, false) else { return false };
         designs.retain(|other| !(other.kind == switch.kind && is_latent(other)));
         designs.push(switch);
         true

@@ -10,6 +10,8 @@
 use super::frame::Frame;
 use super::linear::dot;
 use super::noise::{Arma, fit_near};
+use super::race::Seen;
+use super::rhythm::Rhythm;
 use crate::statistics::{count, median, robust_deviation};
 use std::ops::Range;
 
@@ -37,14 +39,19 @@ const STEPS_SHARE_MIN: f64 = 0.3;
 const STEP: std::ops::RangeInclusive<f64> = 0.5..=1.8;
 /// Levels to start from, in deviations of the innovations.
 const STARTS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-/// Rounds of sequence and level to choose a start, and of sequence, level and noise after it.
-const ROUNDS: (usize, usize) = (2, 4);
+/// Rounds of sequence and level to choose a start, of sequence, level and noise after it, and of these with a rhythm.
+const ROUNDS: (usize, usize, usize) = (2, 4, 6);
 /// The best starts from which it is followed to the end.
 const SETTLED: usize = 3;
-/// Square of an innovation, in variances, beyond which a row says no more.
-const SURPRISE_MAX: f64 = 25.0;
+/// Share of its price that a sequence may fall short by and still be looked at for a rhythm.
+const RHYTHM_SHARE: f64 = 0.6;
+/// Step, in deviations of the innovations, from which a switch need not keep a rhythm.
+const CLEAR: f64 = 2.5;
 /// Chance that a switch stays as it is from one row to the next, where it is followed.
 const STAYS: f64 = 0.99;
+
+/// Tells a rhythm from a sequence and its stretches.
+type RhythmLaw = fn(&[f64], &[Range<usize>]) -> Option<Rhythm>;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,24 +68,32 @@ pub struct Switching {
     pub noise: Arma,
     /// See `noise`.
     pub deviation: f64,
+    /// How long it stays on and off, where that is known.
+    pub rhythm: Option<Rhythm>,
 }
 
-/// Finds the switch in a residual of this noise, if there is one that explains more than its price.
+/// Finds the switch in a residual of this noise, if there is one that explains more than its price. Only where nothing else
+/// is named, `alone`, is its rhythm asked for: what is left beside others is no noise that one could be read from.
 #[must_use]
-pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
+pub fn find(residual: &[f64], frame: &Frame, noise: Arma, alone: bool) -> Option<Switching> {
     let likelihood = |noise: Arma, residual: &[f64]| {
         let e = frame.whiten(residual, noise);
         frame.log_likelihood(dot(&e, &e), noise)
     };
     let before = likelihood(noise, residual);
-    let gain = |found: &Switching| 2.0 * (likelihood(found.noise, &found.left(residual)) - before) - price(found);
+    let raw = |found: &Switching| 2.0 * (likelihood(found.noise, &found.left(residual)) - before);
+    let gain = |found: &Switching| raw(found) - price(found, residual, frame);
     let starts = [noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
     let begun = starts.iter().flat_map(|noise| STARTS.map(|size| begin(residual, frame, *noise, size)));
     let mut begun: Vec<(f64, Switching)> =
         begun.flatten().filter(Switching::lasts).map(|found| (gain(&found), found)).collect();
     begun.sort_by(|a, b| b.0.total_cmp(&a.0));
     let settled = begun.into_iter().take(SETTLED).filter_map(|(_, found)| found.settled(residual, frame));
-    let best = settled.map(|found| (gain(&found), found)).max_by(|a, b| a.0.total_cmp(&b.0))?.1;
+    let best = settled.map(|found| (gain(&found), found)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let near = alone && best.0 > -RHYTHM_SHARE * price(&best.1, residual, frame);
+    let told = if near { best.1.with_rhythms(residual, frame) } else { Vec::new() };
+    let told = told.into_iter().map(|found| (gain(&found), found));
+    let best = std::iter::once(best).chain(told).max_by(|a, b| a.0.total_cmp(&b.0))?.1;
     (gain(&best) > 0.0 && best.switchings >= SWITCHINGS_MIN && best.lasts()).then_some(best)
 }
 
@@ -86,7 +101,8 @@ pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
 fn begin(residual: &[f64], frame: &Frame, noise: Arma, size: f64) -> Option<Switching> {
     let deviation = deviation(&frame.whiten(residual, noise))?;
     let level = size * deviation;
-    let mut found = Switching { state: Vec::new(), switchings: 0, off: -0.3 * level, level, noise, deviation };
+    let mut found =
+        Switching { state: Vec::new(), switchings: 0, off: -0.3 * level, level, noise, deviation, rhythm: None };
     for _ in 0..ROUNDS.0 {
         found = found.improved(residual, frame)?;
     }
@@ -130,6 +146,31 @@ impl Switching {
             self = self.improved(residual, frame)?;
         }
         Some(self)
+    }
+
+    /// The same switch as its rhythm tells it, where that is clear: with the chances of its sequence only, and with the
+    /// durations of its spells.
+    fn with_rhythms(&self, residual: &[f64], frame: &Frame) -> Vec<Self> {
+        let laws: [(RhythmLaw, usize); 2] = [(Rhythm::even, 0), (Rhythm::of, ROUNDS.2)];
+        let told = laws.into_iter().filter_map(|(law, rounds)| self.clone().with_rhythm(law, rounds, residual, frame));
+        told.filter(Self::is_clear).collect()
+    }
+
+    /// Sequence, level, noise and rhythm in turn.
+    fn with_rhythm(mut self, law: RhythmLaw, rounds: usize, residual: &[f64], frame: &Frame) -> Option<Self> {
+        self.rhythm = Some(law(&self.state, &frame.stretches)?);
+        for _ in 0..rounds {
+            self.noise = fit_near(&self.left(residual), frame, self.noise).1;
+            self = self.improved(residual, frame)?;
+            self.rhythm = Some(law(&self.state, &frame.stretches)?);
+        }
+        Some(self)
+    }
+
+    /// Does its step stand out from a single innovation, or does it keep a rhythm? What is lower and irregular has two levels
+    /// also in noise of another shape than a bell, unless every switching is paid for.
+    fn is_clear(&self) -> bool {
+        self.level >= CLEAR * self.deviation || self.rhythm.as_ref().is_some_and(Rhythm::is_regular)
     }
 
     /// Is each of the two levels there for a good part of the time?
@@ -196,7 +237,10 @@ pub fn again(residual: &[f64], frame: &Frame, found: &Switching) -> Switching {
 
 /// The price, in units of information, of having chosen when to switch.
 #[must_use]
-pub fn price(switching: &Switching) -> f64 {
+pub fn price(switching: &Switching, residual: &[f64], frame: &Frame) -> f64 {
+    if let Some(rhythm) = &switching.rhythm {
+        return rhythm.price(residual, frame, switching);
+    }
     let rows = count(switching.state.len());
     let switchings = count(switching.switchings).max(1.0);
     2.0 * switchings * (rows / switchings).ln() + 2.0 * switchings
@@ -207,87 +251,25 @@ fn deviation(innovations: &[f64]) -> Option<f64> {
     robust_deviation(innovations.iter().copied()).filter(|deviation| *deviation > 0.0)
 }
 
-/// One of the two sequences that are still in the race.
-#[derive(Clone, Copy)]
-struct Survivor {
-    cost: f64,
-    x: f64,
-    e: f64,
-}
-
 /// The most likely sequence of on (1) and off (0).
 fn sequence(residual: &[f64], frame: &Frame, found: &Switching) -> Vec<f64> {
+    // What one more switching costs beside as many as there were: the slope of [`price`].
+    let price = (count(residual.len()) / count(found.switchings.max(SWITCHINGS_FIRST))).ln().max(1.0);
+    let any = Rhythm::none((-price).exp(), 0.5);
+    let rhythm = found.rhythm.as_ref().unwrap_or(&any);
     let mut state = vec![0.0; residual.len()];
     for rows in &frame.stretches {
-        follow_stretch(residual, frame, found, rows.clone(), &mut state);
+        rhythm.likeliest(residual, frame, found, rows.clone(), &mut state);
     }
     state
-}
-
-fn follow_stretch(residual: &[f64], frame: &Frame, found: &Switching, rows: Range<usize>, state: &mut [f64]) {
-    // What one more switching costs beside as many as there were: the slope of [`price`].
-    let price = 2.0 * (count(residual.len()) / count(found.switchings.max(SWITCHINGS_FIRST))).ln().max(1.0);
-    let cost = |row: usize, e: f64| (e * frame.weight(row) / found.deviation).powi(2).min(SURPRISE_MAX);
-    let value = |row: usize, on: usize| residual[row] - found.off - if on == 1 { found.level } else { 0.0 };
-    let begin = |on: usize| {
-        let x = value(rows.start, on);
-        Survivor { cost: cost(rows.start, x * found.noise.first_weight()), x, e: 0.0 }
-    };
-    let mut race = [begin(0), begin(1)];
-    let mut back: Vec<[usize; 2]> = vec![[0, 1]];
-    for row in rows.start + 1..rows.end {
-        let step = |to: usize| {
-            let x = value(row, to);
-            let from = |from: usize| {
-                let e = found.noise.innovation(x, race[from].x, race[from].e);
-                let price = if from == to { 0.0 } else { price };
-                (Survivor { cost: race[from].cost + price + cost(row, e), x, e }, from)
-            };
-            let (stay, switch) = (from(to), from(1 - to));
-            if switch.0.cost < stay.0.cost { switch } else { stay }
-        };
-        let (off, on) = (step(0), step(1));
-        back.push([off.1, on.1]);
-        race = [off.0, on.0];
-    }
-    let mut on = usize::from(race[1].cost < race[0].cost);
-    for (row, came_from) in rows.zip(back).rev() {
-        state[row] = if on == 1 { 1.0 } else { 0.0 };
-        on = came_from[on];
-    }
 }
 
 /// The chance, row by row and from earlier rows of the stretch only, that the switch is on.
 #[must_use]
 pub fn follow(residual: &[f64], found: &Switching, share_on: f64) -> Vec<f64> {
-    let mut belief = share_on;
-    let mut last: Option<[(f64, f64); 2]> = None;
-    let chance = |e: f64| (-0.5 * (e / found.deviation).powi(2).min(SURPRISE_MAX)).exp();
-    let mut told = Vec::with_capacity(residual.len());
-    for x in residual {
-        told.push(belief * STAYS + (1.0 - belief) * (1.0 - STAYS));
-        let x = [x - found.off, x - found.off - found.level];
-        // From each state before to each state now: how likely, and with which innovation.
-        let path = |from: usize, to: usize| {
-            let e = match last {
-                Some(last) => found.noise.innovation(x[to], last[from].0, last[from].1),
-                None => x[to] * found.noise.first_weight(),
-            };
-            let stays = if to == from { STAYS } else { 1.0 - STAYS };
-            let before = if from == 1 { belief } else { 1.0 - belief };
-            (stays * before * chance(e), e)
-        };
-        let now = [0, 1].map(|to| {
-            let (off, on) = (path(0, to), path(1, to));
-            let sum = off.0 + on.0;
-            let mean = (off.0 * off.1 + on.0 * on.1) / sum.max(f64::MIN_POSITIVE);
-            (sum, if last.is_none() { 0.0 } else { mean })
-        });
-        last = Some([(x[0], now[0].1), (x[1], now[1].1)]);
-        let sum = now[0].0 + now[1].0;
-        belief = if sum > 0.0 { now[1].0 / sum } else { belief };
-    }
-    told
+    let any = Rhythm::none(1.0 - STAYS, share_on);
+    let rhythm = found.rhythm.as_ref().unwrap_or(&any);
+    rhythm.followed(found, residual.iter().map(|x| Seen { x: found.levels(*x), weight: 1.0 })).1
 }
 
 #[cfg(test)]
@@ -331,14 +313,14 @@ mod tests {
     #[test]
     fn a_pump_is_found_with_its_level() {
         let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&residual, &frame(1000), Arma { phi: 0.97, theta: -0.65 }).expect("a switch");
+        let found = find(&residual, &frame(1000), Arma { phi: 0.97, theta: -0.65 }, true).expect("a switch");
         assert!((found.level - 4.0).abs() < 0.3 && found.switchings == 16, "{} {}", found.level, found.switchings);
     }
 
     #[test]
     fn a_pump_as_strong_as_slow_noise_is_found() {
         let residual = with_pump(&noise(2000, 0.95, 6), 1.5);
-        let found = find(&residual, &frame(2000), Arma { phi: 0.97, theta: 0.0 }).expect("a switch");
+        let found = find(&residual, &frame(2000), Arma { phi: 0.97, theta: 0.0 }, true).expect("a switch");
         let right = found.state.iter().enumerate().filter(|(row, state)| **state == on(*row)).count();
         assert!((found.level - 1.5).abs() < 0.2 && right > 1800, "{} {right}", found.level);
     }
@@ -346,17 +328,17 @@ mod tests {
     #[test]
     fn noise_and_a_drift_are_no_pump() {
         let frame = frame(1000);
-        assert_eq!(find(&noise(1000, 0.0, 4), &frame, Arma::WHITE), None);
-        assert_eq!(find(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }), None);
+        assert_eq!(find(&noise(1000, 0.0, 4), &frame, Arma::WHITE, true), None);
+        assert_eq!(find(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }, true), None);
         let drift: Vec<f64> = noise(1000, 0.0, 5).iter().enumerate().map(|(row, x)| x + 0.006 * count(row)).collect();
-        assert_eq!(find(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }), None);
+        assert_eq!(find(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }, true), None);
     }
 
     #[test]
     fn a_spike_is_no_step() {
         let frame = frame(1000);
         let pump = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&pump, &frame, Arma::WHITE).expect("a switch");
+        let found = find(&pump, &frame, Arma::WHITE, true).expect("a switch");
         let spikes: Vec<f64> = (0..1000).map(|row| if row % 60 == 0 { 4.0 } else { 0.0 }).collect();
         assert!(steps(&found, &pump, &frame) && !steps(&found, &spikes, &frame));
     }
@@ -364,7 +346,7 @@ mod tests {
     #[test]
     fn what_flickers_is_no_consumer() {
         let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let mut found = find(&residual, &frame(1000), Arma::WHITE).expect("a switch");
+        let mut found = find(&residual, &frame(1000), Arma::WHITE, true).expect("a switch");
         assert!(found.stays());
         (0..1000).step_by(20).for_each(|row| found.state[row] = 1.0 - found.state[row]);
         assert!(!found.stays());
@@ -373,7 +355,7 @@ mod tests {
     #[test]
     fn what_switches_with_the_machine_is_no_switch_of_its_own() {
         let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&residual, &frame(1000), Arma::WHITE).expect("a switch");
+        let found = find(&residual, &frame(1000), Arma::WHITE, true).expect("a switch");
         let with_the_pump: Vec<bool> = (0..1000).map(|row| (row + 2) % 60 < 5).collect();
         let seldom: Vec<bool> = (0..1000).map(|row| (row + 2) % 170 < 5).collect();
         let cut: Vec<bool> = (0..1000).map(|row| row % 50 > 25).collect();
@@ -384,7 +366,7 @@ mod tests {
 
     #[test]
     fn a_followed_pump_is_known_soon_after_it_switches() {
-        let found = find(&with_pump(&noise(2000, 0.9, 6), 3.0), &frame(2000), Arma { phi: 0.9, theta: 0.0 });
+        let found = find(&with_pump(&noise(2000, 0.9, 6), 3.0), &frame(2000), Arma { phi: 0.9, theta: 0.0 }, true);
         let told = follow(&with_pump(&noise(2000, 0.9, 7), 3.0), &found.expect("a switch"), 0.5);
         let right = told.iter().enumerate().filter(|(row, chance)| (*chance - on(*row)).abs() < 0.5).count();
         assert!(right > 1850, "{right}");
