@@ -166,6 +166,11 @@ pub trait Effect: Sync + Send {
         self.doc().needs.iter().flat_map(|need| need.split('|')).any(|need| need.trim() == "load")
     }
 
+    /// A column that nothing else in the catalogue follows: whatever bends over it is this effect, if with another law.
+    fn own_column(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {

@@ -10,7 +10,7 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::scan::price;
 use super::search::{Found, Hypothesis};
-use super::unknown::{STANDS_SHARE, Yardsticks, has_friction, margin};
+use super::unknown::{STANDS_SHARE, Yardsticks, margin};
 
 /// Share of all that is named from which a member leads.
 pub(super) const LEADING_SHARE: f64 = 0.5;
@@ -63,8 +63,7 @@ impl Case<'_> {
             |fit: &Fit, design: &Design| 2.0 * (fit.log_likelihood - rest.log_likelihood) - price(design, ln_rows);
         let own = gained(&best.fit, &designs[best.members[position]]);
         let its = gained(&form.fit, &form.design);
-        let outdone =
-            its > own + margin(&form.design, own) && !(self.may_be_friction(&form.design) && has_friction(&best.fit));
+        let outdone = its > own + margin(&form.design, own) && !self.is_another_shape(&form.design, &best.fit);
         let share = own / best.information;
         if outdone && share >= LEADING_SHARE {
             // A leader that explains as much beside the form as without it is another thing than the form.

@@ -69,6 +69,10 @@ impl Effect for AmbientDrift {
         [direct].into_iter().chain(lag_forms(scene, "lag", &[1800.0, 3600.0, 7200.0])).collect()
     }
 
+    fn own_column(&self) -> Option<&'static str> {
+        Some("ambient_temperature_c")
+    }
+
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let ambient = scene.role(Role::Ambient)?;
         let first = *ambient.first()?;

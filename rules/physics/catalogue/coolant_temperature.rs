@@ -1,7 +1,7 @@
 //! Coolant warms bed, work and fixture.
 
 use crate::physics::drive::is_displacement;
-use crate::physics::excitation::{lag_forms, spread};
+use crate::physics::excitation::{lag_forms, spread, varies};
 use crate::physics::state::first_order;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
@@ -12,7 +12,7 @@ pub struct CoolantTemperature;
 static DOC: EffectDoc = EffectDoc {
     kind: "coolant_temperature",
     family: "thermal",
-    law: "E = per_k * w; dw/dt = ((Tc - Tc0) - w) / tau, Tc0 at the start; without tau: w = Tc - Tc0",
+    law: "E = per_k * w; dw/dt = ((Tc - Tc0) - w) / tau, Tc0 at the start; without tau: w = Tc - Tc0; flowing: w = (Tc - Tc0) while the coolant is on",
     parameters: &[
         ParameterDoc {
             name: "per_k",
@@ -57,7 +57,7 @@ impl Effect for CoolantTemperature {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["direct", "lag"]
+        &["direct", "flowing", "lag"]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -66,13 +66,24 @@ impl Effect for CoolantTemperature {
             return Vec::new();
         }
         let direct = Form { name: "direct", ..Form::plain() };
-        [direct].into_iter().chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
+        // Only coolant that flows carries its warmth anywhere.
+        let flowing =
+            scene.column("coolant_on").filter(|on| varies(on)).map(|_| Form { name: "flowing", ..Form::plain() });
+        [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
+    }
+
+    fn own_column(&self) -> Option<&'static str> {
+        Some("coolant_temperature_c")
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let coolant = scene.column("coolant_temperature_c")?;
         let first = *coolant.first()?;
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
+        if form.name == "flowing" {
+            let on = scene.column("coolant_on")?;
+            return Some(vec![("per_k", change.iter().zip(on).map(|(change, on)| change * on).collect())]);
+        }
         let followed = match form.value("tau_s") {
             Some(tau_s) => first_order(scene, &change, tau_s),
             None => change,

@@ -49,6 +49,10 @@ impl Effect for SupplyVoltage {
         if swings && scene.simulated().is_some() { vec![Form::plain()] } else { Vec::new() }
     }
 
+    fn own_column(&self) -> Option<&'static str> {
+        Some("supply_voltage_v")
+    }
+
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
         let voltage = scene.role(Role::Voltage)?;
         let simulated = scene.simulated()?;
