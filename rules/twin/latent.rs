@@ -3,9 +3,10 @@
 //! The most likely sequence of on and off in the presence of slow noise: a switching is a jump, and slow noise makes none,
 //! so that a consumer half as strong as the noise still shows. Viterbi's algorithm, in which each of the two survivors
 //! carries its own innovation (per-survivor processing: Raheli, Polydoros, Tzou, IEEE Trans. Communications 43 (1995)),
-//! with a price per switching; sequence, level and noise are found in turn. What makes it a consumer of its own and not
-//! something of the process: it is on for a good part of the time, on and off as often in the cut as out of it, and it
-//! does not switch only when the machine changes its pace.
+//! with a price per switching; sequence, level and noise are found in turn (the race itself: `race`), and where it stands
+//! alone its rhythm with them (`rhythm`). What makes it a consumer of its own and not something of the process: it is on
+//! for a good part of the time, on and off as often in the cut as out of it, and it does not switch only when the machine
+//! changes its pace.
 
 use super::frame::Frame;
 use super::linear::dot;

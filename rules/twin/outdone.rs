@@ -63,7 +63,7 @@ impl Case<'_> {
             |fit: &Fit, design: &Design| 2.0 * (fit.log_likelihood - rest.log_likelihood) - price(design, ln_rows);
         let own = gained(&best.fit, &designs[best.members[position]]);
         let its = gained(&form.fit, &form.design);
-        let outdone = its > own + margin(&form.design, own) && !self.is_another_shape(&form.design, &best.fit);
+        let outdone = its > own + margin(&form.design, own) && !self.is_another_shape(&form.design, best);
         let share = own / best.information;
         if outdone && share >= LEADING_SHARE {
             // A leader that explains as much beside the form as without it is another thing than the form.

@@ -85,10 +85,11 @@ fn has_friction(fit: &Fit) -> bool {
     fit.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
 }
 
-/// Does it bend over a column that only an effect among the parts of a fit follows?
-fn is_over_own_column(empirical: &Design, named: &Fit) -> bool {
+/// Does it bend over a column that only an effect among the named ones follows?
+fn is_over_own_column(empirical: &Design, named: &Hypothesis) -> bool {
     let Body::Empirical(form) = &empirical.part.body else { return false };
-    let own = named.parts.iter().filter_map(|part| part.effect_and_form()?.0.own_column());
+    let members = &named.fit.parts[named.fit.parts.len() - named.members.len()..];
+    let own = members.iter().filter_map(|part| part.effect_and_form()?.0.own_column());
     own.into_iter().any(|column| column == form.channel)
 }
 
@@ -183,14 +184,14 @@ impl Case<'_> {
         let remains = on_top.information > (UNKNOWN_SHARE * named).max(least);
         let better = anything
             && alone.information > named + margin(&alone.design, named)
-            && !self.is_another_shape(&alone.design, &found.best.fit);
+            && !self.is_another_shape(&alone.design, best);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
-        let own = is_over_own_column(&alone.design, &found.best.fit);
+        let own = is_over_own_column(&alone.design, best);
         let unlike = anything && close && !own && self.unlike(&found.best);
-        let refined = is_against_motion(&on_top.design) && has_friction(&found.best.fit)
-            || is_over_own_column(&on_top.design, &found.best.fit);
+        let refined =
+            is_against_motion(&on_top.design) && has_friction(&best.fit) || is_over_own_column(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;
@@ -249,12 +250,13 @@ impl Case<'_> {
     /// Is a nameless form no more than another shape of what has been named? A bent line over the velocity of the axis, or
     /// one against the motion over whatever else, is that of a friction, for no law of friction fits a real axis to its
     /// noise; and one over a column that only one effect follows is that effect's.
-    pub(super) fn is_another_shape(&self, empirical: &Design, named: &Fit) -> bool {
+    pub(super) fn is_another_shape(&self, empirical: &Design, named: &Hypothesis) -> bool {
         let of_velocity = match &empirical.part.body {
             Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
             _ => false,
         };
-        (of_velocity || is_against_motion(empirical)) && has_friction(named) || is_over_own_column(empirical, named)
+        (of_velocity || is_against_motion(empirical)) && has_friction(&named.fit)
+            || is_over_own_column(empirical, named)
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
