@@ -86,7 +86,16 @@ mod tests {
     fn switching(rows: usize) -> Switching {
         let state: Vec<f64> = (0..ROWS).map(|row| if 2 * (row % rows) >= rows { 1.0 } else { 0.0 }).collect();
         let switchings = state.windows(2).filter(|pair| pair[0] != pair[1]).count();
-        Switching { state, switchings, off: 0.0, level: 1.0, noise: Arma::WHITE, deviation: 0.1, rhythm: None }
+        Switching {
+            state,
+            switchings,
+            off: 0.0,
+            level: 1.0,
+            noise: Arma::WHITE,
+            deviation: 0.1,
+            rhythm: None,
+            price: 0.0,
+        }
     }
 
     fn frame() -> Frame {

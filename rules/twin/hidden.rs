@@ -42,11 +42,7 @@ impl Case<'_> {
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
         self.switching = Some(found.clone());
-        let form = Form {
-            name: "latent",
-            ln_choices: 0.5 * latent::price(&found, &base.residual, &self.frame),
-            ..Form::default()
-        };
+        let form = Form { name: "latent", ln_choices: 0.5 * found.price, ..Form::default() };
         let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         Some(Design { noise: Some(found.noise), ..design })
     }

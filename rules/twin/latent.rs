@@ -71,6 +71,8 @@ pub struct Switching {
     pub deviation: f64,
     /// How long it stays on and off, where that is known.
     pub rhythm: Option<Rhythm>,
+    /// What having chosen when to switch costs, in units of information.
+    pub price: f64,
 }
 
 /// Finds the switch in a residual of this noise, if there is one that explains more than its price. Only where nothing else
@@ -83,27 +85,37 @@ pub fn find(residual: &[f64], frame: &Frame, noise: Arma, alone: bool) -> Option
     };
     let before = likelihood(noise, residual);
     let raw = |found: &Switching| 2.0 * (likelihood(found.noise, &found.left(residual)) - before);
-    let gain = |found: &Switching| raw(found) - price(found, residual, frame);
+    let priced = |found: Switching| {
+        let found = Switching { price: price(&found, residual, frame), ..found };
+        (raw(&found) - found.price, found)
+    };
     let starts = [noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
     let begun = starts.iter().flat_map(|noise| STARTS.map(|size| begin(residual, frame, *noise, size)));
-    let mut begun: Vec<(f64, Switching)> =
-        begun.flatten().filter(Switching::lasts).map(|found| (gain(&found), found)).collect();
+    let mut begun: Vec<(f64, Switching)> = begun.flatten().filter(Switching::lasts).map(priced).collect();
     begun.sort_by(|a, b| b.0.total_cmp(&a.0));
     let settled = begun.into_iter().take(SETTLED).filter_map(|(_, found)| found.settled(residual, frame));
-    let best = settled.map(|found| (gain(&found), found)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let near = alone && best.0 > -RHYTHM_SHARE * price(&best.1, residual, frame);
+    let best = settled.map(priced).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let near = alone && best.0 > -RHYTHM_SHARE * best.1.price;
     let told = if near { best.1.with_rhythms(residual, frame) } else { Vec::new() };
-    let told = told.into_iter().map(|found| (gain(&found), found));
-    let best = std::iter::once(best).chain(told).max_by(|a, b| a.0.total_cmp(&b.0))?.1;
-    (gain(&best) > 0.0 && best.switchings >= SWITCHINGS_MIN && best.lasts()).then_some(best)
+    let told = told.into_iter().map(priced);
+    let (gain, best) = std::iter::once(best).chain(told).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (gain > 0.0 && best.switchings >= SWITCHINGS_MIN && best.lasts()).then_some(best)
 }
 
 /// From a level of so many innovations, with this noise.
 fn begin(residual: &[f64], frame: &Frame, noise: Arma, size: f64) -> Option<Switching> {
     let deviation = deviation(&frame.whiten(residual, noise))?;
     let level = size * deviation;
-    let mut found =
-        Switching { state: Vec::new(), switchings: 0, off: -0.3 * level, level, noise, deviation, rhythm: None };
+    let mut found = Switching {
+        state: Vec::new(),
+        switchings: 0,
+        off: -0.3 * level,
+        level,
+        noise,
+        deviation,
+        rhythm: None,
+        price: 0.0,
+    };
     for _ in 0..ROUNDS.0 {
         found = found.improved(residual, frame)?;
     }
@@ -112,7 +124,7 @@ fn begin(residual: &[f64], frame: &Frame, noise: Arma, size: f64) -> Option<Swit
 
 impl Switching {
     /// What it leaves of a residual.
-    fn left(&self, residual: &[f64]) -> Vec<f64> {
+    pub(super) fn left(&self, residual: &[f64]) -> Vec<f64> {
         residual.iter().zip(&self.state).map(|(x, on)| x - self.off - self.level * on).collect()
     }
 
@@ -237,8 +249,7 @@ pub fn again(residual: &[f64], frame: &Frame, found: &Switching) -> Switching {
 }
 
 /// The price, in units of information, of having chosen when to switch.
-#[must_use]
-pub fn price(switching: &Switching, residual: &[f64], frame: &Frame) -> f64 {
+pub(super) fn price(switching: &Switching, residual: &[f64], frame: &Frame) -> f64 {
     if let Some(rhythm) = &switching.rhythm {
         return rhythm.price(residual, frame, switching);
     }

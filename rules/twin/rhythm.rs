@@ -8,6 +8,7 @@
 
 use super::frame::Frame;
 use super::latent::Switching;
+use super::noise::whiten;
 use super::race::{Belief, Came, Race, Seen};
 use crate::statistics::{count, median, robust_deviation};
 use std::ops::Range;
@@ -110,10 +111,11 @@ impl Rhythm {
     /// The price, in units of information, of having chosen this sequence among all and of the rhythm itself.
     #[must_use]
     pub fn price(&self, residual: &[f64], frame: &Frame, found: &Switching) -> f64 {
+        let e = whiten(&found.left(residual), &frame.stretches, found.noise);
         let whole = |rows: &Range<usize>| {
             let seen = |row: usize| Seen { x: found.levels(residual[row]), weight: frame.weight(row) };
-            let all = self.followed(found, rows.clone().map(seen)).0;
-            (found.likelihood_along(residual, frame, rows), all)
+            let along: f64 = rows.clone().map(|row| -0.5 * found.surprise(e[row], frame.weight(row))).sum();
+            (along, self.followed(found, rows.clone().map(seen)).0)
         };
         let (along, all) =
             frame.stretches.iter().map(whole).fold((0.0, 0.0), |sum, next| (sum.0 + next.0, sum.1 + next.1));
@@ -162,21 +164,6 @@ impl Switching {
 
     pub(super) fn surprise(&self, e: f64, weight: f64) -> f64 {
         (e * weight / self.deviation).powi(2).min(SURPRISE_MAX)
-    }
-
-    /// Logarithm of the likelihood along the sequence, without what the sequence itself costs.
-    fn likelihood_along(&self, residual: &[f64], frame: &Frame, rows: &Range<usize>) -> f64 {
-        let (mut last, mut sum) = (None, 0.0);
-        for row in rows.clone() {
-            let x = self.levels(residual[row])[usize::from(self.state[row] > 0.5)];
-            let e = match last {
-                None => x * self.noise.first_weight(),
-                Some((last_x, last_e)) => self.noise.innovation(x, last_x, last_e),
-            };
-            sum -= 0.5 * self.surprise(e, frame.weight(row));
-            last = Some((x, if last.is_none() { 0.0 } else { e }));
-        }
-        sum
     }
 }
 
