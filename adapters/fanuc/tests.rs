@@ -19,9 +19,10 @@ fn serve(served: Box<dyn Served>) -> Server {
     Server::start(listener, served, ServerSettings::default()).expect("threads")
 }
 
-/// A simulated lathe in the middle of its morning, 20 times as fast as real.
+/// A simulated lathe in the middle of its morning, 4 times as fast as real: the 1.5 s in which its ladder wants a
+/// heartbeat are long enough for a busy computer.
 fn lathe() -> Server {
-    lathe_with(20.0, |control| control).0
+    lathe_with(4.0, |control| control).0
 }
 
 fn lathe_with(times: f64, with: impl FnOnce(SimulatedControl) -> SimulatedControl) -> (Server, Simulated) {
@@ -82,7 +83,7 @@ fn the_ladder_takes_what_comes_through_the_mailbox() {
 
 #[test]
 fn a_known_dial_is_told_apart_from_what_is_in_force() {
-    let (server, _) = lathe_with(20.0, dial_at(80));
+    let (server, _) = lathe_with(4.0, dial_at(80));
     let clock = SystemClock::new();
     let mut actuator = actuator(&server, "write=mailbox&dial=R907");
     assert_eq!(actuator.read_feed_override(&clock), Ok(pct(80)), "the dial alone");
@@ -100,7 +101,7 @@ fn a_known_dial_is_told_apart_from_what_is_in_force() {
 
 #[test]
 fn a_product_goes_above_the_dial_where_the_maker_lets_it() {
-    let (server, _) = lathe_with(20.0, |control| dial_at(80)(control.with_rule(crate::LadderRule::Product)));
+    let (server, _) = lathe_with(4.0, |control| dial_at(80)(control.with_rule(crate::LadderRule::Product)));
     let mut mailbox = actuator(&server, "write=mailbox&dial=R907");
     assert_eq!(write(mailbox.as_mut(), 120), Ok(pct(96)));
     mailbox.release(&SystemClock::new()).expect("given back");
@@ -232,7 +233,7 @@ fn the_external_offset_is_moved_between_programs_only_and_never_over_what_somebo
 
 #[test]
 fn the_path_that_is_named_first_is_written_to_on_the_one_connection() {
-    let (server, _) = lathe_with(20.0, |control| dial_at(90)(control.with_path()));
+    let (server, _) = lathe_with(4.0, |control| dial_at(90)(control.with_path()));
     let clock = SystemClock::new();
     let opened = opened(&server, "paths=2,1&write=mailbox&mailbox=R920&dial=R927");
     let mut actuator = opened.actuator.expect("a way of writing");
