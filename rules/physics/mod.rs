@@ -166,8 +166,14 @@ pub trait Effect: Sync + Send {
         self.doc().needs.iter().flat_map(|need| need.split('|')).any(|need| need.trim() == "load")
     }
 
-    /// A column that nothing else in the catalogue follows: whatever bends over it is this effect, if with another law.
-    fn own_column(&self) -> Option<&'static str> {
+    /// Do they change with the losses that the cut causes as well?
+    fn reads_load_at_output(&self) -> bool {
+        false
+    }
+
+    /// The column of this recording that nothing else in the catalogue follows: whatever bends over it is this effect, if
+    /// with another law.
+    fn own_column<'a>(&self, _scene: &'a Scene) -> Option<&'a str> {
         None
     }
 

@@ -161,6 +161,7 @@ pub struct Scene {
     usable: Vec<bool>,
     passes: Vec<Range<usize>>,
     load: Option<Vec<f64>>,
+    load_at_output: Option<Vec<f64>>,
     simulated: Option<Vec<f64>>,
     laws: RefCell<BTreeMap<String, LinearLaw>>,
     feed_load_growth: OnceLock<Option<Vec<f64>>>,
@@ -202,6 +203,7 @@ impl Scene {
             output: output.to_owned(),
             passes: Vec::new(),
             load: None,
+            load_at_output: None,
             simulated: None,
             laws: RefCell::default(),
             feed_load_growth: OnceLock::new(),
@@ -403,6 +405,18 @@ impl Scene {
     /// Sets what the model simulates as the cut.
     pub fn set_load(&mut self, load: Option<Vec<f64>>) {
         self.load = load;
+    }
+
+    /// The load of the cut as it comes to the output, with the losses that the model has it cause; without such losses
+    /// [`Scene::load`]. What mis-states the cut mis-states its losses as well.
+    #[must_use]
+    pub fn load_at_output(&self) -> Option<&[f64]> {
+        self.load_at_output.as_deref().or_else(|| self.load())
+    }
+
+    /// Sets what the model simulates as the cut and the losses that it causes.
+    pub fn set_load_at_output(&mut self, load: Option<Vec<f64>>) {
+        self.load_at_output = load;
     }
 
     /// The state that nobody records of an effect of this kind, per row, where a search has found one: how present a

@@ -1,9 +1,11 @@
-//! Is it a consumer? What switches at the same place of every pass is the process, and what recovers after each step, or
-//! grows until the next, has more than two levels.
+//! Is it a consumer? What flickers is noise; what switches with the pace, in the cut only, or at the same place of every
+//! pass, is the process; what does not step is a drift or a spike; and what recovers after each step, or grows until the
+//! next, has more than two levels.
 
 use super::frame::Frame;
 use super::latent::{SWITCHINGS_MIN, Switching};
-use crate::statistics::{count, mean};
+use super::rhythm::spells;
+use crate::statistics::{count, mean, median};
 use std::ops::Range;
 
 /// Places of a channel at which switchings are counted, and how many must be seen there.
@@ -15,8 +17,52 @@ const SPELLS_TOLD: usize = 5;
 const THIRD_ROWS_MIN: usize = 3;
 const SLOPE_DEVIATE: f64 = 4.0;
 const SLOPE_SHARE: f64 = 0.4;
+/// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
+/// doing.
+const OWN_DOING: f64 = 0.7;
+/// By how much its share of the cut and that of the rest may differ.
+const SHARES_APART_MAX: f64 = 0.35;
+/// Rows of a spell that is no flicker, and the share of spells that may be shorter.
+const SPELL_ROWS_MIN: usize = 4;
+const SHORT_SPELLS_MAX: f64 = 0.25;
+/// Rows on either side of a switching by which its step is measured, and how many there must be.
+const BESIDE_ROWS: usize = 5;
+const BESIDE_ROWS_MIN: usize = 3;
+/// Switchings that must be seen within a run, and their share of all.
+const STEPS_MIN: usize = 2;
+const STEPS_SHARE_MIN: f64 = 0.3;
+/// What the middle one of these must step by, in levels.
+const STEP: std::ops::RangeInclusive<f64> = 0.5..=1.8;
 
 impl Switching {
+    /// Does it stay as it is for a while? What flickers from row to row is noise with two faces.
+    #[must_use]
+    pub fn stays(&self) -> bool {
+        let spells = spells(&self.state, &(0..self.state.len()));
+        let short = spells.iter().filter(|spell| spell.rows.len() < SPELL_ROWS_MIN).count();
+        count(short) <= SHORT_SPELLS_MAX * count(spells.len())
+    }
+
+    /// Does it switch by itself? Not where it switches with the pace only, nor where it is on in the cut and off out of
+    /// it or the other way round. `change` says of each row whether the pace changes there or nearby, `cut` whether it is
+    /// cut.
+    #[must_use]
+    pub fn by_itself(&self, change: &[bool], cut: &[bool]) -> bool {
+        let switchings = || (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]);
+        let all = count(switchings().count());
+        let together = count(switchings().filter(|row| change[*row]).count());
+        // As often as by chance is no sign.
+        let by_chance = count((0..change.len()).filter(|row| change[*row]).count()) / count(change.len());
+        let own_doing = all * (1.0 - by_chance) > 3.0 && together / all - by_chance > OWN_DOING * (1.0 - by_chance);
+        let share = |wanted: bool| {
+            let of: Vec<f64> =
+                self.state.iter().zip(cut).filter(|(_, cut)| **cut == wanted).map(|(on, _)| *on).collect();
+            (!of.is_empty()).then(|| of.iter().sum::<f64>() / count(of.len()))
+        };
+        let apart = share(true).zip(share(false)).map_or(0.0, |(cut, rest)| (cut - rest).abs());
+        !own_doing && apart <= SHARES_APART_MAX
+    }
+
     /// Does it switch at certain places of something that the process goes through again and again, such as the position
     /// of an axis or the time in the cut? `channel` holds its value where it has one.
     #[must_use]
@@ -41,8 +87,8 @@ impl Switching {
     /// Does it stay at its two levels? What recovers after each step, or grows until the next, is no consumer.
     #[must_use]
     pub fn is_flat(&self, residual: &[f64], frame: &Frame) -> bool {
-        [1.0, 0.0].into_iter().all(|level| {
-            let changes = self.changes_within_spells(residual, frame, level);
+        [true, false].into_iter().all(|on| {
+            let changes = self.changes_within_spells(residual, frame, on);
             let spells = count(changes.len());
             let mean = mean(&changes);
             let variance = changes.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (spells - 1.0).max(1.0);
@@ -51,34 +97,46 @@ impl Switching {
         })
     }
 
-    /// Last third less first third of every spell at a level that is long enough.
-    fn changes_within_spells(&self, residual: &[f64], frame: &Frame, level: f64) -> Vec<f64> {
+    /// Last third less first third of every spell on or off that is long enough.
+    fn changes_within_spells(&self, residual: &[f64], frame: &Frame, on: bool) -> Vec<f64> {
         let mut changes = Vec::new();
-        for stretch in &frame.stretches {
-            let mut start = stretch.start;
-            for spell in self.state[stretch.clone()].chunk_by(|a, b| a == b) {
-                // The rows at either end may be on for a part.
-                let inner = start + 1..(start + spell.len()).saturating_sub(1);
-                start += spell.len();
-                if spell[0] == level && inner.len() >= 3 * THIRD_ROWS_MIN {
-                    let third = inner.len() / 3;
-                    let level = |rows: Range<usize>| mean(&residual[rows]);
-                    changes.push(level(inner.end - third..inner.end) - level(inner.start..inner.start + third));
-                }
+        for spell in frame.stretches.iter().flat_map(|stretch| spells(&self.state, stretch)) {
+            // The rows at either end may be on for a part.
+            let inner = spell.rows.start + 1..spell.rows.end.saturating_sub(1);
+            if spell.on == on && inner.len() >= 3 * THIRD_ROWS_MIN {
+                let third = inner.len() / 3;
+                let level = |rows: Range<usize>| mean(&residual[rows]);
+                changes.push(level(inner.end - third..inner.end) - level(inner.start..inner.start + third));
             }
         }
         changes
+    }
+
+    /// Does the residual step by the level where it switches, and stay there? A consumer does; what wanders does not, nor
+    /// does a spike, nor what is one level in one run and another in the next.
+    #[must_use]
+    pub fn steps(&self, residual: &[f64], frame: &Frame) -> bool {
+        let mut steps = Vec::new();
+        let turn = |row: usize| self.state[row] - self.state[row - 1];
+        for rows in &frame.stretches {
+            for row in (rows.start + 1..rows.end).filter(|row| turn(*row) != 0.0) {
+                // The row of the switching itself may be on for a part.
+                let before = residual[row.saturating_sub(BESIDE_ROWS).max(rows.start)..row].to_vec();
+                let after = residual[row + 1..(row + 1 + BESIDE_ROWS).min(rows.end)].to_vec();
+                if before.len().min(after.len()) >= BESIDE_ROWS_MIN {
+                    steps.extend(median(after).zip(median(before)).map(|(after, before)| turn(row) * (after - before)));
+                }
+            }
+        }
+        let enough = steps.len() >= STEPS_MIN && count(steps.len()) >= STEPS_SHARE_MIN * count(self.switchings);
+        enough && median(steps).is_some_and(|step| STEP.contains(&(step / self.level)))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::units;
     use super::super::noise::Arma;
     use super::*;
-    use crate::physics::Scene;
-    use adapters::Recording;
-    use adapters::recording::{Cells, Numbers};
 
     const ROWS: usize = 1200;
 
@@ -99,10 +157,7 @@ mod tests {
     }
 
     fn frame() -> Frame {
-        let mut recording = Recording::new("test", (0..ROWS).map(count).collect(), None);
-        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; ROWS])));
-        let scene = Scene::new(&recording, "spindle_power_w", &Default::default()).expect("a scene");
-        Frame::new(&scene, &units(&scene), 1, |_| true)
+        Frame::one_run(ROWS)
     }
 
     #[test]
@@ -122,5 +177,38 @@ mod tests {
             (0..ROWS).map(|row| count((row + 40) % 80) / 40.0 + 0.1 * (count(row) * 1.7).sin()).collect();
         assert!(found.is_flat(&pump, &frame()));
         assert!(!found.is_flat(&saw, &frame()));
+    }
+
+    /// On for sixty of every hundred and twenty rows, by one, in a little of something else.
+    fn pump() -> (Switching, Vec<f64>) {
+        let found = switching(120);
+        let residual = found.state.iter().enumerate().map(|(row, on)| on + 0.1 * (count(row) * 1.7).sin()).collect();
+        (found, residual)
+    }
+
+    #[test]
+    fn a_spike_is_no_step() {
+        let (found, pump) = pump();
+        let spikes: Vec<f64> = (0..ROWS).map(|row| if row % 60 == 0 { 1.0 } else { 0.0 }).collect();
+        assert!(found.steps(&pump, &frame()) && !found.steps(&spikes, &frame()));
+    }
+
+    #[test]
+    fn what_flickers_is_no_consumer() {
+        let mut found = switching(120);
+        assert!(found.stays());
+        (0..ROWS).step_by(20).for_each(|row| found.state[row] = 1.0 - found.state[row]);
+        assert!(!found.stays());
+    }
+
+    #[test]
+    fn what_switches_with_the_machine_is_no_switch_of_its_own() {
+        let found = switching(120);
+        let with_the_pump: Vec<bool> = (0..ROWS).map(|row| (row + 2) % 60 < 5).collect();
+        let seldom: Vec<bool> = (0..ROWS).map(|row| (row + 2) % 170 < 5).collect();
+        let cut: Vec<bool> = (0..ROWS).map(|row| row % 50 > 25).collect();
+        assert!(!found.by_itself(&with_the_pump, &cut));
+        assert!(!found.by_itself(&seldom, &found.state.iter().map(|on| *on > 0.5).collect::<Vec<bool>>()));
+        assert!(found.by_itself(&seldom, &cut));
     }
 }

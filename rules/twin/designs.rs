@@ -26,7 +26,8 @@ fn reluctance(kind: &str, form: &Form) -> f64 {
 }
 
 /// Kinds that act at the edges of the engagement only: one of them at a time, or they mend each other's form.
-pub(super) const AT_EDGES: [&str; 4] = ["clock_lag", "meter_window", "engagement_timing", "entry_exit"];
+pub(super) const AT_EDGES: [&str; 5] =
+    ["clock_lag", "meter_window", "engagement_timing", "entry_exit", "override_delay"];
 
 /// Would a hypothesis of these kinds be twice the same cause?
 #[must_use]

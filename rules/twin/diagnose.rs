@@ -19,7 +19,7 @@ use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median, robust_deviation};
 use adapters::Recording;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rows below which nothing is claimed.
 const ROWS_MIN: usize = 60;
@@ -72,6 +72,8 @@ pub struct Case<'a> {
     pub unbent: Option<Vec<Part>>,
     /// Effects at edges that show with every row in full.
     pub seen_at_edges: Vec<SeenForm>,
+    /// Delays that show between samples, by kind: each with its standard error, s.
+    pub delays: BTreeMap<&'static str, (f64, f64)>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -118,6 +120,7 @@ impl<'a> Case<'a> {
             switching: None,
             unbent: None,
             seen_at_edges: Vec::new(),
+            delays: BTreeMap::new(),
             whole: None,
         }
     }
@@ -230,7 +233,7 @@ impl<'a> Case<'a> {
         }
         designs.extend(self.designs_seen_at_edges());
         designs.extend(self.hidden_lots(base));
-        designs.extend(self.hidden_switch(base, true));
+        designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
         let found = self.searched(base, &designs, seed);
         if self.shows_switch_beside(&found.best, &mut designs) {

@@ -21,6 +21,7 @@ use super::linear::dot;
 use super::model::{Body, Part};
 use super::ripple::Ripple;
 use super::verdicts::unit_of;
+use crate::physics::state::BETWEEN_SAMPLES;
 use crate::physics::{Entry, unit_in};
 use crate::statistics::count;
 
@@ -36,7 +37,7 @@ const NOTICED: f64 = 0.05;
 /// Share of all that is known of a coefficient below which a level tells nothing of it.
 const TELLS: f64 = 0.01;
 /// Kinds outside the family of the cut that mis-state it.
-const OF_THE_CUT: [&str; 3] = ["recipe_error", "engagement_timing", "override_delay"];
+const OF_THE_CUT: [&str; 1] = ["recipe_error"];
 
 /// The parameters of part number `part` of a fit, with intervals in their own units.
 #[must_use]
@@ -70,6 +71,7 @@ pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate
             }
         })
         .chain(followed)
+        .chain(delay_between_samples(case, &fit.parts[part]))
         .collect()
 }
 
@@ -167,6 +169,15 @@ fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
         unit: unit.to_owned(),
     };
     [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
+}
+
+/// The delay of a part that acts between samples: as often as edges were late.
+fn delay_between_samples(case: &Case<'_>, part: &Part) -> Option<Estimate> {
+    let (_, form) = part.effect_and_form().filter(|(_, form)| form.name == BETWEEN_SAMPLES)?;
+    let value = form.value("delay_s")?;
+    let (_, error) = case.delays.get(part.kind.as_str())?;
+    let half = INTERVAL * error;
+    Some(Estimate { name: "delay_s".to_owned(), value, low: value - half, high: value + half, unit: "s".to_owned() })
 }
 
 #[cfg(test)]

@@ -316,8 +316,8 @@ fn is_direct(parts: &[Part], free: Free) -> bool {
     let part = &parts[free.part];
     let linear = part.parameters[free.parameter].entry == Entry::Linear;
     let coupled = parts.iter().any(Part::acts_on_output) && !part.acts_on_output();
-    let load_read = part.is_cut() && parts.iter().any(Part::reads_load);
-    linear && !coupled && !load_read
+    let read = parts.iter().any(|other| part.is_read_by(other));
+    linear && !coupled && !read
 }
 
 fn difference(data: &mut Data<'_>, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {

@@ -286,13 +286,22 @@ fn unbroken(scene: &Scene, rows: Range<usize>) -> Vec<Range<usize>> {
 }
 
 #[cfg(test)]
+impl Frame {
+    /// One run of so many rows a second apart, for tests of what is done to a residual.
+    pub(super) fn one_run(rows: usize) -> Self {
+        use adapters::recording::{Cells, Numbers};
+        let mut recording = adapters::Recording::new("test", (0..rows).map(count).collect(), None);
+        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; rows])));
+        let scene = Scene::new(&recording, "spindle_power_w", &Default::default()).expect("a scene");
+        Self::new(&scene, &units(&scene), 1, |_| true)
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
-    use adapters::recording::read_csv;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
-    use std::collections::BTreeMap;
-    use std::fmt::Write;
 
     const ROWS: usize = 3000;
 
@@ -308,17 +317,9 @@ mod tests {
         (0..ROWS).map(&mut row_of).collect()
     }
 
-    fn frame() -> Frame {
-        let mut text = String::from("time_s,y_w\n");
-        (0..ROWS).for_each(|row| writeln!(text, "{row},{}", row % 7).expect("a string takes it"));
-        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
-        let scene = Scene::new(&recording, "y_w", &BTreeMap::new()).expect("recorded");
-        Frame::new(&scene, &units(&scene), 1, |_| true)
-    }
-
     #[test]
     fn a_few_spikes_do_not_make_noise_with_a_memory_look_white() {
-        let frame = frame();
+        let frame = Frame::one_run(ROWS);
         let spiked = residual(1000);
         let over_all = super::super::noise::fit(&spiked, &frame.stretches);
         assert!(over_all.phi < 0.3, "{over_all:?}");

@@ -4,8 +4,10 @@
 use super::designs::{AT_EDGES, Design};
 use super::diagnose::Case;
 use super::fit::Fit;
+use super::frame::Frame;
 use super::latent::{self, Switching};
 use super::model::{Body, simulate};
+use super::noise::Arma;
 use super::ripple;
 use super::search::Hypothesis;
 use super::wave::{self, Wave};
@@ -21,20 +23,28 @@ const AT_A_CHANGE_GROUPS: usize = 2;
 /// Rows of a spell in the cut from which a frequency can be read.
 const SPELL_ROWS_MIN: usize = 8;
 
+/// Finds a switch in a residual of this noise.
+type Finder = fn(&[f64], &Frame, Arma) -> Option<Switching>;
+
 impl Case<'_> {
     /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
-    pub(super) fn hidden_switch(&mut self, base: &Fit, alone: bool) -> Option<Design> {
+    pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
+        self.hidden_consumer(base, latent::find_alone)
+    }
+
+    /// A consumer as this finds it in what a fit leaves, if it goes on and off by itself.
+    fn hidden_consumer(&mut self, base: &Fit, find: Finder) -> Option<Design> {
         let effect = crate::physics::effect("auxiliary_switch")?;
         if !self.electric() || !super::designs::wanted(effect, self.model) {
             return None;
         }
-        let found = latent::find(&base.residual, &self.frame, base.noise, alone)?;
+        let found = find(&base.residual, &self.frame, base.noise)?;
         let (change, cut) = self.pace_of_groups();
         let by_itself = found.by_itself(&change, &cut)
             && self.repeated_of_groups(&cut).iter().all(|channel| !found.follows(channel));
         let acts = found.stays()
             && by_itself
-            && latent::steps(&found, &base.residual, &self.frame)
+            && found.steps(&base.residual, &self.frame)
             && found.is_flat(&base.residual, &self.frame);
         if !acts {
             return None;
@@ -57,15 +67,20 @@ impl Case<'_> {
         if named || best.members.is_empty() || simulate(&best.fit.parts, &mut self.scene).is_none() {
             return false;
         }
-        let Some(switch) = self.hidden_switch(&best.fit, false) else { return false };
+        let Some(switch) = self.hidden_consumer(&best.fit, latent::find) else { return false };
         designs.retain(|other| !(other.kind == switch.kind && is_latent(other)));
         designs.push(switch);
         true
     }
 
+    /// Is every row fitted by itself? Averaged rows have neither phase nor edge any more.
+    pub(super) fn is_row_by_row(&self) -> bool {
+        self.frame.len() == (0..self.frame.len()).map(|group| self.frame.rows(group).len()).sum::<usize>()
+    }
+
     /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else, and not in the
     /// current of a feed drive.
-    fn electric(&self) -> bool {
+    pub(super) fn electric(&self) -> bool {
         let metered = self.scene.output_kind() == OutputKind::Power || self.scene.output().ends_with("_a");
         metered && !is_axis_output(&self.scene)
     }
@@ -104,10 +119,7 @@ impl Case<'_> {
     /// The ripple of the mains folded by sampling, as a hypothesis, where what the baseline leaves has a wandering line.
     pub(super) fn hidden_ripple(&mut self, base: &Fit) -> Option<Design> {
         let effect = crate::physics::effect("ripple_alias")?;
-        // Averaged rows have no phase any more.
-        let sampled =
-            self.frame.len() == (0..self.frame.len()).map(|group| self.frame.rows(group).len()).sum::<usize>();
-        if !self.electric() || !sampled || !super::designs::wanted(effect, self.model) {
+        if !self.electric() || !self.is_row_by_row() || !super::designs::wanted(effect, self.model) {
             return None;
         }
         let found = ripple::find(&base.residual, &self.frame.stretches, base.noise)?;

@@ -4,16 +4,15 @@
 //! so that a consumer half as strong as the noise still shows. Viterbi's algorithm, in which each of the two survivors
 //! carries its own innovation (per-survivor processing: Raheli, Polydoros, Tzou, IEEE Trans. Communications 43 (1995)),
 //! with a price per switching; sequence, level and noise are found in turn (the race itself: `race`), and where it stands
-//! alone its rhythm with them (`rhythm`). What makes it a consumer of its own and not something of the process: it is on
-//! for a good part of the time, on and off as often in the cut as out of it, and it does not switch only when the machine
-//! changes its pace.
+//! alone its rhythm with them (`rhythm`). What makes it a consumer of its own and not something of the process stands in
+//! `consumer`.
 
 use super::frame::Frame;
 use super::linear::dot;
 use super::noise::{Arma, fit_near};
 use super::race::Seen;
 use super::rhythm::Rhythm;
-use crate::statistics::{count, median, robust_deviation};
+use crate::statistics::{count, robust_deviation};
 use std::ops::Range;
 
 /// Switchings that must be seen, those between runs included.
@@ -22,22 +21,6 @@ pub(super) const SWITCHINGS_MIN: usize = 4;
 const SWITCHINGS_FIRST: usize = 10;
 /// Share of the rows that each of the two levels must have.
 const SHARE_MIN: f64 = 0.15;
-/// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
-/// doing.
-const OWN_DOING: f64 = 0.7;
-/// By how much its share of the cut and that of the rest may differ.
-const SHARES_APART_MAX: f64 = 0.35;
-/// Rows of a spell that is no flicker, and the share of spells that may be shorter.
-const SPELL_ROWS_MIN: usize = 4;
-const SHORT_SPELLS_MAX: f64 = 0.25;
-/// Rows on either side of a switching by which its step is measured, and how many there must be.
-const BESIDE_ROWS: usize = 5;
-const BESIDE_ROWS_MIN: usize = 3;
-/// Switchings that must be seen within a run, and their share of all.
-const STEPS_MIN: usize = 2;
-const STEPS_SHARE_MIN: f64 = 0.3;
-/// What the middle one of these must step by, in levels.
-const STEP: std::ops::RangeInclusive<f64> = 0.5..=1.8;
 /// Levels to start from, in deviations of the innovations.
 const STARTS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Rounds of sequence and level to choose a start, of sequence, level and noise after it, and of these with a rhythm.
@@ -75,31 +58,56 @@ pub struct Switching {
     pub price: f64,
 }
 
-/// Finds the switch in a residual of this noise, if there is one that explains more than its price. Only where nothing else
-/// is named, `alone`, is its rhythm asked for: what is left beside others is no noise that one could be read from.
+/// Finds the switch in a residual of this noise, if there is one that explains more than its price: that of every switching.
 #[must_use]
-pub fn find(residual: &[f64], frame: &Frame, noise: Arma, alone: bool) -> Option<Switching> {
-    let likelihood = |noise: Arma, residual: &[f64]| {
-        let e = frame.whiten(residual, noise);
-        frame.log_likelihood(dot(&e, &e), noise)
-    };
-    let before = likelihood(noise, residual);
-    let raw = |found: &Switching| 2.0 * (likelihood(found.noise, &found.left(residual)) - before);
-    let priced = |found: Switching| {
-        let found = Switching { price: price(&found, residual, frame), ..found };
-        (raw(&found) - found.price, found)
-    };
+pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
+    likeliest(residual, frame, noise).filter(Offer::holds).map(|offer| offer.found)
+}
+
+/// The same, and where its switchings cost too much, as its rhythm tells it. For what is left where nothing is named: beside
+/// others it is no noise that a rhythm could be read from.
+#[must_use]
+pub fn find_alone(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
+    let best = likeliest(residual, frame, noise)?;
+    let near = best.gain > -RHYTHM_SHARE * best.found.price;
+    let told = if near { best.found.with_rhythms(residual, frame) } else { Vec::new() };
+    let told = told.into_iter().map(|found| Offer::of(found, residual, frame, noise));
+    let best = std::iter::once(best).chain(told).max_by(|a, b| a.gain.total_cmp(&b.gain));
+    best.filter(Offer::holds).map(|offer| offer.found)
+}
+
+/// The best of all starts.
+fn likeliest(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Offer> {
+    let offer = |found: Switching| Offer::of(found, residual, frame, noise);
     let starts = [noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
     let begun = starts.iter().flat_map(|noise| STARTS.map(|size| begin(residual, frame, *noise, size)));
-    let mut begun: Vec<(f64, Switching)> = begun.flatten().filter(Switching::lasts).map(priced).collect();
-    begun.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let settled = begun.into_iter().take(SETTLED).filter_map(|(_, found)| found.settled(residual, frame));
-    let best = settled.map(priced).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let near = alone && best.0 > -RHYTHM_SHARE * best.1.price;
-    let told = if near { best.1.with_rhythms(residual, frame) } else { Vec::new() };
-    let told = told.into_iter().map(priced);
-    let (gain, best) = std::iter::once(best).chain(told).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (gain > 0.0 && best.switchings >= SWITCHINGS_MIN && best.lasts()).then_some(best)
+    let mut begun: Vec<Offer> = begun.flatten().filter(Switching::lasts).map(offer).collect();
+    begun.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let settled = begun.into_iter().take(SETTLED).filter_map(|begun| begun.found.settled(residual, frame));
+    settled.map(offer).max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// A switch, and what it explains beyond its price, in units of information.
+struct Offer {
+    gain: f64,
+    found: Switching,
+}
+
+impl Offer {
+    /// Over the same residual without a switch, in this noise.
+    fn of(found: Switching, residual: &[f64], frame: &Frame, noise: Arma) -> Self {
+        let likelihood = |residual: &[f64], noise: Arma| {
+            let e = frame.whiten(residual, noise);
+            frame.log_likelihood(dot(&e, &e), noise)
+        };
+        let gained = 2.0 * (likelihood(&found.left(residual), found.noise) - likelihood(residual, noise));
+        let price = price(&found, residual, frame);
+        Self { gain: gained - price, found: Switching { price, ..found } }
+    }
+
+    fn holds(&self) -> bool {
+        self.gain > 0.0 && self.found.switchings >= SWITCHINGS_MIN && self.found.lasts()
+    }
 }
 
 /// From a level of so many innovations, with this noise.
@@ -191,54 +199,6 @@ impl Switching {
         let on = self.state.iter().sum::<f64>() / count(self.state.len());
         (SHARE_MIN..=1.0 - SHARE_MIN).contains(&on)
     }
-
-    /// Does it stay as it is for a while? What flickers from row to row is noise with two faces.
-    #[must_use]
-    pub fn stays(&self) -> bool {
-        let spells: Vec<usize> = self.state.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
-        let short = spells.iter().filter(|rows| **rows < SPELL_ROWS_MIN).count();
-        count(short) <= SHORT_SPELLS_MAX * count(spells.len())
-    }
-
-    /// Does it switch by itself? Not where it switches with the pace only, nor where it is on in the cut and off out of
-    /// it or the other way round. `change` says of each row whether the pace changes there or nearby, `cut` whether it is
-    /// cut.
-    #[must_use]
-    pub fn by_itself(&self, change: &[bool], cut: &[bool]) -> bool {
-        let switchings = || (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]);
-        let all = count(switchings().count());
-        let together = count(switchings().filter(|row| change[*row]).count());
-        // As often as by chance is no sign.
-        let by_chance = count((0..change.len()).filter(|row| change[*row]).count()) / count(change.len());
-        let own_doing = all * (1.0 - by_chance) > 3.0 && together / all - by_chance > OWN_DOING * (1.0 - by_chance);
-        let share = |wanted: bool| {
-            let of: Vec<f64> =
-                self.state.iter().zip(cut).filter(|(_, cut)| **cut == wanted).map(|(on, _)| *on).collect();
-            (!of.is_empty()).then(|| of.iter().sum::<f64>() / count(of.len()))
-        };
-        let apart = share(true).zip(share(false)).map_or(0.0, |(cut, rest)| (cut - rest).abs());
-        !own_doing && apart <= SHARES_APART_MAX
-    }
-}
-
-/// Does the residual step by the level where it switches, and stay there? A consumer does; what wanders does not, nor
-/// does a spike, nor what is one level in one run and another in the next.
-#[must_use]
-pub fn steps(found: &Switching, residual: &[f64], frame: &Frame) -> bool {
-    let mut steps = Vec::new();
-    let turn = |row: usize| found.state[row] - found.state[row - 1];
-    for rows in &frame.stretches {
-        for row in (rows.start + 1..rows.end).filter(|row| turn(*row) != 0.0) {
-            // The row of the switching itself may be on for a part.
-            let before = residual[row.saturating_sub(BESIDE_ROWS).max(rows.start)..row].to_vec();
-            let after = residual[row + 1..(row + 1 + BESIDE_ROWS).min(rows.end)].to_vec();
-            if before.len().min(after.len()) >= BESIDE_ROWS_MIN {
-                steps.extend(median(after).zip(median(before)).map(|(after, before)| turn(row) * (after - before)));
-            }
-        }
-    }
-    let enough = steps.len() >= STEPS_MIN && count(steps.len()) >= STEPS_SHARE_MIN * count(found.switchings);
-    enough && median(steps).is_some_and(|step| STEP.contains(&(step / found.level)))
 }
 
 /// The same switch in another residual, with the noise that is there.
@@ -286,21 +246,9 @@ pub fn follow(residual: &[f64], found: &Switching, share_on: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::units;
     use super::*;
-    use crate::physics::Scene;
-    use adapters::Recording;
-    use adapters::recording::{Cells, Numbers};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
-
-    /// One run of so many rows.
-    fn frame(rows: usize) -> Frame {
-        let mut recording = Recording::new("test", (0..rows).map(count).collect(), None);
-        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; rows])));
-        let scene = Scene::new(&recording, "spindle_power_w", &Default::default()).expect("a scene");
-        Frame::new(&scene, &units(&scene), 1, |_| true)
-    }
 
     /// Noise with this memory and unit variance.
     fn noise(rows: usize, phi: f64, seed: u64) -> Vec<f64> {
@@ -325,60 +273,31 @@ mod tests {
     #[test]
     fn a_pump_is_found_with_its_level() {
         let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&residual, &frame(1000), Arma { phi: 0.97, theta: -0.65 }, true).expect("a switch");
+        let found = find_alone(&residual, &Frame::one_run(1000), Arma { phi: 0.97, theta: -0.65 }).expect("a switch");
         assert!((found.level - 4.0).abs() < 0.3 && found.switchings == 16, "{} {}", found.level, found.switchings);
     }
 
     #[test]
     fn a_pump_as_strong_as_slow_noise_is_found() {
         let residual = with_pump(&noise(2000, 0.95, 6), 1.5);
-        let found = find(&residual, &frame(2000), Arma { phi: 0.97, theta: 0.0 }, true).expect("a switch");
+        let found = find_alone(&residual, &Frame::one_run(2000), Arma { phi: 0.97, theta: 0.0 }).expect("a switch");
         let right = found.state.iter().enumerate().filter(|(row, state)| **state == on(*row)).count();
         assert!((found.level - 1.5).abs() < 0.2 && right > 1800, "{} {right}", found.level);
     }
 
     #[test]
     fn noise_and_a_drift_are_no_pump() {
-        let frame = frame(1000);
-        assert_eq!(find(&noise(1000, 0.0, 4), &frame, Arma::WHITE, true), None);
-        assert_eq!(find(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }, true), None);
+        let frame = Frame::one_run(1000);
+        assert_eq!(find_alone(&noise(1000, 0.0, 4), &frame, Arma::WHITE), None);
+        assert_eq!(find_alone(&noise(1000, 0.97, 4), &frame, Arma { phi: 0.97, theta: 0.0 }), None);
         let drift: Vec<f64> = noise(1000, 0.0, 5).iter().enumerate().map(|(row, x)| x + 0.006 * count(row)).collect();
-        assert_eq!(find(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }, true), None);
-    }
-
-    #[test]
-    fn a_spike_is_no_step() {
-        let frame = frame(1000);
-        let pump = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&pump, &frame, Arma::WHITE, true).expect("a switch");
-        let spikes: Vec<f64> = (0..1000).map(|row| if row % 60 == 0 { 4.0 } else { 0.0 }).collect();
-        assert!(steps(&found, &pump, &frame) && !steps(&found, &spikes, &frame));
-    }
-
-    #[test]
-    fn what_flickers_is_no_consumer() {
-        let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let mut found = find(&residual, &frame(1000), Arma::WHITE, true).expect("a switch");
-        assert!(found.stays());
-        (0..1000).step_by(20).for_each(|row| found.state[row] = 1.0 - found.state[row]);
-        assert!(!found.stays());
-    }
-
-    #[test]
-    fn what_switches_with_the_machine_is_no_switch_of_its_own() {
-        let residual = with_pump(&noise(1000, 0.0, 3), 4.0);
-        let found = find(&residual, &frame(1000), Arma::WHITE, true).expect("a switch");
-        let with_the_pump: Vec<bool> = (0..1000).map(|row| (row + 2) % 60 < 5).collect();
-        let seldom: Vec<bool> = (0..1000).map(|row| (row + 2) % 170 < 5).collect();
-        let cut: Vec<bool> = (0..1000).map(|row| row % 50 > 25).collect();
-        assert!(!found.by_itself(&with_the_pump, &cut));
-        assert!(!found.by_itself(&seldom, &found.state.iter().map(|on| *on > 0.5).collect::<Vec<bool>>()));
-        assert!(found.by_itself(&seldom, &cut));
+        assert_eq!(find_alone(&drift, &frame, Arma { phi: 0.985, theta: -0.93 }), None);
     }
 
     #[test]
     fn a_followed_pump_is_known_soon_after_it_switches() {
-        let found = find(&with_pump(&noise(2000, 0.9, 6), 3.0), &frame(2000), Arma { phi: 0.9, theta: 0.0 }, true);
+        let found =
+            find_alone(&with_pump(&noise(2000, 0.9, 6), 3.0), &Frame::one_run(2000), Arma { phi: 0.9, theta: 0.0 });
         let told = follow(&with_pump(&noise(2000, 0.9, 7), 3.0), &found.expect("a switch"), 0.5);
         let right = told.iter().enumerate().filter(|(row, chance)| (*chance - on(*row)).abs() < 0.5).count();
         assert!(right > 1850, "{right}");

@@ -51,6 +51,7 @@ mod race;
 pub mod report;
 pub mod rhythm;
 pub mod ripple;
+mod sampled;
 pub mod scan;
 pub mod search;
 pub mod size;

@@ -180,9 +180,26 @@ impl Part {
         }
     }
 
+    /// Does it read what the load comes to at the output, losses included?
+    #[must_use]
+    pub fn reads_load_at_output(&self) -> bool {
+        matches!(&self.body, Body::Effect(effect, _) if effect.reads_load_at_output())
+    }
+
     /// Does this part have to be simulated again after that one of the same model has changed?
     fn follows(&self, changed: &Self) -> bool {
-        self.acts_on_output() && !changed.acts_on_output() || changed.is_cut() && self.reads_load()
+        self.acts_on_output() && !changed.acts_on_output() || changed.is_read_by(self)
+    }
+
+    /// Does the other read what this one simulates, the output as a whole apart?
+    #[must_use]
+    pub fn is_read_by(&self, other: &Self) -> bool {
+        self.is_cut() && other.reads_load() || self.is_load_loss() && other.reads_load_at_output()
+    }
+
+    /// Is it what the cut loses on its way to the output?
+    fn is_load_loss(&self) -> bool {
+        self.kind == "load_loss"
     }
 
     /// Is it the cut, whose contribution is the load for the others?
@@ -238,7 +255,7 @@ pub struct Simulated {
     pub contributions: Vec<Vec<f64>>,
 }
 
-/// Runs parts over a scene: the cut first, whose contribution becomes the load; then the other physical parts; last
+/// Runs parts over a scene: the cut first, whose contribution becomes the load; its losses; the other physical parts; last
 /// those that act on the output as a whole. The scene keeps load and simulated output for candidates. `None` when a
 /// part lacks an input.
 pub fn simulate(parts: &[Part], scene: &mut Scene) -> Option<Simulated> {
@@ -263,12 +280,17 @@ fn simulate_again<'a>(parts: &[Part], scene: &mut Scene, before: Option<(&'a Sim
     let mut contributions: Vec<Cow<'a, [f64]>> = vec![Cow::Borrowed(&[]); parts.len()];
     let mut total = vec![0.0; scene.rows()];
     scene.set_load(None);
+    scene.set_load_at_output(None);
     scene.set_simulated(None);
-    if parts.iter().any(Part::is_cut) {
+    let cut = parts.iter().any(Part::is_cut);
+    let before_others = |part: &Part| part.is_cut() || cut && part.is_load_loss();
+    if cut {
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_cut)?;
         scene.set_load(Some(total.clone()));
+        run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_load_loss)?;
+        scene.set_load_at_output(Some(total.clone()));
     }
-    let in_between = |part: &Part| !part.is_cut() && !part.acts_on_output();
+    let in_between = |part: &Part| !(before_others(part) || part.acts_on_output());
     run_stage(parts, scene, before, &mut contributions, &mut total, in_between)?;
     scene.set_simulated(Some(total.clone()));
     if parts.iter().any(Part::acts_on_output) {
@@ -309,6 +331,7 @@ mod tests {
         [[effect]]\nkind = \"no_load_power\"\nparameters = { p0_w = 100.0, p1_w_per_rpm = 0.2, p2_w_per_rpm2 = 1e-5 }\n\
         [[effect]]\nkind = \"cutting_power\"\nparameters = { kc11_n_per_mm2 = 1800.0, mc = 0.25 }\n\
         [[effect]]\nkind = \"load_loss\"\nparameters = { linear = 0.1 }\n\
+        [[effect]]\nkind = \"engagement_timing\"\nparameters = { share = 1.0, delay_s = 0.6 }\n\
         [[effect]]\nkind = \"clock_lag\"\nparameters = { share = 1.0, delay_s = 0.4 }\n";
 
     fn scene() -> Scene {

@@ -10,6 +10,47 @@ pub(super) struct Seen {
     pub(super) weight: f64,
 }
 
+/// What is carried along by every state (off, on) and age of a spell, and what each way on from there weighs.
+struct Lanes<T> {
+    now: [Vec<T>; 2],
+    next: [Vec<T>; 2],
+    stay: [Vec<f64>; 2],
+    turn: [Vec<f64>; 2],
+}
+
+/// From a state and an age to those of the next row.
+struct Way {
+    from: (usize, usize),
+    to: (usize, usize),
+    weight: f64,
+}
+
+impl<T: Copy> Lanes<T> {
+    /// With what a state carries that begins with a chance, and with the weight of a chance to go on.
+    fn begin(rhythm: &Rhythm, carried: impl Fn(usize, f64) -> T, weight: impl Fn(f64) -> f64) -> Self {
+        let now = [0, 1].map(|on| rhythm.begins[on].iter().map(|begins| carried(on, *begins)).collect::<Vec<T>>());
+        let stay = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| weight(1.0 - end)).collect());
+        let turn = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| weight(*end)).collect());
+        Self { next: now.clone(), now, stay, turn }
+    }
+
+    /// Goes on by a row: a spell lasts, and is a row older, or the other one begins. `meet` puts what comes along a way to
+    /// what is there already, at first `none`.
+    fn step(&mut self, none: T, mut meet: impl FnMut(&mut T, T, &Way)) {
+        let ages = self.now[0].len();
+        self.next.iter_mut().for_each(|lanes| lanes.fill(none));
+        for on in [0, 1] {
+            for (age, lane) in self.now[on].iter().enumerate() {
+                let older = (age + 1).min(ages - 1);
+                for (to, weight) in [((on, older), self.stay[on][age]), ((1 - on, 0), self.turn[on][age])] {
+                    meet(&mut self.next[to.0][to.1], *lane, &Way { from: (on, age), to, weight });
+                }
+            }
+        }
+        std::mem::swap(&mut self.now, &mut self.next);
+    }
+}
+
 /// A sequence that is still in the race.
 #[derive(Debug, Clone, Copy)]
 struct Lane {
@@ -21,12 +62,10 @@ impl Lane {
     const NONE: Self = Self { cost: f64::INFINITY, e: 0.0 };
 }
 
-/// The cheapest sequences up to a row, by state and age, and what going on costs.
+/// The cheapest sequences up to a row, by state and age.
 pub(super) struct Race<'a> {
     found: &'a Switching,
-    stay: [Vec<f64>; 2],
-    turn: [Vec<f64>; 2],
-    lanes: [Vec<Lane>; 2],
+    lanes: Lanes<Lane>,
     last: [f64; 2],
 }
 
@@ -34,46 +73,31 @@ impl<'a> Race<'a> {
     pub(super) fn begin(rhythm: &Rhythm, found: &'a Switching, value: f64, weight: f64) -> Self {
         let price = |chance: f64| -2.0 * chance.ln();
         let last = found.levels(value);
-        let lanes = [0, 1].map(|on| {
-            let first = found.surprise(last[on] * found.noise.first_weight(), weight);
-            rhythm.begins[on].iter().map(|begins| Lane { cost: price(*begins) + first, e: 0.0 }).collect()
-        });
-        let stay = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| price(1.0 - end)).collect());
-        let turn = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| price(*end)).collect());
-        Self { found, stay, turn, lanes, last }
+        let first = last.map(|x| found.surprise(x * found.noise.first_weight(), weight));
+        let lanes = Lanes::begin(rhythm, |on, begins| Lane { cost: price(begins) + first[on], e: 0.0 }, price);
+        Self { found, lanes, last }
     }
 
     /// Goes on by a row; says where each came from.
     pub(super) fn step(&mut self, value: f64, weight: f64) -> [Came; 2] {
-        let x = self.found.levels(value);
-        let ages = self.lanes[0].len();
-        let mut next = [vec![Lane::NONE; ages], vec![Lane::NONE; ages]];
+        let (found, x, last) = (self.found, self.found.levels(value), self.last);
+        let ages = self.lanes.now[0].len();
         let mut came = [Came::default(); 2];
-        for on in [0, 1] {
-            for (age, lane) in self.lanes[on].iter().enumerate() {
-                let to = |to: usize, price: f64| {
-                    let e = self.found.noise.innovation(x[to], self.last[on], lane.e);
-                    Lane { cost: lane.cost + price + self.found.surprise(e, weight), e }
-                };
-                let (stays, older) = (to(on, self.stay[on][age]), (age + 1).min(ages - 1));
-                if stays.cost < next[on][older].cost {
-                    next[on][older] = stays;
-                    came[on].note(older, ages, (on, age));
-                }
-                let (turns, other) = (to(1 - on, self.turn[on][age]), 1 - on);
-                if turns.cost < next[other][0].cost {
-                    next[other][0] = turns;
-                    came[other].note(0, ages, (on, age));
-                }
+        self.lanes.step(Lane::NONE, |there, lane, way| {
+            let e = found.noise.innovation(x[way.to.0], last[way.from.0], lane.e);
+            let cost = lane.cost + way.weight + found.surprise(e, weight);
+            if cost < there.cost {
+                *there = Lane { cost, e };
+                came[way.to.0].note(way.to.1, ages, way.from);
             }
-        }
-        (self.lanes, self.last) = (next, x);
+        });
+        self.last = x;
         came
     }
 
     /// State and age at the end of the cheapest.
     pub(super) fn winner(&self) -> (usize, usize) {
-        let ends = self.lanes.iter().enumerate();
+        let ends = self.lanes.now.iter().enumerate();
         let ends = ends.flat_map(|(on, lanes)| lanes.iter().enumerate().map(move |(age, lane)| (lane.cost, (on, age))));
         ends.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((0, 0), |(_, at)| at)
     }
@@ -107,62 +131,55 @@ impl Came {
 /// What is believed of state and age before a row is seen: chances that add up to one, each with its innovation, which is
 /// the mean of those that meet there.
 pub(super) struct Belief<'a> {
-    rhythm: &'a Rhythm,
     found: &'a Switching,
-    lanes: [Vec<(f64, f64)>; 2],
+    lanes: Lanes<(f64, f64)>,
     last: Option<[f64; 2]>,
 }
 
 impl<'a> Belief<'a> {
-    pub(super) fn begin(rhythm: &'a Rhythm, found: &'a Switching) -> Self {
-        let lanes = [0, 1].map(|on| rhythm.begins[on].iter().map(|p| (*p, 0.0)).collect());
-        Self { rhythm, found, lanes, last: None }
+    pub(super) fn begin(rhythm: &Rhythm, found: &'a Switching) -> Self {
+        let lanes = Lanes::begin(rhythm, |_, begins| (begins, 0.0), |chance| chance);
+        Self { found, lanes, last: None }
     }
 
     /// The chance that it is on in a row before that row is seen, and the logarithm of how likely the row was.
     pub(super) fn step(&mut self, row: &Seen) -> (f64, f64) {
-        let ages = self.lanes[0].len();
-        let mut next = [vec![(0.0, 0.0); ages], vec![(0.0, 0.0); ages]];
-        let mut expected = [0.0; 2];
-        for on in [0, 1] {
-            for (age, (p, e)) in self.lanes[on].iter().enumerate() {
-                for (to, age, p) in self.ways(on, age, *p).into_iter().filter(|(.., p)| *p > 0.0) {
-                    let (now, carried) = self.innovation(row, on, to, *e);
-                    let likely = p * (-0.5 * self.found.surprise(now, row.weight)).exp();
-                    expected[to] += p;
-                    next[to][age].0 += likely;
-                    next[to][age].1 += likely * carried;
-                }
-            }
-        }
-        let all: f64 = next.iter().flatten().map(|(p, _)| p).sum();
-        for (p, e) in next.iter_mut().flatten() {
+        let expected = match self.last {
+            None => self.see_first(row),
+            Some(last) => self.see(row, last),
+        };
+        self.last = Some(row.x);
+        let all: f64 = self.lanes.now.iter().flatten().map(|(p, _)| p).sum();
+        for (p, e) in self.lanes.now.iter_mut().flatten() {
             *e /= p.max(f64::MIN_POSITIVE);
             *p /= all.max(f64::MIN_POSITIVE);
         }
-        (self.lanes, self.last) = (next, Some(row.x));
         let on = expected[1] / (expected[0] + expected[1]).max(f64::MIN_POSITIVE);
         (on, all.max(f64::MIN_POSITIVE).ln())
     }
 
-    /// Where a spell goes from here, each with its chance: it lasts, or ends. Before the first row it goes nowhere.
-    fn ways(&self, on: usize, age: usize, p: f64) -> [(usize, usize, f64); 2] {
-        if self.last.is_none() {
-            return [(on, age, p), (1 - on, 0, 0.0)];
+    /// Chances of off and on before the first row of a stretch.
+    fn see_first(&mut self, row: &Seen) -> [f64; 2] {
+        let expected = [0, 1].map(|on| self.lanes.now[on].iter().map(|(p, _)| p).sum());
+        let first = row.x.map(|x| self.found.surprise(x * self.found.noise.first_weight(), row.weight));
+        for on in [0, 1] {
+            self.lanes.now[on].iter_mut().for_each(|(p, _)| *p *= (-0.5 * first[on]).exp());
         }
-        let (end, oldest) = (self.rhythm.ends[on][age], self.lanes[on].len() - 1);
-        [(on, (age + 1).min(oldest), p * (1.0 - end)), (1 - on, 0, p * end)]
+        expected
     }
 
-    /// The innovation of a row, and what is carried on of it.
-    fn innovation(&self, row: &Seen, from: usize, to: usize, e: f64) -> (f64, f64) {
-        let noise = self.found.noise;
-        match self.last {
-            None => (row.x[to] * noise.first_weight(), 0.0),
-            Some(last) => {
-                let e = noise.innovation(row.x[to], last[from], e);
-                (e, e)
-            }
-        }
+    /// Chances of off and on before a row with another before it.
+    fn see(&mut self, row: &Seen, last: [f64; 2]) -> [f64; 2] {
+        let found = self.found;
+        let mut expected = [0.0; 2];
+        self.lanes.step((0.0, 0.0), |there, (p, e), way| {
+            let p = p * way.weight;
+            let e = found.noise.innovation(row.x[way.to.0], last[way.from.0], e);
+            let likely = p * (-0.5 * found.surprise(e, row.weight)).exp();
+            expected[way.to.0] += p;
+            there.0 += likely;
+            there.1 += likely * e;
+        });
+        expected
     }
 }

@@ -32,6 +32,23 @@ const PARAMETERS: f64 = 4.0;
 /// Square of an innovation, in variances, beyond which a row says no more.
 const SURPRISE_MAX: f64 = 25.0;
 
+/// Rows next to each other in which it is on, or off.
+pub(super) struct Spell {
+    pub(super) on: bool,
+    pub(super) rows: Range<usize>,
+}
+
+/// The spells of a stretch, in order.
+pub(super) fn spells(state: &[f64], stretch: &Range<usize>) -> Vec<Spell> {
+    let mut start = stretch.start;
+    let of_rows = |rows: &[f64]| {
+        let spell = Spell { on: rows[0] > 0.5, rows: start..start + rows.len() };
+        start = spell.rows.end;
+        spell
+    };
+    state[stretch.clone()].chunk_by(|a, b| a == b).map(of_rows).collect()
+}
+
 /// By state (off, on) and by the rows a spell has lasted: the chance that it ends with the next row, and how often a
 /// stretch begins there.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,19 +93,18 @@ impl Rhythm {
     /// The rhythm of a sequence, from the spells that begin and end within a stretch; `None` where they are few.
     #[must_use]
     pub fn of(state: &[f64], stretches: &[Range<usize>]) -> Option<Self> {
-        let mut spells = [Vec::new(), Vec::new()];
+        let mut lasted = [Vec::new(), Vec::new()];
         for stretch in stretches {
-            let rows: Vec<&[f64]> = state[stretch.clone()].chunk_by(|a, b| a == b).collect();
-            let whole = rows.len().saturating_sub(2);
-            rows.iter()
-                .skip(1)
-                .take(whole)
-                .for_each(|spell| spells[usize::from(spell[0] > 0.5)].push(count(spell.len())));
+            let of_stretch = spells(state, stretch);
+            let whole = of_stretch.len().saturating_sub(2);
+            for spell in of_stretch.iter().skip(1).take(whole) {
+                lasted[usize::from(spell.on)].push(count(spell.rows.len()));
+            }
         }
-        if spells.iter().any(|spells| spells.len() < SPELLS_MIN) {
+        if lasted.iter().any(|lasted| lasted.len() < SPELLS_MIN) {
             return None;
         }
-        let laws = spells.map(|spells| Duration::of(&spells));
+        let laws = lasted.map(|rows| Duration::of(&rows));
         let [Some(off), Some(on)] = laws else { return None };
         let ages = (AGES * off.middle.max(on.middle)).ceil().clamp(1.0, count(AGES_MAX)) as usize;
         let survival = [off, on].map(|law| (0..ages).map(|age| law.lasts(count(age))).collect::<Vec<f64>>());
@@ -194,23 +210,16 @@ impl Duration {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::units;
-    use super::super::latent::{find, price};
+    use super::super::latent::{find, find_alone, price};
     use super::super::noise::{Arma, fit_near};
     use super::*;
-    use crate::physics::Scene;
-    use adapters::Recording;
-    use adapters::recording::{Cells, Numbers};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
     const ROWS: usize = 2000;
 
     fn frame() -> Frame {
-        let mut recording = Recording::new("test", (0..ROWS).map(count).collect(), None);
-        recording.set_column("spindle_power_w", Cells::Numbers(Numbers::full(vec![1.0; ROWS])));
-        let scene = Scene::new(&recording, "spindle_power_w", &Default::default()).expect("a scene");
-        Frame::new(&scene, &units(&scene), 1, |_| true)
+        Frame::one_run(ROWS)
     }
 
     /// On for 14 of every 38 rows, by two deviations of an innovation of noise with this memory.
@@ -230,8 +239,8 @@ mod tests {
     fn a_rhythm_shows_a_pump_that_switches_too_often_to_pay_for() {
         let (residual, state) = pump(0.3, 9);
         let noise = fit_near(&residual, &frame(), Arma::WHITE).1;
-        assert!(find(&residual, &frame(), noise, false).is_none());
-        let found = find(&residual, &frame(), noise, true).expect("a switch");
+        assert!(find(&residual, &frame(), noise).is_none());
+        let found = find_alone(&residual, &frame(), noise).expect("a switch");
         let right = found.state.iter().zip(&state).filter(|(found, true_state)| found == true_state).count();
         assert!(right > 1800 && (found.level - 2.0).abs() < 0.4, "{right} rows, level {}", found.level);
         let told = Rhythm::of(&found.state, &frame().stretches).expect("a rhythm");

@@ -85,14 +85,6 @@ fn has_friction(fit: &Fit) -> bool {
     fit.parts.iter().any(|part| friction.contains(&part.kind.as_str()))
 }
 
-/// Does it bend over a column that only an effect among the named ones follows?
-fn is_over_own_column(empirical: &Design, named: &Hypothesis) -> bool {
-    let Body::Empirical(form) = &empirical.part.body else { return false };
-    let members = &named.fit.parts[named.fit.parts.len() - named.members.len()..];
-    let own = members.iter().filter_map(|part| part.effect_and_form()?.0.own_column());
-    own.into_iter().any(|column| column == form.channel)
-}
-
 /// An empirical form fitted on top of something.
 #[derive(Clone)]
 pub(super) struct Form {
@@ -188,10 +180,10 @@ impl Case<'_> {
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
-        let own = is_over_own_column(&alone.design, best);
+        let own = self.is_over_own_column(&alone.design, best);
         let unlike = anything && close && !own && self.unlike(&found.best);
-        let refined =
-            is_against_motion(&on_top.design) && has_friction(&best.fit) || is_over_own_column(&on_top.design, best);
+        let refined = is_against_motion(&on_top.design) && has_friction(&best.fit)
+            || self.is_over_own_column(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;
@@ -256,7 +248,15 @@ impl Case<'_> {
             _ => false,
         };
         (of_velocity || is_against_motion(empirical)) && has_friction(&named.fit)
-            || is_over_own_column(empirical, named)
+            || self.is_over_own_column(empirical, named)
+    }
+
+    /// Does it bend over a column that only an effect among the named ones follows?
+    fn is_over_own_column(&self, empirical: &Design, named: &Hypothesis) -> bool {
+        let Body::Empirical(form) = &empirical.part.body else { return false };
+        let members = &named.fit.parts[named.fit.parts.len() - named.members.len()..];
+        let mut own = members.iter().filter_map(|part| part.effect_and_form()?.0.own_column(&self.scene));
+        own.any(|column| column == form.channel)
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.

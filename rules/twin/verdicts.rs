@@ -6,8 +6,10 @@ use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::model::{Body, Model, Part, simulate};
+use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER};
 use crate::physics::effect;
+use crate::physics::state::BETWEEN_SAMPLES;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
@@ -185,6 +187,11 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
         let delta = best.information - other.information - forgiven(outcome, other);
+        let within = if [best, other].iter().all(|of| acts_between_samples(outcome, of)) {
+            within.max(SURPRISE_MAX)
+        } else {
+            within
+        };
         if other.members.len() != best.members.len() || delta > within {
             continue;
         }
@@ -198,6 +205,13 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
         }
     }
     all
+}
+
+/// Is one of its members a delay as it acts between samples? Two of them have nearly all edges in common, and no single
+/// edge, which may stand there for a reason of its own, is to decide between a clock and a flag.
+fn acts_between_samples(outcome: &Outcome, hypothesis: &Hypothesis) -> bool {
+    let acts = |member: &usize| matches!(&outcome.designs[*member].part.body, Body::Effect(_, form) if form.name == BETWEEN_SAMPLES);
+    hypothesis.members.iter().any(acts)
 }
 
 /// Reluctance to name a fault of a meter, where one stands in the place of something else: it guards against false alarms

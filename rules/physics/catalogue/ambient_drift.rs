@@ -69,8 +69,8 @@ impl Effect for AmbientDrift {
         [direct].into_iter().chain(lag_forms(scene, "lag", &[1800.0, 3600.0, 7200.0])).collect()
     }
 
-    fn own_column(&self) -> Option<&'static str> {
-        Some("ambient_temperature_c")
+    fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
+        scene.role_name(Role::Ambient)
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {

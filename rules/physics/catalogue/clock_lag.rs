@@ -2,7 +2,7 @@
 
 use crate::physics::drive::rate;
 use crate::physics::excitation::{delays, varies};
-use crate::physics::state::delayed;
+use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
@@ -12,7 +12,7 @@ pub struct ClockLag;
 static DOC: EffectDoc = EffectDoc {
     kind: "clock_lag",
     family: "measurement",
-    law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt",
+    law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
     parameters: &[
         ParameterDoc {
             name: "share",
@@ -65,7 +65,7 @@ impl Effect for ClockLag {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["delay", "small"]
+        &["delay", "small", BETWEEN_SAMPLES]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -83,7 +83,7 @@ impl Effect for ClockLag {
         if form.name == "small" {
             return Some(vec![("lag_s", rate(scene, simulated).iter().map(|rate| -rate).collect())]);
         }
-        let late = delayed(scene, simulated, form.value("delay_s").unwrap_or(0.0));
+        let late = delayed_between_samples(scene, DOC.kind, simulated, form);
         Some(vec![("share", late.iter().zip(simulated).map(|(late, now)| late - now).collect())])
     }
 

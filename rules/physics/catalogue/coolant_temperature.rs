@@ -9,6 +9,8 @@ use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scen
 #[derive(Debug, Clone, Copy)]
 pub struct CoolantTemperature;
 
+const COOLANT: &str = "coolant_temperature_c";
+
 static DOC: EffectDoc = EffectDoc {
     kind: "coolant_temperature",
     family: "thermal",
@@ -31,7 +33,7 @@ static DOC: EffectDoc = EffectDoc {
             zh: "床身和工件跟随的时间常数",
         },
     ],
-    needs: &["coolant_temperature_c"],
+    needs: &[COOLANT],
     source: "expansion of what the coolant washes: 11.5 um/(m K) for steel",
     experiment_minutes: 40.0,
     rivals: &["ambient_drift", "spindle_growth"],
@@ -61,7 +63,7 @@ impl Effect for CoolantTemperature {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let known = scene.column("coolant_temperature_c").is_some_and(|coolant| spread(coolant) > 0.2);
+        let known = scene.column(COOLANT).is_some_and(|coolant| spread(coolant) > 0.2);
         if !known || !is_displacement(scene) {
             return Vec::new();
         }
@@ -72,21 +74,18 @@ impl Effect for CoolantTemperature {
         [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
     }
 
-    fn own_column(&self) -> Option<&'static str> {
-        Some("coolant_temperature_c")
+    fn own_column<'a>(&self, _scene: &'a Scene) -> Option<&'a str> {
+        Some(COOLANT)
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let coolant = scene.column("coolant_temperature_c")?;
+        let coolant = scene.column(COOLANT)?;
         let first = *coolant.first()?;
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
-        if form.name == "flowing" {
-            let on = scene.column("coolant_on")?;
-            return Some(vec![("per_k", change.iter().zip(on).map(|(change, on)| change * on).collect())]);
-        }
-        let followed = match form.value("tau_s") {
-            Some(tau_s) => first_order(scene, &change, tau_s),
-            None => change,
+        let followed = match (form.name, form.value("tau_s")) {
+            ("flowing", _) => change.iter().zip(scene.column("coolant_on")?).map(|(change, on)| change * on).collect(),
+            (_, Some(tau_s)) => first_order(scene, &change, tau_s),
+            (_, None) => change,
         };
         Some(vec![("per_k", followed)])
     }

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::cut;
 use crate::physics::excitation::delays;
-use crate::physics::state::delayed;
+use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
@@ -12,7 +12,7 @@ pub struct EngagementTiming;
 static DOC: EffectDoc = EffectDoc {
     kind: "engagement_timing",
     family: "measurement",
-    law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut",
+    law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut, losses included; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
     parameters: &[
         ParameterDoc {
             name: "share",
@@ -56,6 +56,10 @@ impl Effect for EngagementTiming {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &[BETWEEN_SAMPLES]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.load().is_none() || cut(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
@@ -67,10 +71,14 @@ impl Effect for EngagementTiming {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let engaged = scene.role(Role::Engaged)?;
-        let load = held_from_cut(scene, scene.load()?, engaged);
-        let shifted = delayed(scene, engaged, form.value("delay_s").unwrap_or(0.0));
+        let load = held_from_cut(scene, scene.load_at_output()?, engaged);
+        let shifted = delayed_between_samples(scene, DOC.kind, engaged, form);
         let law = |row: usize| (shifted[row] - engaged[row]) * load[row];
         Some(vec![("share", (0..scene.rows()).map(law).collect())])
+    }
+
+    fn reads_load_at_output(&self) -> bool {
+        true
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

@@ -76,7 +76,11 @@ impl Effect for OverrideDelay {
             let ratio = if *now > 0.0 { (before / now).clamp(0.0, 4.0) } else { 1.0 };
             load * (ratio.powf(0.75) - 1.0)
         };
-        Some(vec![("share", scene.load()?.iter().zip(&before).zip(&feed).map(law).collect())])
+        Some(vec![("share", scene.load_at_output()?.iter().zip(&before).zip(&feed).map(law).collect())])
+    }
+
+    fn reads_load_at_output(&self) -> bool {
+        true
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

@@ -49,8 +49,8 @@ impl Effect for SupplyVoltage {
         if swings && scene.simulated().is_some() { vec![Form::plain()] } else { Vec::new() }
     }
 
-    fn own_column(&self) -> Option<&'static str> {
-        Some("supply_voltage_v")
+    fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
+        scene.role_name(Role::Voltage)
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {

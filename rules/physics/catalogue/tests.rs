@@ -179,6 +179,10 @@ fn whatever_changes_with_the_load_says_so() {
             for form in effect.forms(&scene).iter().chain([&effect.default_form(&scene)]) {
                 let changes = effect.columns(&scene, form) != effect.columns(&heavier, form);
                 assert!(!changes || effect.reads_load(), "{} {form:?}", effect.doc().kind);
+                let mut lossy = scene.clone();
+                lossy.set_load_at_output(heavier.load().map(<[f64]>::to_vec));
+                let changes = effect.columns(&scene, form) != effect.columns(&lossy, form);
+                assert!(!changes || effect.reads_load_at_output(), "{} {form:?}", effect.doc().kind);
             }
         }
     }

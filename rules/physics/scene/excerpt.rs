@@ -52,6 +52,7 @@ impl Scene {
             usable: usable.iter().zip(blocks).map(|(usable, block)| *usable && block.compared).collect(),
             passes: self.passes.iter().map(|rows| blocks_of(blocks, rows)).collect(),
             load: self.load.as_deref().map(mean),
+            load_at_output: self.load_at_output.as_deref().map(mean),
             simulated: self.simulated.as_deref().map(mean),
             laws: std::cell::RefCell::default(),
             feed_load_growth: std::sync::OnceLock::from(growth),
