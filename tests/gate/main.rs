@@ -9,6 +9,8 @@ mod late;
 mod latency;
 mod offsets;
 mod outputs;
+#[path = "../support/port.rs"]
+mod port;
 #[path = "../box/process.rs"]
 #[allow(dead_code, reason = "the suite of the box uses more of it")]
 mod process;

@@ -29,7 +29,7 @@ fn full() -> (std::io::PipeReader, Stdio) {
 fn a_full_pipe_stops_neither_the_tick_nor_the_writing() {
     let directory = tempfile::tempdir().expect("a directory");
     let config = prepared(directory.path(), "simulated://lathe?dropouts_per_h=0&begun_s=110");
-    let port = std::net::TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a port").port();
+    let port = super::port::free_port();
     let address = format!("127.0.0.1:{port}");
     let ((mut told, operator), (_logged, engineer)) = (full(), full());
     let mut command = program();

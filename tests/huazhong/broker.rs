@@ -1,6 +1,7 @@
 //! A real mosquitto on a free port of this computer; killed when dropped.
 
-use std::net::{TcpListener, TcpStream};
+use crate::port::free_port;
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -22,10 +23,6 @@ pub(crate) fn program(name: &str) -> Option<PathBuf> {
         eprintln!("SKIPPED: {name} is not installed (Debian: mosquitto, mosquitto-clients)");
     }
     found
-}
-
-pub(crate) fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a free port").port()
 }
 
 impl Broker {
@@ -55,10 +52,11 @@ impl Broker {
     pub(crate) fn run(&mut self) {
         let mut command = Command::new(program("mosquitto").expect("found before"));
         command.arg("-c").arg(self.directory.path().join("conf")).stdout(Stdio::null()).stderr(Stdio::null());
-        self.child = Some(command.spawn().expect("mosquitto starts"));
+        let child = self.child.insert(command.spawn().expect("mosquitto starts"));
         let until = Instant::now() + Duration::from_secs(10);
         while TcpStream::connect(("127.0.0.1", self.port)).is_err() {
-            assert!(Instant::now() < until, "mosquitto does not listen at {}", self.port);
+            let ended = child.try_wait().expect("a child of ours");
+            assert!(ended.is_none() && Instant::now() < until, "mosquitto does not listen at {}: {ended:?}", self.port);
             std::thread::sleep(Duration::from_millis(10));
         }
     }

@@ -1,7 +1,7 @@
 //! The vendor's library: one with the same functions, compiled here and really loaded in the real child process.
 
-use crate::broker::free_port;
 use crate::library::{Library, nothing_is_left, poll_survives};
+use crate::port::free_port;
 use crate::stand::until;
 use adapters::address::Endpoint;
 use adapters::clock::SystemClock;

@@ -13,6 +13,8 @@ mod hnc;
 #[path = "../support/library.rs"]
 mod library;
 mod nclink;
+#[path = "../support/port.rs"]
+mod port;
 mod samples;
 mod sampling;
 #[path = "../support/served.rs"]

@@ -1,8 +1,9 @@
 //! What a controller samples by itself reaches the tick: blocks, features, raw samples around what is remarkable, through a
 //! real broker and through the library really loaded.
 
-use crate::broker::{Broker, free_port};
+use crate::broker::Broker;
 use crate::hnc::library;
+use crate::port::free_port;
 use crate::process::{Gateway, get, program, wait_for};
 use crate::stand::{Stand, address};
 use adapters::{Fact, FactValue, Reading};

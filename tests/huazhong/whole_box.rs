@@ -1,7 +1,8 @@
 //! The programs as an integrator starts them: one serves the simulated machine as an NC-Link device, the other reads it.
 
-use crate::broker::{Broker, free_port};
+use crate::broker::Broker;
 use crate::hnc::library;
+use crate::port::free_port;
 use crate::process::{Gateway, get, program, run, stderr, stdout, wait_for};
 use std::time::Duration;
 

@@ -115,7 +115,7 @@ fn a_late_answer_is_never_taken_for_the_next_one() {
 
 #[test]
 fn nobody_there_is_told_with_what_to_do() {
-    let port = super::partner::free_port();
+    let port = super::port::free_port();
     let error = poll(source(&format!("modbus-tcp://127.0.0.1:{port}?profile=pac")).as_mut()).expect_err("nobody");
     assert!(error.to_string().contains("nothing listens on port"), "{error}");
 }

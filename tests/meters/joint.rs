@@ -2,7 +2,7 @@
 //! meters, and three phases of current at 1 kHz. The box's own assembly reads them all, and what it merged is compared with
 //! what was true, channel by channel.
 
-use super::partner::free_port;
+use super::port::free_port;
 use adapters::address::{Address, Target};
 use adapters::clock::{Clock, SECOND_NS, ScaledClock};
 use adapters::modbus::{profile, server::ModbusServer};

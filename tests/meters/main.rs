@@ -6,6 +6,8 @@ mod faults;
 mod joint;
 mod modbus;
 mod partner;
+#[path = "../support/port.rs"]
+mod port;
 mod serial_faults;
 mod served;
 mod waveforms;

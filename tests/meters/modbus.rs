@@ -1,7 +1,8 @@
 //! Shipped profiles against pymodbus, over TCP and over a serial line. The addresses are typed from the meters' lists, not
 //! taken from the profiles.
 
-use super::partner::{Cell, cable, free_port, near, poll, pymodbus, pymodbus_is_there, socat_is_there, source};
+use super::partner::{Cell, cable, near, poll, pymodbus, pymodbus_is_there, socat_is_there, source};
+use super::port::free_port;
 use adapters::{Reading, Source};
 use std::time::{Duration, Instant};
 

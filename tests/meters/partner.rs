@@ -3,7 +3,6 @@
 use adapters::clock::SystemClock;
 use adapters::{Address, ChannelId, Reading, Source, SourceError};
 use std::io::{BufRead, BufReader, Write};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -60,11 +59,6 @@ pub(crate) fn pymodbus(arguments: &[&str], cells: &[Cell]) -> Running {
     let running = Running(child);
     assert_eq!(line.trim(), "ready", "pymodbus did not start");
     running
-}
-
-/// A port that is free at this moment.
-pub(crate) fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address").port()
 }
 
 /// Two ends of a serial line.

@@ -1,6 +1,7 @@
 //! `serve modbus` as another process, read by our own client, by mbpoll and by `run`.
 
-use super::partner::{free_port, number, poll, source};
+use super::partner::{number, poll, source};
+use super::port::free_port;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};

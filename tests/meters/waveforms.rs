@@ -81,7 +81,7 @@ fn what_is_no_stream_is_told() {
     let derailed = sends([header().line().into_bytes(), vec![0x55; 64]].concat());
     let error = Receiver::new("waveform:test", &derailed).read(&clock).expect_err("no frame");
     assert!(matches!(error, SourceError::Decode { .. }), "{error}");
-    let port = super::partner::free_port();
+    let port = super::port::free_port();
     let nobody = Endpoint { host: "127.0.0.1".to_owned(), port };
     let error = Receiver::new("waveform:test", &nobody).read(&clock).expect_err("nobody");
     assert!(error.to_string().contains("serve waveform"), "{error}");
