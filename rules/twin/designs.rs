@@ -25,7 +25,7 @@ fn reluctance(kind: &str, form: &Form) -> f64 {
     }
 }
 
-/// Kinds that act at the edges of the engagement only: one of them at a time, or they mend each other's form.
+/// Kinds that act at the edges of the engagement or the feed only: one of them at a time, or they mend each other's form.
 pub(super) const AT_EDGES: [&str; 5] =
     ["clock_lag", "meter_window", "engagement_timing", "entry_exit", "override_delay"];
 

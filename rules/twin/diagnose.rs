@@ -72,8 +72,8 @@ pub struct Case<'a> {
     pub unbent: Option<Vec<Part>>,
     /// Effects at edges that show with every row in full.
     pub seen_at_edges: Vec<SeenForm>,
-    /// Delays that show between samples, by kind: each with its standard error, s.
-    pub delays: BTreeMap<&'static str, (f64, f64)>,
+    /// Standard errors of the delays that show between samples, by kind, s.
+    pub delay_errors_s: BTreeMap<&'static str, f64>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -120,7 +120,7 @@ impl<'a> Case<'a> {
             switching: None,
             unbent: None,
             seen_at_edges: Vec::new(),
-            delays: BTreeMap::new(),
+            delay_errors_s: BTreeMap::new(),
             whole: None,
         }
     }

@@ -173,10 +173,9 @@ fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
 
 /// The delay of a part that acts between samples: as often as edges were late.
 fn delay_between_samples(case: &Case<'_>, part: &Part) -> Option<Estimate> {
-    let (_, form) = part.effect_and_form().filter(|(_, form)| form.name == BETWEEN_SAMPLES)?;
+    let (_, form) = part.effect_and_form().filter(|_| part.has_form(BETWEEN_SAMPLES))?;
     let value = form.value("delay_s")?;
-    let (_, error) = case.delays.get(part.kind.as_str())?;
-    let half = INTERVAL * error;
+    let half = INTERVAL * case.delay_errors_s.get(part.kind.as_str())?;
     Some(Estimate { name: "delay_s".to_owned(), value, low: value - half, high: value + half, unit: "s".to_owned() })
 }
 

@@ -3,10 +3,10 @@
 
 use super::designs::{AT_EDGES, Design};
 use super::diagnose::Case;
-use super::fit::Fit;
+use super::fit::{Fit, residual};
 use super::frame::Frame;
 use super::latent::{self, Switching};
-use super::model::{Body, simulate};
+use super::model::simulate;
 use super::noise::Arma;
 use super::ripple;
 use super::search::Hypothesis;
@@ -75,7 +75,7 @@ impl Case<'_> {
 
     /// Is every row fitted by itself? Averaged rows have neither phase nor edge any more.
     pub(super) fn is_row_by_row(&self) -> bool {
-        self.frame.len() == (0..self.frame.len()).map(|group| self.frame.rows(group).len()).sum::<usize>()
+        (0..self.frame.len()).all(|group| self.frame.rows(group).len() == 1)
     }
 
     /// Is the output what a meter in the supply shows? Consumers and the mains' ripple are nowhere else, and not in the
@@ -147,11 +147,10 @@ impl Case<'_> {
     /// Follows what an excerpt has shown of hidden states through the whole recording.
     pub(super) fn show_hidden(&mut self, base: &Fit) {
         let Some(whole) = &mut self.whole else { return };
-        if self.ripple.is_none() && self.switching.is_none() || simulate(&base.parts, &mut whole.scene).is_none() {
+        if self.ripple.is_none() && self.switching.is_none() {
             return;
         }
-        let simulated = whole.frame.reduce(whole.scene.simulated().unwrap_or_default());
-        let residual: Vec<f64> = whole.recorded.iter().zip(&simulated).map(|(x, simulated)| x - simulated).collect();
+        let Some(residual) = whole.with_data(|data| residual(data, &base.parts)) else { return };
         if let Some(found) = &self.switching {
             let found = latent::again(&residual, &whole.frame, found);
             let state = whole.switch_per_row(&found);
@@ -241,5 +240,5 @@ impl Case<'_> {
 
 /// Is its state read from a residual?
 fn is_latent(design: &Design) -> bool {
-    matches!(&design.part.body, Body::Effect(_, form) if form.name == "latent")
+    design.part.has_form("latent")
 }

@@ -61,30 +61,58 @@ pub struct Switching {
 /// Finds the switch in a residual of this noise, if there is one that explains more than its price: that of every switching.
 #[must_use]
 pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
-    likeliest(residual, frame, noise).filter(Offer::holds).map(|offer| offer.found)
+    Search::new(residual, frame, noise).likeliest().filter(Offer::holds).map(|offer| offer.found)
 }
 
 /// The same, and where its switchings cost too much, as its rhythm tells it. For what is left where nothing is named: beside
 /// others it is no noise that a rhythm could be read from.
 #[must_use]
 pub fn find_alone(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
-    let best = likeliest(residual, frame, noise)?;
+    let search = Search::new(residual, frame, noise);
+    let best = search.likeliest()?;
     let near = best.gain > -RHYTHM_SHARE * best.found.price;
     let told = if near { best.found.with_rhythms(residual, frame) } else { Vec::new() };
-    let told = told.into_iter().map(|found| Offer::of(found, residual, frame, noise));
+    let told = told.into_iter().map(|found| search.offer(found));
     let best = std::iter::once(best).chain(told).max_by(|a, b| a.gain.total_cmp(&b.gain));
     best.filter(Offer::holds).map(|offer| offer.found)
 }
 
-/// The best of all starts.
-fn likeliest(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Offer> {
-    let offer = |found: Switching| Offer::of(found, residual, frame, noise);
-    let starts = [noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
-    let begun = starts.iter().flat_map(|noise| STARTS.map(|size| begin(residual, frame, *noise, size)));
-    let mut begun: Vec<Offer> = begun.flatten().filter(Switching::lasts).map(offer).collect();
-    begun.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let settled = begun.into_iter().take(SETTLED).filter_map(|begun| begun.found.settled(residual, frame));
-    settled.map(offer).max_by(|a, b| a.gain.total_cmp(&b.gain))
+/// Where a switch is looked for.
+struct Search<'a> {
+    residual: &'a [f64],
+    frame: &'a Frame,
+    noise: Arma,
+    /// Logarithm of the likelihood of the residual without a switch.
+    without: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(residual: &'a [f64], frame: &'a Frame, noise: Arma) -> Self {
+        Self { residual, frame, noise, without: log_likelihood(residual, frame, noise) }
+    }
+
+    /// The best of all starts.
+    fn likeliest(&self) -> Option<Offer> {
+        let starts = [self.noise, Arma::WHITE, Arma { phi: 0.7, theta: 0.0 }];
+        let begin = |noise: &Arma| STARTS.map(|size| begin(self.residual, self.frame, *noise, size));
+        let begun = starts.iter().flat_map(begin).flatten().filter(Switching::lasts);
+        let mut begun: Vec<Offer> = begun.map(|found| self.offer(found)).collect();
+        begun.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let settled =
+            begun.into_iter().take(SETTLED).filter_map(|begun| begun.found.settled(self.residual, self.frame));
+        settled.map(|found| self.offer(found)).max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    fn offer(&self, found: Switching) -> Offer {
+        let with = log_likelihood(&found.left(self.residual), self.frame, found.noise);
+        let price = price(&found, self.residual, self.frame);
+        Offer { gain: 2.0 * (with - self.without) - price, found: Switching { price, ..found } }
+    }
+}
+
+fn log_likelihood(residual: &[f64], frame: &Frame, noise: Arma) -> f64 {
+    let e = frame.whiten(residual, noise);
+    frame.log_likelihood(dot(&e, &e), noise)
 }
 
 /// A switch, and what it explains beyond its price, in units of information.
@@ -94,17 +122,6 @@ struct Offer {
 }
 
 impl Offer {
-    /// Over the same residual without a switch, in this noise.
-    fn of(found: Switching, residual: &[f64], frame: &Frame, noise: Arma) -> Self {
-        let likelihood = |residual: &[f64], noise: Arma| {
-            let e = frame.whiten(residual, noise);
-            frame.log_likelihood(dot(&e, &e), noise)
-        };
-        let gained = 2.0 * (likelihood(&found.left(residual), found.noise) - likelihood(residual, noise));
-        let price = price(&found, residual, frame);
-        Self { gain: gained - price, found: Switching { price, ..found } }
-    }
-
     fn holds(&self) -> bool {
         self.gain > 0.0 && self.found.switchings >= SWITCHINGS_MIN && self.found.lasts()
     }

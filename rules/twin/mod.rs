@@ -13,6 +13,7 @@
 
 mod agreement;
 pub mod bind;
+mod carried;
 mod channel;
 mod consumer;
 mod corroborated;

@@ -128,6 +128,12 @@ impl Part {
         form
     }
 
+    /// Is it an effect of the catalogue in the form of this name?
+    #[must_use]
+    pub(super) fn has_form(&self, name: &str) -> bool {
+        matches!(&self.body, Body::Effect(_, form) if form.name == name)
+    }
+
     /// One column per linear parameter, by name; `None` when an input is missing. An expression has none.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
@@ -164,9 +170,8 @@ impl Part {
     /// Does it act on the output that the physical parts simulate, and so come after all of them?
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
-        let clipped = matches!(&self.body, Body::Effect(_, form) if form.name == "clipped");
         let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation"];
-        clipped || acting.contains(&self.kind.as_str())
+        self.has_form("clipped") || acting.contains(&self.kind.as_str())
     }
 
     /// Does it read the load that the cut simulates?
@@ -283,14 +288,16 @@ fn simulate_again<'a>(parts: &[Part], scene: &mut Scene, before: Option<(&'a Sim
     scene.set_load_at_output(None);
     scene.set_simulated(None);
     let cut = parts.iter().any(Part::is_cut);
-    let before_others = |part: &Part| part.is_cut() || cut && part.is_load_loss();
+    let losses = cut && parts.iter().any(Part::is_load_loss);
     if cut {
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_cut)?;
         scene.set_load(Some(total.clone()));
+    }
+    if losses {
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_load_loss)?;
         scene.set_load_at_output(Some(total.clone()));
     }
-    let in_between = |part: &Part| !(before_others(part) || part.acts_on_output());
+    let in_between = |part: &Part| !(part.is_cut() || losses && part.is_load_loss() || part.acts_on_output());
     run_stage(parts, scene, before, &mut contributions, &mut total, in_between)?;
     scene.set_simulated(Some(total.clone()));
     if parts.iter().any(Part::acts_on_output) {

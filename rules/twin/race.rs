@@ -1,6 +1,7 @@
 //! Which sequence of on and off is the likeliest, and how likely each is by now: Viterbi's race and the forward recursion
 //! over state and age of a spell, in which every survivor carries its own innovation.
 
+use super::carried::{Cheapest, Mixture};
 use super::latent::Switching;
 use super::rhythm::Rhythm;
 
@@ -51,21 +52,10 @@ impl<T: Copy> Lanes<T> {
     }
 }
 
-/// A sequence that is still in the race.
-#[derive(Debug, Clone, Copy)]
-struct Lane {
-    cost: f64,
-    e: f64,
-}
-
-impl Lane {
-    const NONE: Self = Self { cost: f64::INFINITY, e: 0.0 };
-}
-
 /// The cheapest sequences up to a row, by state and age.
 pub(super) struct Race<'a> {
     found: &'a Switching,
-    lanes: Lanes<Lane>,
+    lanes: Lanes<Cheapest>,
     last: [f64; 2],
 }
 
@@ -74,7 +64,7 @@ impl<'a> Race<'a> {
         let price = |chance: f64| -2.0 * chance.ln();
         let last = found.levels(value);
         let first = last.map(|x| found.surprise(x * found.noise.first_weight(), weight));
-        let lanes = Lanes::begin(rhythm, |on, begins| Lane { cost: price(begins) + first[on], e: 0.0 }, price);
+        let lanes = Lanes::begin(rhythm, |on, begins| Cheapest { cost: price(begins) + first[on], e: 0.0 }, price);
         Self { found, lanes, last }
     }
 
@@ -83,11 +73,10 @@ impl<'a> Race<'a> {
         let (found, x, last) = (self.found, self.found.levels(value), self.last);
         let ages = self.lanes.now[0].len();
         let mut came = [Came::default(); 2];
-        self.lanes.step(Lane::NONE, |there, lane, way| {
+        self.lanes.step(Cheapest::NONE, |there, lane, way| {
             let e = found.noise.innovation(x[way.to.0], last[way.from.0], lane.e);
             let cost = lane.cost + way.weight + found.surprise(e, weight);
-            if cost < there.cost {
-                *there = Lane { cost, e };
+            if there.take(cost, e) {
                 came[way.to.0].note(way.to.1, ages, way.from);
             }
         });
@@ -132,13 +121,13 @@ impl Came {
 /// the mean of those that meet there.
 pub(super) struct Belief<'a> {
     found: &'a Switching,
-    lanes: Lanes<(f64, f64)>,
+    lanes: Lanes<Mixture>,
     last: Option<[f64; 2]>,
 }
 
 impl<'a> Belief<'a> {
     pub(super) fn begin(rhythm: &Rhythm, found: &'a Switching) -> Self {
-        let lanes = Lanes::begin(rhythm, |_, begins| (begins, 0.0), |chance| chance);
+        let lanes = Lanes::begin(rhythm, |_, chance| Mixture { chance, e: 0.0 }, |chance| chance);
         Self { found, lanes, last: None }
     }
 
@@ -149,21 +138,18 @@ impl<'a> Belief<'a> {
             Some(last) => self.see(row, last),
         };
         self.last = Some(row.x);
-        let all: f64 = self.lanes.now.iter().flatten().map(|(p, _)| p).sum();
-        for (p, e) in self.lanes.now.iter_mut().flatten() {
-            *e /= p.max(f64::MIN_POSITIVE);
-            *p /= all.max(f64::MIN_POSITIVE);
-        }
+        let all: f64 = self.lanes.now.iter().flatten().map(|lane| lane.chance).sum();
+        self.lanes.now.iter_mut().flatten().for_each(|lane| lane.settle(all));
         let on = expected[1] / (expected[0] + expected[1]).max(f64::MIN_POSITIVE);
         (on, all.max(f64::MIN_POSITIVE).ln())
     }
 
     /// Chances of off and on before the first row of a stretch.
     fn see_first(&mut self, row: &Seen) -> [f64; 2] {
-        let expected = [0, 1].map(|on| self.lanes.now[on].iter().map(|(p, _)| p).sum());
+        let expected = [0, 1].map(|on| self.lanes.now[on].iter().map(|lane| lane.chance).sum());
         let first = row.x.map(|x| self.found.surprise(x * self.found.noise.first_weight(), row.weight));
         for on in [0, 1] {
-            self.lanes.now[on].iter_mut().for_each(|(p, _)| *p *= (-0.5 * first[on]).exp());
+            self.lanes.now[on].iter_mut().for_each(|lane| lane.chance *= (-0.5 * first[on]).exp());
         }
         expected
     }
@@ -172,13 +158,11 @@ impl<'a> Belief<'a> {
     fn see(&mut self, row: &Seen, last: [f64; 2]) -> [f64; 2] {
         let found = self.found;
         let mut expected = [0.0; 2];
-        self.lanes.step((0.0, 0.0), |there, (p, e), way| {
-            let p = p * way.weight;
-            let e = found.noise.innovation(row.x[way.to.0], last[way.from.0], e);
-            let likely = p * (-0.5 * found.surprise(e, row.weight)).exp();
-            expected[way.to.0] += p;
-            there.0 += likely;
-            there.1 += likely * e;
+        self.lanes.step(Mixture::default(), |there, lane, way| {
+            let chance = lane.chance * way.weight;
+            let e = found.noise.innovation(row.x[way.to.0], last[way.from.0], lane.e);
+            expected[way.to.0] += chance;
+            there.take(chance * (-0.5 * found.surprise(e, row.weight)).exp(), e);
         });
         expected
     }

@@ -7,6 +7,7 @@
 //! likeliest (the forward sum); each edge is then late or not as the likeliest sequence has it (Viterbi), and what that
 //! choice explains beyond the sum is its price. Where the output ramps over several rows a delay is what it is in the mean.
 
+use super::carried::{Cheapest, Mixture};
 use super::frame::Frame;
 use super::noise::Arma;
 use crate::statistics::count;
@@ -80,20 +81,10 @@ struct Looks {
     chance: [f64; 2],
 }
 
-/// What is carried along with a look of a row: its value, its innovation, and its chance or its cost.
-#[derive(Clone, Copy)]
-struct Lane {
-    x: f64,
-    e: f64,
-    weight: f64,
-}
-
 /// From a look of the row before to a look of this one.
 struct Way {
     from: usize,
     to: usize,
-    /// That of the lane it comes from.
-    weight: f64,
     /// The innovation that is carried on.
     e: f64,
     /// Square of the innovation, in variances.
@@ -176,28 +167,27 @@ impl<'a> Edges<'a> {
         Looks { x: [x, later], late_rows: [whole, whole + 1.0], chance: [1.0 - chance, chance] }
     }
 
-    /// The ways into the looks of a row; `begin` is the weight of the only one into the first row of a stretch.
+    /// The ways into the looks of a row from those of the row before with their innovations; one where there is none.
     fn ways<'b>(
         &'b self,
         looks: &'b Looks,
         row: usize,
-        last: Option<&'b [Lane; 2]>,
-        begin: f64,
+        last: Option<(Looks, [f64; 2])>,
     ) -> impl Iterator<Item = Way> + 'b {
         let noise = self.noise;
         let way = move |from: usize, to: usize| {
             let x = looks.x[to];
-            let (weight, innovation, e) = match last {
+            let (innovation, e) = match last {
                 // The stationary start carries its size into the recursion only through its value.
-                None if from == 0 => (begin, x * noise.first_weight(), 0.0),
+                None if from == 0 => (x * noise.first_weight(), 0.0),
                 None => return None,
-                Some(lanes) => {
-                    let e = noise.innovation(x, lanes[from].x, lanes[from].e);
-                    (lanes[from].weight, e, e)
+                Some((before, last_e)) => {
+                    let e = noise.innovation(x, before.x[from], last_e[from]);
+                    (e, e)
                 }
             };
             let surprise = (innovation * self.frame.weight(row) / self.deviation).powi(2).min(SURPRISE_MAX);
-            Some(Way { from, to, weight, e, surprise })
+            Some(Way { from, to, e, surprise })
         };
         let looked = (0..2).filter(|to| looks.chance[*to] > 0.0);
         looked.flat_map(move |to| (0..2).filter_map(move |from| way(from, to)))
@@ -209,23 +199,19 @@ impl<'a> Edges<'a> {
     }
 
     fn likelihood_of(&self, lateness: Lateness, rows: Range<usize>) -> f64 {
-        let mut lanes: Option<[Lane; 2]> = None;
+        let mut last: Option<(Looks, [Mixture; 2])> = None;
         let mut sum = 0.0;
         for row in rows {
             let looks = self.looks(lateness, row);
-            let mut next = looks.x.map(|x| Lane { x, e: 0.0, weight: 0.0 });
-            for way in self.ways(&looks, row, lanes.as_ref(), 1.0) {
-                let likely = way.weight * looks.chance[way.to] * (-0.5 * way.surprise).exp();
-                next[way.to].weight += likely;
-                next[way.to].e += likely * way.e;
+            let mut next = [Mixture::default(); 2];
+            for way in self.ways(&looks, row, last.map(|(looks, lanes)| (looks, lanes.map(|lane| lane.e)))) {
+                let chance = last.map_or(1.0, |(_, lanes)| lanes[way.from].chance);
+                next[way.to].take(chance * looks.chance[way.to] * (-0.5 * way.surprise).exp(), way.e);
             }
-            let all = (next[0].weight + next[1].weight).max(f64::MIN_POSITIVE);
-            for lane in &mut next {
-                lane.e /= lane.weight.max(f64::MIN_POSITIVE);
-                lane.weight /= all;
-            }
-            sum += all.ln();
-            lanes = Some(next);
+            let all = next[0].chance + next[1].chance;
+            next.iter_mut().for_each(|lane| lane.settle(all));
+            sum += all.max(f64::MIN_POSITIVE).ln();
+            last = Some((looks, next));
         }
         sum
     }
@@ -239,24 +225,23 @@ impl<'a> Edges<'a> {
     }
 
     fn likeliest_of(&self, lateness: Lateness, rows: Range<usize>, late_rows: &mut [f64]) -> f64 {
-        let mut lanes: Option<[Lane; 2]> = None;
+        let mut last: Option<(Looks, [Cheapest; 2])> = None;
         // Where each look came from, and how surprising it was from there.
         let mut back = Vec::with_capacity(rows.len());
         for row in rows.clone() {
             let looks = self.looks(lateness, row);
-            let mut next = looks.x.map(|x| Lane { x, e: 0.0, weight: f64::INFINITY });
+            let mut next = [Cheapest::NONE; 2];
             let mut came = [(0, 0.0); 2];
-            for way in self.ways(&looks, row, lanes.as_ref(), 0.0) {
-                let cost = way.weight + way.surprise - 2.0 * looks.chance[way.to].ln();
-                if cost < next[way.to].weight {
-                    next[way.to] = Lane { e: way.e, weight: cost, ..next[way.to] };
+            for way in self.ways(&looks, row, last.map(|(looks, lanes)| (looks, lanes.map(|lane| lane.e)))) {
+                let cost = last.map_or(0.0, |(_, lanes)| lanes[way.from].cost);
+                if next[way.to].take(cost + way.surprise - 2.0 * looks.chance[way.to].ln(), way.e) {
                     came[way.to] = (way.from, way.surprise);
                 }
             }
             back.push((looks, came));
-            lanes = Some(next);
+            last = Some((looks, next));
         }
-        let mut look = lanes.map_or(0, |lanes| usize::from(lanes[1].weight < lanes[0].weight));
+        let mut look = last.map_or(0, |(_, lanes)| usize::from(lanes[1].cost < lanes[0].cost));
         let mut along = 0.0;
         for (row, (looks, came)) in rows.zip(back).rev() {
             late_rows[row] = looks.late_rows[look];

@@ -6,7 +6,7 @@
 
 use super::designs::{AT_EDGES, Design, design, designs_of};
 use super::diagnose::Case;
-use super::fit::{Fit, fit, fit_levels};
+use super::fit::{Fit, fit, fit_levels, residual};
 use super::model::{Part, simulate};
 use super::noise::Arma;
 use super::sampled::{self, Edges};
@@ -132,13 +132,7 @@ impl Case<'_> {
         let mut with_it = Fit { noise, ..base.clone() };
         for _ in 0..ROUNDS {
             let alone = &with_it.parts[..base.parts.len()];
-            let simulated = simulate(alone, &mut self.scene)?;
-            let residual: Vec<f64> = self
-                .recorded
-                .iter()
-                .zip(self.frame.reduce(&simulated.total))
-                .map(|(y, simulated)| y - simulated)
-                .collect();
+            let residual = self.with_data(|data| residual(data, alone))?;
             let innovations = self.frame.whiten(&with_it.residual, with_it.noise);
             let deviation = robust_deviation(innovations).filter(|deviation| *deviation > 0.0)?;
             let form = self.between_samples(effect, &residual, (with_it.noise, deviation))?;
@@ -167,7 +161,7 @@ impl Case<'_> {
         }
         self.scene.set_latent(kind, late_s);
         let delay_s = found.rows * period_s;
-        self.delays.insert(kind, (delay_s, found.rows_error * period_s));
+        self.delay_errors_s.insert(kind, found.rows_error * period_s);
         Some(Form {
             name: BETWEEN_SAMPLES,
             known: vec![("share", 1.0), ("delay_s", delay_s)],

@@ -184,14 +184,12 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
     }
     // Where a fit leaves more than noise, likelihoods mean that much less.
     let within = CLASS_INFORMATION * best.fit.dispersion(&case.frame);
+    let between_samples = acts_between_samples(outcome, best);
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
         let delta = best.information - other.information - forgiven(outcome, other);
-        let within = if [best, other].iter().all(|of| acts_between_samples(outcome, of)) {
-            within.max(SURPRISE_MAX)
-        } else {
-            within
-        };
+        let both_between_samples = between_samples && acts_between_samples(outcome, other);
+        let within = if both_between_samples { within.max(SURPRISE_MAX) } else { within };
         if other.members.len() != best.members.len() || delta > within {
             continue;
         }
@@ -210,8 +208,7 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
 /// Is one of its members a delay as it acts between samples? Two of them have nearly all edges in common, and no single
 /// edge, which may stand there for a reason of its own, is to decide between a clock and a flag.
 fn acts_between_samples(outcome: &Outcome, hypothesis: &Hypothesis) -> bool {
-    let acts = |member: &usize| matches!(&outcome.designs[*member].part.body, Body::Effect(_, form) if form.name == BETWEEN_SAMPLES);
-    hypothesis.members.iter().any(acts)
+    hypothesis.members.iter().any(|member| outcome.designs[*member].part.has_form(BETWEEN_SAMPLES))
 }
 
 /// Reluctance to name a fault of a meter, where one stands in the place of something else: it guards against false alarms
