@@ -22,22 +22,52 @@ pub(crate) fn visits(scene: &Scene, holds: impl Fn(usize) -> bool) -> usize {
         .sum()
 }
 
+/// Gaps from which a band of speeds is no level with its jitter any more: constant cutting speed passes through all.
+const BAND_GAPS: f64 = 4.0;
+
 /// Speeds in rpm half-way between the levels at which the spindle stays, which are apart by more than `gap_share` of the
-/// greatest; at most `most` of them.
+/// greatest, and at every such gap within a band that it passes through; at most `most` of them, as many rows between each.
 pub(crate) fn between_speeds(scene: &Scene, gap_share: f64, most: usize) -> Vec<f64> {
     let Some(speeds) = steady_speeds_rpm(scene) else { return Vec::new() };
     let gap = gap_share * greatest(&speeds);
-    let between: Vec<f64> =
-        speeds.windows(2).filter(|pair| pair[1] - pair[0] > gap).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-    thinned(&between, most)
+    let bands = speeds.chunk_by(|slower, faster| faster - slower <= gap);
+    let levels: Vec<&[f64]> = bands.flat_map(|band| levels_of(band, gap)).collect();
+    let mut rows = 0;
+    let between = levels.windows(2).map(|pair| {
+        rows += pair[0].len();
+        // Chunks are never empty.
+        (rows, 0.5 * (pair[0][pair[0].len() - 1] + pair[1][0]))
+    });
+    thinned(&between.collect::<Vec<_>>(), speeds.len(), most)
 }
 
-/// At most `most` of the values, evenly spread.
-fn thinned(values: &[f64], most: usize) -> Vec<f64> {
-    if values.len() <= most {
-        return values.to_vec();
+/// A band of speeds in rising order: one level, or one for every gap that it is wide.
+fn levels_of(mut band: &[f64], gap: f64) -> Vec<&[f64]> {
+    let mut levels = Vec::new();
+    if band[band.len() - 1] - band[0] > BAND_GAPS * gap {
+        while let Some(first) = band.first() {
+            let (level, rest) = band.split_at(band.partition_point(|speed| *speed <= first + gap));
+            levels.push(level);
+            band = rest;
+        }
+    } else {
+        levels.push(band);
     }
-    (0..most).map(|index| values[(2 * index + 1) * values.len() / (2 * most)]).collect()
+    levels
+}
+
+/// Of places with the rows below each, in rising order, at most `most`, with as many of the rows between one and the next.
+fn thinned(places: &[(usize, f64)], rows: usize, most: usize) -> Vec<f64> {
+    if places.len() <= most {
+        return places.iter().map(|(_, place)| *place).collect();
+    }
+    let nearest = |index: usize| {
+        let wanted = (2 * index + 1) * rows / (2 * most);
+        places.iter().min_by_key(|(below, _)| below.abs_diff(wanted)).map(|(_, place)| *place)
+    };
+    let mut chosen: Vec<f64> = (0..most).filter_map(nearest).collect();
+    chosen.dedup();
+    chosen
 }
 
 /// Speeds of the rows in which the spindle turns and hardly accelerates, in rising order.
@@ -171,4 +201,25 @@ pub(crate) fn spread(values: &[f64]) -> f64 {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (high - low).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{levels_of, thinned};
+
+    #[test]
+    fn speeds_that_are_held_are_levels_and_a_band_that_is_passed_through_is_cut() {
+        let held = [995.0, 1000.0, 1004.0, 1012.0];
+        assert_eq!(levels_of(&held, 9.0), [&held], "jitter");
+        let passed: Vec<f64> = (0..100).map(|row| 500.0 + 10.0 * f64::from(row)).collect();
+        let levels = levels_of(&passed, 90.0);
+        assert!(levels.len() == 10 && levels.iter().all(|level| level.len() == 10), "{levels:?}");
+    }
+
+    #[test]
+    fn of_many_places_those_with_as_many_rows_between_are_kept() {
+        let places: Vec<(usize, f64)> = (1..100).map(|place| (place * place, 10.0 * place as f64)).collect();
+        assert_eq!(thinned(&places, 10_000, 4), [350.0, 610.0, 790.0, 940.0]);
+        assert_eq!(thinned(&places[..3], 10_000, 4), [10.0, 20.0, 30.0]);
+    }
 }

@@ -66,6 +66,8 @@ pub struct Case<'a> {
     pub faults: Vec<Fault>,
     /// A wave that was followed, where there is one.
     pub ripple: Option<super::ripple::Ripple>,
+    /// A tone of the spindle that was followed, where there is one.
+    pub tone: Option<super::tone::Tone>,
     /// A hidden switch that was followed, where there is one.
     pub switching: Option<super::latent::Switching>,
     /// The baseline beside an effect at the edges that bends it, where there is one.
@@ -117,6 +119,7 @@ impl<'a> Case<'a> {
             recorded,
             faults,
             ripple: None,
+            tone: None,
             switching: None,
             unbent: None,
             seen_at_edges: Vec::new(),
@@ -150,6 +153,7 @@ impl<'a> Case<'a> {
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);
+        self.show_tone(&base);
         let mut outcome = Outcome::new(self, base, found, designs, doubt);
         if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
             // On rows that took no part it explains nothing.
@@ -235,6 +239,7 @@ impl<'a> Case<'a> {
         designs.extend(self.hidden_lots(base));
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
+        designs.extend(self.hidden_tone(base));
         let found = self.searched(base, &designs, seed);
         if self.shows_switch_beside(&found.best, &mut designs) {
             let found = self.searched(base, &designs, seed);

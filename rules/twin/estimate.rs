@@ -17,6 +17,7 @@ use super::agreement::{between, cleared};
 use super::diagnose::Case;
 use super::diagnosis::Estimate;
 use super::fit::Fit;
+use super::hidden_tone;
 use super::linear::dot;
 use super::model::{Body, Part};
 use super::ripple::Ripple;
@@ -71,6 +72,7 @@ pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate
             }
         })
         .chain(followed)
+        .chain(tone_estimate(case, &fit.parts[part]))
         .chain(delay_between_samples(case, &fit.parts[part]))
         .collect()
 }
@@ -169,6 +171,15 @@ fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
         unit: unit.to_owned(),
     };
     [estimate("frequency_hz", hz, half_hz, "Hz"), estimate("amplitude", amplitude, half, unit_of(&case.model.output))]
+}
+
+/// Size of a tone that was followed, in the cut.
+fn tone_estimate(case: &Case<'_>, part: &Part) -> Option<Estimate> {
+    let tone = case.tone.as_ref().filter(|_| part.kind == hidden_tone::KIND && part.has_form("latent"))?;
+    let value = std::f64::consts::SQRT_2 * tone.deviation;
+    let half = INTERVAL * value / (2.0 * count(tone.spells)).sqrt();
+    let (low, high) = (value - half, value + half);
+    Some(Estimate { name: "amplitude".to_owned(), value, low, high, unit: "1".to_owned() })
 }
 
 /// The delay of a part that acts between samples: as often as edges were late.

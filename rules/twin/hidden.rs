@@ -123,20 +123,25 @@ impl Case<'_> {
             return None;
         }
         let found = ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
-        if !self.keeps_its_frequency(&base.residual, &found.wave) {
+        let runs_through = self.in_step_with_the_cut(&found.values) < ripple::IN_STEP;
+        if !runs_through || !self.keeps_its_frequency(&base.residual, &found.wave) {
             return None;
         }
         let wave = self.wave_per_row(&found.values, &found.wave);
+        if !self.carries_over(&wave) {
+            return None;
+        }
         self.scene.set_latent("ripple_alias", wave);
         // The wave is read from the residual it explains: what it seems to gain beyond its likelihood is no gain.
         let left: Vec<f64> = base.residual.iter().zip(&found.values).map(|(x, wave)| x - wave).collect();
-        let (likelihood, _) = super::noise::fit_near(&left, &self.frame, found.wave.noise);
+        let (likelihood, noise) = super::noise::fit_near(&left, &self.frame, found.wave.noise);
         let seeming = 2.0 * (likelihood - base.log_likelihood);
         let ln_choices = 0.5 * (seeming - found.gain + ripple::price(self.frame.len()));
         let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
         let form = Form { name: "latent", ln_choices: ln_choices.max(0.0), shape, ..Form::default() };
         let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         design.freedom = 1;
+        design.noise = Some(noise);
         for parameter in design.part.parameters.iter_mut().filter(|parameter| parameter.name == "frequency_hz") {
             parameter.fixed = true;
         }
@@ -163,6 +168,16 @@ impl Case<'_> {
         }
     }
 
+    /// Does a wave that is followed from earlier rows leave less of the held-out runs than there was?
+    pub(super) fn carries_over(&self, wave: &[f64]) -> bool {
+        let simulated = self.scene.simulated().unwrap_or_default();
+        let held = self.held_frame.stretches.iter().flat_map(Clone::clone);
+        let rows: Vec<usize> = held.flat_map(|group| self.held_frame.rows(group)).collect();
+        let left = |row: usize| self.scene.recorded()[row] - simulated[row];
+        let squares = |left: &dyn Fn(usize) -> f64| rows.iter().map(|row| left(*row).powi(2)).sum::<f64>();
+        rows.is_empty() || squares(&|row| left(row) - wave[row]) < squares(&left)
+    }
+
     /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a
     /// screw, an insert or the work is not.
     fn keeps_its_frequency(&self, residual: &[f64], wave: &Wave) -> bool {
@@ -180,6 +195,15 @@ impl Case<'_> {
             let (slow, fast) = (part(false), part(true));
             ripple::same_frequency(residual, &slow, &fast, wave)
         })
+    }
+
+    /// See [`ripple::in_step`]: of the passes of each tool.
+    fn in_step_with_the_cut(&self, values: &[f64]) -> f64 {
+        let mut wave = vec![None; self.scene.rows()];
+        values.iter().enumerate().for_each(|(group, value)| wave[self.frame.rows(group).start] = Some(*value));
+        let tools = self.scene.words("tool");
+        let tool = |row: usize| tools.and_then(|tools| tools.get(row)).unwrap_or_default();
+        ripple::in_step(self.scene.passes().iter().map(|pass| (tool(pass.start), &wave[pass.clone()])))
     }
 
     /// Stretches of the cut at one pace, with that pace.

@@ -7,6 +7,7 @@
 use super::noise::{Arma, PHI_MAX, whiten};
 use super::wave::{Wave, likelihood, smoothed, variance};
 use crate::statistics::count;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -24,6 +25,9 @@ const INFORMATION_MIN: f64 = 4.0;
 const SEEN: f64 = 12.0;
 /// Rounds of refinement.
 const ROUNDS: usize = 60;
+
+/// Mean correlation of a wave from cut to cut from which each cut begins it anew.
+pub const IN_STEP: f64 = 0.3;
 
 /// What was found in a residual.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +69,24 @@ pub fn find(residual: &[f64], stretches: &[Range<usize>], noise: Arma) -> Option
     let values = smoothed(residual, stretches, &best.1);
     let deviation = (best.1.size * variance(residual, stretches, &best.1)).sqrt();
     Some(Ripple { gain, values, deviation, frequency_error: frequency_error(best, &score), wave: best.1 })
+}
+
+/// Mean correlation of a wave in one pass with that in another of the same tool, row by row from where the cut begins: none
+/// for the mains, which run through; one for what each cut begins anew, as an insert that rocks in its seat does. Of each
+/// pass its tool, and the wave where it is known.
+#[must_use]
+pub fn in_step<'a>(passes: impl Iterator<Item = (&'a str, &'a [Option<f64>])>) -> f64 {
+    // By tool and row of the pass: how many, their sum and the sum of their squares.
+    let mut sums: BTreeMap<(&str, usize), (f64, f64, f64)> = BTreeMap::new();
+    for (tool, pass) in passes {
+        for (row, value) in pass.iter().enumerate().filter_map(|(row, value)| Some((row, (*value)?))) {
+            let of = sums.entry((tool, row)).or_default();
+            *of = (of.0 + 1.0, of.1 + value, of.2 + value * value);
+        }
+    }
+    let together: f64 = sums.values().map(|(_, sum, squares)| sum * sum - squares).sum();
+    let all: f64 = sums.values().map(|(passes, _, squares)| (passes - 1.0) * squares).sum();
+    if all > 0.0 { together / all } else { 0.0 }
 }
 
 /// Do two sets of stretches agree on the frequency of a wave? Also where one of them is too short to say.
@@ -225,5 +247,14 @@ mod tests {
             assert_eq!(find(&white, &all, Arma::WHITE), None);
             assert_eq!(find(&coloured, &all, Arma { phi: 0.9, theta: 0.0 }), None);
         }
+    }
+
+    #[test]
+    fn what_each_cut_begins_anew_is_in_step_and_the_mains_are_not() {
+        let pass = |begin: f64| (0..40).map(|row| Some((begin + 0.4 * count(row)).sin())).collect::<Vec<_>>();
+        let anew: Vec<_> = (0..12).map(|_| pass(0.3)).collect();
+        let through: Vec<_> = (0..12).map(|number| pass(0.4 * 97.0 * count(number))).collect();
+        let in_step = |passes: &[Vec<Option<f64>>]| super::in_step(passes.iter().map(|pass| ("T1", pass.as_slice())));
+        assert!(in_step(&anew) > 0.999 && in_step(&through).abs() < 0.1, "{} {}", in_step(&anew), in_step(&through));
     }
 }

@@ -11,7 +11,7 @@ pub struct FieldWeakening;
 static DOC: EffectDoc = EffectDoc {
     kind: "field_weakening",
     family: "drive",
-    law: "P = magnetising * (n - nb) / 1000 rpm + per_load2 * (L / (nb / 1000 rpm))^2, both for n > nb only",
+    law: "P = magnetising * (n - nb) / 1000 rpm + per_load2 * L^2 * 1 / nb^2, both for n > nb only; in excess of a copper loss that is known below nb: 1 / nb^2 - 1 / n^2; n, nb in 1000 rpm",
     parameters: &[
         ParameterDoc {
             name: "magnetising",
@@ -39,7 +39,7 @@ static DOC: EffectDoc = EffectDoc {
         },
     ],
     needs: &["speed"],
-    source: "torque constant proportional to nb / n above base speed; nb 750-3000 rpm",
+    source: "torque constant proportional to nb / n above base speed, so that copper loss grows from T^2 to T^2 (n / nb)^2; nb 750-3000 rpm",
     experiment_minutes: 12.0,
     rivals: &["gear_stage", "windage", "copper_loss", "speed_softening"],
     en: Texts {
@@ -68,22 +68,28 @@ impl Effect for FieldWeakening {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["whole", "excess"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, BENDS_TRIED);
-        let ln_choices = ln_count(speeds.len());
-        let form = |speed: &f64| Form { ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
-        speeds.iter().map(form).collect()
+        let names = if reads_load(scene) { self.form_names() } else { &["whole"] };
+        let ln_choices = ln_count(speeds.len() * names.len());
+        let form = |name, speed: &f64| Form { name, ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
+        names.iter().flat_map(|name| speeds.iter().map(move |speed| form(name, speed))).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let krpm = driven_krpm(scene)?;
         let base = form.value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
         let mut columns = vec![("magnetising", krpm.iter().map(|n| (n - base).max(0.0)).collect())];
-        if let Some(load) = scene.load().filter(|_| is_power(scene)) {
-            let law = |(n, load): (&f64, &f64)| if *n > base { (load / base).powi(2) } else { 0.0 };
+        if let Some(load) = scene.load().filter(|_| reads_load(scene)) {
+            let below = |n: f64| if form.name == "excess" { n.powi(-2) } else { 0.0 };
+            let law = |(n, load): (&f64, &f64)| if *n > base { load * load * (base.powi(-2) - below(*n)) } else { 0.0 };
             columns.push(("per_load2", krpm.iter().zip(load).map(law).collect()));
         }
         Some(columns)
@@ -94,6 +100,11 @@ impl Effect for FieldWeakening {
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
-        Form::of(&[("base_speed_rpm", 1500.0)])
+        Form { name: "whole", ..Form::of(&[("base_speed_rpm", 1500.0)]) }
     }
+}
+
+/// Is there a load whose losses are of this output?
+fn reads_load(scene: &Scene) -> bool {
+    is_power(scene) && scene.load().is_some()
 }

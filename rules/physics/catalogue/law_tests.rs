@@ -88,6 +88,23 @@ fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
     effect(kind).expect("known").forms(scene)
 }
 
+/// In constant power the excess grows out of nothing at base speed; the loss as a whole is there at once.
+#[test]
+fn in_excess_of_a_known_copper_loss_a_weak_field_begins_at_base_speed() {
+    let speed = |row: usize| 1000.0 + 20.0 * row as f64;
+    let mut motor = with_inputs(101, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &speed)]);
+    motor.set_load(Some(vec![3000.0; 101]));
+    let loss = |name| {
+        let form = Form { name, ..Form::of(&[("base_speed_rpm", 1500.0)]) };
+        effect("field_weakening").expect("known").columns(&motor, &form).expect("columns").swap_remove(1).1
+    };
+    let (whole, excess) = (loss("whole"), loss("excess"));
+    assert!(whole[25] == 0.0 && excess[25] == 0.0, "at base speed");
+    assert!((whole[26] - 4e6).abs() < 1.0 && excess[26] < 0.05 * whole[26], "{} {}", whole[26], excess[26]);
+    // At twice base speed the current for the same torque is twice as great.
+    assert!((excess[100] / (4e6 / 4.0) - 3.0).abs() < 1e-9, "{}", excess[100]);
+}
+
 #[test]
 fn warm_up_lowers_and_preload_raises_idle_power() {
     let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);

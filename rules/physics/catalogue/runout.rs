@@ -2,7 +2,6 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::drive::RAD_PER_S_OF_RPM;
-use crate::physics::excitation::greatest;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Cut that swells once per turn.
@@ -12,8 +11,16 @@ pub struct Runout;
 static DOC: EffectDoc = EffectDoc {
     kind: "runout",
     family: "cutting",
-    law: "y = (cosine * cos(phi) + sine * sin(phi)) * L; dphi/dt = 2 pi n / 60, phi = 0 at the start of each run",
+    law: "y = (cosine * cos(phi) + sine * sin(phi)) * L; dphi/dt = 2 pi n / 60, phi = 0 at the start of each run; as a candidate also: scale * a tone of each cut's own size and phase, followed row by row",
     parameters: &[
+        ParameterDoc {
+            name: "scale",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (0.0, 3.0),
+            en: "size over that of the tone as it is followed",
+            zh: "相对于跟踪所得单音的比例",
+        },
         ParameterDoc {
             name: "cosine",
             unit: "1",
@@ -56,23 +63,28 @@ impl Effect for Runout {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &["latent"]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let Some(speed) = scene.role(Role::Speed).filter(|_| cut(scene).is_some()) else { return Vec::new() };
-        let told = greatest(speed) / 60.0 * scene.period_s() * 2.2 < 1.0 && varies_in_cut(scene, speed);
+        let (Some(speed), Some(cut)) = (scene.role(Role::Speed), cut(scene)) else { return Vec::new() };
+        let in_cut = cut.iter().zip(speed).filter(|(cut, _)| **cut != 0.0).map(|(_, speed)| speed.abs());
+        let fastest_rpm = in_cut.fold(0.0, f64::max);
+        let told = fastest_rpm > 1.0 && fastest_rpm / 60.0 * scene.period_s() * 2.2 < 1.0;
         told.then(Form::plain).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+        if form.name == "latent" {
+            let tone = scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec);
+            return Some(vec![("scale", tone)]);
+        }
         let turn = turn_rad(scene)?;
         let cosine = cut_times(scene, |row| turn[row].cos())?;
         let sine = cut_times(scene, |row| turn[row].sin())?;
         Some(vec![("cosine", cosine), ("sine", sine)])
     }
-}
-
-/// Does the spindle turn while cutting?
-fn varies_in_cut(scene: &Scene, speed: &[f64]) -> bool {
-    cut(scene).is_some_and(|cut| cut.iter().zip(speed).any(|(cut, speed)| *cut != 0.0 && speed.abs() > 1.0))
 }
 
 /// Angle of the spindle since the start of the run.
