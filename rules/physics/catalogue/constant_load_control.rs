@@ -128,12 +128,17 @@ fn is_feed(scene: &Scene) -> bool {
 /// Share of the rows in the cut in which a feed may differ from the program's.
 const DIFFERS: f64 = 0.02;
 
-/// Is the feed that the program asks for recorded, and nothing of what became of it? Then a controller acts unseen.
+/// Is the feed that the program asks for recorded, and of what became of it no more than the dial's override? Then a
+/// controller acts unseen.
 fn knows_the_program_only(scene: &Scene) -> bool {
     let Some(program) = scene.column("feed_programmed_mm_min") else { return false };
     let Some(actual) = scene.column("feed_mm_min") else { return true };
     let cutting = cutting_rows(scene);
     let rows: Vec<usize> = (0..scene.rows()).filter(|row| cutting[*row]).collect();
-    let differs = |row: &&usize| (actual[**row] - program[**row]).abs() > 0.01 * program[**row].abs();
-    count(rows.iter().filter(differs).count()) <= DIFFERS * count(rows.len())
+    let agrees = |asked: &dyn Fn(usize) -> f64| {
+        let differs = |row: &&usize| (actual[**row] - asked(**row)).abs() > 0.01 * asked(**row).abs();
+        count(rows.iter().filter(differs).count()) <= DIFFERS * count(rows.len())
+    };
+    let with_dial = |dial: &[f64]| agrees(&|row| program[row] * dial[row] / 100.0);
+    agrees(&|row| program[row]) || scene.column("feed_override_pct").is_some_and(with_dial)
 }

@@ -291,12 +291,14 @@ fn a_controller_unseen_takes_from_heavy_cuts_after_a_while() {
     // Three times the depth is heavy, one is light, two is the median.
     assert!(taken[45].abs() < 1e-9 && taken[59] < -100.0 && taken[50] > taken[59], "{:?}", &taken[40..60]);
     assert!(taken[19] > 100.0 && taken[39].abs() < 1e-9, "{} {}", taken[19], taken[39]);
-    let with_actual = |actual: &dyn Fn(usize) -> f64| {
-        let inputs = [inputs[0], inputs[1], inputs[2], ("feed_mm_min", actual)];
+    let with_dial_and_actual = |dial: &dyn Fn(usize) -> f64, actual: &dyn Fn(usize) -> f64| {
+        let inputs = [inputs[0], inputs[1], inputs[2], ("feed_override_pct", dial), ("feed_mm_min", actual)];
         forms("constant_load_control", &with_inputs(120, 1.0, "spindle_power_w", &inputs)).len()
     };
-    assert_eq!(with_actual(&|row| if row % 2 == 0 { 200.0 } else { 150.0 }), 0, "what the feed became is known");
-    assert_eq!(with_actual(&program), tried.len());
+    let turned = |row: usize| if row.is_multiple_of(2) { 200.0 } else { 150.0 };
+    assert_eq!(with_dial_and_actual(&|_| 100.0, &turned), 0, "what the feed became is known");
+    assert_eq!(with_dial_and_actual(&|_| 100.0, &program), tried.len());
+    assert_eq!(with_dial_and_actual(&|row| turned(row) / 2.0, &turned), tried.len(), "no more than the dial asks for");
 }
 
 #[test]
