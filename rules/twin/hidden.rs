@@ -8,6 +8,7 @@ use super::frame::Frame;
 use super::latent::{self, Switching};
 use super::model::simulate;
 use super::noise::Arma;
+use super::rhythm::{self, Spell};
 use super::ripple;
 use super::search::Hypothesis;
 use super::wave::{self, Wave};
@@ -123,6 +124,9 @@ impl Case<'_> {
             return None;
         }
         let found = ripple::find(&base.residual, &self.frame.stretches, base.noise)?;
+        if !self.flows_through(&base.residual, &found.wave) {
+            return None;
+        }
         let runs_through = self.in_step_with_the_cut(&found.values) < ripple::IN_STEP;
         if !runs_through || !self.keeps_its_frequency(&base.residual, &found.wave) {
             return None;
@@ -204,6 +208,18 @@ impl Case<'_> {
         let tools = self.scene.words("tool");
         let tool = |row: usize| tools.and_then(|tools| tools.get(row)).unwrap_or_default();
         ripple::in_step(self.scene.passes().iter().map(|pass| (tool(pass.start), &wave[pass.clone()])))
+    }
+
+    /// Is it there whether coolant flows or not? The mains do not know; what churns with the pump is gone without it.
+    fn flows_through(&self, residual: &[f64], wave: &Wave) -> bool {
+        let Some(coolant) = self.scene.column("coolant_on") else { return true };
+        let on: Vec<f64> = (0..self.frame.len()).map(|group| coolant[self.frame.rows(group).start].round()).collect();
+        let spells = self.frame.stretches.iter().flat_map(|stretch| rhythm::spells(&on, stretch));
+        let (on, off): (Vec<Spell>, Vec<Spell>) = spells.partition(|spell| spell.on);
+        [on, off].into_iter().all(|spells| {
+            let spells: Vec<Range<usize>> = spells.into_iter().map(|spell| spell.rows).collect();
+            !ripple::is_absent(residual, &spells, wave)
+        })
     }
 
     /// Stretches of the cut at one pace, with that pace.

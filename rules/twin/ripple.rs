@@ -98,6 +98,14 @@ pub fn same_frequency(residual: &[f64], one: &[Range<usize>], other: &[Range<usi
     }
 }
 
+/// Do these stretches say that a wave as it is elsewhere is not there? Not where they are too short to say.
+#[must_use]
+pub fn is_absent(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> bool {
+    let rows: usize = stretches.iter().map(ExactSizeIterator::len).sum();
+    let without = || likelihood(residual, stretches, &Wave { size: 0.0, ..*wave });
+    rows >= SEGMENT_ROWS && 2.0 * (without() - likelihood(residual, stretches, wave)) > SEEN
+}
+
 /// Likeliest frequency in some stretches, and its standard error; `None` where they tell nothing of the wave.
 fn frequency_in(residual: &[f64], stretches: &[Range<usize>], wave: &Wave) -> Option<(f64, f64)> {
     let rows: usize = stretches.iter().map(ExactSizeIterator::len).sum();
@@ -256,5 +264,16 @@ mod tests {
         let through: Vec<_> = (0..12).map(|number| pass(0.4 * 97.0 * count(number))).collect();
         let in_step = |passes: &[Vec<Option<f64>>]| super::in_step(passes.iter().map(|pass| ("T1", pass.as_slice())));
         assert!(in_step(&anew) > 0.999 && in_step(&through).abs() < 0.1, "{} {}", in_step(&anew), in_step(&through));
+    }
+
+    #[test]
+    fn a_wave_that_stops_with_the_pump_is_absent_without_it() {
+        let noise = normal(2000, 3);
+        let wave = |row: usize| if row < 1000 { 2.0 * (TAU * 0.13 * count(row)).sin() } else { 0.0 };
+        let residual: Vec<f64> = noise.iter().enumerate().map(|(row, noise)| noise + wave(row)).collect();
+        let with = Wave { frequency: 0.13, rho: 0.97, size: 2.0, noise: Arma::WHITE };
+        assert!(is_absent(&residual, &[1000..1500, 1500..2000], &with));
+        assert!(!is_absent(&residual, &[0..500, 500..1000], &with), "it is there");
+        assert!(!is_absent(&residual, std::slice::from_ref(&(1000..1040)), &with), "too short to say");
     }
 }
