@@ -6,6 +6,7 @@ use super::diagnose::Case;
 use super::fit::{Fit, residual};
 use super::frame::Frame;
 use super::latent::{self, Switching};
+use super::linear::dot;
 use super::model::simulate;
 use super::noise::Arma;
 use super::rhythm::{self, Spell};
@@ -23,6 +24,9 @@ const AT_A_CHANGE_S: f64 = 3.0;
 const AT_A_CHANGE_GROUPS: usize = 2;
 /// Rows of a spell in the cut from which a frequency can be read.
 const SPELL_ROWS_MIN: usize = 8;
+
+/// Standard errors by which a followed wave must leave less of held-out runs.
+const CARRIED: f64 = 1.0;
 
 /// Finds a switch in a residual of this noise.
 type Finder = fn(&[f64], &Frame, Arma) -> Option<Switching>;
@@ -172,14 +176,16 @@ impl Case<'_> {
         }
     }
 
-    /// Does a wave that is followed from earlier rows leave less of the held-out runs than there was?
+    /// Does a wave that is followed from earlier rows leave less of the held-out runs than there was, by more than chance?
     pub(super) fn carries_over(&self, wave: &[f64]) -> bool {
         let simulated = self.scene.simulated().unwrap_or_default();
         let held = self.held_frame.stretches.iter().flat_map(Clone::clone);
-        let rows: Vec<usize> = held.flat_map(|group| self.held_frame.rows(group)).collect();
-        let left = |row: usize| self.scene.recorded()[row] - simulated[row];
-        let squares = |left: &dyn Fn(usize) -> f64| rows.iter().map(|row| left(*row).powi(2)).sum::<f64>();
-        rows.is_empty() || squares(&|row| left(row) - wave[row]) < squares(&left)
+        let less = |row: usize| {
+            let left = self.scene.recorded()[row] - simulated[row];
+            left * left - (left - wave[row]) * (left - wave[row])
+        };
+        let less: Vec<f64> = held.flat_map(|group| self.held_frame.rows(group)).map(less).collect();
+        less.is_empty() || less.iter().sum::<f64>() > CARRIED * dot(&less, &less).sqrt()
     }
 
     /// Is the frequency the same at slow and at fast feed, and at slow and at fast speed? The clock's is; that of a

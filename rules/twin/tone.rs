@@ -22,8 +22,11 @@ const REFINED: [f64; 4] = [1.7, 1.3, 1.15, 1.07];
 /// Turns per row by which other tones are off: what swells at these as well is no tone of the spindle. One of them may be
 /// its mirror image at half the sampling rate.
 const OTHERS: [f64; 8] = [-0.16, -0.11, -0.07, -0.04, 0.04, 0.07, 0.11, 0.16];
-/// Information that it must bring beyond other tones and every price.
-const INFORMATION_MIN: f64 = 10.0;
+/// Share of what it brings that it must bring beyond them.
+const OTHERS_SHARE: f64 = 0.5;
+/// Information that it must bring beyond other tones and every price: noise that grows with the cut swells at every
+/// frequency, here more and there less.
+const INFORMATION_MIN: f64 = 30.0;
 
 /// Cosine and sine of the angle of the spindle, each times what swells with it, per group; zero where nothing does.
 pub(super) type Turning = [Vec<f64>; 2];
@@ -81,7 +84,8 @@ pub(super) fn find(residual: &[f64], frame: &Frame, noise: Arma, without: f64, t
     let information = 2.0 * (likelihood - without) - price;
     let mut others: Vec<f64> = OTHERS.iter().filter_map(|off| look.off_by(*off, tone.noise)).collect();
     others.sort_by(|a, b| b.total_cmp(a));
-    let beyond = others.get(1).is_none_or(|other| 2.0 * (likelihood - other) > INFORMATION_MIN);
+    let least = INFORMATION_MIN.max(OTHERS_SHARE * information);
+    let beyond = others.get(1).is_none_or(|other| 2.0 * (likelihood - other) > least);
     (beyond && information > INFORMATION_MIN).then_some(Tone { information, ..tone })
 }
 
