@@ -153,7 +153,6 @@ impl<'a> Case<'a> {
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
         self.show_hidden(&base);
-        self.show_tone(&base);
         let mut outcome = Outcome::new(self, base, found, designs, doubt);
         if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
             // On rows that took no part it explains nothing.

@@ -135,18 +135,15 @@ impl Case<'_> {
         if !runs_through || !self.keeps_its_frequency(&base.residual, &found.wave) {
             return None;
         }
-        let wave = self.wave_per_row(&found.values, &found.wave);
+        let wave = self.state_per_row(&found.values, |_, left| wave::follow(left, &found.wave));
         if !self.carries_over(&wave) {
             return None;
         }
         self.scene.set_latent("ripple_alias", wave);
-        // The wave is read from the residual it explains: what it seems to gain beyond its likelihood is no gain.
-        let left: Vec<f64> = base.residual.iter().zip(&found.values).map(|(x, wave)| x - wave).collect();
-        let (likelihood, noise) = super::noise::fit_near(&left, &self.frame, found.wave.noise);
-        let seeming = 2.0 * (likelihood - base.log_likelihood);
-        let ln_choices = 0.5 * (seeming - found.gain + ripple::price(self.frame.len()));
+        let information = found.gain - ripple::price(self.frame.len());
+        let (ln_choices, noise) = self.seeming_choices(base, &found.values, found.wave.noise, information);
         let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
-        let form = Form { name: "latent", ln_choices: ln_choices.max(0.0), shape, ..Form::default() };
+        let form = Form { name: "latent", ln_choices, shape, ..Form::default() };
         let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         design.freedom = 1;
         design.noise = Some(noise);
@@ -157,10 +154,18 @@ impl Case<'_> {
         Some(design)
     }
 
+    /// Logarithm of the choices that a state seems to have had, which is read from the residual that it explains: what it
+    /// gains there beyond the information of its likelihood is no gain. And the noise beside it, looked for from `start`.
+    pub(super) fn seeming_choices(&self, base: &Fit, state: &[f64], start: Arma, information: f64) -> (f64, Arma) {
+        let left: Vec<f64> = base.residual.iter().zip(state).map(|(x, state)| x - state).collect();
+        let (likelihood, noise) = super::noise::fit_near(&left, &self.frame, start);
+        ((likelihood - base.log_likelihood - 0.5 * information).max(0.0), noise)
+    }
+
     /// Follows what an excerpt has shown of hidden states through the whole recording.
     pub(super) fn show_hidden(&mut self, base: &Fit) {
         let Some(whole) = &mut self.whole else { return };
-        if self.ripple.is_none() && self.switching.is_none() {
+        if self.ripple.is_none() && self.switching.is_none() && self.tone.is_none() {
             return;
         }
         let Some(residual) = whole.with_data(|data| residual(data, &base.parts)) else { return };
@@ -171,8 +176,11 @@ impl Case<'_> {
         }
         if let Some(found) = &self.ripple {
             let values = wave::smoothed(&residual, &whole.frame.stretches, &found.wave);
-            let state = whole.wave_per_row(&values, &found.wave);
+            let state = whole.state_per_row(&values, |_, left| wave::follow(left, &found.wave));
             whole.scene.set_latent("ripple_alias", state);
+        }
+        if let Some(found) = &self.tone {
+            whole.show_tone(&residual, found);
         }
     }
 
@@ -252,35 +260,24 @@ impl Case<'_> {
         spells
     }
 
-    /// The wave in every row: as smoothed where the rows were fitted, expected from earlier rows in held-out runs.
-    fn wave_per_row(&self, values: &[f64], followed: &Wave) -> Vec<f64> {
-        let mut wave = self.frame.spread(values, self.scene.rows());
+    /// A hidden state in every row: as found where the rows were fitted; followed group by group, from earlier ones only,
+    /// in held-out runs, of which `follow` is given the groups of a stretch and what the model leaves in each.
+    pub(super) fn state_per_row(&self, found: &[f64], follow: impl Fn(&Range<usize>, &[f64]) -> Vec<f64>) -> Vec<f64> {
+        let mut state = self.frame.spread(found, self.scene.rows());
         let simulated = self.scene.simulated().unwrap_or_default();
-        let recorded = self.scene.recorded();
+        let left: Vec<f64> = self.scene.recorded().iter().zip(simulated).map(|(x, simulated)| x - simulated).collect();
+        let left = self.held_frame.reduce(&left);
         for groups in &self.held_frame.stretches {
-            let rows: Vec<usize> = groups.clone().flat_map(|group| self.held_frame.rows(group)).collect();
-            let residual: Vec<f64> = rows.iter().map(|row| recorded[*row] - simulated[*row]).collect();
-            let expected = wave::follow(&residual, followed);
-            rows.iter().zip(expected).for_each(|(row, expected)| wave[*row] = expected);
-        }
-        wave
-    }
-
-    /// The state of a hidden switch in every row: as found where the rows were fitted, followed causally in held-out
-    /// runs.
-    fn switch_per_row(&self, found: &Switching) -> Vec<f64> {
-        let mut state = self.frame.spread(&found.state, self.scene.rows());
-        let simulated = self.scene.simulated().unwrap_or_default();
-        let on = found.state.iter().sum::<f64>() / count(found.state.len());
-        for groups in &self.held_frame.stretches {
-            let rows = |group: usize| self.held_frame.rows(group);
-            let left = |row: usize| self.scene.recorded()[row] - simulated[row];
-            let residual = |group: usize| rows(group).map(left).sum::<f64>() / count(rows(group).len());
-            let residual: Vec<f64> = groups.clone().map(residual).collect();
-            let followed = latent::follow(&residual, found, on);
-            groups.clone().zip(followed).for_each(|(group, on)| rows(group).for_each(|row| state[row] = on));
+            let followed = follow(groups, &left[groups.clone()]);
+            groups.clone().zip(followed).for_each(|(group, value)| state[self.held_frame.rows(group)].fill(value));
         }
         state
+    }
+
+    /// The state of a hidden switch in every row.
+    fn switch_per_row(&self, found: &Switching) -> Vec<f64> {
+        let share_on = found.state.iter().sum::<f64>() / count(found.state.len());
+        self.state_per_row(&found.state, |_, left| latent::follow(left, found, share_on))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::designs::{Design, design, wanted};
 use super::diagnose::Case;
-use super::fit::{Fit, residual};
+use super::fit::Fit;
 use super::frame::Frame;
 use super::tone::{self, Tone, Turning};
 use crate::physics::{Form, Scene, effect};
@@ -10,7 +10,8 @@ use crate::physics::{Form, Scene, effect};
 /// The kind.
 pub(super) const KIND: &str = "runout";
 
-/// The cut in step with the spindle, per group of a frame; `None` where the sampling is too slow to show it.
+/// The cut in step with the spindle, per group of a frame. Where a turn is shorter than two rows its image at the sampling
+/// rate is in step all the same, as long as the recorded speed is true; `None` where it is not.
 fn turning(scene: &Scene, frame: &Frame) -> Option<Turning> {
     let runout = effect(KIND)?;
     let columns: Vec<Vec<f64>> =
@@ -33,39 +34,28 @@ impl Case<'_> {
             return None;
         }
         self.scene.set_latent(KIND, tone);
-        // The tone is read from the residual it explains: what it seems to gain beyond its likelihood is no gain.
-        let left: Vec<f64> = base.residual.iter().zip(&values).map(|(x, tone)| x - tone).collect();
-        let (likelihood, noise) = super::noise::fit_near(&left, &self.frame, found.noise);
-        let ln_choices = likelihood - base.log_likelihood - 0.5 * found.information;
-        let form = Form { name: "latent", ln_choices: ln_choices.max(0.0), ..Form::default() };
+        let (ln_choices, noise) = self.seeming_choices(base, &values, found.noise, found.information);
+        let form = Form { name: "latent", ln_choices, ..Form::default() };
         let found_as = design(runout, &form, &self.scene, &self.frame)?;
         self.tone = Some(found);
         Some(Design { noise: Some(noise), ..found_as })
     }
 
-    /// Follows what an excerpt has shown of it through the whole recording.
-    pub(super) fn show_tone(&mut self, base: &Fit) {
-        let (Some(whole), Some(found)) = (&mut self.whole, &self.tone) else { return };
-        let Some(residual) = whole.with_data(|data| residual(data, &base.parts)) else { return };
-        let Some(turning) = turning(&whole.scene, &whole.frame) else { return };
-        let values = tone::values(&residual, &whole.frame, &turning, found);
-        if let Some(tone) = whole.tone_per_row(&values, found) {
-            whole.scene.set_latent(KIND, tone);
+    /// Follows a tone that an excerpt has shown through this recording, which is the whole.
+    pub(super) fn show_tone(&mut self, residual: &[f64], found: &Tone) {
+        let Some(turning) = turning(&self.scene, &self.frame) else { return };
+        let values = tone::values(residual, &self.frame, &turning, found);
+        if let Some(tone) = self.tone_per_row(&values, found) {
+            self.scene.set_latent(KIND, tone);
         }
     }
 
     /// The tone in every row: as told where the rows were fitted, expected from earlier rows in held-out runs.
     fn tone_per_row(&self, values: &[f64], found: &Tone) -> Option<Vec<f64>> {
         let turning = turning(&self.scene, &self.held_frame)?;
-        let simulated = self.scene.simulated().unwrap_or_default();
-        let left: Vec<f64> = self.scene.recorded().iter().zip(simulated).map(|(x, simulated)| x - simulated).collect();
-        let left = self.held_frame.reduce(&left);
-        let mut tone = self.frame.spread(values, self.scene.rows());
-        for groups in &self.held_frame.stretches {
+        Some(self.state_per_row(values, |groups, left| {
             let of = [0, 1].map(|of| turning[of][groups.clone()].to_vec());
-            let expected = tone::follow(&left[groups.clone()], &of, found);
-            groups.clone().zip(expected).for_each(|(group, expected)| tone[self.held_frame.rows(group)].fill(expected));
-        }
-        Some(tone)
+            tone::follow(left, &of, found)
+        }))
     }
 }

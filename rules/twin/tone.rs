@@ -139,6 +139,25 @@ fn turns(rows: &Range<usize>, [c, s]: &Turning) -> f64 {
     (rows.start + 1..rows.end).map(|row| turned(row).abs() / TAU).sum()
 }
 
+/// What a look tells in one noise.
+#[derive(Clone, Copy)]
+struct Fitted {
+    /// Logarithm of the likelihood.
+    likelihood: f64,
+    /// See [`Tone::size`].
+    size: f64,
+    /// Variance of an innovation.
+    variance: f64,
+    /// Spells that told.
+    spells: usize,
+}
+
+impl Fitted {
+    fn or_likelier(self, other: Self) -> Self {
+        if other.likelihood > self.likelihood { other } else { self }
+    }
+}
+
 /// One way to look for it.
 struct Look<'a> {
     residual: &'a [f64],
@@ -148,22 +167,22 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    fn spells(&self, turning: &Turning, noise: Arma) -> Vec<Spell> {
+    /// The spells, and the sum of the squares of all innovations without a tone.
+    fn spells(&self, turning: &Turning, noise: Arma) -> (Vec<Spell>, f64) {
         let x = self.frame.whiten(self.residual, noise);
         let [c, s] = [0, 1].map(|of| self.frame.whiten(&turning[of], noise));
         let stretches = self.frame.stretches.iter();
         let rows = stretches.flat_map(|stretch| spells(stretch.clone(), turning, self.rows_max));
-        rows.map(|rows| Spell::new(rows.clone(), [&c[rows.clone()], &s[rows.clone()]], &x[rows])).collect()
+        let told = rows.map(|rows| Spell::new(rows.clone(), [&c[rows.clone()], &s[rows.clone()]], &x[rows])).collect();
+        (told, dot(&x, &x))
     }
 
-    /// Logarithm of the likelihood in this noise at the best size, that size, and the variance of an innovation.
-    fn likeliest(&self, turning: &Turning, noise: Arma) -> Option<(f64, f64, f64)> {
-        let spells = self.spells(turning, noise);
+    /// The best size in this noise.
+    fn likeliest(&self, turning: &Turning, noise: Arma) -> Option<Fitted> {
+        let (spells, squares) = self.spells(turning, noise);
         if spells.len() < SPELLS_MIN {
             return None;
         }
-        let x = self.frame.whiten(self.residual, noise);
-        let squares = dot(&x, &x);
         let typical = spells.iter().map(|spell| spell.cc + spell.ss).sum::<f64>() / (2.0 * count(spells.len()));
         let of = |size: f64| {
             let (mut left, mut narrower) = (squares, 0.0);
@@ -171,20 +190,20 @@ impl Look<'_> {
                 left -= explained;
                 narrower += ln;
             }
-            (self.frame.log_likelihood(left, noise) - 0.5 * narrower, size, left / count(x.len()))
+            let likelihood = self.frame.log_likelihood(left, noise) - 0.5 * narrower;
+            Fitted { likelihood, size, variance: left / count(self.residual.len()), spells: spells.len() }
         };
-        let likelier = |a: (f64, f64, f64), b: (f64, f64, f64)| if b.0 > a.0 { b } else { a };
-        let first = SIZES.map(|size| of(size / typical)).into_iter().reduce(likelier)?;
-        let refined =
-            |best: (f64, f64, f64), by: f64| [best.1 * by, best.1 / by].map(of).into_iter().fold(best, likelier);
+        let first = SIZES.map(|size| of(size / typical)).into_iter().reduce(Fitted::or_likelier)?;
+        let refined = |best: Fitted, by: f64| {
+            [best.size * by, best.size / by].map(of).into_iter().fold(best, Fitted::or_likelier)
+        };
         Some(REFINED.into_iter().fold(first, refined))
     }
 
     /// Tone and noise in turn.
     fn settled(&self, noise: Arma) -> Option<(f64, Tone)> {
         let tone_in = |noise: Arma| {
-            let (likelihood, size, variance) = self.likeliest(self.turning, noise)?;
-            let spells = self.spells(self.turning, noise).len();
+            let Fitted { likelihood, size, variance, spells } = self.likeliest(self.turning, noise)?;
             let deviation = (size * variance).sqrt();
             Some((likelihood, Tone { noise, information: 0.0, spells, deviation, size, rows_max: self.rows_max }))
         };
@@ -202,12 +221,12 @@ impl Look<'_> {
             (c[row] * cosine - s[row] * sine, s[row] * cosine + c[row] * sine)
         };
         let (c, s) = (0..c.len()).map(turned).unzip();
-        self.likeliest(&[c, s], noise).map(|(likelihood, ..)| likelihood)
+        self.likeliest(&[c, s], noise).map(|found| found.likelihood)
     }
 
     fn values(&self, tone: &Tone) -> Vec<f64> {
         let mut values = vec![0.0; self.residual.len()];
-        for spell in self.spells(self.turning, tone.noise) {
+        for spell in self.spells(self.turning, tone.noise).0 {
             let ([cosine, sine], ..) = spell.told(tone.size);
             for row in spell.rows {
                 values[row] = cosine * self.turning[0][row] + sine * self.turning[1][row];
