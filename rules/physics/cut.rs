@@ -44,3 +44,13 @@ pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
     };
     Some(area.iter().zip(lever).map(|(area, lever)| area * lever).collect())
 }
+
+/// Way since the first of some rows at these feeds, mm.
+pub(crate) fn way_mm(time_s: &[f64], feed_mm_min: &[f64]) -> Vec<f64> {
+    let mut way_mm = vec![0.0; time_s.len()];
+    for row in 1..time_s.len() {
+        let mean_mm_min = 0.5 * (feed_mm_min[row] + feed_mm_min[row - 1]);
+        way_mm[row] = way_mm[row - 1] + mean_mm_min / 60.0 * (time_s[row] - time_s[row - 1]).max(0.0);
+    }
+    way_mm
+}

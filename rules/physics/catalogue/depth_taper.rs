@@ -1,6 +1,6 @@
 //! The depth of cut changes along the pass: a tapered blank, or tool and work that bend away.
 
-use crate::physics::cut::{cut, cut_times};
+use crate::physics::cut::{cut, cut_times, way_mm};
 use crate::physics::excitation::varies;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
@@ -133,19 +133,11 @@ fn places<'s>(scene: &'s Scene, pass: &Range<usize>) -> Cow<'s, [f64]> {
     let time_s = &scene.time_s()[pass.clone()];
     match (position.filter(|position| varies(position)), scene.column("feed_mm_min")) {
         (Some(position), _) => Cow::Borrowed(position),
-        (None, Some(feed)) if feed[pass.clone()].iter().all(|feed| *feed > 0.0) => way(time_s, &feed[pass.clone()]),
+        (None, Some(feed)) if feed[pass.clone()].iter().all(|feed| *feed > 0.0) => {
+            Cow::Owned(way_mm(time_s, &feed[pass.clone()]))
+        }
         _ => Cow::Borrowed(time_s),
     }
-}
-
-/// Way since the first row, mm.
-fn way<'s>(time_s: &[f64], feed_mm_min: &[f64]) -> Cow<'s, [f64]> {
-    let mut way_mm = vec![0.0; time_s.len()];
-    for row in 1..time_s.len() {
-        let mean_mm_min = 0.5 * (feed_mm_min[row] + feed_mm_min[row - 1]);
-        way_mm[row] = way_mm[row - 1] + mean_mm_min / 60.0 * (time_s[row] - time_s[row - 1]).max(0.0);
-    }
-    Cow::Owned(way_mm)
 }
 
 fn length(places: &[f64]) -> f64 {

@@ -1,7 +1,8 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
-use crate::physics::cut::{cut, cut_times};
+use crate::physics::cut::{cut, cut_times, way_mm};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::count;
 use std::ops::Range;
 
 /// Build-up and fading of the cut.
@@ -11,7 +12,7 @@ pub struct EntryExit;
 static DOC: EffectDoc = EffectDoc {
     kind: "entry_exit",
     family: "cutting",
-    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L",
+    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L; travel: the same over the way s at the feed, from entry and to exit, in place of the time",
     parameters: &[
         ParameterDoc {
             name: "entry",
@@ -53,6 +54,22 @@ static DOC: EffectDoc = EffectDoc {
             en: "how long the exit lasts where it differs from the entry",
             zh: "切出持续时间（与切入不同时）",
         },
+        ParameterDoc {
+            name: "length_mm",
+            unit: "mm",
+            entry: Entry::Shape,
+            range: (0.02, 200.0),
+            en: "way at the feed over which the cut builds up",
+            zh: "切削建立所经进给行程",
+        },
+        ParameterDoc {
+            name: "exit_length_mm",
+            unit: "mm",
+            entry: Entry::Shape,
+            range: (0.02, 200.0),
+            en: "way at the feed over which it fades",
+            zh: "切削消退所经进给行程",
+        },
     ],
     needs: &["engaged"],
     source: "the engagement ramps over (ap / tan kappa) / (f n); first and last 1-3 s of a pass",
@@ -80,7 +97,7 @@ impl Effect for EntryExit {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["ramp", "settling"]
+        &["ramp", TRAVEL, "settling"]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -99,6 +116,13 @@ impl Effect for EntryExit {
             })
         };
         forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(ramps));
+        let travels = |length_mm: f64| {
+            [0.5, 1.0].map(|share| Form {
+                name: TRAVEL,
+                ..Form::of(&[("length_mm", length_mm), ("exit_length_mm", share * length_mm)])
+            })
+        };
+        forms.extend(ways_mm(scene).into_iter().flat_map(travels));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
@@ -107,16 +131,27 @@ impl Effect for EntryExit {
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
-        let over_s = form.value("length_s").unwrap_or(1.0).max(f64::MIN_POSITIVE);
-        let exit_over_s = form.value("exit_length_s").unwrap_or(over_s).max(f64::MIN_POSITIVE);
-        let fades =
-            |s: f64, over_s: f64| if form.name == "ramp" { (1.0 - s / over_s).max(0.0) } else { (-s / over_s).exp() };
+        let travels = form.name == TRAVEL;
+        let (length, exit_length) =
+            if travels { ("length_mm", "exit_length_mm") } else { ("length_s", "exit_length_s") };
+        let over = form.value(length).unwrap_or(1.0).max(f64::MIN_POSITIVE);
+        let exit_over = form.value(exit_length).unwrap_or(over).max(f64::MIN_POSITIVE);
+        let ramps = travels || form.name == "ramp";
+        let fades = |s: f64, over: f64| if ramps { (1.0 - s / over).max(0.0) } else { (-s / over).exp() };
+        let (time_s, feed) = (scene.time_s(), scene.column("feed_mm_min"));
         let (mut entry, mut exit) = (vec![0.0; scene.rows()], vec![0.0; scene.rows()]);
-        let time_s = scene.time_s();
         for pass in scene.passes() {
-            for row in pass.clone() {
-                entry[row] = fades(time_s[row] - time_s[pass.start], over_s);
-                exit[row] = fades(time_s[pass.end - 1] - time_s[row], exit_over_s);
+            let along = if travels {
+                way_mm(&time_s[pass.clone()], &feed?[pass.clone()])
+            } else {
+                time_s[pass.clone()].to_vec()
+            };
+            let (first, last) = (along[0], along[along.len() - 1]);
+            // Between what is entered and the first row lies half a row's way in the mean: a fast feed is through by then.
+            let half = if travels { 0.5 * (last - first) / count((along.len() - 1).max(1)) } else { 0.0 };
+            for (row, at) in pass.clone().zip(&along) {
+                entry[row] = fades(at - first + half, over);
+                exit[row] = fades(last - at + half, exit_over);
             }
         }
         if form.name == "settling" {
@@ -136,6 +171,32 @@ impl Effect for EntryExit {
 
 /// Sampling periods from which on the entry is more than an edge: tool, chip and work settle over a good part of a pass.
 const SETTLING_PERIODS: f64 = 8.0;
+
+/// The form over the way at the feed.
+const TRAVEL: &str = "travel";
+/// Ways over which a cut may build up, mm.
+const WAYS_MM: [f64; 4] = [0.5, 1.5, 5.0, 15.0];
+/// Passes in which a way must last a row at least.
+const TOLD_IN: usize = 3;
+/// Ratio of the feeds at which a way is something else than a time.
+const FEEDS_APART: f64 = 1.3;
+
+/// The ways that this recording can tell: they last for a row or more, and for no more than a third of the pass.
+fn ways_mm(scene: &Scene) -> Vec<f64> {
+    let Some(feed) = scene.column("feed_mm_min") else { return Vec::new() };
+    let mm_s = |pass: &Range<usize>| feed[pass.start + pass.len() / 2] / 60.0;
+    let passes = || scene.passes().iter().filter(|pass| feed[(*pass).clone()].iter().all(|feed| *feed > 0.0));
+    let (slowest, fastest) = passes().map(mm_s).fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+    if passes().count() < scene.passes().len() || fastest < FEEDS_APART * slowest {
+        return Vec::new();
+    }
+    let tells = |way_mm: &f64| {
+        let lasts =
+            |pass: &&Range<usize>| (scene.period_s()..=length_s(scene, pass) / 3.0).contains(&(way_mm / mm_s(pass)));
+        passes().filter(lasts).count() >= TOLD_IN
+    };
+    WAYS_MM.into_iter().filter(tells).collect()
+}
 
 fn length_s(scene: &Scene, pass: &Range<usize>) -> f64 {
     scene.time_s()[pass.end - 1] - scene.time_s()[pass.start]

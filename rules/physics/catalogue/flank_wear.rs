@@ -1,8 +1,10 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::physics::drive::is_displacement;
+use crate::physics::excitation::greatest;
 use crate::physics::tool_load;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +13,7 @@ pub struct FlankWear;
 static DOC: EffectDoc = EffectDoc {
     kind: "flank_wear",
     family: "cutting",
-    law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; without ap and vc: y = k * engaged * W^p; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
+    law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; of a drill D / 2 in place of ap; without ap or D and vc: y = k * engaged * W^p; break_in: P = (k_break_in * (1 - exp(-W / W0)) + k * W) * ap * vc; edges: every edge its own k_i; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
     parameters: &[
         ParameterDoc {
             name: "k",
@@ -29,6 +31,34 @@ static DOC: EffectDoc = EffectDoc {
             en: "exponent of the cutting time: below 1 break-in, above 1 accelerating wear",
             zh: "切削时间指数：小于1为初期磨损，大于1为加速磨损",
         },
+        ParameterDoc {
+            name: "k_break_in",
+            unit: "output/(mm m/min)",
+            entry: Entry::Linear,
+            range: (0.0, f64::INFINITY),
+            en: "power per depth and cutting speed of an edge that has broken in",
+            zh: "初期磨损结束后，单位切深、切速的功率增量",
+        },
+        ParameterDoc {
+            name: "break_in_min",
+            unit: "min",
+            entry: Entry::Shape,
+            range: (0.05, 60.0),
+            en: "cutting time in which an edge breaks in",
+            zh: "初期磨损的切削时间常数",
+        },
+        rate(
+            "k_1",
+            "growth of the first edge, per depth, cutting speed and cutting time",
+            "第1个刀刃单位切深、切速、切削时间的功率增长",
+        ),
+        rate("k_2", "the same of the second edge", "第2个刀刃的功率增长"),
+        rate("k_3", "the same of the third edge", "第3个刀刃的功率增长"),
+        rate("k_4", "the same of the fourth edge", "第4个刀刃的功率增长"),
+        rate("k_5", "the same of the fifth edge", "第5个刀刃的功率增长"),
+        rate("k_6", "the same of the sixth edge", "第6个刀刃的功率增长"),
+        rate("k_7", "the same of the seventh edge", "第7个刀刃的功率增长"),
+        rate("k_8", "the same of the eighth edge", "第8个刀刃的功率增长"),
         ParameterDoc {
             name: "k_load",
             unit: "output/(mm m/min)",
@@ -58,13 +88,23 @@ static DOC: EffectDoc = EffectDoc {
     },
 };
 
+/// How fast one of several edges wears.
+const fn rate(name: &'static str, en: &'static str, zh: &'static str) -> ParameterDoc {
+    ParameterDoc { name, unit: "output/(mm m/min min^p)", entry: Entry::Linear, range: (0.0, f64::INFINITY), en, zh }
+}
+
+/// Names of the rates of the edges.
+const RATES: [&str; 8] = ["k_1", "k_2", "k_3", "k_4", "k_5", "k_6", "k_7", "k_8"];
+/// Shares of the longest cutting time in which an edge may break in.
+const BREAK_INS: [f64; 2] = [0.06, 0.2];
+
 impl Effect for FlankWear {
     fn doc(&self) -> &'static EffectDoc {
         &DOC
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["followed"]
+        &["break_in", "edges", "followed"]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -75,15 +115,20 @@ impl Effect for FlankWear {
         if scene.feed_load_growth().is_some() {
             return vec![Form { name: "followed", ..Form::plain() }];
         }
-        [1.0, 0.5, 1.5, 2.5].iter().map(|p| Form::of(&[("p", *p)])).collect()
+        let longest_min = greatest(scene.column("cutting_time_min").unwrap_or_default());
+        let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::of(&[("p", p)]));
+        let break_ins =
+            BREAK_INS.map(|share| Form { name: "break_in", ..Form::of(&[("break_in_min", share * longest_min)]) });
+        let edges = edges(scene).map(|_| [1.0, 0.5].map(|p| Form { name: "edges", ..Form::of(&[("p", p)]) }));
+        powers.into_iter().chain(break_ins).chain(edges.into_iter().flatten()).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let engaged = scene.role(Role::Engaged)?;
         let minutes = scene.column("cutting_time_min")?;
-        let depth = scene.column("depth_of_cut_mm");
+        let depth = length_of_edge(scene);
         let speed = scene.column("cutting_speed_m_min");
-        let width = |row: usize| match (depth, speed) {
+        let width = |row: usize| match (&depth, speed) {
             (Some(depth), Some(speed)) => depth[row] * speed[row],
             _ => 1.0,
         };
@@ -93,11 +138,35 @@ impl Effect for FlankWear {
             let growth = scene.feed_load_growth()?;
             return Some(vec![("k_load", times(&|row| tool_load::wear(minutes[row], growth[row])))]);
         }
+        if form.name == "break_in" {
+            let whole_min = form.value("break_in_min").unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            let broken_in = times(&|row| 1.0 - (-minutes[row].max(0.0) / whole_min).exp());
+            return Some(vec![("k_break_in", broken_in), ("k", times(&|row| minutes[row].max(0.0)))]);
+        }
         let p = form.value("p").unwrap_or(1.0);
+        if form.name == "edges" {
+            let tools = scene.words("tool")?;
+            let worn = |edge: &str| {
+                times(&|row| if tools.get(row) == Some(edge) { minutes[row].max(0.0).powf(p) } else { 0.0 })
+            };
+            return Some(RATES.into_iter().zip(edges(scene)?).map(|(rate, edge)| (rate, worn(edge))).collect());
+        }
         Some(vec![("k", times(&|row| minutes[row].max(0.0).powf(p)))])
     }
 
     fn has_hidden_state(&self) -> bool {
         true
     }
+}
+
+/// The edges, where there are several and no more than can have a rate of their own.
+fn edges(scene: &Scene) -> Option<Vec<&str>> {
+    let edges: Vec<&str> = scene.words("tool")?.words().iter().map(String::as_str).collect();
+    (2..=RATES.len()).contains(&edges.len()).then_some(edges)
+}
+
+/// How much of an edge cuts, mm: the depth of cut, of a drill its radius.
+fn length_of_edge(scene: &Scene) -> Option<Cow<'_, [f64]>> {
+    let radius = || scene.column("diameter_mm").map(|diameter| diameter.iter().map(|d| 0.5 * d).collect());
+    scene.column("depth_of_cut_mm").map(Cow::Borrowed).or_else(radius)
 }

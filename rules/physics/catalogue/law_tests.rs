@@ -130,7 +130,63 @@ fn stribeck_needs_visits_at_creep() {
     assert!(forms("stribeck", &with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &fast)])).is_empty());
     let creeping = |row: usize| 0.5 * (row as f64 / 30.0).sin();
     let creep = with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &creeping)]);
-    assert!(!forms("stribeck", &creep).is_empty());
+    let tried = forms("stribeck", &creep);
+    assert!(tried.iter().any(|form| form.name == "lorentzian"), "{tried:?}");
+    let level = |name| column("stribeck", &creep, &Form { name, ..Form::of(&[("stribeck_speed", 0.1)]) })[45];
+    // At nearly five times the Stribeck speed.
+    assert!(level("") < 1e-9 && level("exponential") < 0.02 && (0.03..0.06).contains(&level("lorentzian")));
+    let turning = |row: usize| 3000.0 * (row as f64 / 300.0).sin().abs();
+    let spindle = with_inputs(4000, 0.1, "spindle_power_w", &[("spindle_speed_rpm", &turning)]);
+    let tried = forms("stribeck", &spindle);
+    assert!(!tried.is_empty() && tried.iter().all(|form| form.name.is_empty()), "{tried:?}");
+}
+
+#[test]
+fn an_entry_over_a_way_lasts_longer_at_a_slow_feed() {
+    let place = |row: usize| row % 40;
+    let engaged = |row: usize| f64::from(u8::from((10..40).contains(&place(row))));
+    let feed = |row: usize| if (row / 40).is_multiple_of(2) { 60.0 } else { 240.0 };
+    let inputs: [(&str, &dyn Fn(usize) -> f64); 2] = [("engaged", &engaged), ("feed_mm_min", &feed)];
+    let mut scene = with_inputs(400, 1.0, "spindle_power_w", &inputs);
+    scene.set_load(Some((0..400).map(|row| 500.0 * engaged(row)).collect()));
+    assert!(forms("entry_exit", &scene).iter().any(|form| form.name == "travel"));
+    let form = Form { name: "travel", ..Form::of(&[("length_mm", 4.0), ("exit_length_mm", 4.0)]) };
+    let entry = column("entry_exit", &scene, &form);
+    let rows = |pass: usize| (40 * pass..40 * pass + 40).filter(|row| entry[*row] > 0.0).count();
+    assert_eq!((rows(0), rows(1)), (4, 1), "a millimetre per row, and four");
+    let even = with_inputs(400, 1.0, "spindle_power_w", &[("engaged", &engaged), ("feed_mm_min", &|_| 60.0)]);
+    assert!(forms("entry_exit", &even).iter().all(|form| form.name != "travel"), "at one feed a way is a time");
+}
+
+#[test]
+fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
+    let mut recording = Recording::new("edges", (0..240).map(|row| 10.0 * f64::from(row)).collect(), None);
+    set(&mut recording, "engaged", |_| 1.0);
+    set(&mut recording, "cutting_time_min", |row| (row % 120) as f64 / 6.0);
+    set(&mut recording, "cutting_speed_m_min", |_| 100.0);
+    set(&mut recording, "diameter_mm", |_| 8.0);
+    set(&mut recording, "spindle_power_w", |_| 1.0);
+    set_words(&mut recording, "tool", |row| if row < 120 { "T1-a" } else { "T1-b" }.to_owned());
+    let scene = scene(&recording, "spindle_power_w");
+    let names: Vec<&str> = forms("flank_wear", &scene).iter().map(|form| form.name).collect();
+    assert_eq!(names, ["", "", "", "", "break_in", "break_in", "edges", "edges"]);
+    let edges = Form { name: "edges", ..Form::of(&[("p", 1.0)]) };
+    let columns = effect("flank_wear").expect("known").columns(&scene, &edges).expect("columns");
+    assert_eq!(columns.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["k_1", "k_2"]);
+    // Half the diameter of the drill cuts.
+    assert!((columns[0].1[60] - 4.0 * 100.0 * 10.0).abs() < 1e-9 && columns[0].1[180] == 0.0);
+    let broken_in = column("flank_wear", &scene, &Form { name: "break_in", ..Form::of(&[("break_in_min", 1.0)]) });
+    assert!(broken_in[119] / broken_in[30] < 1.01 && broken_in[30] / broken_in[3] > 2.0);
+}
+
+#[test]
+fn a_state_that_stands_still_leaves_its_law_over_speed() {
+    let speed = |row: usize| 1000.0 + row as f64;
+    let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &speed)]);
+    for (kind, power) in [("bearing_warm_up", 5.0 / 3.0), ("preload_growth", 2.0)] {
+        let still = column(kind, &idle, &effect(kind).expect("known").still().expect("a state"));
+        assert!((still[1000] - 2.0_f64.powf(power)).abs() < 1e-9, "{kind}: {}", still[1000]);
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! At creep the oil film breaks down: friction is higher than when moving.
 
-use crate::physics::drive::{is_power, motion, soft_sign};
+use crate::physics::drive::{is_power, motion, soft_sign, turns};
 use crate::physics::excitation::{greatest, varies, visits};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
@@ -11,7 +11,7 @@ pub struct Stribeck;
 static DOC: EffectDoc = EffectDoc {
     kind: "stribeck",
     family: "axis",
-    law: "F = level * sign(v) * exp(-(v / vs)^2), vs = stribeck_speed; in a power: P = level * |v| / vs * exp(-(v / vs)^2); v in m/s, of a spindle in rad/s",
+    law: "F = level * sign(v) * s, s = exp(-(v / vs)^2), or exp(-|v| / vs) (exponential), or 1 / (1 + (v / vs)^2) (lorentzian), vs = stribeck_speed; in a power: P = level * |v| / vs * s; v in m/s, of a spindle in rad/s",
     parameters: &[
         ParameterDoc {
             name: "level",
@@ -31,7 +31,7 @@ static DOC: EffectDoc = EffectDoc {
         },
     ],
     needs: &["velocity | speed"],
-    source: "Stribeck curve F = Fc + (Fs - Fc) exp(-(v / vs)^2); spindles: vs 50-300 rpm",
+    source: "Stribeck curve F = Fc + (Fs - Fc) s(v / vs): s Gaussian, exponential (Tustin 1947) or Lorentzian (Hess and Soom 1990), see Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994), section 2.1; spindles: vs 50-300 rpm",
     experiment_minutes: 4.0,
     rivals: &["dry_friction", "viscous_friction", "direction_asymmetry"],
     en: Texts {
@@ -55,12 +55,19 @@ impl Effect for Stribeck {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &[EXPONENTIAL, LORENTZIAN]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(velocity) = motion(scene).filter(|velocity| varies(velocity)) else { return Vec::new() };
         let top = greatest(&velocity);
         let creeps = |speed: f64| visits(scene, |row| (0.02 * speed..speed).contains(&velocity[row].abs())) >= 3;
         let speeds = [0.01, 0.03, 0.1, 0.2].into_iter().map(|share| share * top).filter(|speed| creeps(*speed));
-        speeds.map(|speed| Form::of(&[("stribeck_speed", speed)])).collect()
+        // How the film of a guide carries differs; of a spindle's bearings a long tail is but any bend over speed.
+        let falls = if turns(scene) { &FALLS[..1] } else { &FALLS };
+        let form = |name, speed| Form { name, ..Form::of(&[("stribeck_speed", speed)]) };
+        speeds.flat_map(|speed| falls.iter().map(move |name| form(*name, speed))).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -69,7 +76,7 @@ impl Effect for Stribeck {
         let law = |v: &f64| {
             let share = v / speed;
             let level = if is_power(scene) { share.abs() } else { soft_sign(share, 0.05) };
-            level * (-share * share).exp()
+            level * fall(form.name, share)
         };
         Some(vec![("level", velocity.iter().map(law).collect())])
     }
@@ -77,5 +84,19 @@ impl Effect for Stribeck {
     fn default_form(&self, scene: &Scene) -> Form {
         let top = motion(scene).map_or(1.0, |velocity| greatest(&velocity));
         Form::of(&[("stribeck_speed", 0.05 * top)])
+    }
+}
+
+const EXPONENTIAL: &str = "exponential";
+const LORENTZIAN: &str = "lorentzian";
+/// Names of the forms; the first is the Gaussian.
+const FALLS: [&str; 3] = ["", EXPONENTIAL, LORENTZIAN];
+
+/// Share of the extra friction that is left at so many times the Stribeck speed.
+fn fall(form: &str, share: f64) -> f64 {
+    match form {
+        EXPONENTIAL => (-share.abs()).exp(),
+        LORENTZIAN => 1.0 / (1.0 + share * share),
+        _ => (-share * share).exp(),
     }
 }
