@@ -20,6 +20,8 @@ const SLOPE_SHARE: f64 = 0.4;
 /// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
 /// doing.
 const OWN_DOING: f64 = 0.7;
+/// Chance that so many switchings, or more, are at a change of pace, below which they are not there by chance.
+const BY_CHANCE_MAX: f64 = 0.02;
 /// By how much its share of the cut and that of the rest may differ.
 const SHARES_APART_MAX: f64 = 0.35;
 /// Rows of a spell that is no flicker, and the share of spells that may be shorter.
@@ -49,11 +51,12 @@ impl Switching {
     #[must_use]
     pub fn by_itself(&self, change: &[bool], cut: &[bool]) -> bool {
         let switchings = || (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]);
-        let all = count(switchings().count());
-        let together = count(switchings().filter(|row| change[*row]).count());
+        let all = switchings().count();
+        let together = switchings().filter(|row| change[*row]).count();
         // As often as by chance is no sign.
         let by_chance = count((0..change.len()).filter(|row| change[*row]).count()) / count(change.len());
-        let own_doing = all * (1.0 - by_chance) > 3.0 && together / all - by_chance > OWN_DOING * (1.0 - by_chance);
+        let own_doing = count(together) / count(all) - by_chance > OWN_DOING * (1.0 - by_chance)
+            && at_least(together, all, by_chance) < BY_CHANCE_MAX;
         let share = |wanted: bool| {
             let of: Vec<f64> =
                 self.state.iter().zip(cut).filter(|(_, cut)| **cut == wanted).map(|(on, _)| *on).collect();
@@ -133,6 +136,16 @@ impl Switching {
     }
 }
 
+/// Chance of so many or more, of all, each with the same chance: the upper tail of the binomial.
+fn at_least(some: usize, all: usize, chance: f64) -> f64 {
+    // The terms one from another, from none on.
+    let odds = chance / (1.0 - chance).max(f64::MIN_POSITIVE);
+    let next = |(k, term): (usize, f64)| (k + 1, term * odds * count(all - k) / count(k + 1));
+    let none = (0, (1.0 - chance).powf(count(all)));
+    let terms = std::iter::successors(Some(none), |term| (term.0 < all).then(|| next(*term)));
+    terms.filter(|(k, _)| *k >= some).map(|(_, term)| term).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::noise::Arma;
@@ -191,6 +204,12 @@ mod tests {
         let (found, pump) = pump();
         let spikes: Vec<f64> = (0..ROWS).map(|row| if row % 60 == 0 { 1.0 } else { 0.0 }).collect();
         assert!(found.steps(&pump, &frame()) && !found.steps(&spikes, &frame()));
+    }
+
+    #[test]
+    fn nine_of_ten_at_even_chances_are_no_chance() {
+        assert!((at_least(9, 10, 0.5) - 11.0 / 1024.0).abs() < 1e-12);
+        assert!((at_least(0, 10, 0.3) - 1.0).abs() < 1e-12 && at_least(10, 10, 1.0).is_finite());
     }
 
     #[test]
