@@ -5,7 +5,7 @@ use super::designs::{Design, designs};
 use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
 use super::excerpt;
 use super::fit::{Data, Fit, fit};
-use super::frame::{Frame, Unit, group_size, held_out, units};
+use super::frame::{FOLDS, Frame, Unit, group_size, held_out, units};
 use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::Arma;
@@ -33,7 +33,11 @@ const CREEPING: [&str; 3] = ["zero_drift", "bearing_warm_up", "preload_growth"];
 pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let mut whole = Case::new(recording, model)?;
     if !excerpt::is_long(&whole.scene) {
-        return Ok(whole.diagnosed(seed));
+        let first = whole.diagnosed(seed);
+        let Some(mut other) = whole.with_the_strange_fitted(&first) else { return Ok(first) };
+        let second = other.diagnosed(seed);
+        let silent = matches!(second.verdict, Verdict::NoMismatch | Verdict::CannotTell);
+        return Ok(if silent { first } else { second });
     }
     let pieces = excerpt::close(&whole.scene, &whole.units);
     let (first, whole) = whole.seen_through(&pieces, seed);
@@ -90,13 +94,13 @@ impl<'a> Case<'a> {
         super::inputs::exclude_rows_without_inputs(&mut scene, &parts);
         let faults = clean(&mut scene, &nominal.total);
         let units = units(&scene);
-        let held = held_out(&units);
+        let held = held_out(&units, FOLDS - 1);
         // Of a long recording an excerpt is fitted, and every row counts where the answer is told.
         let size = if excerpt::is_long(&scene) { 1 } else { group_size(&scene) };
         Ok(Self::of(model, scene, parts, units, held, size, faults))
     }
 
-    fn of(
+    pub(super) fn of(
         model: &'a Model,
         scene: Scene,
         parts: Vec<Part>,
@@ -148,10 +152,7 @@ impl<'a> Case<'a> {
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let base = self.unveil(base);
-        let (mut found, designs) = self.search(&base, seed);
-        let base = self.settle(base, &mut found);
-        let doubt = self.doubt(&base, &mut found, &designs, seed);
-        let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
+        let Answer { base, found, designs, doubt } = self.answer(&base, seed);
         self.show_hidden(&base);
         let mut outcome = Outcome::new(self, base, found, designs, doubt);
         if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
@@ -160,6 +161,15 @@ impl<'a> Case<'a> {
             outcome = Outcome::new(self, base, found, designs, Doubt::NONE);
         }
         verdicts::judge(self, outcome)
+    }
+
+    /// What is found, without some kinds, and what is doubted of it.
+    pub(super) fn answered(&mut self, base: Fit, refused: &[String], seed: u64) -> Answer {
+        let (mut found, designs) = self.search(&base, refused, seed);
+        let base = self.settle(base, &mut found);
+        let doubt = self.doubt(&base, &mut found, &designs, seed);
+        let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
+        Answer { base, found, designs, doubt }
     }
 
     /// The case in which the answer is told: the whole recording.
@@ -226,7 +236,7 @@ impl<'a> Case<'a> {
         found.map(|frame| self.frame = frame).is_some()
     }
 
-    fn search(&mut self, base: &Fit, seed: u64) -> (Found, Vec<Design>) {
+    fn search(&mut self, base: &Fit, refused: &[String], seed: u64) -> (Found, Vec<Design>) {
         // Candidates see the load and the output that the fitted baseline simulates.
         let _ = simulate(self.unbent.as_ref().unwrap_or(&base.parts), &mut self.scene);
         let mut designs = designs(&self.scene, &self.frame, self.model);
@@ -239,6 +249,7 @@ impl<'a> Case<'a> {
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
         designs.extend(self.hidden_tone(base));
+        designs.retain(|design| !refused.contains(&design.kind));
         let found = self.searched(base, &designs, seed);
         if self.shows_switch_beside(&found.best, &mut designs) {
             let found = self.searched(base, &designs, seed);
@@ -302,6 +313,14 @@ pub fn ordinary_noise(fit: &Fit) -> f64 {
 /// Root mean square distance.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count(a.len().max(1))).sqrt()
+}
+
+/// What was found, before it is told.
+pub(super) struct Answer {
+    base: Fit,
+    pub(super) found: Found,
+    designs: Vec<Design>,
+    doubt: Doubt,
 }
 
 /// Everything the verdict is made from.

@@ -53,10 +53,16 @@ fn cut(rows: &Range<usize>, name: &str, wanted: usize) -> Vec<Unit> {
         .collect()
 }
 
-/// Every fourth unit is held out; none where there are fewer than four.
+/// One unit in so many is held out.
+pub const FOLDS: usize = 4;
+
+/// Every fourth unit is held out, of the first four the one of this index; none of fewer than four.
 #[must_use]
-pub fn held_out(units: &[Unit]) -> BTreeSet<usize> {
-    (0..units.len()).filter(|index| index % 4 == 3).collect()
+pub fn held_out(units: &[Unit], fold: usize) -> BTreeSet<usize> {
+    if units.len() < FOLDS {
+        return BTreeSet::new();
+    }
+    (0..units.len()).filter(|index| index % FOLDS == fold).collect()
 }
 
 /// Groups of rows that take part.

@@ -118,6 +118,7 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let best = self.pruned(best);
         self.try_rivals_at_edges(&best);
+        let best = self.beside_rivals(best);
         let best = self.meter_first(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
@@ -190,7 +191,12 @@ impl<'a, 'b> Search<'a, 'b> {
         best
     }
 
-    fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
+    pub(super) fn fitted(
+        &mut self,
+        members: Vec<usize>,
+        parts: &[Part],
+        noise: super::noise::Arma,
+    ) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
         let added = &fit.parts[self.base.parts.len()..];
         if !added.iter().all(|part| plausible(part, &fit, self.data)) {

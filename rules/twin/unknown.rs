@@ -182,8 +182,7 @@ impl Case<'_> {
         let close = alone.information > CLOSE_SHARE * named;
         let own = self.is_over_own_column(&alone.design, best);
         let unlike = anything && close && !own && self.unlike(&found.best);
-        let refined = is_against_motion(&on_top.design) && has_friction(&best.fit)
-            || self.is_over_own_column(&on_top.design, best);
+        let refined = self.is_another_shape(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
         if !(doubted || better || unlike || outdone) {
             return None;
