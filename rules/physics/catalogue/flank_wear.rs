@@ -4,6 +4,7 @@ use crate::physics::drive::is_displacement;
 use crate::physics::excitation::greatest;
 use crate::physics::tool_load;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::statistics::count;
 use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.
@@ -13,7 +14,7 @@ pub struct FlankWear;
 static DOC: EffectDoc = EffectDoc {
     kind: "flank_wear",
     family: "cutting",
-    law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; of a drill D / 2 in place of ap; without ap or D and vc: y = k * engaged * W^p; break_in: P = (k_break_in * (1 - exp(-W / W0)) + k * W) * ap * vc; edges: every edge its own k_i; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
+    law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; of a drill D / 2 in place of ap; without ap or D and vc: y = k * engaged * W^p; break_in: P = (k_break_in * (1 - exp(-W / W0)) + k * W) * ap * vc; edges: every edge its own k_i, another one their mean; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
     parameters: &[
         ParameterDoc {
             name: "k",
@@ -95,6 +96,8 @@ const fn rate(name: &'static str, en: &'static str, zh: &'static str) -> Paramet
 
 /// Names of the rates of the edges.
 const RATES: [&str; 8] = ["k_1", "k_2", "k_3", "k_4", "k_5", "k_6", "k_7", "k_8"];
+/// Between the names of the edges.
+const EDGE_TO_EDGE: &str = ", ";
 /// Shares of the longest cutting time in which an edge may break in.
 const BREAK_INS: [f64; 2] = [0.06, 0.2];
 
@@ -119,7 +122,10 @@ impl Effect for FlankWear {
         let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::of(&[("p", p)]));
         let break_ins =
             BREAK_INS.map(|share| Form { name: "break_in", ..Form::of(&[("break_in_min", share * longest_min)]) });
-        let edges = edges(scene).map(|_| [1.0, 0.5].map(|p| Form { name: "edges", ..Form::of(&[("p", p)]) }));
+        let edges = edges(scene).map(|edges| {
+            let place = Some(("tool".to_owned(), edges.join(EDGE_TO_EDGE)));
+            [1.0, 0.5].map(|p| Form { name: "edges", place: place.clone(), ..Form::of(&[("p", p)]) })
+        });
         powers.into_iter().chain(break_ins).chain(edges.into_iter().flatten()).collect()
     }
 
@@ -145,11 +151,16 @@ impl Effect for FlankWear {
         }
         let p = form.value("p").unwrap_or(1.0);
         if form.name == "edges" {
-            let tools = scene.words("tool")?;
-            let worn = |edge: &str| {
-                times(&|row| if tools.get(row) == Some(edge) { minutes[row].max(0.0).powf(p) } else { 0.0 })
+            let named: Vec<&str> = form.place.as_ref()?.1.split(EDGE_TO_EDGE).collect();
+            let tools = scene.words("tool");
+            let own = |row: usize| tools.and_then(|tools| tools.get(row)).filter(|tool| named.contains(tool));
+            // An edge that nobody has measured yet wears like the others in the mean.
+            let share = |edge: &str, row: usize| match own(row) {
+                Some(tool) => f64::from(u8::from(tool == edge)),
+                None => 1.0 / count(named.len()),
             };
-            return Some(RATES.into_iter().zip(edges(scene)?).map(|(rate, edge)| (rate, worn(edge))).collect());
+            let worn = |edge: &str| times(&|row| share(edge, row) * minutes[row].max(0.0).powf(p));
+            return Some(RATES.into_iter().zip(&named).map(|(rate, edge)| (rate, worn(edge))).collect());
         }
         Some(vec![("k", times(&|row| minutes[row].max(0.0).powf(p)))])
     }
@@ -162,7 +173,8 @@ impl Effect for FlankWear {
 /// The edges, where there are several and no more than can have a rate of their own.
 fn edges(scene: &Scene) -> Option<Vec<&str>> {
     let edges: Vec<&str> = scene.words("tool")?.words().iter().map(String::as_str).collect();
-    (2..=RATES.len()).contains(&edges.len()).then_some(edges)
+    let tellable = edges.iter().all(|edge| !edge.contains(EDGE_TO_EDGE));
+    ((2..=RATES.len()).contains(&edges.len()) && tellable).then_some(edges)
 }
 
 /// How much of an edge cuts, mm: the depth of cut, of a drill its radius.

@@ -170,11 +170,17 @@ fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
     let scene = scene(&recording, "spindle_power_w");
     let names: Vec<&str> = forms("flank_wear", &scene).iter().map(|form| form.name).collect();
     assert_eq!(names, ["", "", "", "", "break_in", "break_in", "edges", "edges"]);
-    let edges = Form { name: "edges", ..Form::of(&[("p", 1.0)]) };
+    let edges = forms("flank_wear", &scene).swap_remove(6);
     let columns = effect("flank_wear").expect("known").columns(&scene, &edges).expect("columns");
     assert_eq!(columns.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["k_1", "k_2"]);
     // Half the diameter of the drill cuts.
     assert!((columns[0].1[60] - 4.0 * 100.0 * 10.0).abs() < 1e-9 && columns[0].1[180] == 0.0);
+    // A model that was accepted meets an edge that it has not seen.
+    set_words(&mut recording, "tool", |_| "T9".to_owned());
+    let columns =
+        effect("flank_wear").expect("known").columns(&super::tests::scene(&recording, "spindle_power_w"), &edges);
+    let columns = columns.expect("columns");
+    assert!((columns[0].1[60] - 2000.0).abs() < 1e-9 && (columns[1].1[180] - 2000.0).abs() < 1e-9, "half each");
     let broken_in = column("flank_wear", &scene, &Form { name: "break_in", ..Form::of(&[("break_in_min", 1.0)]) });
     assert!(broken_in[119] / broken_in[30] < 1.01 && broken_in[30] / broken_in[3] > 2.0);
 }
