@@ -131,6 +131,12 @@ impl Form {
         Self { known: vec![("share", 1.0)], ..self }
     }
 
+    /// The form in which a state stands still.
+    #[must_use]
+    pub fn still() -> Self {
+        Self { name: STILL, ..Self::default() }
+    }
+
     /// The value of a shape parameter.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {

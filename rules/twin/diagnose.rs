@@ -267,11 +267,7 @@ impl<'a> Case<'a> {
 
     /// The hypothesis with one member taken out and everything else refitted.
     pub fn without(&mut self, from: &Hypothesis, position: usize) -> Option<Hypothesis> {
-        let mut members = from.members.clone();
-        members.remove(position);
-        let first = from.fit.parts.len() - from.members.len();
-        let mut parts = from.fit.parts.clone();
-        parts.remove(first + position);
+        let (members, parts) = from.taken_out(position);
         let fit = self.with_data(|data| fit(data, &parts, from.fit.noise))?;
         let information = from.information - 2.0 * (from.fit.log_likelihood - fit.log_likelihood);
         Some(Hypothesis { members, fit, information })

@@ -137,33 +137,12 @@ impl Case<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::twin::{diagnose, parse_model};
-    use adapters::recording::read_csv;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use std::fmt::Write;
-
-    const MODEL: &str = "schema = \"model/1\"\noutput = \"flow_l_min\"\n[[effect]]\nkind = \"linear\"\n\
-                         columns = { pump_v = 2.0, one = 0.0 }\n";
-
-    /// A vessel that spills beyond a level, in ten runs.
-    fn spilling(full: f64) -> String {
-        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
-        let mut text = String::from("time_s,run,pump_v,level_v,flow_l_min\n");
-        for row in 0..1500_u32 {
-            let t = f64::from(row);
-            let (pump, level) = (3.0 + (t / 37.0).sin(), 6.0 + 4.0 * (t / 61.0).sin());
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            let flow = 2.0 * pump - 4.0 * (level - full).max(0.0) + 0.2 * noise;
-            writeln!(text, "{t},{},{pump:.5},{level:.5},{flow:.5}", row / 150).expect("a string takes it");
-        }
-        text
-    }
+    use crate::twin::vessel;
 
     #[test]
     fn what_happens_beyond_a_level_is_located_there() {
-        let recording = read_csv(spilling(9.4).as_bytes(), "t.csv").expect("readable").recording;
-        let found = diagnose(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable");
+        let level = |row: u32| 6.0 + 4.0 * (f64::from(row) / 61.0).sin();
+        let (recording, found) = vessel::diagnosed(1500, level, |level| 4.0 * (level - 9.4).max(0.0));
         assert_eq!((found.verdict.word(), found.missing[0].effect.as_str()), ("unexplained", "unknown"));
         let level = found.rows.effects[0].1.iter().zip(recording.numbers("level_v").expect("recorded").iter());
         let acts: Vec<f64> = level.filter(|(effect, _)| effect.abs() > 0.02).filter_map(|(_, level)| level).collect();

@@ -38,7 +38,7 @@ impl Case<'_> {
     fn misnamed(&mut self, best: &Hypothesis) -> Vec<String> {
         let mut misnamed = Vec::new();
         for position in 0..best.members.len() {
-            let part = &best.fit.parts[added(best, position)];
+            let part = &best.fit.parts[best.first_part() + position];
             if enters_at_once(part) || self.is_timeless(best, position) == Some(true) {
                 misnamed.push(part.kind.clone());
             }
@@ -49,7 +49,7 @@ impl Case<'_> {
     /// Does it explain hardly more than the same law without time does?
     fn is_timeless(&mut self, best: &Hypothesis, position: usize) -> Option<bool> {
         let mut parts = best.fit.parts.clone();
-        let part = &mut parts[added(best, position)];
+        let part = &mut parts[best.first_part() + position];
         *part = still(part, &self.scene)?;
         let still = self.with_data(|data| fit(data, &parts, best.fit.noise))?;
         let without = self.without(best, position)?.fit;
@@ -57,11 +57,6 @@ impl Case<'_> {
         let least = INFORMATION_MIN.max(SHARE_MIN * brought(without.log_likelihood));
         Some(brought(still.log_likelihood) < least)
     }
-}
-
-/// Where a member stands among the parts.
-fn added(best: &Hypothesis, position: usize) -> usize {
-    best.fit.parts.len() - best.members.len() + position
 }
 
 /// Is it an entry, or an exit, with nearly all of the cut? What settles in the course of a pass may be slight.

@@ -67,6 +67,8 @@ pub mod tone;
 pub mod unknown;
 mod veil;
 pub mod verdicts;
+#[cfg(test)]
+mod vessel;
 pub mod wave;
 pub mod words;
 

@@ -41,6 +41,23 @@ pub struct Hypothesis {
     pub information: f64,
 }
 
+impl Hypothesis {
+    /// Where the first member stands among the parts of the fit.
+    #[must_use]
+    pub(super) fn first_part(&self) -> usize {
+        self.fit.parts.len() - self.members.len()
+    }
+
+    /// Members and parts with one member taken out.
+    #[must_use]
+    pub(super) fn taken_out(&self, position: usize) -> (Vec<usize>, Vec<Part>) {
+        let (mut members, mut parts) = (self.members.clone(), self.fit.parts.clone());
+        members.remove(position);
+        parts.remove(self.first_part() + position);
+        (members, parts)
+    }
+}
+
 /// What a search found.
 pub struct Found {
     /// The accepted hypothesis; no members when nothing passed the gate.
@@ -227,11 +244,7 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn without(&mut self, from: &Hypothesis, position: usize) -> Option<Hypothesis> {
-        let mut members = from.members.clone();
-        members.remove(position);
-        let first = from.fit.parts.len() - from.members.len();
-        let mut parts = from.fit.parts.clone();
-        parts.remove(first + position);
+        let (members, parts) = from.taken_out(position);
         self.fitted(members, &parts, from.fit.noise)
     }
 

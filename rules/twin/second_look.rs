@@ -37,32 +37,13 @@ impl Case<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::twin::{diagnose, parse_model};
-    use adapters::recording::read_csv;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use std::fmt::Write;
+    use crate::twin::vessel;
 
-    const MODEL: &str = "schema = \"model/1\"\noutput = \"flow_l_min\"\n[[effect]]\nkind = \"linear\"\n\
-                         columns = { pump_v = 2.0, one = 0.0 }\n";
-
-    /// A vessel in twelve runs; in every fourth of them, which are held out first, it is fuller, and spills.
-    fn vessel(spills: f64) -> String {
-        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
-        let mut text = String::from("time_s,run,pump_v,level_v,flow_l_min\n");
-        for row in 0..1800_u32 {
-            let (t, full) = (f64::from(row), if row / 150 % 4 == 3 { 3.0 } else { 0.0 });
-            let (pump, level) = (3.0 + (t / 37.0).sin(), 5.0 + full + 2.0 * (t / 61.0).sin());
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            let flow = 2.0 * pump - spills * (level - 7.5).max(0.0) + 0.2 * noise;
-            writeln!(text, "{t},{},{pump:.5},{level:.5},{flow:.5}", row / 150).expect("a string takes it");
-        }
-        text
-    }
-
+    /// Of a vessel in twelve runs; in every fourth of them, which are held out first, it is fuller, and spills.
     fn verdict(spills: f64) -> (&'static str, Vec<String>) {
-        let recording = read_csv(vessel(spills).as_bytes(), "t.csv").expect("readable").recording;
-        let found = diagnose(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable");
+        let full = |row: u32| if row / 150 % 4 == 3 { 3.0 } else { 0.0 };
+        let level = |row: u32| 5.0 + full(row) + 2.0 * (f64::from(row) / 61.0).sin();
+        let (_, found) = vessel::diagnosed(1800, level, |level| spills * (level - 7.5).max(0.0));
         (found.verdict.word(), found.fit.expect("fitted").held_out_runs)
     }
 

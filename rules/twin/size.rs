@@ -66,7 +66,7 @@ impl Case<'_> {
 
     fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> Option<usize> {
         let deviation = ordinary_noise(&best.fit);
-        let first = best.fit.parts.len() - best.members.len();
+        let first = best.first_part();
         let several = best.members.len() > 1;
         let ln_rows = self.ln_rows(base);
         let unclaimable = |position: usize| {

@@ -230,7 +230,7 @@ impl Case<'_> {
 
     /// Is what explains most of it another one in every run?
     fn unlike(&mut self, best: &Hypothesis) -> bool {
-        let first = best.fit.parts.len() - best.members.len();
+        let first = best.first_part();
         (0..best.members.len()).any(|position| {
             differs_by_run(&best.fit, &self.frame, first + position)
                 && (best.members.len() == 1
@@ -253,7 +253,7 @@ impl Case<'_> {
     /// Does it bend over a column that only an effect among the named ones follows?
     fn is_over_own_column(&self, empirical: &Design, named: &Hypothesis) -> bool {
         let Body::Empirical(form) = &empirical.part.body else { return false };
-        let members = &named.fit.parts[named.fit.parts.len() - named.members.len()..];
+        let members = &named.fit.parts[named.first_part()..];
         let mut own = members.iter().filter_map(|part| part.effect_and_form()?.0.own_column(&self.scene));
         own.any(|column| column == form.channel)
     }

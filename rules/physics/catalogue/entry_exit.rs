@@ -108,21 +108,8 @@ impl Effect for EntryExit {
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
         let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
-        let ramps = |length_s: f64| {
-            let shares = [0.5, 1.0].into_iter();
-            shares.map(move |share| Form {
-                name: "ramp",
-                ..Form::of(&[("length_s", length_s), ("exit_length_s", share * length_s)])
-            })
-        };
-        forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(ramps));
-        let travels = |length_mm: f64| {
-            [0.5, 1.0].map(|share| Form {
-                name: TRAVEL,
-                ..Form::of(&[("length_mm", length_mm), ("exit_length_mm", share * length_mm)])
-            })
-        };
-        forms.extend(ways_mm(scene).into_iter().flat_map(travels));
+        forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| entries("ramp", TIMES, length_s)));
+        forms.extend(ways_mm(scene).into_iter().flat_map(|length_mm| entries(TRAVEL, WAYS, length_mm)));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
@@ -132,8 +119,7 @@ impl Effect for EntryExit {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let travels = form.name == TRAVEL;
-        let (length, exit_length) =
-            if travels { ("length_mm", "exit_length_mm") } else { ("length_s", "exit_length_s") };
+        let [length, exit_length] = if travels { WAYS } else { TIMES };
         let over = form.value(length).unwrap_or(1.0).max(f64::MIN_POSITIVE);
         let exit_over = form.value(exit_length).unwrap_or(over).max(f64::MIN_POSITIVE);
         let ramps = travels || form.name == "ramp";
@@ -171,6 +157,16 @@ impl Effect for EntryExit {
 
 /// Sampling periods from which on the entry is more than an edge: tool, chip and work settle over a good part of a pass.
 const SETTLING_PERIODS: f64 = 8.0;
+
+/// Names of the lengths of entry and exit, as times and as ways.
+const TIMES: [&str; 2] = ["length_s", "exit_length_s"];
+/// See [`TIMES`].
+const WAYS: [&str; 2] = ["length_mm", "exit_length_mm"];
+
+/// Forms of this name with an entry of this length, and an exit half as long and as long.
+fn entries(name: &'static str, [entry, exit]: [&'static str; 2], length: f64) -> [Form; 2] {
+    [0.5, 1.0].map(|share| Form { name, ..Form::of(&[(entry, length), (exit, share * length)]) })
+}
 
 /// The form over the way at the feed.
 const TRAVEL: &str = "travel";

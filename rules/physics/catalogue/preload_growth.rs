@@ -98,7 +98,7 @@ impl Effect for PreloadGrowth {
     }
 
     fn still(&self) -> Option<Form> {
-        Some(Form { name: STILL, ..Form::plain() })
+        Some(Form::still())
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

@@ -56,7 +56,7 @@ impl Effect for Stribeck {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &[EXPONENTIAL, LORENTZIAN]
+        &FALLS[1..]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
