@@ -197,6 +197,7 @@ impl<'a> Case<'a> {
     fn fit_baseline(&mut self) -> Option<Fit> {
         let parts = self.parts.clone();
         let plain = self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))?;
+        self.even_out(&plain);
         let noise = self.frame.noise_between_outliers(&plain.residual, plain.noise);
         self.frame.weigh(&plain.residual, noise);
         self.with_data(|data| fit(data, &plain.parts, noise))
@@ -258,7 +259,7 @@ impl<'a> Case<'a> {
         (found, designs)
     }
 
-    fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> Found {
+    pub(super) fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> Found {
         let frame = self.frame.clone();
         let bank = Bank::new(designs, &frame);
         let unbent = self.unbent.clone();

@@ -25,6 +25,7 @@ pub mod empirical;
 mod estimate;
 pub mod examine;
 mod excerpt;
+mod excluded;
 pub mod experiments;
 pub mod expression;
 pub mod fit;
@@ -65,6 +66,7 @@ pub mod term;
 pub mod text;
 pub mod tone;
 pub mod unknown;
+mod unrest;
 mod veil;
 pub mod verdicts;
 #[cfg(test)]

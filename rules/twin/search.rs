@@ -27,6 +27,8 @@ const STEP_SHARE: f64 = 0.05;
 pub const P_MAX: f64 = 0.02;
 /// Information by which a fault of the measurement may explain less than a cause in the machine and still be named first.
 const MEASURED_AS_WELL: f64 = 3.0;
+/// Share by which more was found than is named, from which the names are not the whole story.
+const UNNAMED_SHARE: f64 = 0.25;
 /// Faults of a meter.
 pub(super) const METER: [&str; 6] = ["sensor_gain", "zero_drift", "offset", "clock_lag", "meter_window", "saturation"];
 
@@ -68,6 +70,16 @@ pub struct Found {
     pub others: Vec<Hypothesis>,
     /// The p-value of the best hypothesis that was refused, when nothing was accepted.
     pub refused_p: Option<f64>,
+}
+
+impl Found {
+    /// Do others explain much more than what is named? What they name besides was not worth a name, so that something
+    /// real is left, and what is named may be no more than its likeness.
+    #[must_use]
+    pub fn leaves_much_unnamed(&self) -> bool {
+        let most = self.others.iter().map(|other| other.information).fold(0.0, f64::max);
+        most > (1.0 + UNNAMED_SHARE) * self.best.information
+    }
 }
 
 /// A search in progress.

@@ -54,6 +54,8 @@ pub struct Unknown {
     pub information: f64,
     /// The gate's answer.
     pub p_value: f64,
+    /// What the model file excludes and would explain clearly more than any name it admits.
+    pub excluded: Option<String>,
 }
 
 /// A cause without a name that explains what was named as well.
@@ -107,6 +109,15 @@ impl Doubt {
     pub(super) const NONE: Self = Self { unknown: None, nameless: None };
 }
 
+/// Why names are withdrawn, whatever a form without a name explains.
+#[derive(Debug, Clone)]
+struct Withdrawn {
+    /// The leading one is outdone in its place.
+    leading: bool,
+    /// What the model file excludes, where it explains clearly more.
+    excluded: Option<String>,
+}
+
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
 pub(super) struct Yardsticks<'a> {
     pub(super) bank: Bank<'a>,
@@ -130,12 +141,16 @@ impl Case<'_> {
         let yardsticks = Yardsticks { bank, of_base };
         let outdone = self.outdone(base, &found.best, designs, &yardsticks);
         let leading = outdone.iter().any(|outdone| outdone.share >= LEADING_SHARE);
-        let unknown = self.unknown(base, found, &yardsticks, leading, seed);
+        let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
+        let unknown = self.unknown(base, found, &yardsticks, Withdrawn { leading, excluded: excluded.clone() }, seed);
         if unknown.is_some() {
             return Doubt { unknown, nameless: None };
         }
         self.drop_minor(base, found, designs, &yardsticks, outdone);
-        Doubt { unknown, nameless: self.nameless(base, found, designs, &yardsticks) }
+        let nameless = self.nameless(base, found, designs, &yardsticks);
+        let first = found.best.members.first().filter(|_| excluded.is_some());
+        let named = first.map(|member| Nameless { instead_of: designs[*member].kind.clone(), delta_ic: 0.0 });
+        Doubt { unknown, nameless: nameless.or(named) }
     }
 
     /// Every empirical form worth trying.
@@ -159,7 +174,7 @@ impl Case<'_> {
         base: &Fit,
         found: &Found,
         forms: &Yardsticks<'_>,
-        outdone: bool,
+        withdrawn: Withdrawn,
         seed: u64,
     ) -> Option<Unknown> {
         let best = &found.best;
@@ -184,23 +199,24 @@ impl Case<'_> {
         let unlike = anything && close && !own && self.unlike(&found.best);
         let refined = self.is_another_shape(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
-        if !(doubted || better || unlike || outdone) {
+        let Withdrawn { leading, excluded } = withdrawn;
+        let instead = better || unlike || leading || excluded.is_some() && alone.information > 0.0;
+        if !(doubted || instead) {
             return None;
         }
-        let instead = better || unlike || outdone;
         let (from, to) = if instead { (base, &alone) } else { (&found.best.fit, &on_top) };
         let noise = ordinary_noise(&to.fit);
         let small =
             self.negligible(&from.residual, &to.fit.residual, noise, to.information >= BEYOND_DOUBT_INFORMATION);
-        if small {
+        if small && excluded.is_none() {
             return None;
         }
         let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, None, self.ln_rows(base), seed, !anything);
-        if !better && p > P_MAX {
+        if !better && excluded.is_none() && p > P_MAX {
             return None;
         }
         let alone = self.localised(base, alone);
-        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p })
+        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p, excluded })
     }
 
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording

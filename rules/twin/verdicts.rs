@@ -49,7 +49,8 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
     }
-    if alternatives.is_empty() && outcome.unknown.is_none() && outcome.fits.rises() {
+    let doubtful = outcome.fits.rises() || outcome.found.leaves_much_unnamed();
+    if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
     }
     let verdict = outcome.verdict(!alternatives.is_empty());
@@ -108,6 +109,11 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
             found[0].equation = format!("{}; {}", found[0].equation, more.equation);
             let named = |e: Estimate| Estimate { name: format!("{}.{}", part.label(), e.name), ..e };
             found[0].parameters.extend(more.parameters.into_iter().map(named));
+        }
+        if let Some(excluded) = &unknown.excluded {
+            let statement = &found[0].statement;
+            found[0].statement =
+                format!("{statement}; of what the model file excludes, {excluded} would explain it better");
         }
         found[0].delta_ic = unknown.information;
         found[0].p_value = unknown.p_value;
