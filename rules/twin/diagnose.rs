@@ -238,8 +238,7 @@ impl<'a> Case<'a> {
     }
 
     fn search(&mut self, base: &Fit, refused: &[String], seed: u64) -> (Found, Vec<Design>) {
-        // Candidates see the load and the output that the fitted baseline simulates.
-        let _ = simulate(self.unbent.as_ref().unwrap_or(&base.parts), &mut self.scene);
+        self.simulate_baseline(base);
         let mut designs = designs(&self.scene, &self.frame, self.model);
         if self.frame.levels.is_some() {
             // What creeps over hours is in the levels of the tools; within one tool's life it is but a bend.

@@ -11,7 +11,7 @@ pub enum Verdict {
     Explained,
     /// Real, but several named explanations cannot be told apart on this data.
     Ambiguous,
-    /// Real and located; nothing in the catalogue explains it.
+    /// Real and located; no candidate explains it.
     Unexplained,
     /// Nothing beyond the noise.
     NoMismatch,

@@ -21,16 +21,11 @@ impl Case<'_> {
         if !narrowed || best.members.is_empty() {
             return None;
         }
-        let _ = simulate(self.unbent.as_ref().unwrap_or(&base.parts), &mut self.scene);
-        let open = Model { exclude: Vec::new(), only: Vec::new(), ..self.model.clone() };
-        let excluded = |kind: &str| crate::physics::effect(kind).is_some_and(|effect| !wanted(effect, self.model));
-        let mut all = designs.to_vec();
-        all.extend(designs_of(&self.scene, &self.frame, &open, excluded));
-        if all.len() == designs.len() {
-            return None;
-        }
-        let found = self.searched(base, &all, seed).best;
+        self.simulate_baseline(base);
+        let all = [designs, &self.excluded_designs()].concat();
+        let found = (all.len() > designs.len()).then(|| self.searched(base, &all, seed).best);
         let _ = simulate(&best.fit.parts, &mut self.scene);
+        let found = found?;
         let kinds = |of: &Hypothesis| of.members.iter().map(|member| all[*member].kind.clone()).collect::<Vec<_>>();
         let (named, instead) = (kinds(best), kinds(&found));
         // What merely stands beside all that is named takes nothing from it.
@@ -39,6 +34,13 @@ impl Case<'_> {
         let excluded = found.members.iter().filter(|member| **member >= designs.len());
         let excluded: Vec<&str> = excluded.map(|member| all[*member].kind.as_str()).collect();
         (replaces && clearly && !excluded.is_empty()).then(|| excluded.join(", "))
+    }
+
+    /// Every form of the kinds that the model file keeps out of the search.
+    fn excluded_designs(&self) -> Vec<Design> {
+        let open = Model { exclude: Vec::new(), only: Vec::new(), ..self.model.clone() };
+        let excluded = |kind: &str| crate::physics::effect(kind).is_some_and(|effect| !wanted(effect, self.model));
+        designs_of(&self.scene, &self.frame, &open, excluded)
     }
 }
 

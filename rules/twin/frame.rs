@@ -75,9 +75,9 @@ pub struct Frame {
     pub unit: Vec<usize>,
     /// Weight of each group's innovation; empty while all weigh the same.
     weights: Vec<f64>,
-    /// How quiet the pass of each group is: inverse of its noise, with a geometric mean of one; empty while all are
-    /// taken to be alike.
-    pub quiet: Vec<f64>,
+    /// How quiet its pass or its load leaves each group: inverse of its noise, with a geometric mean of one; empty while
+    /// all are taken to be alike.
+    quiet: Vec<f64>,
     /// Levels of their own that passes and tools have, where they have been found.
     pub levels: Option<Levels>,
 }
@@ -116,7 +116,14 @@ impl Frame {
         white
     }
 
-    /// Innovations of a column divided by how restless its pass is.
+    /// Divides innovations from now on by how restless each group is, given how quiet each is in relation to the others.
+    pub fn even_by(&mut self, mut quiet: Vec<f64>) {
+        let typical = (quiet.iter().map(|x| x.ln()).sum::<f64>() / count(quiet.len())).exp();
+        quiet.iter_mut().for_each(|x| *x /= typical);
+        self.quiet = quiet;
+    }
+
+    /// Innovations of a column divided by how restless its pass or its load is.
     #[must_use]
     pub fn evened(&self, column: &[f64], noise: Arma) -> Vec<f64> {
         let mut white = whiten(column, &self.stretches, noise);

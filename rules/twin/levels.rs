@@ -10,7 +10,7 @@ use super::frame::Frame;
 use super::linear::{dot, subtract};
 use super::noise::{Arma, fit_near};
 use crate::physics::Scene;
-use crate::statistics::{count, median};
+use crate::statistics::median;
 use std::ops::Range;
 
 /// Passes below which scatter between them cannot be told from an effect.
@@ -89,7 +89,7 @@ fn centre(ones: &[f64], column: &mut [f64], share: f64) {
 #[must_use]
 pub(super) fn found(scene: &Scene, frame: &Frame, residual: &[f64]) -> Option<Frame> {
     let mut broken = frame.broken_at(scene.passes());
-    broken.quiet = quiet(&broken, residual);
+    broken.even_by(quiet(&broken, residual));
     let in_pass: Vec<bool> = broken.stretches.iter().map(|groups| within(scene, &broken, groups.start)).collect();
     let passes = in_pass.iter().filter(|in_pass| **in_pass).count();
     let tools = tools(scene, &broken);
@@ -113,7 +113,7 @@ pub(super) fn found(scene: &Scene, frame: &Frame, residual: &[f64]) -> Option<Fr
 /// Passes are taken to be at most this many times quieter or more restless than the middle one.
 const QUIET_MAX: f64 = 4.0;
 
-/// How quiet each group's stretch is, from the changes between neighbours, with a geometric mean of one.
+/// How quiet each group's stretch is, from the changes between neighbours, the middle one at one.
 fn quiet(frame: &Frame, residual: &[f64]) -> Vec<f64> {
     let typical = |rows: &Range<usize>| {
         median(residual[rows.clone()].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()).filter(|x| *x > 0.0)
@@ -124,8 +124,6 @@ fn quiet(frame: &Frame, residual: &[f64]) -> Vec<f64> {
         let weight = typical(rows).map_or(1.0, |typical| (middle / typical).clamp(1.0 / QUIET_MAX, QUIET_MAX));
         quiet[rows.clone()].fill(weight);
     }
-    let mean = (quiet.iter().map(|x| x.ln()).sum::<f64>() / count(quiet.len())).exp();
-    quiet.iter_mut().for_each(|x| *x /= mean);
     quiet
 }
 

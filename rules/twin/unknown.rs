@@ -110,12 +110,12 @@ impl Doubt {
 }
 
 /// Why names are withdrawn, whatever a form without a name explains.
-#[derive(Debug, Clone)]
-struct Withdrawn {
+#[derive(Debug, Clone, Copy)]
+struct Withdrawn<'a> {
     /// The leading one is outdone in its place.
     leading: bool,
     /// What the model file excludes, where it explains clearly more.
-    excluded: Option<String>,
+    excluded: Option<&'a str>,
 }
 
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
@@ -142,7 +142,8 @@ impl Case<'_> {
         let outdone = self.outdone(base, &found.best, designs, &yardsticks);
         let leading = outdone.iter().any(|outdone| outdone.share >= LEADING_SHARE);
         let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
-        let unknown = self.unknown(base, found, &yardsticks, Withdrawn { leading, excluded: excluded.clone() }, seed);
+        let withdrawn = Withdrawn { leading, excluded: excluded.as_deref() };
+        let unknown = self.unknown(base, found, &yardsticks, withdrawn, seed);
         if unknown.is_some() {
             return Doubt { unknown, nameless: None };
         }
@@ -174,7 +175,7 @@ impl Case<'_> {
         base: &Fit,
         found: &Found,
         forms: &Yardsticks<'_>,
-        withdrawn: Withdrawn,
+        withdrawn: Withdrawn<'_>,
         seed: u64,
     ) -> Option<Unknown> {
         let best = &found.best;
@@ -216,7 +217,7 @@ impl Case<'_> {
             return None;
         }
         let alone = self.localised(base, alone);
-        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p, excluded })
+        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p, excluded: excluded.map(str::to_owned) })
     }
 
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording

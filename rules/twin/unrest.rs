@@ -7,9 +7,10 @@
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::frame::Frame;
+use super::linear::{Solution, least_squares};
 use super::model::simulate;
 use crate::physics::Role;
-use crate::statistics::{count, mean, median};
+use crate::statistics::{mean, median};
 
 /// Loads at which restlessness is told.
 const BINS: usize = 10;
@@ -27,28 +28,29 @@ const RESTLESS_MAX: f64 = 12.0;
 const QUIET_MAX: f64 = 2.0;
 
 impl Case<'_> {
-    /// Lets rows count by how restless their load makes them.
+    /// Lets rows count by how restless their load makes them; where passes have levels of their own each pass has told
+    /// how restless it is.
     pub(super) fn even_out(&mut self, plain: &Fit) {
+        if self.frame.levels.is_some() {
+            return;
+        }
         let Some(simulated) = simulate(&plain.parts, &mut self.scene) else { return };
         let load = self.scene.load().or_else(|| self.scene.role(Role::Load)).unwrap_or(&simulated.total);
         if let Some(quiet) = quiet_under_load(&self.frame, &self.frame.reduce(load), &plain.residual) {
-            self.frame.quiet = quiet;
+            self.frame.even_by(quiet);
         }
     }
 }
 
-/// How quiet each group's load leaves it, with a geometric mean of one; `None` where the noise does not grow with the
-/// load. `load` and `residual` are one value per group, in the output's unit.
+/// How quiet each group's load leaves it, the middle one at one; `None` where the noise does not grow with the load.
+/// `load` and `residual` are one value per group, in the output's unit.
 #[must_use]
 fn quiet_under_load(frame: &Frame, load: &[f64], residual: &[f64]) -> Option<Vec<f64>> {
     let bins = bins(frame, load, residual)?;
     let law = Law::of(&bins)?;
     let quiet: Vec<f64> = load.iter().map(|load| law.variance(*load).sqrt().recip()).collect();
     let middle = median(quiet.clone())?;
-    let mut quiet: Vec<f64> = quiet.iter().map(|x| (x / middle).clamp(1.0 / RESTLESS_MAX, QUIET_MAX)).collect();
-    let typical = (quiet.iter().map(|x| x.ln()).sum::<f64>() / count(quiet.len())).exp();
-    quiet.iter_mut().for_each(|x| *x /= typical);
-    Some(quiet)
+    Some(quiet.iter().map(|x| (x / middle).clamp(1.0 / RESTLESS_MAX, QUIET_MAX)).collect())
 }
 
 /// Neighbours under about the same load.
@@ -91,17 +93,11 @@ impl Law {
         let mut law = Self { constant: mean(&bins.iter().map(|bin| bin.variance).collect::<Vec<_>>()), slope: 0.0 };
         for _ in 0..4 {
             // Errors are shares of the variance itself.
-            let weight = |bin: &Bin| law.variance(bin.load).powi(-2);
-            let sum = |of: &dyn Fn(&Bin) -> f64| bins.iter().map(|bin| weight(bin) * of(bin)).sum::<f64>();
-            let square = |bin: &Bin| bin.load * bin.load;
-            let (w, x, y) = (sum(&|_| 1.0), sum(&square), sum(&|bin| bin.variance));
-            let (xx, xy) = (sum(&|bin| square(bin).powi(2)), sum(&|bin| square(bin) * bin.variance));
-            let determinant = w * xx - x * x;
-            if determinant <= 1e-12 * w * xx {
-                return None;
-            }
-            let slope = (w * xy - x * y) / determinant;
-            let constant = (y - slope * x) / w;
+            let weight = |bin: &Bin| law.variance(bin.load).recip();
+            let weighted = |of: &dyn Fn(&Bin) -> f64| bins.iter().map(|bin| weight(bin) * of(bin)).collect();
+            let columns = [weighted(&|_| 1.0), weighted(&|bin| bin.load * bin.load)];
+            let Solution { coefficients, dropped, .. } = least_squares(&columns, &weighted(&|bin| bin.variance));
+            let (&[constant, slope], true) = (coefficients.as_slice(), dropped.is_empty()) else { return None };
             law = Self { constant: constant.max(0.25 * least), slope: slope.max(0.0) };
         }
         law.is_clear(bins).then_some(law)
@@ -121,6 +117,7 @@ impl Law {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::count;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 

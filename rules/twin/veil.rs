@@ -63,6 +63,11 @@ impl Case<'_> {
         self.with_data(|data| fit(data, &base.parts, base.noise)).unwrap_or(base)
     }
 
+    /// Simulates the baseline, for candidates to see its load and its output.
+    pub(super) fn simulate_baseline(&mut self, base: &Fit) {
+        let _ = simulate(self.unbent.as_ref().unwrap_or(&base.parts), &mut self.scene);
+    }
+
     /// Keeps the forms of the effects at edges that explain something with every row in full, for the search to fit: its
     /// own scan, of rows that weigh little, sees nothing of them.
     fn seen_in_full(&mut self, base: &Fit, fits: &[Fit]) {

@@ -13,7 +13,7 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::CannotTell => diagnosis.summary.clone(),
         Verdict::Unexplained => {
             format!(
-                "Something real is missing from the model, and nothing in the catalogue explains it{}. {fit}",
+                "Something real is missing from the model, and no candidate explains it{}. {fit}",
                 region(diagnosis)
             )
         }
