@@ -38,6 +38,40 @@ pub fn first_order_in_each_pass(scene: &Scene, input: &[f64], tau_s: f64) -> Vec
     state
 }
 
+/// A state that follows the direction of motion over the way, `dz = (sign(dx) - z) |dx| / way`, from zero at the first row:
+/// what is bent stays bent at rest and across pauses. Velocity in m/s or rad/s, linear between rows; way in m or rad.
+#[must_use]
+pub fn bent_over_the_way(scene: &Scene, velocity: &[f64], way: f64) -> Vec<f64> {
+    let mut state = vec![0.0; velocity.len()];
+    for row in 1..velocity.len() {
+        let bent = |z: f64, dx: f64| relaxed(z, dx.signum(), dx.abs(), way);
+        state[row] = ways(scene, velocity, row).into_iter().fold(state[row - 1], bent);
+    }
+    state
+}
+
+/// The ways between reversals, with their direction, in m or rad: of no length where the drive never moves.
+#[must_use]
+pub fn strokes(scene: &Scene, velocity: &[f64]) -> Vec<f64> {
+    let mut strokes: Vec<f64> = Vec::new();
+    for dx in (1..velocity.len()).flat_map(|row| ways(scene, velocity, row)).filter(|dx| *dx != 0.0) {
+        match strokes.last_mut() {
+            Some(stroke) if stroke.signum() == dx.signum() => *stroke += dx,
+            _ => strokes.push(dx),
+        }
+    }
+    strokes
+}
+
+/// The ways since the row before, one in each direction where it reverses in between.
+fn ways(scene: &Scene, velocity: &[f64], row: usize) -> [f64; 2] {
+    let (before, now) = (velocity[row - 1], velocity[row]);
+    let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0).min(scene.driven_s(row));
+    let same = before * now >= 0.0;
+    let until_s = if same { dt_s } else { dt_s * before / (before - now) };
+    if same { [0.5 * (before + now) * dt_s, 0.0] } else { [0.5 * before * until_s, 0.5 * now * (dt_s - until_s)] }
+}
+
 /// What is left of an initial state of one: `exp(-t / tau_s)` since the first row.
 #[must_use]
 pub fn decay(scene: &Scene, tau_s: f64) -> Vec<f64> {

@@ -217,7 +217,12 @@ impl Case<'_> {
             return None;
         }
         let alone = self.localised(base, alone);
-        Some(Unknown { fit: alone.fit, information: alone.information, p_value: p, excluded: excluded.map(str::to_owned) })
+        Some(Unknown {
+            fit: alone.fit,
+            information: alone.information,
+            p_value: p,
+            excluded: excluded.map(str::to_owned),
+        })
     }
 
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording

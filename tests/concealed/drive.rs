@@ -94,8 +94,9 @@ pub(crate) struct Order {
 type Law = fn(&mut Dice, &Ride, &[f64]) -> Part;
 
 /// Hidden law, what the model knows, expectation.
-const SINGLES: [(&str, Law, Known, Expect); 12] = [
+const SINGLES: [(&str, Law, Known, Expect); 13] = [
     ("dry_friction", dry, NO_DRY, Expect::Named),
+    ("presliding", presliding, NO_DRY, Expect::Named),
     ("offset", offset, ALL, Expect::Named),
     ("direction_asymmetry", asymmetry, ALL, Expect::Named),
     ("stribeck", stribeck, ALL, Expect::Named),
@@ -196,6 +197,23 @@ fn dry(dice: &mut Dice, ride: &Ride, _: &[f64]) -> Part {
     let (force, creep, wave) = (dice.uniform(14.0, 30.0), dice.uniform(0.0006, 0.002), dice.uniform(0.0, 6.0));
     let law = |x: f64, v: f64, _| force * (v / creep).tanh() * (1.0 + 0.04 * (9.0 * x + wave).sin());
     Part { parameters: vec![("level", force)], ..part("dry_friction", "hyperbolic tangent", ride.force(law)) }
+}
+
+/// Dry friction of a preloaded rail with seals: what touches bends before it slips, harder or softer the farther, and stays
+/// bent at rest.
+fn presliding(dice: &mut Dice, ride: &Ride, _: &[f64]) -> Part {
+    const STEPS: usize = 50;
+    let (force, way, softening) = (dice.uniform(14.0, 30.0), dice.uniform(0.0003, 0.003), dice.uniform(0.6, 1.6));
+    let mut bent: f64 = 0.0;
+    let mut at = |velocity: &f64| {
+        let dx = velocity * STEP_S / STEPS as f64;
+        for _ in 0..STEPS {
+            bent = (bent + dx / way * (1.0 - bent * dx.signum()).max(0.0).powf(softening)).clamp(-1.0, 1.0);
+        }
+        force * bent
+    };
+    let contribution = ride.velocity.iter().map(&mut at).collect();
+    Part { parameters: vec![("level", force)], ..part("dry_friction", "bends before it slips", contribution) }
 }
 
 fn offset(dice: &mut Dice, ride: &Ride, _: &[f64]) -> Part {

@@ -2,6 +2,7 @@
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
 use crate::physics::excitation::greatest;
+use crate::physics::state::{bent_over_the_way, strokes};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
@@ -11,7 +12,8 @@ pub struct DryFriction;
 static DOC: EffectDoc = EffectDoc {
     kind: "dry_friction",
     family: "axis",
-    law: "F = level * tanh(v / v0); in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
+    law: "F = level * tanh(v / v0); presliding: F = level * z, dz/dx = (sign(dx) - z) / way, held at rest; \
+          in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
     parameters: &[
         ParameterDoc {
             name: "level",
@@ -29,9 +31,18 @@ static DOC: EffectDoc = EffectDoc {
             en: "speed at which the level is reached, as a share of the greatest speed",
             zh: "达到摩擦力的速度与最大速度之比",
         },
+        ParameterDoc {
+            name: "presliding_way",
+            unit: "m",
+            entry: Entry::Shape,
+            range: (1e-7, 10.0),
+            en: "way after a reversal in which two thirds of the change of friction build up; rad where the drive turns",
+            zh: "换向后摩擦力变化建立三分之二所经过的位移；旋转驱动时单位为rad",
+        },
     ],
     needs: &["velocity | speed"],
-    source: "Coulomb; smoothed at reversal so that rows at rest carry no sign of noise",
+    source: "Coulomb; smoothed at reversal so that rows at rest carry no sign of noise; presliding: Dahl, A solid friction \
+             model, Aerospace Corporation TOR-0158(3107-18)-1, 1968",
     experiment_minutes: 3.0,
     rivals: &["viscous_friction", "stribeck", "offset", "direction_asymmetry"],
     en: Texts {
@@ -55,6 +66,10 @@ impl Effect for DryFriction {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &[PRESLIDING]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(velocity) = motion(scene) else { return Vec::new() };
         if velocity.iter().all(|v| *v == 0.0) {
@@ -62,12 +77,19 @@ impl Effect for DryFriction {
         }
         match scene.output_kind() {
             OutputKind::Power => vec![Form::plain()],
-            _ => [1e-4, 0.002, 0.01, 0.04].iter().map(|share| Form::of(&[("reversal_share", *share)])).collect(),
+            _ => {
+                let sudden = [1e-4, 0.002, 0.01, 0.04].map(|share| Form::of(&[("reversal_share", share)]));
+                sudden.into_iter().chain(presliding(scene, &velocity)).collect()
+            }
         }
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let velocity = motion(scene)?;
+        if form.name == PRESLIDING {
+            let way = form.value("presliding_way").unwrap_or(PRESLIDING_WAY_M);
+            return Some(vec![("level", bent_over_the_way(scene, &velocity, way))]);
+        }
         let top = greatest(&velocity);
         let reference = if turns(scene) { 1000.0 * RAD_PER_S_OF_RPM } else { 1.0 };
         let share = form.value("reversal_share").unwrap_or(0.01);
@@ -77,4 +99,24 @@ impl Effect for DryFriction {
         };
         Some(vec![("level", velocity.iter().map(law).collect())])
     }
+}
+
+/// The form in which guides and seals bend before they slip.
+const PRESLIDING: &str = "presliding";
+/// What is usual in a guide, m.
+const PRESLIDING_WAY_M: f64 = 1e-4;
+/// Ways that are tried, as shares of the longest stroke.
+const STROKE_SHARES: [f64; 3] = [3e-4, 3e-3, 0.02];
+/// Strokes below which nothing is seen of what happens at reversals.
+const STROKES_MIN: usize = 4;
+
+/// Where the motion reverses, forms that build up over a share of the longest stroke.
+fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
+    let strokes = strokes(scene, velocity);
+    let longest = greatest(&strokes);
+    if strokes.len() < STROKES_MIN || longest <= 0.0 {
+        return Vec::new();
+    }
+    let form = |share: &f64| Form { name: PRESLIDING, ..Form::of(&[("presliding_way", share * longest)]) };
+    STROKE_SHARES.iter().map(form).collect()
 }

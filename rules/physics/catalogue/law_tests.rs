@@ -60,6 +60,34 @@ fn inertia_is_the_rate_of_kinetic_energy() {
 }
 
 #[test]
+fn friction_that_bends_before_it_slips_is_held_at_rest() {
+    // A second forwards at 0.1 m/s, a second at rest, then backwards.
+    let velocity = |row: usize| [0.1, 0.0, -0.1][(row / 100).min(2)];
+    let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+    set(&mut recording, "velocity_m_s", velocity);
+    set(&mut recording, "axis_force_n", |_| 1.0);
+    let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
+    let friction = column("dry_friction", &scene(&recording, "axis_force_n"), &form);
+    assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
+    assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);
+    // Half a millimetre while it starts, then one a row: turned about after ln 2 of the way.
+    assert!(friction[206] > 0.0 && friction[208] < 0.0, "{:?}", &friction[205..210]);
+    assert!((friction[299] + 1.0).abs() < 1e-3, "slips backwards: {}", friction[299]);
+}
+
+#[test]
+fn presliding_is_asked_for_where_the_motion_reverses() {
+    let forms = |period: usize| {
+        let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+        set(&mut recording, "velocity_m_s", |row| if row / period % 2 == 0 { 0.1 } else { -0.1 });
+        set(&mut recording, "axis_force_n", |_| 1.0);
+        let forms = effect("dry_friction").expect("known").forms(&scene(&recording, "axis_force_n"));
+        forms.iter().filter(|form| form.name == "presliding").count()
+    };
+    assert_eq!((forms(30), forms(200)), (3, 0));
+}
+
+#[test]
 fn run_out_needs_more_than_two_samples_per_turn() {
     let turning = |period_s: f64| {
         let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
