@@ -62,7 +62,7 @@ impl Design {
     #[must_use]
     pub fn law(&self) -> &'static str {
         match &self.part.body {
-            Body::Effect(_, form) if self.kind == "meter_window" => form.name,
+            Body::Effect(_, form) if ["meter_window", "dry_friction"].contains(&self.kind.as_str()) => form.name,
             _ => "",
         }
     }

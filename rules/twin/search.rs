@@ -7,6 +7,7 @@ use super::gate::p_value;
 use super::model::Part;
 use super::scan::{Bank, best_of_each_law, likeliest, price_of};
 use crate::physics::OutputKind;
+use crate::physics::catalogue::dry_friction::slips;
 use crate::statistics::count;
 
 /// Effects that may be found at once.
@@ -331,6 +332,7 @@ fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
         "meter_window" => resolved("window_s") && acts,
         "saturation" => acts,
         "zero_drift" => stands_out(part, fit, data),
+        "dry_friction" => value("presliding_way").is_none_or(|way| slips(scene, way)),
         "stribeck" if scene.output_kind() == OutputKind::Force => has_dry_friction(&fit.parts),
         _ => true,
     }

@@ -107,6 +107,8 @@ const PRESLIDING: &str = "presliding";
 const PRESLIDING_WAY_M: f64 = 1e-4;
 /// Ways that are tried, as shares of the longest stroke.
 const STROKE_SHARES: [f64; 3] = [3e-4, 3e-3, 0.02];
+/// Share of the longest stroke in which friction builds up at most: what takes longer is a spring.
+const SLIPS_SHARE: f64 = 0.1;
 /// Strokes below which nothing is seen of what happens at reversals.
 const STROKES_MIN: usize = 4;
 
@@ -119,4 +121,9 @@ fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
     }
     let form = |share: &f64| Form { name: PRESLIDING, ..Form::of(&[("presliding_way", share * longest)]) };
     STROKE_SHARES.iter().map(form).collect()
+}
+
+/// Does friction that builds up over such a way, in m or rad, slip in the longest stroke?
+pub(crate) fn slips(scene: &Scene, way: f64) -> bool {
+    motion(scene).is_some_and(|velocity| way <= SLIPS_SHARE * greatest(&strokes(scene, &velocity)))
 }

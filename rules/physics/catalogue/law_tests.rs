@@ -88,6 +88,16 @@ fn presliding_is_asked_for_where_the_motion_reverses() {
 }
 
 #[test]
+fn what_does_not_slip_within_a_tenth_of_a_stroke_is_a_spring() {
+    let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+    set(&mut recording, "velocity_m_s", |row| if row / 30 % 2 == 0 { 0.1 } else { -0.1 });
+    set(&mut recording, "axis_force_n", |_| 1.0);
+    let scene = scene(&recording, "axis_force_n");
+    // Strokes of 30 mm.
+    assert!(super::dry_friction::slips(&scene, 0.002) && !super::dry_friction::slips(&scene, 0.004));
+}
+
+#[test]
 fn run_out_needs_more_than_two_samples_per_turn() {
     let turning = |period_s: f64| {
         let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
