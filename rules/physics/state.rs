@@ -13,6 +13,20 @@ pub fn first_order(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
     state
 }
 
+/// A first-order lag behind something that is there whether the machine runs or not, such as the air of a hall: linear
+/// between rows, also across known pauses; from rest at the first value.
+#[must_use]
+pub fn first_order_behind(scene: &Scene, input: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut state = input.to_vec();
+    for row in 1..input.len() {
+        let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
+        // Behind a ramp of this pace the state lags by `pace * tau_s`.
+        let lag = if dt_s > 0.0 { (input[row] - input[row - 1]) / dt_s * tau_s } else { 0.0 };
+        state[row] = input[row] - lag + (state[row - 1] - input[row - 1] + lag) * (-dt_s / tau_s).exp();
+    }
+    state
+}
+
 fn advance(scene: &Scene, x: f64, input: f64, row: usize, tau_s: f64) -> f64 {
     let dt_s = (scene.clock_s()[row] - scene.clock_s()[row - 1]).max(0.0);
     let driven_s = scene.driven_s(row).min(dt_s);

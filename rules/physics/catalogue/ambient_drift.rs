@@ -2,7 +2,7 @@
 
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread};
-use crate::physics::state::first_order;
+use crate::physics::state::first_order_behind;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Displacement that follows the shop.
@@ -78,7 +78,7 @@ impl Effect for AmbientDrift {
         let first = *ambient.first()?;
         let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
         let followed = match form.value("tau_s") {
-            Some(tau_s) => first_order(scene, &change, tau_s),
+            Some(tau_s) => first_order_behind(scene, &change, tau_s),
             None => change,
         };
         Some(vec![("per_k", followed)])

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread, varies};
-use crate::physics::state::first_order;
+use crate::physics::state::first_order_behind;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Displacement that follows the coolant.
@@ -84,7 +84,7 @@ impl Effect for CoolantTemperature {
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
         let followed = match (form.name, form.value("tau_s")) {
             ("flowing", _) => change.iter().zip(scene.column("coolant_on")?).map(|(change, on)| change * on).collect(),
-            (_, Some(tau_s)) => first_order(scene, &change, tau_s),
+            (_, Some(tau_s)) => first_order_behind(scene, &change, tau_s),
             (_, None) => change,
         };
         Some(vec![("per_k", followed)])

@@ -1,8 +1,9 @@
 //! Losses in the inverter: grow with current.
 
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::{greatest, varies};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use std::f64::consts::LN_2;
 
 /// Losses in the inverter.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +12,8 @@ pub struct InverterLoss;
 static DOC: EffectDoc = EffectDoc {
     kind: "inverter_loss",
     family: "drive",
-    law: "P = conduction * |i| + resistive * i^2; i = L / (n / 1000 rpm) stands for the current, L load, n at least 50 rpm",
+    law: "P = conduction * |i| + resistive * i^2; magnetised: P = conduction * (sqrt(i^2 + m^2) - m); i = L / (n / 1000 rpm) \
+          stands for the current, L load, n at least 50 rpm, m = magnetising_share times the greatest i",
     parameters: &[
         ParameterDoc {
             name: "conduction",
@@ -29,9 +31,18 @@ static DOC: EffectDoc = EffectDoc {
             en: "loss per squared current, at 1000 rpm",
             zh: "单位电流平方损耗，1000 rpm下",
         },
+        ParameterDoc {
+            name: "magnetising_share",
+            unit: "1",
+            entry: Entry::Shape,
+            range: (0.0, 1.0),
+            en: "magnetising current as a share of the greatest load current; flows without load, too",
+            zh: "励磁电流与最大负载电流之比，空载时也存在",
+        },
     ],
     needs: &["load", "speed"],
-    source: "a + b I + c I^2; 2-4 % of power",
+    source: "a + b I + c I^2; 2-4 % of power; the current of an induction motor is that of the torque and, at right angles \
+             to it, the magnetising one",
     experiment_minutes: 8.0,
     rivals: &["copper_loss", "load_loss"],
     en: Texts {
@@ -56,18 +67,29 @@ impl Effect for InverterLoss {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["conduction", "both"]
+        &["conduction", "both", MAGNETISED]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
         let known = turns && is_power(scene) && scene.load().is_some_and(varies);
-        let named = |name| Form { name, ..Form::plain() };
-        if known { vec![named("conduction")] } else { Vec::new() }
+        if !known {
+            return Vec::new();
+        }
+        let magnetising = vec![("magnetising_share", MAGNETISING_SHARE)];
+        // How much it is hides in the coefficient; left open it would bend into the copper loss.
+        let (shape, known, ln_choices) = (magnetising.clone(), magnetising, LN_2);
+        let magnetised = Form { name: MAGNETISED, shape, known, ln_choices, ..Form::plain() };
+        vec![Form { name: "conduction", ..Form::plain() }, magnetised]
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let current = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
+        if form.name == MAGNETISED {
+            let magnetising = form.value("magnetising_share").unwrap_or(MAGNETISING_SHARE) * greatest(&current);
+            let beyond = |i: &f64| i.hypot(magnetising) - magnetising;
+            return Some(vec![("conduction", current.iter().map(beyond).collect())]);
+        }
         let mut columns = vec![("conduction", current.iter().map(|i| i.abs()).collect())];
         if form.name != "conduction" {
             columns.push(("resistive", current.iter().map(|i| i * i).collect()));
@@ -79,3 +101,8 @@ impl Effect for InverterLoss {
         Form { name: "both", ..Form::plain() }
     }
 }
+
+/// The form whose current has a magnetising part.
+const MAGNETISED: &str = "magnetised";
+/// What is usual in an induction motor near its rated torque.
+const MAGNETISING_SHARE: f64 = 0.3;
