@@ -2,6 +2,7 @@
 
 use super::{OutputKind, Role, Scene};
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 
 /// Tool in the work, 0 to 1; 1 everywhere when no channel tells (then depth and feed must tell).
 pub(crate) fn engaged(scene: &Scene) -> Vec<f64> {
@@ -43,6 +44,19 @@ pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
         scene.column("cutting_speed_m_min")?.iter().map(|speed| speed / 60.0).collect()
     };
     Some(area.iter().zip(lever).map(|(area, lever)| area * lever).collect())
+}
+
+/// How many teeth of a milling cutter are in the work at once, in the mean of a turn: `z arccos(1 - 2 ae / D) / (2 pi)`, of a
+/// cut from the side (Altintas, Manufacturing Automation, 2nd ed., section 2.5). `None` where teeth, width and diameter
+/// are not known; zero in rows in which one of them is none.
+pub(crate) fn teeth_in_cut(scene: &Scene) -> Option<Vec<f64>> {
+    let [teeth, width, diameter] = ["teeth", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));
+    let (teeth, width, diameter) = (teeth?, width?, diameter?);
+    let of = |row: usize| match diameter[row] {
+        d if d > 0.0 => teeth[row] * (1.0 - 2.0 * (width[row] / d).clamp(0.0, 1.0)).acos() / TAU,
+        _ => 0.0,
+    };
+    Some((0..scene.rows()).map(of).collect())
 }
 
 /// Way since the first of some rows at these feeds, mm.

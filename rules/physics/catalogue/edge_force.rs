@@ -1,6 +1,6 @@
 //! Ploughing of the cutting edge: a force along the edge that does not depend on feed.
 
-use crate::physics::cut::{engaged, in_output};
+use crate::physics::cut::{engaged, in_output, teeth_in_cut};
 use crate::physics::drive::{is_axis_output, is_displacement};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
@@ -11,7 +11,8 @@ pub struct EdgeForce;
 static DOC: EffectDoc = EffectDoc {
     kind: "edge_force",
     family: "cutting",
-    law: "P = kte * (ap + nose) * vc / 60 * engaged; a force output takes kte * (ap + nose), a torque output D / 2000 of it",
+    law: "P = kte * (ap + nose) * vc / 60 * engaged; milled: times the teeth that are in the work at once, \
+          z * arccos(1 - 2 ae / D) / (2 pi); a force output takes kte * (ap + nose), a torque output D / 2000 of it",
     parameters: &[
         ParameterDoc {
             name: "kte_n_per_mm",
@@ -55,9 +56,14 @@ impl Effect for EdgeForce {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &[MILLED]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let forms = [0.0, 0.8].map(|nose_mm| Form::of(&[("nose_mm", nose_mm)]));
-        forms.into_iter().filter(|form| self.columns(scene, form).is_some()).collect()
+        let whole = [0.0, 0.8].map(|nose_mm| Form::of(&[("nose_mm", nose_mm)]));
+        let milled = Form { name: MILLED, ..Form::plain() };
+        whole.into_iter().chain([milled]).filter(|form| self.columns(scene, form).is_some()).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -65,9 +71,15 @@ impl Effect for EdgeForce {
             return None;
         }
         let nose_mm = form.value("nose_mm").unwrap_or(0.0);
-        let length: Vec<f64> = scene.column("depth_of_cut_mm")?.iter().map(|depth| depth + nose_mm).collect();
+        let mut length: Vec<f64> = scene.column("depth_of_cut_mm")?.iter().map(|depth| depth + nose_mm).collect();
+        if form.name == MILLED {
+            length.iter_mut().zip(teeth_in_cut(scene)?).for_each(|(length, teeth)| *length *= teeth);
+        }
         let edge = in_output(scene, &length)?;
         let engaged = engaged(scene);
         Some(vec![("kte_n_per_mm", edge.iter().zip(&engaged).map(|(edge, engaged)| edge * engaged).collect())])
     }
 }
+
+/// The form of a cutter whose teeth cut in turn.
+const MILLED: &str = "milled";
