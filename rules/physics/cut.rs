@@ -47,7 +47,7 @@ pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// How many teeth of a milling cutter are in the work at once, in the mean of a turn: `z arccos(1 - 2 ae / D) / (2 pi)`, of a
-/// cut from the side (Altintas, Manufacturing Automation, 2nd ed., section 2.5). `None` where teeth, width and diameter
+/// cut from the side (Altintas, Manufacturing Automation, 2nd ed., chapter 2). `None` where teeth, width and diameter
 /// are not known; zero in rows in which one of them is none.
 pub(crate) fn teeth_in_cut(scene: &Scene) -> Option<Vec<f64>> {
     let [teeth, width, diameter] = ["teeth", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));

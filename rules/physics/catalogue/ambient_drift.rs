@@ -88,3 +88,24 @@ impl Effect for AmbientDrift {
         Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::catalogue::tests::{scene, set};
+    use adapters::Recording;
+
+    #[test]
+    fn the_air_changes_while_the_machine_rests() {
+        // Ten minutes at 20 degrees, a night, ten minutes at 14.
+        let time_s = |row: u32| 60.0 * f64::from(row) + if row < 10 { 0.0 } else { 36_000.0 };
+        let mut recording = Recording::new("night", (0..20).map(time_s).collect(), None);
+        set(&mut recording, "ambient_temperature_c", |row| if row < 10 { 20.0 } else { 14.0 });
+        set(&mut recording, "thermal_error_um", |_| 1.0);
+        let scene = scene(&recording, "thermal_error_um");
+        let lag = Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) };
+        let column = AmbientDrift.columns(&scene, &lag).expect("the air is known").swap_remove(0).1;
+        // It fell all night, so that the column is an hour behind: 0.6 K.
+        assert!(column[9] == 0.0 && (column[10] + 5.4).abs() < 0.01, "{column:?}");
+    }
+}

@@ -1,8 +1,9 @@
 //! Cutting wet needs another force than cutting dry.
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::excitation::visits;
+use crate::physics::excitation::{varies, visits};
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::statistics::median;
 
 /// Cut that differs wet and dry.
 #[derive(Debug, Clone, Copy)]
@@ -11,17 +12,28 @@ pub struct CoolantRegime;
 static DOC: EffectDoc = EffectDoc {
     kind: "coolant_regime",
     family: "cutting",
-    law: "y = change * L * coolant_on",
-    parameters: &[ParameterDoc {
-        name: "change",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (-0.3, 0.3),
-        en: "share by which the cut changes with coolant; negative is lighter",
-        zh: "有冷却液时切削变化的比例，负值为变轻",
-    }],
+    law: "y = change * L * coolant_on; fading: times (vm / vc)^fading, vm the median cutting speed of the wet cuts",
+    parameters: &[
+        ParameterDoc {
+            name: "change",
+            unit: "1",
+            entry: Entry::Linear,
+            range: (-0.3, 0.3),
+            en: "share by which the cut changes with coolant, where it fades at the usual cutting speed; negative is lighter",
+            zh: "有冷却液时切削变化的比例（作用随速度减弱时指常用切速下），负值为变轻",
+        },
+        ParameterDoc {
+            name: "fading",
+            unit: "1",
+            entry: Entry::Shape,
+            range: (0.0, 4.0),
+            en: "exponent by which it does less at higher cutting speed",
+            zh: "切速升高时作用减弱的指数",
+        },
+    ],
     needs: &["load | engaged", "coolant_on"],
-    source: "friction on rake and flank wet against dry: 5-15 % of cutting power",
+    source: "friction on rake and flank wet against dry: 5-15 % of cutting power; less gets to the chip the faster it runs \
+             (Shaw, Metal Cutting Principles, 2nd ed., chapter 13)",
     experiment_minutes: 5.0,
     rivals: &["auxiliary_switch", "hardness_batch", "speed_softening"],
     en: Texts {
@@ -45,16 +57,70 @@ impl Effect for CoolantRegime {
         &DOC
     }
 
+    fn form_names(&self) -> &'static [&'static str] {
+        &[FADING]
+    }
+
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(coolant) = scene.column("coolant_on") else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let wet = visits(scene, |row| cutting[row] && coolant[row] > 0.5);
         let dry = visits(scene, |row| cutting[row] && coolant[row] < 0.5);
-        if wet.min(dry) == 0 || cut(scene).is_none() { Vec::new() } else { vec![Form::plain()] }
+        if wet.min(dry) == 0 || cut(scene).is_none() {
+            return Vec::new();
+        }
+        let speeds = wet_speeds(scene, coolant).filter(|speeds| varies(speeds));
+        let fading = speeds.map(|_| Form { name: FADING, ..Form::of(&[("fading", 1.0)]) });
+        [Form::plain()].into_iter().chain(fading).collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let coolant = scene.column("coolant_on")?;
-        Some(vec![("change", cut_times(scene, |row| coolant[row])?)])
+        if form.name != FADING {
+            return Some(vec![("change", cut_times(scene, |row| coolant[row])?)]);
+        }
+        let usual = median(wet_speeds(scene, coolant)?)?;
+        let speed = scene.column("cutting_speed_m_min")?;
+        let fading = form.value("fading").unwrap_or(1.0);
+        let share = |row: usize| (usual / speed[row].max(SLOW_SHARE * usual)).powf(fading);
+        Some(vec![("change", cut_times(scene, |row| coolant[row] * share(row))?)])
+    }
+}
+
+/// The form that does less the faster the cut.
+const FADING: &str = "fading";
+/// Share of the usual cutting speed below which coolant does no more.
+const SLOW_SHARE: f64 = 0.1;
+
+/// Cutting speeds of the rows that cut wet, m/min; `None` where they are not known.
+fn wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
+    let speed = scene.column("cutting_speed_m_min")?;
+    let cutting = cutting_rows(scene);
+    let wet = |row: &usize| cutting[*row] && coolant[*row] > 0.5 && speed[*row] > 0.0;
+    let speeds: Vec<f64> = (0..scene.rows()).filter(wet).map(|row| speed[row]).collect();
+    (!speeds.is_empty()).then_some(speeds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::catalogue::tests::{scene, set};
+    use adapters::Recording;
+
+    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
+        CoolantRegime.columns(scene, form).expect("makes columns").swap_remove(0).1
+    }
+
+    #[test]
+    fn coolant_that_fades_does_half_at_twice_the_usual_speed() {
+        let mut recording = Recording::new("wet", (0..4).map(f64::from).collect(), None);
+        set(&mut recording, "cutting_speed_m_min", |row| [100.0, 100.0, 200.0, 200.0][row]);
+        set(&mut recording, "coolant_on", |row| [1.0, 1.0, 1.0, 0.0][row]);
+        set(&mut recording, "engaged", |_| 1.0);
+        set(&mut recording, "spindle_power_w", |_| 1.0);
+        let mut scene = scene(&recording, "spindle_power_w");
+        scene.set_load(Some(vec![800.0; 4]));
+        let form = Form { name: "fading", ..Form::of(&[("fading", 1.0)]) };
+        assert_eq!(column(&scene, &form), [800.0, 800.0, 400.0, 0.0]);
     }
 }

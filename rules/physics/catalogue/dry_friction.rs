@@ -127,3 +127,52 @@ fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
 pub(crate) fn slips(scene: &Scene, way: f64) -> bool {
     motion(scene).is_some_and(|velocity| way <= SLIPS_SHARE * greatest(&strokes(scene, &velocity)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::catalogue::tests::{scene, set};
+    use adapters::Recording;
+
+    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
+        DryFriction.columns(scene, form).expect("makes columns").swap_remove(0).1
+    }
+
+    #[test]
+    fn friction_that_bends_before_it_slips_is_held_at_rest() {
+        // A second forwards at 0.1 m/s, a second at rest, then backwards.
+        let velocity = |row: usize| [0.1, 0.0, -0.1][(row / 100).min(2)];
+        let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+        set(&mut recording, "velocity_m_s", velocity);
+        set(&mut recording, "axis_force_n", |_| 1.0);
+        let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
+        let friction = column(&scene(&recording, "axis_force_n"), &form);
+        assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
+        assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);
+        // Half a millimetre while it starts, then one a row: turned about after ln 2 of the way.
+        assert!(friction[206] > 0.0 && friction[208] < 0.0, "{:?}", &friction[205..210]);
+        assert!((friction[299] + 1.0).abs() < 1e-3, "slips backwards: {}", friction[299]);
+    }
+
+    #[test]
+    fn presliding_is_asked_for_where_the_motion_reverses() {
+        let forms = |period: usize| {
+            let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+            set(&mut recording, "velocity_m_s", |row| if row / period % 2 == 0 { 0.1 } else { -0.1 });
+            set(&mut recording, "axis_force_n", |_| 1.0);
+            let forms = DryFriction.forms(&scene(&recording, "axis_force_n"));
+            forms.iter().filter(|form| form.name == "presliding").count()
+        };
+        assert_eq!((forms(30), forms(200)), (3, 0));
+    }
+
+    #[test]
+    fn what_does_not_slip_within_a_tenth_of_a_stroke_is_a_spring() {
+        let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
+        set(&mut recording, "velocity_m_s", |row| if row / 30 % 2 == 0 { 0.1 } else { -0.1 });
+        set(&mut recording, "axis_force_n", |_| 1.0);
+        let scene = scene(&recording, "axis_force_n");
+        // Strokes of 30 mm.
+        assert!(slips(&scene, 0.002) && !slips(&scene, 0.004));
+    }
+}

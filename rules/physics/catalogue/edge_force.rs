@@ -83,3 +83,30 @@ impl Effect for EdgeForce {
 
 /// The form of a cutter whose teeth cut in turn.
 const MILLED: &str = "milled";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::catalogue::tests::{scene, set};
+    use adapters::Recording;
+
+    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
+        EdgeForce.columns(scene, form).expect("makes columns").swap_remove(0).1
+    }
+
+    #[test]
+    fn the_teeth_of_a_cutter_plough_in_turn() {
+        let mut recording = Recording::new("mill", vec![0.0, 1.0], None);
+        for (name, value) in
+            [("depth_of_cut_mm", 2.0), ("diameter_mm", 20.0), ("teeth", 4.0), ("cutting_speed_m_min", 60.0)]
+        {
+            set(&mut recording, name, |_| value);
+        }
+        // A slot, then a cut of half the diameter: of four teeth two and one are in the work.
+        set(&mut recording, "width_of_cut_mm", |row| [20.0, 10.0][row]);
+        set(&mut recording, "spindle_power_w", |_| 1.0);
+        let milled = Form { name: "milled", ..Form::plain() };
+        let power = column(&scene(&recording, "spindle_power_w"), &milled);
+        assert!((power[0] - 4.0).abs() < 1e-9 && (power[1] - 2.0).abs() < 1e-9, "teeth * ap * vc / 60: {power:?}");
+    }
+}

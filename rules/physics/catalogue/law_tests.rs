@@ -60,60 +60,6 @@ fn inertia_is_the_rate_of_kinetic_energy() {
 }
 
 #[test]
-fn the_teeth_of_a_cutter_plough_in_turn() {
-    let mut recording = Recording::new("mill", vec![0.0, 1.0], None);
-    for (name, value) in
-        [("depth_of_cut_mm", 2.0), ("diameter_mm", 20.0), ("teeth", 4.0), ("cutting_speed_m_min", 60.0)]
-    {
-        set(&mut recording, name, |_| value);
-    }
-    // A slot, then a cut of half the diameter: of four teeth two and one are in the work.
-    set(&mut recording, "width_of_cut_mm", |row| [20.0, 10.0][row]);
-    set(&mut recording, "spindle_power_w", |_| 1.0);
-    let milled = Form { name: "milled", ..Form::plain() };
-    let power = column("edge_force", &scene(&recording, "spindle_power_w"), &milled);
-    assert!((power[0] - 4.0).abs() < 1e-9 && (power[1] - 2.0).abs() < 1e-9, "teeth * ap * vc / 60: {power:?}");
-}
-
-#[test]
-fn friction_that_bends_before_it_slips_is_held_at_rest() {
-    // A second forwards at 0.1 m/s, a second at rest, then backwards.
-    let velocity = |row: usize| [0.1, 0.0, -0.1][(row / 100).min(2)];
-    let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-    set(&mut recording, "velocity_m_s", velocity);
-    set(&mut recording, "axis_force_n", |_| 1.0);
-    let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
-    let friction = column("dry_friction", &scene(&recording, "axis_force_n"), &form);
-    assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
-    assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);
-    // Half a millimetre while it starts, then one a row: turned about after ln 2 of the way.
-    assert!(friction[206] > 0.0 && friction[208] < 0.0, "{:?}", &friction[205..210]);
-    assert!((friction[299] + 1.0).abs() < 1e-3, "slips backwards: {}", friction[299]);
-}
-
-#[test]
-fn presliding_is_asked_for_where_the_motion_reverses() {
-    let forms = |period: usize| {
-        let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-        set(&mut recording, "velocity_m_s", |row| if row / period % 2 == 0 { 0.1 } else { -0.1 });
-        set(&mut recording, "axis_force_n", |_| 1.0);
-        let forms = effect("dry_friction").expect("known").forms(&scene(&recording, "axis_force_n"));
-        forms.iter().filter(|form| form.name == "presliding").count()
-    };
-    assert_eq!((forms(30), forms(200)), (3, 0));
-}
-
-#[test]
-fn what_does_not_slip_within_a_tenth_of_a_stroke_is_a_spring() {
-    let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-    set(&mut recording, "velocity_m_s", |row| if row / 30 % 2 == 0 { 0.1 } else { -0.1 });
-    set(&mut recording, "axis_force_n", |_| 1.0);
-    let scene = scene(&recording, "axis_force_n");
-    // Strokes of 30 mm.
-    assert!(super::dry_friction::slips(&scene, 0.002) && !super::dry_friction::slips(&scene, 0.004));
-}
-
-#[test]
 fn run_out_needs_more_than_two_samples_per_turn() {
     let turning = |period_s: f64| {
         let mut recording = Recording::new("turn", (0..400).map(|row| period_s * f64::from(row)).collect(), None);
