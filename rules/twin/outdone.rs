@@ -52,7 +52,7 @@ impl Case<'_> {
         forms: &Yardsticks<'_>,
     ) -> Option<Outdone> {
         // A constant is part of every line: what bends beside it is something else.
-        if designs[best.members[position]].kind == "offset" {
+        if designs[best.members[position]].kind == "offset" || best.is_exceeded(position, designs) {
             return None;
         }
         let ln_rows = self.ln_rows(base);

@@ -1,6 +1,6 @@
 //! The search: singles, then pairs and triples on top of the leaders, each accepted only through the gate.
 
-use super::designs::{AT_EDGES, excludes};
+use super::designs::{AT_EDGES, Design, excludes};
 use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
@@ -8,6 +8,7 @@ use super::model::Part;
 use super::scan::{Bank, best_of_each_law, likeliest, price_of};
 use crate::physics::OutputKind;
 use crate::physics::catalogue::dry_friction::slips;
+use crate::physics::drive::is_axis_output;
 use crate::statistics::count;
 
 /// Effects that may be found at once.
@@ -49,6 +50,13 @@ impl Hypothesis {
     #[must_use]
     pub(super) fn first_part(&self) -> usize {
         self.fit.parts.len() - self.members.len()
+    }
+
+    /// Is this member the dry friction that a Stribeck friction beside it exceeds? Of the two the excess goes first.
+    #[must_use]
+    pub(super) fn is_exceeded(&self, position: usize, designs: &[Design]) -> bool {
+        let is = |member: usize, kind: &str| designs[member].kind == kind;
+        is(self.members[position], "dry_friction") && self.members.iter().any(|member| is(*member, "stribeck"))
     }
 
     /// Members and parts with one member taken out.
@@ -333,14 +341,25 @@ fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
         "saturation" => acts,
         "zero_drift" => stands_out(part, fit, data),
         "dry_friction" => value("presliding_way").is_none_or(|way| slips(scene, way)),
-        "stribeck" if scene.output_kind() == OutputKind::Force => has_dry_friction(&fit.parts),
+        "stribeck" if scene.output_kind() == OutputKind::Force || is_axis_output(scene) => {
+            value("level").is_some_and(|level| level.abs() <= EXCESS_MAX * dry_friction(&fit.parts))
+        }
         _ => true,
     }
 }
 
-fn has_dry_friction(parts: &[Part]) -> bool {
-    parts.iter().any(|part| {
-        let sign = |parameter: &super::model::Parameter| parameter.name.starts_with("sign(");
-        part.kind == "dry_friction" || part.parameters.iter().any(sign)
-    })
+/// Times the dry friction that friction at creep speed may exceed it by: bodies that start to move meet up to two or three
+/// times the friction of bodies that do.
+const EXCESS_MAX: f64 = 3.0;
+
+/// Level of all dry friction among the parts, in the output's unit.
+fn dry_friction(parts: &[Part]) -> f64 {
+    let is_level = |part: &Part, name: &str| match part.kind.as_str() {
+        "dry_friction" => name == "level",
+        _ => name.starts_with("sign("),
+    };
+    let levels = |part: &Part| -> f64 {
+        part.parameters.iter().filter(|p| is_level(part, &p.name)).map(|p| p.value.abs()).sum()
+    };
+    parts.iter().map(levels).sum()
 }

@@ -70,6 +70,9 @@ impl Case<'_> {
         let several = best.members.len() > 1;
         let ln_rows = self.ln_rows(base);
         let unclaimable = |position: usize| {
+            if best.is_exceeded(position, designs) {
+                return None;
+            }
             let without = if several { self.without(best, position)?.fit } else { base.clone() };
             let gained = 2.0 * (best.fit.log_likelihood - without.log_likelihood);
             let minor = several && gained < MINOR_SHARE * best.information;

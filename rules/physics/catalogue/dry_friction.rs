@@ -158,7 +158,7 @@ mod tests {
     fn presliding_is_asked_for_where_the_motion_reverses() {
         let forms = |period: usize| {
             let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-            set(&mut recording, "velocity_m_s", |row| if row / period % 2 == 0 { 0.1 } else { -0.1 });
+            set(&mut recording, "velocity_m_s", |row| if (row / period).is_multiple_of(2) { 0.1 } else { -0.1 });
             set(&mut recording, "axis_force_n", |_| 1.0);
             let forms = DryFriction.forms(&scene(&recording, "axis_force_n"));
             forms.iter().filter(|form| form.name == "presliding").count()
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn what_does_not_slip_within_a_tenth_of_a_stroke_is_a_spring() {
         let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
-        set(&mut recording, "velocity_m_s", |row| if row / 30 % 2 == 0 { 0.1 } else { -0.1 });
+        set(&mut recording, "velocity_m_s", |row| if (row / 30).is_multiple_of(2) { 0.1 } else { -0.1 });
         set(&mut recording, "axis_force_n", |_| 1.0);
         let scene = scene(&recording, "axis_force_n");
         // Strokes of 30 mm.
