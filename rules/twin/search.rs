@@ -342,24 +342,21 @@ fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
         "zero_drift" => stands_out(part, fit, data),
         "dry_friction" => value("presliding_way").is_none_or(|way| slips(scene, way)),
         "stribeck" if scene.output_kind() == OutputKind::Force || is_axis_output(scene) => {
-            value("level").is_some_and(|level| level.abs() <= EXCESS_MAX * dry_friction(&fit.parts))
+            value("level").is_some_and(|level| level.abs() <= most_excess(&fit.parts))
         }
         _ => true,
     }
 }
 
-/// Times the dry friction that friction at creep speed may exceed it by: bodies that start to move meet up to two or three
-/// times the friction of bodies that do.
+/// Times the dry friction beside it that friction at creep speed may exceed it by: bodies that start to move meet up to two
+/// or three times the friction of bodies that do.
 const EXCESS_MAX: f64 = 3.0;
 
-/// Level of all dry friction among the parts, in the output's unit.
-fn dry_friction(parts: &[Part]) -> f64 {
-    let is_level = |part: &Part, name: &str| match part.kind.as_str() {
-        "dry_friction" => name == "level",
-        _ => name.starts_with("sign("),
-    };
-    let levels = |part: &Part| -> f64 {
-        part.parameters.iter().filter(|p| is_level(part, &p.name)).map(|p| p.value.abs()).sum()
-    };
-    parts.iter().map(levels).sum()
+/// The greatest excess of Stribeck friction that these parts allow, in the output's unit: nothing without dry friction,
+/// anything beside that of the model, which was not looked for together with it.
+fn most_excess(parts: &[Part]) -> f64 {
+    let sign = |part: &Part| part.parameters.iter().any(|parameter| parameter.name.starts_with("sign("));
+    let level = |part: &Part| part.parameter("level").map_or(0.0, |level| level.value.abs());
+    let dry = parts.iter().filter(|part| part.kind == "dry_friction").map(level).sum::<f64>();
+    if parts.iter().any(sign) { f64::INFINITY } else { EXCESS_MAX * dry }
 }
