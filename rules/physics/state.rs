@@ -64,7 +64,7 @@ pub fn bent_over_the_way(scene: &Scene, velocity: &[f64], way: f64) -> Vec<f64> 
     state
 }
 
-/// The ways between reversals, with their direction, in m or rad: of no length where the drive never moves.
+/// The ways between reversals, with their direction, in m or rad; none where the drive never moves.
 #[must_use]
 pub fn strokes(scene: &Scene, velocity: &[f64]) -> Vec<f64> {
     let mut strokes: Vec<f64> = Vec::new();

@@ -12,7 +12,7 @@ pub struct DryFriction;
 static DOC: EffectDoc = EffectDoc {
     kind: "dry_friction",
     family: "axis",
-    law: "F = level * tanh(v / v0); presliding: F = level * z, dz/dx = (sign(dx) - z) / way, held at rest; \
+    law: "F = level * tanh(v / v0); presliding: F = level * z, dz = (sign(v) - z) |dx| / way, held at rest; \
           in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
     parameters: &[
         ParameterDoc {
