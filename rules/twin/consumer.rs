@@ -4,7 +4,7 @@
 
 use super::frame::Frame;
 use super::latent::{SWITCHINGS_MIN, Switching};
-use super::rhythm::spells;
+use super::rhythm::{SPELL_ROWS_MIN, spells};
 use crate::statistics::{count, mean, median};
 use std::ops::Range;
 
@@ -19,13 +19,12 @@ const SLOPE_DEVIATE: f64 = 4.0;
 const SLOPE_SHARE: f64 = 0.4;
 /// Share of switchings at a change of pace, of those that are not there by chance, beyond which it is the machine's own
 /// doing.
-const OWN_DOING: f64 = 0.7;
-/// Chance that so many switchings, or more, are at a change of pace, below which they are not there by chance.
+const OWN_DOING: f64 = 0.6;
+/// Chance that so many switchings, or more, are at one place, below which they are not there by chance.
 const BY_CHANCE_MAX: f64 = 0.02;
 /// By how much its share of the cut and that of the rest may differ.
 const SHARES_APART_MAX: f64 = 0.35;
-/// Rows of a spell that is no flicker, and the share of spells that may be shorter.
-const SPELL_ROWS_MIN: usize = 4;
+/// Share of spells that may be flicker.
 const SHORT_SPELLS_MAX: f64 = 0.25;
 /// Rows on either side of a switching by which its step is measured, and how many there must be.
 const BESIDE_ROWS: usize = 5;
@@ -46,24 +45,40 @@ impl Switching {
     }
 
     /// Does it switch by itself? Not where it switches with the pace only, nor where it is on in the cut and off out of
-    /// it or the other way round. `change` says of each row whether the pace changes there or nearby, `cut` whether it is
-    /// cut.
+    /// it or the other way round. `since_change` says of each row how many rows lie between it and a change of pace nearby,
+    /// `cut` whether it is cut.
     #[must_use]
-    pub fn by_itself(&self, change: &[bool], cut: &[bool]) -> bool {
-        let switchings = || (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]);
-        let all = switchings().count();
-        let together = switchings().filter(|row| change[*row]).count();
-        // As often as by chance is no sign.
-        let by_chance = count((0..change.len()).filter(|row| change[*row]).count()) / count(change.len());
-        let own_doing = count(together) / count(all) - by_chance > OWN_DOING * (1.0 - by_chance)
-            && at_least(together, all, by_chance) < BY_CHANCE_MAX;
+    pub fn by_itself(&self, since_change: &[Option<isize>], cut: &[bool]) -> bool {
         let share = |wanted: bool| {
             let of: Vec<f64> =
                 self.state.iter().zip(cut).filter(|(_, cut)| **cut == wanted).map(|(on, _)| *on).collect();
             (!of.is_empty()).then(|| of.iter().sum::<f64>() / count(of.len()))
         };
         let apart = share(true).zip(share(false)).map_or(0.0, |(cut, rest)| (cut - rest).abs());
-        !own_doing && apart <= SHARES_APART_MAX
+        !self.with_the_pace(since_change) && apart <= SHARES_APART_MAX
+    }
+
+    /// Does it switch where the pace changes, more often than by chance and as long after it each time? What cannot be told
+    /// to a row is drawn to changes of pace as well, but to either side of them.
+    fn with_the_pace(&self, since_change: &[Option<isize>]) -> bool {
+        let at: Vec<Option<isize>> = self.rows_of_switchings().map(|row| since_change[row]).collect();
+        // Of rows: how many are at a change, or so long after one.
+        let some = |of: &[Option<isize>], since: Option<isize>| {
+            of.iter().filter(|at| at.is_some() && (since.is_none() || **at == since)).count()
+        };
+        let share = |of: &[Option<isize>], since: Option<isize>| count(some(of, since)) / count(of.len());
+        let chance = |since| at_least(some(&at, since), at.len(), share(since_change, since));
+        let mut lags: Vec<isize> = at.iter().copied().flatten().collect();
+        lags.sort_unstable();
+        lags.dedup();
+        let as_long_after = lags.iter().any(|lag| count(lags.len()) * chance(Some(*lag)) < BY_CHANCE_MAX);
+        let by_chance = share(since_change, None);
+        let apart = share(&at, None) - by_chance > OWN_DOING * (1.0 - by_chance);
+        apart && chance(None) < BY_CHANCE_MAX && as_long_after
+    }
+
+    fn rows_of_switchings(&self) -> impl Iterator<Item = usize> + '_ {
+        (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1])
     }
 
     /// Does it switch at certain places of something that the process goes through again and again, such as the position
@@ -77,14 +92,18 @@ impl Switching {
         }
         let edges: Vec<f64> = (1..PLACES).map(|place| sorted[place * sorted.len() / PLACES]).collect();
         let mut switchings = [0_usize; PLACES];
-        for row in (1..self.state.len()).filter(|row| self.state[*row] != self.state[*row - 1]) {
+        for row in self.rows_of_switchings() {
             if let Some(value) = channel[row] {
                 switchings[edges.partition_point(|edge| *edge <= value)] += 1;
             }
         }
         let here: usize = switchings.iter().sum();
         switchings.sort_unstable_by(|a, b| b.cmp(a));
-        here >= SWITCHINGS_TOLD && 2 * here >= self.switchings && 2 * (switchings[0] + switchings[1]) > here
+        let together = switchings[0] + switchings[1];
+        // The two places were chosen among all.
+        let pairs = count(PLACES * (PLACES - 1) / 2);
+        let by_chance = pairs * at_least(together, here, 2.0 / count(PLACES)) > BY_CHANCE_MAX;
+        here >= SWITCHINGS_TOLD && 2 * here >= self.switchings && 2 * together > here && !by_chance
     }
 
     /// Does it stay at its two levels? What recovers after each step, or grows until the next, is no consumer.
@@ -223,11 +242,22 @@ mod tests {
     #[test]
     fn what_switches_with_the_machine_is_no_switch_of_its_own() {
         let found = switching(120);
-        let with_the_pump: Vec<bool> = (0..ROWS).map(|row| (row + 2) % 60 < 5).collect();
-        let seldom: Vec<bool> = (0..ROWS).map(|row| (row + 2) % 170 < 5).collect();
+        let since = |rows: usize, within: isize| -> Vec<Option<isize>> {
+            (0..ROWS).map(|row| Some((row % rows) as isize).filter(|since| *since < within)).collect()
+        };
         let cut: Vec<bool> = (0..ROWS).map(|row| row % 50 > 25).collect();
-        assert!(!found.by_itself(&with_the_pump, &cut));
-        assert!(!found.by_itself(&seldom, &found.state.iter().map(|on| *on > 0.5).collect::<Vec<bool>>()));
-        assert!(found.by_itself(&seldom, &cut));
+        assert!(!found.by_itself(&since(60, 5), &cut));
+        assert!(!found.by_itself(&since(170, 5), &found.state.iter().map(|on| *on > 0.5).collect::<Vec<bool>>()));
+        assert!(found.by_itself(&since(170, 5), &cut));
+    }
+
+    #[test]
+    fn what_switches_now_before_and_now_after_a_change_of_pace_switches_by_itself() {
+        let found = switching(120);
+        let to_either_side: Vec<Option<isize>> = (0..ROWS as isize)
+            .map(|row| Some((row % 60 + row / 60 % 7) % 10 - 3).filter(|since| (-3..=3).contains(since)))
+            .collect();
+        let cut: Vec<bool> = (0..ROWS).map(|row| row % 50 > 25).collect();
+        assert!(found.by_itself(&to_either_side, &cut));
     }
 }

@@ -44,8 +44,8 @@ impl Case<'_> {
             return None;
         }
         let found = find(&base.residual, &self.frame, base.noise)?;
-        let (change, cut) = self.pace_of_groups();
-        let by_itself = found.by_itself(&change, &cut)
+        let (since_change, cut) = self.pace_of_groups();
+        let by_itself = found.by_itself(&since_change, &cut)
             && self.repeated_of_groups(&cut).iter().all(|channel| !found.follows(channel));
         let acts = found.stays()
             && by_itself
@@ -90,24 +90,27 @@ impl Case<'_> {
         metered && !is_axis_output(&self.scene)
     }
 
-    /// Of each group that is fitted: does the machine change its pace there or nearby, and does it cut?
-    fn pace_of_groups(&self) -> (Vec<bool>, Vec<bool>) {
+    /// Of each group that is fitted: how many groups after (or, less than none, before) a change of pace nearby it is, and
+    /// does the machine cut there?
+    fn pace_of_groups(&self) -> (Vec<Option<isize>>, Vec<bool>) {
         let row = |group: usize| self.frame.rows(group).start;
         let paces = [self.scene.role(Role::Speed), self.scene.column("feed_mm_min"), self.scene.role(Role::Engaged)];
         let paces: Vec<&[f64]> = paces.into_iter().flatten().collect();
         let differ = |a: f64, b: f64| (a - b).abs() > 0.02 * a.abs().max(b.abs());
         let group_s = self.scene.period_s() * count(self.frame.rows(0).len());
-        let nearby = AT_A_CHANGE_GROUPS.max((AT_A_CHANGE_S / group_s).ceil().min(1e6) as usize);
-        let mut change = vec![false; self.frame.len()];
-        for group in 1..self.frame.len() {
-            if paces.iter().any(|pace| differ(pace[row(group - 1)], pace[row(group)])) {
-                let last = (group + nearby).min(self.frame.len() - 1);
-                change[group.saturating_sub(nearby)..=last].fill(true);
-            }
-        }
+        let nearby = AT_A_CHANGE_GROUPS.max((AT_A_CHANGE_S / group_s).ceil().min(1e6) as usize) as isize;
+        let changes = |group: &usize| paces.iter().any(|pace| differ(pace[row(group - 1)], pace[row(*group)]));
+        let changes: Vec<isize> = (1..self.frame.len()).filter(changes).map(|group| group as isize).collect();
+        let since_change = |group: usize| {
+            let group = group as isize;
+            let next = changes.partition_point(|change| *change <= group);
+            let beside = changes[next.saturating_sub(1)..(next + 1).min(changes.len())].iter();
+            beside.map(|change| group - change).min_by_key(|rows| rows.abs()).filter(|rows| rows.abs() <= nearby)
+        };
         let engaged = self.scene.role(Role::Engaged);
         let cut = |group: usize| engaged.is_some_and(|engaged| engaged[row(group)] > 0.5);
-        (change, (0..self.frame.len()).map(cut).collect())
+        let groups = 0..self.frame.len();
+        (groups.clone().map(since_change).collect(), groups.map(cut).collect())
     }
 
     /// Of each group in the cut: what the process goes through again and again.

@@ -82,13 +82,16 @@ struct Search<'a> {
     residual: &'a [f64],
     frame: &'a Frame,
     noise: Arma,
-    /// Logarithm of the likelihood of the residual without a switch.
+    /// Logarithm of the likelihood of the residual without a switch: a mean, and noise of its own.
     without: f64,
 }
 
 impl<'a> Search<'a> {
     fn new(residual: &'a [f64], frame: &'a Frame, noise: Arma) -> Self {
-        Self { residual, frame, noise, without: log_likelihood(residual, frame, noise) }
+        let one = frame.whiten(&vec![1.0; residual.len()], noise);
+        let mean = dot(&one, &frame.whiten(residual, noise)) / dot(&one, &one).max(f64::MIN_POSITIVE);
+        let about_mean: Vec<f64> = residual.iter().map(|x| x - mean).collect();
+        Self { residual, frame, noise, without: fit_near(&about_mean, frame, noise).0 }
     }
 
     /// The best of all starts.

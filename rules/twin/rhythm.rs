@@ -27,6 +27,8 @@ const AGES: f64 = 2.5;
 const AGES_MAX: usize = 160;
 /// Least and greatest chance that a spell ends with a row.
 const CHANCE: (f64, f64) = (1e-4, 0.95);
+/// Rows of a spell that is no flicker.
+pub(super) const SPELL_ROWS_MIN: usize = 4;
 /// Numbers that describe a rhythm.
 const PARAMETERS: f64 = 4.0;
 /// Square of an innovation, in variances, beyond which a row says no more.
@@ -62,13 +64,26 @@ pub struct Rhythm {
 }
 
 impl Rhythm {
-    /// No rhythm: a spell ends with this chance, however long it has lasted; a stretch begins on with the other.
+    /// No rhythm: a spell that is no flicker ends with this chance, however long it has lasted; a stretch begins on with the
+    /// other.
     #[must_use]
     pub fn none(chance: f64, share_on: f64) -> Self {
+        let [ends, begins] = [[chance; 2], [1.0 - share_on, share_on]];
+        Self::without_memory(ends, begins, 0.0)
+    }
+
+    /// By state: the chance that a spell ends with a row once it is no flicker, and that a stretch begins within such a one.
+    /// Without the former a single stray row costs less as two switchings than as what it is.
+    fn without_memory(ends: [f64; 2], begins: [f64; 2], parameters: f64) -> Self {
+        let last = |young: f64, last: f64| {
+            let mut ages = vec![young; SPELL_ROWS_MIN];
+            ages[SPELL_ROWS_MIN - 1] = last;
+            ages
+        };
         Self {
-            ends: [vec![chance], vec![chance]],
-            begins: [vec![1.0 - share_on], vec![share_on]],
-            parameters: 0.0,
+            ends: ends.map(|chance| last(CHANCE.0, chance)),
+            begins: begins.map(|share| last(0.0, share)),
+            parameters,
             spread: f64::INFINITY,
         }
     }
@@ -85,9 +100,8 @@ impl Rhythm {
         if rows.iter().chain(&turns).any(|number| *number < 1.0) {
             return None;
         }
-        let ends = [0, 1].map(|on| vec![(turns[on] / rows[on]).clamp(CHANCE.0, CHANCE.1)]);
-        let begins = rows.map(|rows| vec![rows / count(state.len())]);
-        Some(Self { ends, begins, parameters: 2.0, spread: f64::INFINITY })
+        let ends = [0, 1].map(|on: usize| (turns[on] / rows[on]).clamp(CHANCE.0, CHANCE.1));
+        Some(Self::without_memory(ends, rows.map(|rows| rows / count(state.len())), 2.0))
     }
 
     /// The rhythm of a sequence, from the spells that begin and end within a stretch; `None` where they are few.
