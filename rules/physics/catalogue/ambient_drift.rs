@@ -4,6 +4,7 @@ use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread};
 use crate::physics::state::first_order_behind;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use std::f64::consts::LN_2;
 
 /// Displacement that follows the shop.
 #[derive(Debug, Clone, Copy)]
@@ -12,7 +13,7 @@ pub struct AmbientDrift;
 static DOC: EffectDoc = EffectDoc {
     kind: "ambient_drift",
     family: "thermal",
-    law: "E = per_k * w; dw/dt = ((T - T0) - w) / tau, T0 at the start; without tau: w = T - T0",
+    law: "E = per_k * w; dw/dt = ((T - T0) - w) / tau, T0 at the start; without tau: w = T - T0; two_masses: the same once more behind w, with half the tau",
     parameters: &[
         ParameterDoc {
             name: "per_k",
@@ -57,7 +58,7 @@ impl Effect for AmbientDrift {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["direct", "lag"]
+        &["direct", "lag", TWO_MASSES]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -66,7 +67,9 @@ impl Effect for AmbientDrift {
             return Vec::new();
         }
         let direct = Form { name: "direct", ..Form::plain() };
-        [direct].into_iter().chain(lag_forms(scene, "lag", &[1800.0, 3600.0, 7200.0])).collect()
+        let lags = |name| lag_forms(scene, name, &[1800.0, 3600.0, 7200.0]);
+        let two_masses = lags(TWO_MASSES).into_iter().map(|form| Form { ln_choices: LN_2, ..form });
+        [direct].into_iter().chain(lags("lag")).chain(two_masses).collect()
     }
 
     fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
@@ -78,6 +81,10 @@ impl Effect for AmbientDrift {
         let first = *ambient.first()?;
         let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
         let followed = match form.value("tau_s") {
+            Some(tau_s) if form.name == TWO_MASSES => {
+                let skin = first_order_behind(scene, &change, SKIN_SHARE * tau_s);
+                first_order_behind(scene, &skin, tau_s)
+            }
             Some(tau_s) => first_order_behind(scene, &change, tau_s),
             None => change,
         };
@@ -88,6 +95,11 @@ impl Effect for AmbientDrift {
         Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) }
     }
 }
+
+/// The form in which the air warms covers and column, and these the bed.
+const TWO_MASSES: &str = "two_masses";
+/// Time constant of the first mass as a share of that of the second; which share it is hardly shows.
+const SKIN_SHARE: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {
@@ -107,5 +119,19 @@ mod tests {
         let column = AmbientDrift.columns(&scene, &lag).expect("the air is known").swap_remove(0).1;
         // It fell all night, so that the column is an hour behind: 0.6 K.
         assert!(column[9] == 0.0 && (column[10] + 5.4).abs() < 0.01, "{column:?}");
+    }
+
+    #[test]
+    fn behind_two_masses_the_bed_begins_slowly() {
+        let mut recording = Recording::new("door", (0..240).map(|row| 60.0 * f64::from(row)).collect(), None);
+        set(&mut recording, "ambient_temperature_c", |row| if row < 10 { 20.0 } else { 16.0 });
+        set(&mut recording, "thermal_error_um", |_| 1.0);
+        let scene = scene(&recording, "thermal_error_um");
+        let after = |name, minutes: usize| {
+            let form = Form { name, ..Form::of(&[("tau_s", 3600.0)]) };
+            AmbientDrift.columns(&scene, &form).expect("the air is known").swap_remove(0).1[10 + minutes]
+        };
+        assert!(after("two_masses", 10) > 0.4 * after("lag", 10), "{}", after("two_masses", 10));
+        assert!(after("two_masses", 220) < -3.7, "{}", after("two_masses", 220));
     }
 }

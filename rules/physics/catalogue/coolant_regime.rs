@@ -2,6 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::{varies, visits};
+use crate::physics::state::first_order_behind;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::median;
 
@@ -12,7 +13,7 @@ pub struct CoolantRegime;
 static DOC: EffectDoc = EffectDoc {
     kind: "coolant_regime",
     family: "cutting",
-    law: "y = change * L * coolant_on; fading: times (vm / vc)^fading, vm the median cutting speed of the wet cuts",
+    law: "y = change * L * w, w = coolant_on; arriving: dw/dt = (coolant_on - w) / tau; fading: w = coolant_on * (vm / vc)^fading, vm the median cutting speed of the wet cuts",
     parameters: &[
         ParameterDoc {
             name: "change",
@@ -29,6 +30,14 @@ static DOC: EffectDoc = EffectDoc {
             range: (0.0, 4.0),
             en: "exponent by which it does less at higher cutting speed",
             zh: "切速升高时作用减弱的指数",
+        },
+        ParameterDoc {
+            name: "tau_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.05, 8.0),
+            en: "time the coolant takes to reach the cut and to leave it",
+            zh: "冷却液到达和离开切削区的时间",
         },
     ],
     needs: &["load | engaged", "coolant_on"],
@@ -58,7 +67,7 @@ impl Effect for CoolantRegime {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &[FADING]
+        &[FADING, ARRIVING]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -71,26 +80,40 @@ impl Effect for CoolantRegime {
         }
         let speeds = wet_speeds(scene, coolant).filter(|speeds| varies(speeds));
         let fading = speeds.map(|_| Form { name: FADING, ..Form::of(&[("fading", 1.0)]) });
-        [Form::plain()].into_iter().chain(fading).collect()
+        let arriving = ARRIVING_S.into_iter().filter(|tau_s| *tau_s > ARRIVING_PERIODS * scene.period_s());
+        let arriving = arriving.map(|tau_s| Form { name: ARRIVING, ..Form::of(&[("tau_s", tau_s)]) });
+        [Form::plain()].into_iter().chain(fading).chain(arriving).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let coolant = scene.column("coolant_on")?;
-        if form.name != FADING {
-            return Some(vec![("change", cut_times(scene, |row| coolant[row])?)]);
-        }
-        let usual = median(wet_speeds(scene, coolant)?)?;
-        let speed = scene.column("cutting_speed_m_min")?;
-        let fading = form.value("fading").unwrap_or(1.0);
-        let share = |row: usize| (usual / speed[row].max(SLOW_SHARE * usual)).powf(fading);
-        Some(vec![("change", cut_times(scene, |row| coolant[row] * share(row))?)])
+        let wet = match form.name {
+            ARRIVING => first_order_behind(scene, coolant, form.value("tau_s").unwrap_or(1.0)),
+            FADING => fading(scene, coolant, form.value("fading").unwrap_or(1.0))?,
+            _ => coolant.to_vec(),
+        };
+        Some(vec![("change", cut_times(scene, |row| wet[row])?)])
     }
 }
 
 /// The form that does less the faster the cut.
 const FADING: &str = "fading";
+/// The form in which the cut grows wet and dry again in time: the pipe fills, a film builds up.
+const ARRIVING: &str = "arriving";
+/// Time constants to start from, s, and the shortest that rows can tell, in sampling periods.
+const ARRIVING_S: [f64; 3] = [0.3, 1.0, 4.0];
+/// See [`ARRIVING_S`].
+const ARRIVING_PERIODS: f64 = 0.4;
 /// Share of the usual cutting speed below which coolant does no more.
 const SLOW_SHARE: f64 = 0.1;
+
+/// Coolant by what it does at the speed of each row; `None` where that is not known.
+fn fading(scene: &Scene, coolant: &[f64], exponent: f64) -> Option<Vec<f64>> {
+    let usual = median(wet_speeds(scene, coolant)?)?;
+    let speed = scene.column("cutting_speed_m_min")?;
+    let share = |speed: &f64| (usual / speed.max(SLOW_SHARE * usual)).powf(exponent);
+    Some(coolant.iter().zip(speed).map(|(on, speed)| on * share(speed)).collect())
+}
 
 /// Cutting speeds of the rows that cut wet, m/min; `None` where they are not known.
 fn wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
@@ -109,6 +132,24 @@ mod tests {
 
     fn column(scene: &Scene, form: &Form) -> Vec<f64> {
         CoolantRegime.columns(scene, form).expect("makes columns").swap_remove(0).1
+    }
+
+    /// Four seconds in the cut, wet from the second on.
+    fn wet_scene() -> Scene {
+        let mut recording = Recording::new("wet", (0..4).map(f64::from).collect(), None);
+        set(&mut recording, "coolant_on", |row| [0.0, 1.0, 1.0, 1.0][row]);
+        set(&mut recording, "engaged", |_| 1.0);
+        set(&mut recording, "spindle_power_w", |_| 1.0);
+        let mut scene = scene(&recording, "spindle_power_w");
+        scene.set_load(Some(vec![800.0; 4]));
+        scene
+    }
+
+    #[test]
+    fn coolant_that_arrives_late_is_all_there_later() {
+        let form = Form { name: "arriving", ..Form::of(&[("tau_s", 0.5)]) };
+        let column = column(&wet_scene(), &form);
+        assert!(column[0] == 0.0 && column[1] < 500.0 && column[1] < column[2] && column[3] > 780.0, "{column:?}");
     }
 
     #[test]
