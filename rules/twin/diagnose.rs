@@ -284,6 +284,11 @@ impl<'a> Case<'a> {
         if let Some(whole) = &mut self.whole {
             return whole.predict(fit);
         }
+        self.predict_here(fit)
+    }
+
+    /// The same of what is fitted here, be it but an excerpt.
+    pub(super) fn predict_here(&mut self, fit: &Fit) -> Option<Prediction> {
         let noise = Noise { arma: fit.noise, deviation: ordinary_noise(fit) };
         predict(&mut self.scene, &fit.parts, self.parts.len(), &self.units, &self.held, noise)
     }

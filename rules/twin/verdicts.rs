@@ -49,7 +49,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
     }
-    let doubtful = outcome.fits.rises() || outcome.found.leaves_much_unnamed();
+    let doubtful = outcome.fits.rises() || outcome.fits.carries_little() || outcome.found.leaves_much_unnamed();
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
     }

@@ -40,8 +40,9 @@ fn improvement(diagnosis: &Diagnosis) -> String {
     let unit = &diagnosis.unit;
     match (fit.before.held_out_rmse, fit.after.held_out_rmse) {
         (Some(before), Some(after)) => {
+            let goes = if fit.rises() { "rises" } else { "falls" };
             format!(
-                "On runs that took no part in fitting the error falls from {before:.3} to {after:.3} {unit}; the noise is {:.3} {unit}.",
+                "On runs that took no part in fitting the error {goes} from {before:.3} to {after:.3} {unit}; the noise is {:.3} {unit}.",
                 fit.noise_floor
             )
         }
