@@ -426,6 +426,12 @@ impl Scene {
         self.latent.get(kind).map(Vec::as_slice)
     }
 
+    /// The same, zero in every row where none has been found.
+    #[must_use]
+    pub fn latent_or_zero(&self, kind: &str) -> Vec<f64> {
+        self.latent(kind).map_or_else(|| vec![0.0; self.rows()], <[f64]>::to_vec)
+    }
+
     /// Sets the hidden state of an effect.
     pub fn set_latent(&mut self, kind: &'static str, state: Vec<f64>) {
         self.latent.insert(kind, state);

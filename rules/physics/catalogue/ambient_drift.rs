@@ -104,7 +104,7 @@ const SKIN_SHARE: f64 = 0.5;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{scene, set};
+    use crate::physics::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
     #[test]
@@ -116,7 +116,7 @@ mod tests {
         set(&mut recording, "thermal_error_um", |_| 1.0);
         let scene = scene(&recording, "thermal_error_um");
         let lag = Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) };
-        let column = AmbientDrift.columns(&scene, &lag).expect("the air is known").swap_remove(0).1;
+        let column = column(&AmbientDrift, &scene, &lag);
         // It fell all night, so that the column is an hour behind: 0.6 K.
         assert!(column[9] == 0.0 && (column[10] + 5.4).abs() < 0.01, "{column:?}");
     }
@@ -129,7 +129,7 @@ mod tests {
         let scene = scene(&recording, "thermal_error_um");
         let after = |name, minutes: usize| {
             let form = Form { name, ..Form::of(&[("tau_s", 3600.0)]) };
-            AmbientDrift.columns(&scene, &form).expect("the air is known").swap_remove(0).1[10 + minutes]
+            column(&AmbientDrift, &scene, &form)[10 + minutes]
         };
         assert!(after("two_masses", 10) > 0.4 * after("lag", 10), "{}", after("two_masses", 10));
         assert!(after("two_masses", 220) < -3.7, "{}", after("two_masses", 220));

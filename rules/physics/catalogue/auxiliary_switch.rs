@@ -64,7 +64,7 @@ impl Effect for AuxiliarySwitch {
         if form.name == "latent" {
             return Some(vec![(
                 "level",
-                scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec),
+                scene.latent_or_zero(DOC.kind),
             )]);
         }
         let (flag, _) = form.place.as_ref()?;

@@ -127,12 +127,8 @@ fn wet_speeds(scene: &Scene, coolant: &[f64]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{scene, set};
+    use crate::physics::catalogue::tests::{column, scene, set};
     use adapters::Recording;
-
-    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
-        CoolantRegime.columns(scene, form).expect("makes columns").swap_remove(0).1
-    }
 
     /// Four seconds in the cut, wet from the second on.
     fn wet_scene() -> Scene {
@@ -148,7 +144,7 @@ mod tests {
     #[test]
     fn coolant_that_arrives_late_is_all_there_later() {
         let form = Form { name: "arriving", ..Form::of(&[("tau_s", 0.5)]) };
-        let column = column(&wet_scene(), &form);
+        let column = column(&CoolantRegime, &wet_scene(), &form);
         assert!(column[0] == 0.0 && column[1] < 500.0 && column[1] < column[2] && column[3] > 780.0, "{column:?}");
     }
 
@@ -162,6 +158,6 @@ mod tests {
         let mut scene = scene(&recording, "spindle_power_w");
         scene.set_load(Some(vec![800.0; 4]));
         let form = Form { name: "fading", ..Form::of(&[("fading", 1.0)]) };
-        assert_eq!(column(&scene, &form), [800.0, 800.0, 400.0, 0.0]);
+        assert_eq!(column(&CoolantRegime, &scene, &form), [800.0, 800.0, 400.0, 0.0]);
     }
 }

@@ -131,12 +131,8 @@ pub(crate) fn slips(scene: &Scene, way: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{scene, set};
+    use crate::physics::catalogue::tests::{column, scene, set};
     use adapters::Recording;
-
-    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
-        DryFriction.columns(scene, form).expect("makes columns").swap_remove(0).1
-    }
 
     #[test]
     fn friction_that_bends_before_it_slips_is_held_at_rest() {
@@ -146,7 +142,7 @@ mod tests {
         set(&mut recording, "velocity_m_s", velocity);
         set(&mut recording, "axis_force_n", |_| 1.0);
         let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
-        let friction = column(&scene(&recording, "axis_force_n"), &form);
+        let friction = column(&DryFriction, &scene(&recording, "axis_force_n"), &form);
         assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
         assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);
         // Half a millimetre while it starts, then one a row: turned about after ln 2 of the way.

@@ -87,12 +87,8 @@ const MILLED: &str = "milled";
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::catalogue::tests::{scene, set};
+    use crate::physics::catalogue::tests::{column, scene, set};
     use adapters::Recording;
-
-    fn column(scene: &Scene, form: &Form) -> Vec<f64> {
-        EdgeForce.columns(scene, form).expect("makes columns").swap_remove(0).1
-    }
 
     #[test]
     fn the_teeth_of_a_cutter_plough_in_turn() {
@@ -106,7 +102,7 @@ mod tests {
         set(&mut recording, "width_of_cut_mm", |row| [20.0, 10.0][row]);
         set(&mut recording, "spindle_power_w", |_| 1.0);
         let milled = Form { name: "milled", ..Form::plain() };
-        let power = column(&scene(&recording, "spindle_power_w"), &milled);
+        let power = column(&EdgeForce, &scene(&recording, "spindle_power_w"), &milled);
         assert!((power[0] - 4.0).abs() < 1e-9 && (power[1] - 2.0).abs() < 1e-9, "teeth * ap * vc / 60: {power:?}");
     }
 }

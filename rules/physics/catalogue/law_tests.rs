@@ -1,12 +1,12 @@
 //! What single laws say: magnitudes, signs, and when they have nothing to say.
 
 use super::effect;
-use super::tests::{scene, set, set_words};
+use super::tests::{self, scene, set, set_words};
 use crate::physics::{Form, Scene};
 use adapters::recording::Recording;
 
 fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
-    effect(kind).expect("known").columns(scene, form).expect("makes columns").swap_remove(0).1
+    tests::column(effect(kind).expect("known"), scene, form)
 }
 
 #[test]

@@ -82,7 +82,7 @@ impl Effect for RippleAlias {
         if form.name == "latent" {
             return Some(vec![(
                 "scale",
-                scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec),
+                scene.latent_or_zero(DOC.kind),
             )]);
         }
         let turn = 2.0 * PI * form.value("frequency_hz")?;

@@ -77,7 +77,7 @@ impl Effect for Runout {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if form.name == "latent" {
-            let tone = scene.latent(DOC.kind).map_or_else(|| vec![0.0; scene.rows()], <[f64]>::to_vec);
+            let tone = scene.latent_or_zero(DOC.kind);
             return Some(vec![("scale", tone)]);
         }
         let turn = turn_rad(scene)?;

@@ -63,6 +63,11 @@ fn rich(output: &str) -> Scene {
     scene(&recording, output)
 }
 
+/// The first column that an effect makes.
+pub(super) fn column(effect: &dyn Effect, scene: &Scene, form: &Form) -> Vec<f64> {
+    effect.columns(scene, form).expect("makes columns").swap_remove(0).1
+}
+
 /// A scene as a model would show it: with a load, a simulation and a vertical axis.
 pub(super) fn scene(recording: &Recording, output: &str) -> Scene {
     let roles = BTreeMap::from([(Role::Vertical, "z".to_owned())]);
