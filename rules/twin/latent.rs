@@ -8,7 +8,7 @@
 //! `consumer`.
 
 use super::frame::Frame;
-use super::linear::dot;
+use super::linear::{dot, least_squares};
 use super::noise::{Arma, fit_near};
 use super::race::Seen;
 use super::rhythm::Rhythm;
@@ -89,7 +89,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(residual: &'a [f64], frame: &'a Frame, noise: Arma) -> Self {
         let one = frame.whiten(&vec![1.0; residual.len()], noise);
-        let mean = dot(&one, &frame.whiten(residual, noise)) / dot(&one, &one).max(f64::MIN_POSITIVE);
+        let mean = least_squares(&[one], &frame.whiten(residual, noise)).coefficients[0];
         let about_mean: Vec<f64> = residual.iter().map(|x| x - mean).collect();
         Self { residual, frame, noise, without: fit_near(&about_mean, frame, noise).0 }
     }

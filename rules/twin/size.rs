@@ -81,9 +81,10 @@ impl Case<'_> {
             let minor = several && gained < MINOR_SHARE * best.information;
             let paid = price(&designs[best.members[position]], ln_rows);
             let beyond_doubt = gained >= if minor { BEYOND_DOUBT_BESIDE } else { BEYOND_DOUBT_INFORMATION };
-            let drops = several && (gained < paid || self.misleads(&without, &best.fit, gained - paid))
+            let drops = several && gained < paid
                 || minor && differs_by_run(&best.fit, &self.frame, first + position)
-                || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt);
+                || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt)
+                || several && self.misleads(&without, &best.fit, gained - paid);
             drops.then_some((position, gained))
         };
         let all = (0..best.members.len()).filter_map(unclaimable);

@@ -62,10 +62,7 @@ impl Effect for AuxiliarySwitch {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if form.name == "latent" {
-            return Some(vec![(
-                "level",
-                scene.latent_or_zero(DOC.kind),
-            )]);
+            return Some(vec![("level", scene.latent_or_zero(DOC.kind))]);
         }
         let (flag, _) = form.place.as_ref()?;
         Some(vec![("level", scene.column(flag)?.to_vec())])

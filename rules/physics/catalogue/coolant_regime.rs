@@ -130,10 +130,11 @@ mod tests {
     use crate::physics::catalogue::tests::{column, scene, set};
     use adapters::Recording;
 
-    /// Four seconds in the cut, wet from the second on.
-    fn wet_scene() -> Scene {
+    /// Four seconds in a cut of 800 W, at these speeds in m/min and with the coolant on where it is one.
+    fn cut_for_four_seconds(speed: [f64; 4], coolant_on: [f64; 4]) -> Scene {
         let mut recording = Recording::new("wet", (0..4).map(f64::from).collect(), None);
-        set(&mut recording, "coolant_on", |row| [0.0, 1.0, 1.0, 1.0][row]);
+        set(&mut recording, "cutting_speed_m_min", |row| speed[row]);
+        set(&mut recording, "coolant_on", |row| coolant_on[row]);
         set(&mut recording, "engaged", |_| 1.0);
         set(&mut recording, "spindle_power_w", |_| 1.0);
         let mut scene = scene(&recording, "spindle_power_w");
@@ -144,20 +145,15 @@ mod tests {
     #[test]
     fn coolant_that_arrives_late_is_all_there_later() {
         let form = Form { name: "arriving", ..Form::of(&[("tau_s", 0.5)]) };
-        let column = column(&CoolantRegime, &wet_scene(), &form);
+        let scene = cut_for_four_seconds([100.0; 4], [0.0, 1.0, 1.0, 1.0]);
+        let column = column(&CoolantRegime, &scene, &form);
         assert!(column[0] == 0.0 && column[1] < 500.0 && column[1] < column[2] && column[3] > 780.0, "{column:?}");
     }
 
     #[test]
     fn coolant_that_fades_does_half_at_twice_the_usual_speed() {
-        let mut recording = Recording::new("wet", (0..4).map(f64::from).collect(), None);
-        set(&mut recording, "cutting_speed_m_min", |row| [100.0, 100.0, 200.0, 200.0][row]);
-        set(&mut recording, "coolant_on", |row| [1.0, 1.0, 1.0, 0.0][row]);
-        set(&mut recording, "engaged", |_| 1.0);
-        set(&mut recording, "spindle_power_w", |_| 1.0);
-        let mut scene = scene(&recording, "spindle_power_w");
-        scene.set_load(Some(vec![800.0; 4]));
         let form = Form { name: "fading", ..Form::of(&[("fading", 1.0)]) };
+        let scene = cut_for_four_seconds([100.0, 100.0, 200.0, 200.0], [1.0, 1.0, 1.0, 0.0]);
         assert_eq!(column(&CoolantRegime, &scene, &form), [800.0, 800.0, 400.0, 0.0]);
     }
 }

@@ -80,10 +80,7 @@ impl Effect for RippleAlias {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if form.name == "latent" {
-            return Some(vec![(
-                "scale",
-                scene.latent_or_zero(DOC.kind),
-            )]);
+            return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }
         let turn = 2.0 * PI * form.value("frequency_hz")?;
         let wave = |law: fn(f64) -> f64| scene.time_s().iter().map(|t| law(turn * t)).collect();

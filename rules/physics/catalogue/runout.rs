@@ -77,8 +77,7 @@ impl Effect for Runout {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         if form.name == "latent" {
-            let tone = scene.latent_or_zero(DOC.kind);
-            return Some(vec![("scale", tone)]);
+            return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }
         let turn = turn_rad(scene)?;
         let cosine = cut_times(scene, |row| turn[row].cos())?;
