@@ -2,6 +2,7 @@
 //! be drawn over - the time in the run and in the cut, the direction of a slide, and what the model itself simulates.
 
 use crate::physics::drive::{directions, goes_both_ways, sliding};
+use crate::physics::state::{first_order, first_order_behind};
 use crate::physics::{Role, Scene};
 use std::borrow::Cow;
 
@@ -16,6 +17,15 @@ pub(super) const SIMULATED_CUT: &str = "simulated_cut";
 /// The same over the speed in thousands of turns a minute.
 pub(super) const SIMULATED_CUT_PER_KRPM: &str = "simulated_cut_per_krpm";
 
+/// The whole output as the model simulates it, in its unit.
+pub(super) const SIMULATED_OUTPUT: &str = "simulated_output";
+/// Seconds since the column named behind it last changed, such as that of the tool; since the first row before that.
+pub(super) const TIME_SINCE_CHANGE_OF: &str = "time_since_change_of_";
+/// A first-order lag behind a column: its time constant in seconds stands between this and the next.
+pub(super) const LAG_OF: &str = "lag_of_";
+/// What stands between the time constant and the column.
+pub(super) const LAG_OF_WHAT: &str = "_s_behind_";
+
 /// Direction in which the slide of a feed drive moves, -1 to 1.
 pub(super) const DIRECTION: &str = "direction_of_motion";
 
@@ -28,13 +38,37 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
         DIRECTION => direction(scene).map(Cow::Owned),
         SIMULATED_CUT => scene.load().map(Cow::Borrowed),
         SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
-        _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed),
+        SIMULATED_OUTPUT => scene.simulated().map(Cow::Borrowed),
+        _ => scene.column(name).or_else(|| by_role(scene, name)).map(Cow::Borrowed).or_else(|| derived(scene, name)),
     }
 }
 
-/// Does this channel follow the parameters of the model?
+/// A channel that is made of a column named in its own name.
+fn derived<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
+    if let Some(column) = name.strip_prefix(TIME_SINCE_CHANGE_OF) {
+        return time_since_change_s(scene, column).map(Cow::Owned);
+    }
+    let (tau_s, column) = name.strip_prefix(LAG_OF)?.split_once(LAG_OF_WHAT)?;
+    let tau_s = tau_s.parse().ok().filter(|tau_s: &f64| *tau_s > 0.0)?;
+    let input = scene.column(column)?;
+    let is_there_always = column.contains("temperature");
+    let lag = if is_there_always { first_order_behind } else { first_order };
+    Some(Cow::Owned(lag(scene, input, tau_s)))
+}
+
+/// Does this channel follow what the model makes of the cut?
 pub(super) fn is_simulated(name: &str) -> bool {
     [SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].contains(&name)
+}
+
+/// The rows at which a column, of words or of numbers, has another value than in the row before; `None` without it.
+pub(super) fn changes_of(scene: &Scene, column: &str) -> Option<Vec<usize>> {
+    let rows = 1..scene.rows();
+    if let Some(words) = scene.words(column) {
+        return Some(rows.filter(|row| words.get(*row) != words.get(row - 1)).collect());
+    }
+    let values = scene.column(column)?;
+    Some(rows.filter(|row| values[*row] != values[row - 1]).collect())
 }
 
 /// What a recording may call otherwise.
@@ -66,6 +100,17 @@ fn time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
         }
     }
     Some(values)
+}
+
+fn time_since_change_s(scene: &Scene, column: &str) -> Option<Vec<f64>> {
+    let clock_s = scene.clock_s();
+    let mut changes = changes_of(scene, column)?.into_iter().peekable();
+    let mut since = 0;
+    let at = |row: usize| {
+        since = changes.next_if_eq(&row).unwrap_or(since);
+        clock_s[row] - clock_s[since]
+    };
+    Some((0..scene.rows()).map(at).collect())
 }
 
 fn direction(scene: &Scene) -> Option<Vec<f64>> {
@@ -121,11 +166,44 @@ mod tests {
         Scene::new(&recording, "axis_force_n", &BTreeMap::new()).expect("recorded")
     }
 
+    #[test]
+    fn a_column_of_words_or_of_numbers_tells_how_long_ago_it_changed() {
+        let text = "time_s,run,spindle_power_w,tool,depth_of_cut_mm\n0,a,1,T1,1\n2,a,1,T1,2\n4,a,1,T2,2\n7,a,1,T2,2\n";
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let scene = Scene::new(&recording, "spindle_power_w", &BTreeMap::new()).expect("recorded");
+        let since = |column: &str| channel_values(&scene, &format!("{TIME_SINCE_CHANGE_OF}{column}"));
+        assert_eq!(since("tool").as_deref(), Some(&[0.0, 2.0, 0.0, 3.0][..]));
+        assert_eq!(since("depth_of_cut_mm").as_deref(), Some(&[0.0, 0.0, 2.0, 5.0][..]));
+        assert_eq!(since("coolant"), None, "what is not recorded");
+    }
+
+    #[test]
+    fn a_lag_needs_a_time_constant_and_a_column_that_are_there() {
+        let scene = cut();
+        for name in ["lag_of_0_s_behind_engaged", "lag_of_x_s_behind_engaged", "lag_of_5_s_behind_nothing", "lag_of_5"]
+        {
+            assert_eq!(channel_values(&scene, name), None, "{name}");
+        }
+        let lag = channel_values(&scene, "lag_of_5_s_behind_spindle_speed_rpm").expect("there");
+        assert!(lag.windows(2).all(|pair| pair[0] <= pair[1] && pair[1] < 900.0 + 1e-6), "from zero to the speed");
+    }
+
     /// What a model that carries a form without a name makes of it is what the form was.
     #[test]
     fn a_form_is_the_same_as_a_formula() {
-        let channels = [TIME_IN_RUN, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, "spindle_speed_rpm"];
-        same_as_formulas(&cut(), &channels, Factor::InTheCut);
+        let channels = [
+            TIME_IN_RUN,
+            TIME_IN_CUT,
+            SIMULATED_CUT,
+            SIMULATED_CUT_PER_KRPM,
+            SIMULATED_OUTPUT,
+            "spindle_speed_rpm",
+            "time_since_change_of_depth_of_cut_mm",
+            "lag_of_5_s_behind_depth_of_cut_mm",
+        ];
+        for factor in [Factor::Always, Factor::InTheCut, Factor::WithTheSpeed, Factor::WithTheSpeedSquared] {
+            same_as_formulas(&cut(), &channels, factor);
+        }
         same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION], Factor::AgainstMotion);
     }
 
@@ -138,6 +216,7 @@ mod tests {
                 Shape::Peak(900.0, 80.0),
                 Shape::Fading(3.0),
                 Shape::Wave(7.0, 3),
+                Shape::Shots { every: 6.0, from: 2.3, over: 1.7, among: 3 },
             ]
         };
         for (name, shape) in channels.iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape))) {

@@ -2,18 +2,18 @@
 
 use super::bind::bind;
 use super::designs::{Design, designs};
-use super::diagnosis::{Diagnosis, Fits, Quality, Rows, Verdict};
+use super::diagnosis::{Diagnosis, Quality, Verdict};
 use super::excerpt;
 use super::fit::{Data, Fit, fit};
 use super::frame::{FOLDS, Frame, Unit, group_size, held_out, units};
 use super::holdout::{Noise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::Arma;
+use super::outcome::{Answer, Outcome};
 use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
-use super::size::BEYOND_DOUBT_INFORMATION;
-use super::unknown::{Doubt, Nameless, Unknown};
+use super::unknown::Doubt;
 use super::veil::SeenForm;
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
@@ -152,13 +152,13 @@ impl<'a> Case<'a> {
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let base = self.unveil(base);
-        let Answer { base, found, designs, doubt } = self.answer(&base, seed);
+        let answer = self.answer(&base, seed);
         self.show_hidden(&base);
-        let mut outcome = Outcome::new(self, base, found, designs, doubt);
+        let mut outcome = Outcome::new(self, answer);
         if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
             // On rows that took no part it explains nothing.
-            let Outcome { base, found, designs, .. } = outcome;
-            outcome = Outcome::new(self, base, found, designs, Doubt::NONE);
+            let Outcome { base, found, designs, slight_entry, .. } = outcome;
+            outcome = Outcome::new(self, Answer { base, found, designs, doubt: Doubt::NONE, slight_entry });
         }
         verdicts::judge(self, outcome)
     }
@@ -169,7 +169,7 @@ impl<'a> Case<'a> {
         let base = self.settle(base, &mut found);
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
-        Answer { base, found, designs, doubt }
+        Answer { base, found, designs, doubt, slight_entry: false }
     }
 
     /// The case in which the answer is told: the whole recording.
@@ -314,87 +314,4 @@ pub fn ordinary_noise(fit: &Fit) -> f64 {
 /// Root mean square distance.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / count(a.len().max(1))).sqrt()
-}
-
-/// What was found, before it is told.
-pub(super) struct Answer {
-    base: Fit,
-    pub(super) found: Found,
-    designs: Vec<Design>,
-    doubt: Doubt,
-}
-
-/// Everything the verdict is made from.
-pub struct Outcome {
-    /// The baseline fitted alone.
-    pub base: Fit,
-    /// What the search found.
-    pub found: Found,
-    /// Every hypothesis of the search.
-    pub designs: Vec<Design>,
-    /// What remains unexplained.
-    pub unknown: Option<Unknown>,
-    /// A cause without a name that explains as much as the named ones.
-    pub nameless: Option<Nameless>,
-    /// The fits compared.
-    pub fits: Fits,
-    /// Row by row.
-    pub rows: Rows,
-    /// Contribution of each added effect, by label.
-    pub added: Vec<(String, Vec<f64>)>,
-}
-
-impl Outcome {
-    fn new(case: &mut Case<'_>, base: Fit, found: Found, designs: Vec<Design>, doubt: Doubt) -> Self {
-        let Doubt { unknown, nameless } = doubt;
-        let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
-        let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
-        let none = empty();
-        let before = case.predict(&base).unwrap_or_else(|| none.clone());
-        let after = case.predict(&last).unwrap_or(none);
-        let first = case.parts.len();
-        let labels = last.parts[first..].iter().map(|part| part.label().to_owned());
-        let added: Vec<(String, Vec<f64>)> = labels.zip(after.contributions.iter().skip(first).cloned()).collect();
-        let fits = Fits {
-            rows: case.told().frame.len() + case.told().held_frame.len(),
-            runs: case.units.len(),
-            held_out_runs: case.held.iter().map(|unit| case.units[*unit].name.clone()).collect(),
-            noise_floor: ordinary_noise(&last),
-            before: case.quality(&before),
-            after: case.quality(&after),
-        };
-        let known = super::inputs::rows_with_inputs(&case.told().scene, &case.parts);
-        let visible = |total: Vec<f64>| total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
-        let rows = Rows {
-            simulated_before: visible(before.total),
-            simulated_after: visible(after.total),
-            compared: case.told().scene.usable().to_vec(),
-            effects: added.clone(),
-        };
-        Self { base, found, designs, unknown, nameless, fits, rows, added }
-    }
-
-    /// Is something said to remain where nothing is named, and not beyond doubt?
-    #[must_use]
-    fn is_weak_alarm_without_a_name(&self) -> bool {
-        let weak = self.unknown.as_ref().is_some_and(|unknown| unknown.information < BEYOND_DOUBT_INFORMATION);
-        weak && self.found.best.members.is_empty()
-    }
-
-    /// The fit that is reported.
-    #[must_use]
-    pub fn last(&self) -> &Fit {
-        self.unknown.as_ref().map_or(&self.found.best.fit, |unknown| &unknown.fit)
-    }
-
-    /// Is nothing missing?
-    #[must_use]
-    pub fn verdict(&self, ambiguous: bool) -> Verdict {
-        match (&self.unknown, self.found.best.members.is_empty()) {
-            (Some(_), _) => Verdict::Unexplained,
-            (None, true) => Verdict::NoMismatch,
-            (None, false) if ambiguous => Verdict::Ambiguous,
-            (None, false) => Verdict::Explained,
-        }
-    }
 }

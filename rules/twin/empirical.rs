@@ -1,16 +1,14 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
 //! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed, something
-//! that fades through each pass, or a wave over the position of a slide or the time in the cut (`periodic`); by itself,
-//! in the cut only, or in proportion to the removal rate. It is the yardstick for "something real remains that no
+//! that fades through each pass, a wave (`periodic`), or shots that come again and again (`shots`); by itself, in the
+//! cut only, or in proportion to the removal rate or the speed. It is the yardstick for "something real remains that no
 //! candidate explains".
 
-use super::channel::{
-    DIRECTION, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM, TIME, TIME_IN_CUT, TIME_IN_RUN, channel_values,
-};
+use super::channel::{DIRECTION, channel_values};
 use super::designs::Design;
 use super::frame::Frame;
-use super::model::{Body, Model, Parameter, Part};
+use super::model::{Body, Parameter, Part};
 use crate::physics::{Entry, OutputKind, Role, Scene};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -26,6 +24,10 @@ pub enum Factor {
     WithTheCut,
     /// Running spindle.
     Turning,
+    /// The speed of the spindle, in thousands of turns a minute.
+    WithTheSpeed,
+    /// Its square: what stirs or flings.
+    WithTheSpeedSquared,
     /// Direction in which a slide moves: it is a friction.
     AgainstMotion,
 }
@@ -45,6 +47,17 @@ pub enum Shape {
     Fading(f64),
     /// A wave of this period, one of so many that can be told apart.
     Wave(f64, usize),
+    /// A jump at one value and again after every interval, each of which fades.
+    Shots {
+        /// From one to the next.
+        every: f64,
+        /// The first.
+        from: f64,
+        /// The distance over which it fades.
+        over: f64,
+        /// Intervals and places that can be told apart.
+        among: usize,
+    },
 }
 
 /// A shape over one channel.
@@ -62,10 +75,8 @@ pub struct Empirical {
     pub factor: Factor,
 }
 
-/// Places at which a peak is tried, before neighbours are joined.
-const PEAKS: usize = 12;
 /// Sampling periods below which what fades is an edge.
-const FADING_PERIODS: f64 = 4.0;
+pub(super) const FADING_PERIODS: f64 = 4.0;
 
 impl Empirical {
     /// Is it one height of a given shape, rather than a line that bends where the recording asks for it?
@@ -91,6 +102,19 @@ impl Empirical {
                 // What a period is known by: a part of a turn over the whole distance.
                 let turns = self.scale / period;
                 vec![Shape::Wave(self.scale / (turns + step), among), Shape::Wave(self.scale / (turns - step), among)]
+            }
+            Shape::Shots { every, from, over, among } => {
+                let shots = |every: f64, from: f64, over: f64| Shape::Shots { every, from, over, among };
+                // An interval is known by where the last shot stands.
+                let (place, interval) = (step * over, step * over * every / self.scale);
+                vec![
+                    shots(every, (from + place).rem_euclid(every), over),
+                    shots(every, (from - place).rem_euclid(every), over),
+                    shots(every + interval, from, over),
+                    shots(every - interval, from, over),
+                    shots(every, from, up * over),
+                    shots(every, from, down * over),
+                ]
             }
         };
         shapes.into_iter().map(|shape| Self { shape, ..self.clone() }).collect()
@@ -121,6 +145,11 @@ impl Empirical {
                 let (cosine, sine) = (column(&|x| (turns * x).cos()), column(&|x| (turns * x).sin()));
                 return Some(vec![("cosine".to_owned(), cosine), ("sine".to_owned(), sine)]);
             }
+            Shape::Shots { every, from, over, .. } => {
+                let (from, every, over) = (along(*from), every / self.scale, over / self.scale);
+                let since = |x: f64| (x - from).rem_euclid(every);
+                return Some(vec![("level".to_owned(), column(&|x| (-since(x) / over).exp()))]);
+            }
         };
         let mut columns = vec![("slope".to_owned(), column(&|x| x))];
         if self.factor != Factor::Always {
@@ -141,6 +170,8 @@ impl Empirical {
             Factor::InTheCut => "engaged * ",
             Factor::WithTheCut => "removal rate * ",
             Factor::Turning => "(spindle turning) * ",
+            Factor::WithTheSpeed => "spindle krpm * ",
+            Factor::WithTheSpeedSquared => "spindle krpm^2 * ",
             Factor::AgainstMotion => "(direction of motion) * ",
         };
         let shape = match &self.shape {
@@ -153,6 +184,9 @@ impl Empirical {
             Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
             Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
             Shape::Wave(period, _) => format!("wave over {} with a period of {period:.4}", self.channel),
+            Shape::Shots { every, from, over, .. } => {
+                format!("exp(-(({} - {from:.4}) mod {every:.4}) / {over:.4})", self.channel)
+            }
         };
         format!("y = {factor}{shape}")
     }
@@ -167,6 +201,8 @@ impl Empirical {
             Factor::InTheCut => "engaged",
             Factor::WithTheCut => "engaged * removal_rate_cm3_min",
             Factor::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
+            Factor::WithTheSpeed => "abs(spindle_speed_rpm) / 1000.0",
+            Factor::WithTheSpeedSquared => "(spindle_speed_rpm / 1000.0) ** 2.0",
             Factor::AgainstMotion => DIRECTION,
         };
         format!("({factor}) * ({form})")
@@ -192,6 +228,11 @@ impl Empirical {
                 let turns = TAU * self.scale / period;
                 return format!("cosine * cos({turns:?} * {x}) + sine * sin({turns:?} * {x})");
             }
+            Shape::Shots { every, from, over, .. } => {
+                // The remainder of what is negative is negative.
+                let (from, every, over) = (along(*from), every / self.scale, over / self.scale);
+                return format!("level * exp(-(((({x} - {from:?}) % {every:?}) + {every:?}) % {every:?}) / {over:?})");
+            }
         };
         let mut terms = vec![format!("slope * {x}")];
         if self.factor != Factor::Always {
@@ -214,104 +255,14 @@ pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
             let force = scene.output_kind() == OutputKind::Force;
             force.then(|| channel_values(scene, DIRECTION))?.map(Cow::into_owned)
         }
+        Factor::WithTheSpeed => speed().map(|n| n.iter().map(|n| n.abs() / 1000.0).collect()),
+        Factor::WithTheSpeedSquared => speed().map(|n| n.iter().map(|n| (n / 1000.0).powi(2)).collect()),
         Factor::Turning => speed().map(|n| n.iter().map(|n| f64::from(u8::from(n.abs() > 1.0))).collect()),
         Factor::WithTheCut => {
             let (engaged, rate) = (scene.role(Role::Engaged)?, scene.column("removal_rate_cm3_min")?);
             Some(engaged.iter().zip(rate).map(|(engaged, rate)| engaged * rate).collect())
         }
     }
-}
-
-/// Every empirical form this scene offers.
-#[must_use]
-pub fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
-    let mut channels = empirical_channels(scene);
-    channels.extend([TIME_IN_RUN, TIME, TIME_IN_CUT, SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].map(str::to_owned));
-    let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut, Factor::Turning];
-    let bent = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
-    // How friction bends over the speed has names.
-    let of_motion = [Role::Velocity, Role::Acceleration].map(|role| scene.role_name(role));
-    let elsewhere = channels.iter().filter(|channel| !of_motion.contains(&Some(channel.as_str())));
-    let friction = elsewhere.map(|channel| form(scene, frame, channel, Factor::AgainstMotion));
-    let forms =
-        bent.chain(friction).chain(peaks(scene).into_iter().map(Some)).chain(fading(scene).into_iter().map(Some));
-    // What always drifts has a name.
-    let drift = crate::physics::effect("zero_drift").is_some_and(|effect| super::designs::wanted(effect, model));
-    let unnamed = |form: &Empirical| !(drift && form.channel == TIME && form.factor == Factor::Always);
-    forms.flatten().filter(unnamed).filter_map(|form| as_design(form, scene, frame)).collect()
-}
-
-/// The recorded channels over which a form may be drawn.
-pub(super) fn empirical_channels(scene: &Scene) -> Vec<String> {
-    scene.column_names().filter(|name| !is_output(scene, name)).map(str::to_owned).collect()
-}
-
-/// Measured outputs beside the simulated one must not explain it.
-fn is_output(scene: &Scene, name: &str) -> bool {
-    let measured = ["power", "current", "load_pct", "force_n", "torque", "thermal_error", "_counts"];
-    name == scene.output() || measured.iter().any(|word| name.contains(word))
-}
-
-fn form(scene: &Scene, frame: &Frame, name: &str, factor: Factor) -> Option<Empirical> {
-    let weights = frame.reduce(&factor_values(scene, factor)?);
-    let values = frame.reduce(&channel_values(scene, name)?);
-    let mut inside: Vec<f64> =
-        values.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0).map(|(x, _)| *x).collect();
-    inside.sort_by(f64::total_cmp);
-    let at = |share: f64| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-        let index = (share * crate::statistics::count(inside.len().saturating_sub(1))) as usize;
-        inside.get(index).copied()
-    };
-    let (low, high) = (at(0.0)?, at(1.0)?);
-    if inside.len() < 20 || high - low <= 1e-9 * high.abs().max(low.abs()) {
-        return None;
-    }
-    let mut knots: Vec<f64> =
-        [0.25, 0.5, 0.75].iter().filter_map(|share| at(*share)).filter(|knot| *knot > low && *knot < high).collect();
-    knots.dedup();
-    Some(Empirical { channel: name.to_owned(), shape: Shape::Bent(knots), origin: low, scale: high - low, factor })
-}
-
-/// Peaks over the spindle speed, at the speeds that the recording visits.
-fn peaks(scene: &Scene) -> Vec<Empirical> {
-    let (Some(name), Some(speed)) = (scene.role_name(Role::Speed), scene.role(Role::Speed)) else {
-        return Vec::new();
-    };
-    let mut turning: Vec<f64> = speed.iter().map(|n| n.abs()).filter(|n| *n > 1.0).collect();
-    turning.sort_by(f64::total_cmp);
-    let Some(top) = turning.last().copied() else { return Vec::new() };
-    let mut centres: Vec<f64> = (0..PEAKS).map(|k| turning[k * (turning.len() - 1) / (PEAKS - 1)]).collect();
-    centres.dedup_by(|a, b| (*a - *b).abs() < 0.04 * *b);
-    let one = |centre: f64, share: f64, factor: Factor| Empirical {
-        channel: name.to_owned(),
-        shape: Shape::Peak(centre, share * centre),
-        origin: 0.0,
-        scale: top,
-        factor,
-    };
-    let of = |centre: &f64| [0.06, 0.12, 0.25].map(|share| (*centre, share));
-    let visited: Vec<(f64, f64)> = centres.iter().flat_map(of).collect();
-    // What resonates need not stand at a speed that the work asks for.
-    let between: Vec<f64> = centres.windows(2).map(|pair| (pair[0] * pair[1]).sqrt()).collect();
-    let between = between.iter().flat_map(of).map(|(centre, share)| one(centre, share, Factor::Turning));
-    let factors = [Factor::Turning, Factor::InTheCut, Factor::WithTheCut];
-    let at_visited = visited.iter().flat_map(|(centre, share)| factors.map(|factor| one(*centre, *share, factor)));
-    at_visited.chain(between).collect()
-}
-
-/// What each pass begins with and loses over seconds.
-fn fading(scene: &Scene) -> Vec<Empirical> {
-    let told = |over_s: &f64| *over_s >= FADING_PERIODS * scene.period_s();
-    let one = |over_s: f64, factor: Factor| Empirical {
-        channel: TIME_IN_CUT.to_owned(),
-        shape: Shape::Fading(over_s),
-        origin: 0.0,
-        scale: 1.0,
-        factor,
-    };
-    let times = [3.0, 4.5, 6.0, 9.0, 12.0, 18.0, 24.0].into_iter().filter(told);
-    times.flat_map(|over_s| [Factor::InTheCut, Factor::WithTheCut].map(|factor| one(over_s, factor))).collect()
 }
 
 /// A form as a hypothesis over these rows; `None` without its channel.
@@ -322,9 +273,13 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
     let chosen = match form.shape {
         Shape::Bent(_) => 0,
         Shape::Peak(..) => 2,
+        Shape::Shots { .. } => 3,
         Shape::Above(_) | Shape::Below(_) | Shape::Fading(_) | Shape::Wave(..) => 1,
     };
-    let among = if let Shape::Wave(_, among) = form.shape { among } else { 1 };
+    let among = match form.shape {
+        Shape::Wave(_, among) | Shape::Shots { among, .. } => among,
+        _ => 1,
+    };
     let parameters = columns.iter().map(|(name, _)| Parameter {
         name: name.clone(),
         value: 0.0,

@@ -1,6 +1,6 @@
 //! A user's hypothesis as a rhai expression over columns and its own parameters.
 
-use super::channel::{channel_values, is_simulated};
+use super::channel::{SIMULATED_OUTPUT, channel_values, is_simulated};
 use super::model::Parameter;
 use crate::physics::{LinearLaw, Scene};
 use rhai::{AST, Engine, EvalAltResult, Scope};
@@ -59,7 +59,7 @@ impl Expression {
     /// parameters is run through the script engine once only.
     #[must_use]
     pub fn evaluate(&self, scene: &Scene, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        let kept = !self.inputs.iter().any(|input| is_simulated(input));
+        let kept = !self.inputs.iter().any(|input| is_simulated(input) || input == SIMULATED_OUTPUT);
         let law = kept.then(|| scene.linear_law(&self.text, || self.linear_law(scene, parameters))).flatten();
         match law {
             Some(law) => {

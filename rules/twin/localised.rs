@@ -8,10 +8,11 @@
 use super::channel::channel_values;
 use super::designs::Design;
 use super::diagnose::Case;
-use super::empirical::{Empirical, Factor, Shape, as_design, empirical_channels, factor_values};
+use super::empirical::{Empirical, Factor, Shape, as_design, factor_values};
 use super::fit::{Fit, fit};
 use super::frame::Frame;
 use super::model::{Body, Part};
+use super::offered::empirical_channels;
 use super::scan::{self, Bank, price};
 use super::unknown::{Form, NOTHING_NAMED_INFORMATION};
 use super::verdicts::CLASS_INFORMATION;

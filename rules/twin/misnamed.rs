@@ -5,9 +5,10 @@
 //!
 //! They are refused only once they would be claimed: on the way to something else they may stand for what they imitate.
 
-use super::diagnose::{Answer, Case};
+use super::diagnose::Case;
 use super::fit::{Fit, fit};
 use super::model::Part;
+use super::outcome::Answer;
 use super::search::Hypothesis;
 use crate::physics::Scene;
 
@@ -17,17 +18,24 @@ const INFORMATION_MIN: f64 = 20.0;
 const SHARE_MIN: f64 = 0.25;
 /// Share of the cut that must be missing where it begins or ends, for a tool that is not in the work yet.
 const MISSING_MIN: f64 = 0.15;
+/// The kind that is refused where it is slight, and remembered: what is named in its place explains less.
+pub(super) const ENTRY: &str = "entry_exit";
 
 impl Case<'_> {
     /// What is found, without what is not what it is called: no kind is refused twice, and only a few can be.
     pub(super) fn answer(&mut self, base: &Fit, seed: u64) -> Answer {
         let weighed = self.frame.clone();
         let mut refused = Vec::new();
+        let mut slight = None;
         loop {
-            let answer = self.answered(base.clone(), &refused, seed);
+            let mut answer = self.answered(base.clone(), &refused, seed);
             let misnamed = self.misnamed(&answer.found.best);
             if misnamed.is_empty() {
+                answer.slight_entry = slight.is_some_and(|information| information >= answer.information());
                 return answer;
+            }
+            if misnamed.iter().any(|kind| kind == ENTRY) {
+                slight = Some(answer.information());
             }
             refused.extend(misnamed);
             self.frame = weighed.clone();
@@ -62,7 +70,7 @@ impl Case<'_> {
 /// Is it an entry, or an exit, with nearly all of the cut? What settles in the course of a pass may be slight.
 fn enters_at_once(part: &Part) -> bool {
     let missing = |name: &str| part.parameter(name).map_or(0.0, |parameter| -parameter.value);
-    part.kind == "entry_exit" && !part.has_form("settling") && missing("entry").max(missing("exit")) < MISSING_MIN
+    part.kind == ENTRY && !part.has_form("settling") && missing("entry").max(missing("exit")) < MISSING_MIN
 }
 
 /// The part with a state that stands still, free in sign.

@@ -1,6 +1,6 @@
 //! A model: a list of effects with parameters, whose sum is the simulated output (`model/1`).
 
-use super::channel::is_simulated;
+use super::channel::{SIMULATED_OUTPUT, is_simulated};
 use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
@@ -171,7 +171,12 @@ impl Part {
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
         let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation"];
-        self.has_form("clipped") || acting.contains(&self.kind.as_str())
+        let over_output = match &self.body {
+            Body::Empirical(form) => form.channel == SIMULATED_OUTPUT,
+            Body::Expression(expression) => expression.inputs().iter().any(|input| input == SIMULATED_OUTPUT),
+            _ => false,
+        };
+        over_output || self.has_form("clipped") || acting.contains(&self.kind.as_str())
     }
 
     /// Does it read the load that the cut simulates?

@@ -5,7 +5,7 @@
 //! The periods that stand out in what a fit leaves over are found by a periodogram over the position (Lomb,
 //! Astrophysics and Space Science 39 (1976)), the noise's own colour taken into account, and become empirical forms.
 
-use super::channel::{TIME_IN_CUT, channel_values};
+use super::channel::{TIME, TIME_IN_CUT, channel_values};
 use super::empirical::{Empirical, Factor, Shape, factor_values};
 use super::frame::Frame;
 use super::linear::dot;
@@ -34,20 +34,34 @@ const WEIGHED: usize = 6;
 /// this noise.
 #[must_use]
 pub(super) fn waves(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
+    let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut];
+    let positions = scene.column_names().filter(|name| name.contains("position"));
+    let tracks = positions.chain([TIME_IN_CUT]).flat_map(|position| factors.map(|factor| (position, factor)));
+    waves_along(tracks, scene, frame, residual, noise)
+}
+
+/// The waves over the clock that explain most of this residual, per group, of this noise: what comes again and again,
+/// whatever the machine does.
+#[must_use]
+pub(super) fn waves_in_time(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
+    waves_along([(TIME, Factor::Always)], scene, frame, residual, noise)
+}
+
+fn waves_along<'s>(
+    tracks: impl IntoIterator<Item = (&'s str, Factor)>,
+    scene: &Scene,
+    frame: &Frame,
+    residual: &[f64],
+    noise: Arma,
+) -> Vec<Empirical> {
     if frame.levels.is_some() {
         return Vec::new();
     }
     let white = frame.whiten(residual, noise);
     let weighted: Vec<f64> = white.iter().enumerate().map(|(row, e)| e * frame.weight(row)).collect();
     let sought = unwhiten(&weighted, &frame.stretches, noise);
-    let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut];
-    let positions = scene.column_names().filter(|name| name.contains("position"));
-    positions
-        .chain([TIME_IN_CUT])
-        .flat_map(|position| factors.map(|factor| (position, factor)))
-        .filter_map(|(position, factor)| Track::new(scene, frame, position, factor))
-        .flat_map(|track| track.strongest(&sought, frame, noise))
-        .collect()
+    let tracks = tracks.into_iter().filter_map(|(over, factor)| Track::new(scene, frame, over, factor));
+    tracks.flat_map(|track| track.strongest(&sought, frame, noise)).collect()
 }
 
 /// The rows of a frame along a position, in so far as a factor acts.

@@ -325,7 +325,7 @@ fn are_the_same(some: &[usize], others: &[usize]) -> bool {
 }
 
 /// Sampling periods below which a lag cannot be resolved.
-const RESOLVED: f64 = 0.1;
+pub(super) const RESOLVED: f64 = 0.1;
 
 /// Could this part of a fit be what its name says? A lag far below the sampling period cannot be resolved; a lag, window
 /// or ceiling that acts by less than a fifth is something else; a drift is more than slow noise; Stribeck friction is an

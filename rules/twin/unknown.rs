@@ -6,12 +6,16 @@
 //! without a name.
 
 use super::agreement::differs_by_run;
+use super::channel::SIMULATED_OUTPUT;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
-use super::empirical::{Factor, as_design, empirical_designs};
+use super::empirical::{Factor, as_design};
+use super::events::event_designs;
 use super::fit::{Fit, fit};
 use super::gate::p_value;
+use super::localised::end_designs;
 use super::model::{Body, simulate};
+use super::offered::{designs_with_the_speed, empirical_designs};
 use super::outdone::LEADING_SHARE;
 use super::periodic::waves;
 use super::scan::{Bank, Score, likeliest, price};
@@ -34,6 +38,8 @@ const BETTER_SHARE: f64 = 0.1;
 const BETTER_INFORMATION: f64 = 15.0;
 /// The same for a nameless cause as simple as the named ones, in units of information.
 const SIMPLE_INFORMATION: f64 = 4.0;
+/// Forms on top of a form, at most, before what is left counts as noise.
+const DEEPER_MAX: usize = 3;
 /// Steps by which place, width and time constant of a form are moved, as shares of themselves.
 const SHARPENING: [f64; 3] = [0.15, 0.06, 0.02];
 /// Moves of one step at most.
@@ -79,6 +85,16 @@ pub(super) fn margin(form: &Design, named: f64) -> f64 {
 /// Is it a friction over something, of which a friction that is the same everywhere is part?
 fn is_against_motion(design: &Design) -> bool {
     matches!(&design.part.body, Body::Empirical(form) if form.factor == Factor::AgainstMotion)
+}
+
+/// Is it drawn over the output as a whole?
+fn is_over_output(design: &Design) -> bool {
+    matches!(&design.part.body, Body::Empirical(form) if form.channel == SIMULATED_OUTPUT)
+}
+
+/// Is something among the parts of a fit that bends the output as a whole?
+fn bends_the_output(fit: &Fit) -> bool {
+    fit.parts.iter().any(|part| ["saturation", "sensor_gain"].contains(&part.kind.as_str()))
 }
 
 /// Is a friction among the parts of a fit?
@@ -133,7 +149,9 @@ impl Case<'_> {
         let left = left.into_iter().flatten();
         forms.extend(left.filter_map(|form| as_design(form, &self.scene, &self.frame)));
         if found.best.members.is_empty() {
-            forms.extend(super::localised::end_designs(&self.scene, &self.frame));
+            forms.extend(end_designs(&self.scene, &self.frame));
+            forms.extend(event_designs(&self.scene, &self.frame, base));
+            forms.extend(designs_with_the_speed(&self.scene, &self.frame));
         }
         let frame = self.frame.clone();
         let bank = Bank::new(&forms, &frame);
@@ -206,13 +224,15 @@ impl Case<'_> {
             return None;
         }
         let (from, to) = if instead { (base, &alone) } else { (&found.best.fit, &on_top) };
-        let noise = ordinary_noise(&to.fit);
+        let rest = self.deepened(to, forms);
+        let noise = ordinary_noise(&rest.fit);
         let small =
-            self.negligible(&from.residual, &to.fit.residual, noise, to.information >= BEYOND_DOUBT_INFORMATION);
+            self.negligible(&from.residual, &rest.fit.residual, noise, rest.information >= BEYOND_DOUBT_INFORMATION);
         if small && excluded.is_none() {
             return None;
         }
-        let p = p_value(&forms.bank, &found.best.fit, &on_top.fit, None, self.ln_rows(base), seed, !anything);
+        let rest = if instead { self.deepened(&on_top, forms) } else { rest };
+        let p = p_value(&forms.bank, &found.best.fit, &rest.fit, None, self.ln_rows(base), seed, !anything);
         if !better && excluded.is_none() && p > P_MAX {
             return None;
         }
@@ -223,6 +243,19 @@ impl Case<'_> {
             p_value: p,
             excluded: excluded.map(str::to_owned),
         })
+    }
+
+    /// A form with others on top of it, as long as they explain something: one form seldom describes the whole of what is
+    /// left, and its rest is no noise to be resampled.
+    fn deepened(&mut self, form: &Form, forms: &Yardsticks<'_>) -> Form {
+        let mut deepest = form.clone();
+        for _ in 0..DEEPER_MAX {
+            let scores = forms.bank.scan(&deepest.fit, self.ln_rows(&deepest.fit));
+            let more = self.best_empirical(&deepest.fit, forms, &scores);
+            let Some(more) = more.filter(|more| more.information > UNKNOWN_INFORMATION) else { break };
+            deepest = Form { fit: more.fit, information: deepest.information + more.information, ..deepest };
+        }
+        deepest
     }
 
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording
@@ -262,13 +295,15 @@ impl Case<'_> {
 
     /// Is a nameless form no more than another shape of what has been named? A bent line over the velocity of the axis, or
     /// one against the motion over whatever else, is that of a friction, for no law of friction fits a real axis to its
-    /// noise; and one over a column that only one effect follows is that effect's.
+    /// noise; one over the output is that of a ceiling or a gain; and one over a column that only one effect follows is
+    /// that effect's.
     pub(super) fn is_another_shape(&self, empirical: &Design, named: &Hypothesis) -> bool {
         let of_velocity = match &empirical.part.body {
             Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
             _ => false,
         };
         (of_velocity || is_against_motion(empirical)) && has_friction(&named.fit)
+            || is_over_output(empirical) && bends_the_output(&named.fit)
             || self.is_over_own_column(empirical, named)
     }
 

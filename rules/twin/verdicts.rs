@@ -1,18 +1,22 @@
 //! The verdict: names, intervals, alternatives, regions, the next experiment, and the sentence for the machinist.
 
-use super::diagnose::{Case, Outcome};
+use super::diagnose::Case;
 use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
 use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
+use super::misnamed::ENTRY;
 use super::model::{Body, Model, Part, simulate};
+use super::outcome::Outcome;
 use super::sampled::SURPRISE_MAX;
-use super::search::{Hypothesis, METER};
+use super::search::{Hypothesis, METER, RESOLVED};
 use crate::physics::effect;
 use crate::physics::state::BETWEEN_SAMPLES;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
+/// The kind whose mean delay may be too short to be told from a lag.
+const WINDOW: &str = "meter_window";
 
 /// The diagnosis of a recording that does not suffice.
 #[must_use]
@@ -53,6 +57,14 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
     }
+    if let Some(like) = missing.iter().find(|named| outcome.slight_entry && is_like_an_entry(&named.effect)) {
+        alternatives.push(alternative(ENTRY, &like.effect, 0.0));
+    }
+    if missing.iter().any(|named| is_hardly_a_window(named, case.scene.period_s())) {
+        let lag = "clock_lag";
+        alternatives.retain(|other| other.effect != lag);
+        alternatives.push(alternative(lag, WINDOW, 0.0));
+    }
     let verdict = outcome.verdict(!alternatives.is_empty());
     let mismatch = regions(case, &outcome);
     let unit = unit_of(&case.model.output).to_owned();
@@ -74,6 +86,17 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     };
     diagnosis.summary = super::words::summary(&diagnosis);
     diagnosis
+}
+
+/// Is what a meter averages over, on average, no older than a lag that cannot be resolved?
+fn is_hardly_a_window(named: &Missing, period_s: f64) -> bool {
+    let window = named.parameters.iter().find(|parameter| parameter.name == "window_s");
+    named.effect == WINDOW && window.is_some_and(|window| window.value / 2.0 < RESOLVED * period_s)
+}
+
+/// Is a tool that enters or leaves the work confused with this?
+fn is_like_an_entry(kind: &str) -> bool {
+    effect(ENTRY).is_some_and(|entry| entry.doc().rivals.contains(&kind))
 }
 
 /// The unit at the end of a channel's name, as a symbol.
