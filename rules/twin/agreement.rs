@@ -1,5 +1,5 @@
-//! Do the runs agree on an effect? A law has the same coefficient in all of them; what comes and goes by itself, and is
-//! only imitated by a law on average, has not.
+//! Do the runs agree on an effect, or the tools, operations, parts, passes? A law has the same coefficient in all of them;
+//! what comes and goes by itself, and is only imitated by a law on average, has not.
 
 use super::fit::{Fit, UNITS_MIN};
 use super::frame::Frame;
@@ -12,6 +12,8 @@ use crate::statistics::count;
 const SHARE: f64 = 0.45;
 /// Normal deviate of Cochran's Q beyond which that is no chance (p = 0.025).
 const DEVIATE: f64 = 1.96;
+/// The same for any of many ways to form groups.
+const FAR_DEVIATE: f64 = 4.0;
 /// Share of all that is known of a coefficient below which a unit tells nothing of it.
 const TELLS: f64 = 1e-3;
 
@@ -35,22 +37,40 @@ const OWN: [&str; 13] = [
 /// Does no parameter of this part have one value for all runs?
 #[must_use]
 pub(super) fn differs_by_run(fit: &Fit, frame: &Frame, part: usize) -> bool {
-    if OWN.contains(&fit.parts[part].kind.as_str()) || !is_law(&fit.parts[part]) {
+    if !is_of_the_machine(&fit.parts[part].kind) || !is_law(&fit.parts[part]) {
         return false;
     }
+    let runs: Vec<Option<usize>> = frame.unit.iter().map(|unit| Some(*unit)).collect();
+    let told = disagreements(fit, frame, part, &runs);
+    !told.is_empty() && told.iter().all(|told| told.share > SHARE && told.deviate() > DEVIATE)
+}
+
+/// Does no parameter of this part have one value for all groups, by more than this share of it and far beyond chance?
+/// `group` tells which one a row is of, if any.
+#[must_use]
+pub(super) fn disagrees_between(fit: &Fit, frame: &Frame, part: usize, group: &[Option<usize>], share: f64) -> bool {
+    let told = disagreements(fit, frame, part, group);
+    !told.is_empty() && told.iter().all(|told| told.share > share && told.deviate() > FAR_DEVIATE)
+}
+
+/// Does a coefficient of this kind belong to the machine?
+pub(super) fn is_of_the_machine(kind: &str) -> bool {
+    !OWN.contains(&kind)
+}
+
+/// How far groups disagree on each parameter of a part of which enough of them tell something.
+fn disagreements(fit: &Fit, frame: &Frame, part: usize, group: &[Option<usize>]) -> Vec<Disagreement> {
     let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| frame.whiten(column, fit.noise)).collect();
     let innovations = fit.innovations(frame);
     let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
-    let told = of_part.filter_map(|index| disagreement(fit, frame, &cleared(&white, index), &innovations, index));
-    let told: Vec<Disagreement> = told.collect();
-    !told.is_empty() && told.iter().all(|told| told.share > SHARE && told.deviate() > DEVIATE)
+    of_part.filter_map(|index| disagreement(fit, group, &cleared(&white, index), &innovations, index)).collect()
 }
 
 fn is_law(part: &Part) -> bool {
     matches!(&part.body, Body::Effect(_, form) if form.place.is_none() && form.name != "latent")
 }
 
-/// How far the units of hold-out disagree on one parameter.
+/// How far groups disagree on one parameter.
 struct Disagreement {
     /// Deviation of their own values beyond their noise, over the common value.
     share: f64,
@@ -68,14 +88,20 @@ impl Disagreement {
     }
 }
 
-/// `None` for fewer units than can disagree.
-fn disagreement(fit: &Fit, frame: &Frame, own: &[f64], innovations: &[f64], index: usize) -> Option<Disagreement> {
+/// `None` for fewer groups than can disagree.
+fn disagreement(
+    fit: &Fit,
+    group: &[Option<usize>],
+    own: &[f64],
+    innovations: &[f64],
+    index: usize,
+) -> Option<Disagreement> {
     let variance = fit.innovation_variance(innovations);
-    let units = frame.unit.last().map_or(0, |last| last + 1);
-    let mut told = vec![(0.0, 0.0); units];
-    for (row, unit) in frame.unit.iter().enumerate() {
-        told[*unit].0 += own[row] * own[row];
-        told[*unit].1 += own[row] * innovations[row];
+    let groups = group.iter().flatten().max().map_or(0, |last| last + 1);
+    let mut told = vec![(0.0, 0.0); groups];
+    for (row, group) in group.iter().enumerate().filter_map(|(row, group)| Some((row, (*group)?))) {
+        told[group].0 += own[row] * own[row];
+        told[group].1 += own[row] * innovations[row];
     }
     let total: f64 = told.iter().map(|(weight, _)| weight).sum();
     told.retain(|(weight, _)| *weight > TELLS * total);

@@ -15,6 +15,7 @@ mod agreement;
 pub mod bind;
 mod carried;
 mod channel;
+mod confirmed;
 mod consumer;
 mod corroborated;
 pub mod designs;

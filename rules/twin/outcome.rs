@@ -1,5 +1,6 @@
 //! What a search comes to: the names and what is doubted of them, and the fits that the verdict compares.
 
+use super::confirmed::Totals;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
 use super::diagnosis::{Fits, Rows, Verdict};
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub nameless: Option<Nameless>,
     /// Did an entry or an exit that is too slight to be one explain as much?
     pub slight_entry: bool,
+    /// The kind that is in doubt although nothing else explains as much.
+    pub doubted: Option<String>,
     /// The fits compared.
     pub fits: Fits,
     /// Row by row.
@@ -57,6 +60,9 @@ impl Outcome {
         let none = empty();
         let before = case.predict(&base).unwrap_or_else(|| none.clone());
         let after = case.predict(&last).unwrap_or(none);
+        let totals = Totals { before: &before.total, after: &after.total };
+        let shown = case.shown(&last, &totals);
+        let doubted = if unknown.is_none() { case.doubted(&found.best, shown) } else { None };
         let first = case.parts.len();
         let labels = last.parts[first..].iter().map(|part| part.label().to_owned());
         let added: Vec<(String, Vec<f64>)> = labels.zip(after.contributions.iter().skip(first).cloned()).collect();
@@ -76,7 +82,7 @@ impl Outcome {
             compared: case.told().scene.usable().to_vec(),
             effects: added.clone(),
         };
-        Self { base, found, designs, unknown, nameless, slight_entry, fits, rows, added }
+        Self { base, found, designs, unknown, nameless, slight_entry, doubted, fits, rows, added }
     }
 
     /// Is something said to remain where nothing is named, and not beyond doubt?

@@ -57,6 +57,10 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
     }
+    let is_named = |kind: &&String| missing.iter().any(|named| named.effect == **kind);
+    if let Some(doubted) = outcome.doubted.as_ref().filter(is_named).filter(|_| !alternatives.iter().any(is_nameless)) {
+        alternatives.push(alternative("unknown", doubted, 0.0));
+    }
     if let Some(like) = missing.iter().find(|named| outcome.slight_entry && is_like_an_entry(&named.effect)) {
         alternatives.push(alternative(ENTRY, &like.effect, 0.0));
     }
@@ -92,6 +96,11 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
 fn is_hardly_a_window(named: &Missing, period_s: f64) -> bool {
     let window = named.parameters.iter().find(|parameter| parameter.name == "window_s");
     named.effect == WINDOW && window.is_some_and(|window| window.value / 2.0 < RESOLVED * period_s)
+}
+
+/// Is it a cause without a name?
+fn is_nameless(other: &Alternative) -> bool {
+    other.effect == "unknown"
 }
 
 /// Is a tool that enters or leaves the work confused with this?
