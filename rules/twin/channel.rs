@@ -26,6 +26,9 @@ pub(super) const LAG_OF: &str = "lag_of_";
 /// What stands between the time constant and the column.
 pub(super) const LAG_OF_WHAT: &str = "_s_behind_";
 
+/// Acceleration of the slide, as recorded or as its velocity tells, in its own unit.
+pub(super) const ACCELERATION: &str = "acceleration_of_motion";
+
 /// Direction in which the slide of a feed drive moves, -1 to 1.
 pub(super) const DIRECTION: &str = "direction_of_motion";
 
@@ -36,6 +39,7 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
         TIME_IN_RUN => Some(Cow::Owned(time_in_run_s(scene))),
         TIME_IN_CUT => time_in_cut_s(scene).map(Cow::Owned),
         DIRECTION => direction(scene).map(Cow::Owned),
+        ACCELERATION => scene.role(Role::Acceleration).map(Cow::Borrowed),
         SIMULATED_CUT => scene.load().map(Cow::Borrowed),
         SIMULATED_CUT_PER_KRPM => cut_per_krpm(scene).map(Cow::Owned),
         SIMULATED_OUTPUT => scene.simulated().map(Cow::Borrowed),
@@ -156,11 +160,12 @@ mod tests {
 
     /// A slide that goes to and fro.
     fn slide() -> Scene {
-        let mut text = String::from("time_s,axis_force_n,axis_velocity_mm_min,axis_position_mm\n");
+        let columns = "time_s,axis_force_n,axis_velocity_mm_min,axis_position_mm,axis_acceleration_mm_s2\n";
+        let mut text = String::from(columns);
         for row in 0..200_u32 {
             let (sin, cos) = (f64::from(row) / 9.0).sin_cos();
-            writeln!(text, "{row},{},{:.1},{:.2}", 80.0 * sin.signum(), 900.0 * sin, 100.0 - 130.0 * cos)
-                .expect("a string takes it");
+            let (force, velocity, position) = (80.0 * sin.signum(), 900.0 * sin, 100.0 - 130.0 * cos);
+            writeln!(text, "{row},{force},{velocity:.1},{position:.2},{:.3}", 1.7 * cos).expect("a string takes it");
         }
         let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
         Scene::new(&recording, "axis_force_n", &BTreeMap::new()).expect("recorded")
@@ -204,7 +209,9 @@ mod tests {
         for factor in [Factor::Always, Factor::InTheCut, Factor::WithTheSpeed, Factor::WithTheSpeedSquared] {
             same_as_formulas(&cut(), &channels, factor);
         }
-        same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION], Factor::AgainstMotion);
+        for factor in [Factor::AgainstMotion, Factor::WithTheAcceleration] {
+            same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION, ACCELERATION], factor);
+        }
     }
 
     fn same_as_formulas(scene: &Scene, channels: &[&str], factor: Factor) {

@@ -5,7 +5,7 @@
 //! cut only, or in proportion to the removal rate or the speed. It is the yardstick for "something real remains that no
 //! candidate explains".
 
-use super::channel::{DIRECTION, channel_values};
+use super::channel::{ACCELERATION, DIRECTION, channel_values};
 use super::designs::Design;
 use super::frame::Frame;
 use super::model::{Body, Parameter, Part};
@@ -28,6 +28,8 @@ pub enum Factor {
     WithTheSpeed,
     /// Its square: what stirs or flings.
     WithTheSpeedSquared,
+    /// The acceleration of a slide, in its own unit: it is a mass.
+    WithTheAcceleration,
     /// Direction in which a slide moves: it is a friction.
     AgainstMotion,
 }
@@ -172,6 +174,7 @@ impl Empirical {
             Factor::Turning => "(spindle turning) * ",
             Factor::WithTheSpeed => "spindle krpm * ",
             Factor::WithTheSpeedSquared => "spindle krpm^2 * ",
+            Factor::WithTheAcceleration => "acceleration * ",
             Factor::AgainstMotion => "(direction of motion) * ",
         };
         let shape = match &self.shape {
@@ -203,6 +206,7 @@ impl Empirical {
             Factor::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
             Factor::WithTheSpeed => "abs(spindle_speed_rpm) / 1000.0",
             Factor::WithTheSpeedSquared => "(spindle_speed_rpm / 1000.0) ** 2.0",
+            Factor::WithTheAcceleration => ACCELERATION,
             Factor::AgainstMotion => DIRECTION,
         };
         format!("({factor}) * ({form})")
@@ -257,6 +261,7 @@ pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
         }
         Factor::WithTheSpeed => speed().map(|n| n.iter().map(|n| n.abs() / 1000.0).collect()),
         Factor::WithTheSpeedSquared => speed().map(|n| n.iter().map(|n| (n / 1000.0).powi(2)).collect()),
+        Factor::WithTheAcceleration => channel_values(scene, ACCELERATION).map(Cow::into_owned),
         Factor::Turning => speed().map(|n| n.iter().map(|n| f64::from(u8::from(n.abs() > 1.0))).collect()),
         Factor::WithTheCut => {
             let (engaged, rate) = (scene.role(Role::Engaged)?, scene.column("removal_rate_cm3_min")?);

@@ -1,4 +1,5 @@
-//! Events: what happens by itself, whatever the machine does - once, again and again, or after each change of the tool.
+//! Events: what happens by itself, whatever the machine does - once, again and again, after each change of the tool, or at
+//! one place of a slide or of every turn of its screw.
 //!
 //! They are described where nothing is named at all. Beside a name they would only bend along with whatever its law leaves,
 //! for every program repeats.
@@ -10,7 +11,7 @@ use super::fit::Fit;
 use super::frame::Frame;
 use super::noise::Arma;
 use super::offered::empirical_channels;
-use super::periodic::waves_in_time;
+use super::periodic::{waves_in_time, waves_of_friction};
 use super::shots::shots;
 use crate::physics::{OutputKind, Scene};
 use crate::statistics::count;
@@ -37,8 +38,16 @@ const LESS_MEMORY: Arma = Arma { phi: 0.5, theta: 0.0 };
 pub(super) fn event_designs(scene: &Scene, frame: &Frame, from: &Fit) -> Vec<Design> {
     let noises = [from.noise, LESS_MEMORY];
     let again = noises.into_iter().flat_map(|noise| waves_in_time(scene, frame, &from.residual, noise));
+    let tight = noises.into_iter().flat_map(|noise| waves_of_friction(scene, frame, &from.residual, noise));
     let shots = noises.into_iter().flat_map(|noise| shots(scene, frame, &from.residual, noise));
-    let forms = once(scene).into_iter().chain(again).chain(shots).chain(after_changes(scene)).chain(lagging(scene));
+    let forms = once(scene)
+        .into_iter()
+        .chain(at_a_place(scene))
+        .chain(again)
+        .chain(tight)
+        .chain(shots)
+        .chain(after_changes(scene))
+        .chain(lagging(scene));
     forms.filter_map(|form| as_design(form, scene, frame)).collect()
 }
 
@@ -54,6 +63,27 @@ fn once(scene: &Scene) -> Vec<Empirical> {
     };
     let places = (0..PLACES).filter(|_| whole_s > 0.0);
     places.flat_map(|place| WIDTHS.map(|width| peak(place, width))).collect()
+}
+
+/// A peak somewhere along a slide: a chip, a dent, a cover that drags.
+fn at_a_place(scene: &Scene) -> Vec<Empirical> {
+    let along = |position: &str| {
+        let at = scene.column(position).unwrap_or_default();
+        let (low, high) =
+            at.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+        let peak = |place: usize, width: f64, factor: Factor| Empirical {
+            channel: position.to_owned(),
+            shape: Shape::Peak(low + (high - low) * (count(place) + 0.5) / count(PLACES), width * (high - low)),
+            origin: 0.0,
+            scale: high - low,
+            factor,
+        };
+        let places = (0..PLACES).filter(|_| high > low);
+        let shapes = places.flat_map(|place| WIDTHS.map(|width| (place, width)));
+        let factors = [Factor::Always, Factor::AgainstMotion];
+        shapes.flat_map(|(place, width)| factors.map(|factor| peak(place, width, factor))).collect::<Vec<_>>()
+    };
+    scene.column_names().filter(|name| name.contains("position")).flat_map(along).collect()
 }
 
 /// What each change of the tool begins with and loses over time.
@@ -125,6 +155,20 @@ mod tests {
         assert_eq!(places.len(), PLACES * WIDTHS.len());
         let middle = |form: &Empirical| if let Shape::Peak(middle, _) = form.shape { middle } else { f64::NAN };
         assert!(places.iter().map(middle).all(|middle| (0.0..599.0).contains(&middle)));
+    }
+
+    #[test]
+    fn a_place_lies_on_the_way_of_the_slide() {
+        let mut text = String::from("time_s,axis_force_n,axis_position_mm\n");
+        for row in 0..100 {
+            writeln!(text, "{row},80,{}", -20.0 + f64::from(row)).expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let scene = Scene::new(&recording, "axis_force_n", &BTreeMap::new()).expect("recorded");
+        let places = at_a_place(&scene);
+        assert_eq!(places.len(), 2 * PLACES * WIDTHS.len());
+        let inside = |form: &Empirical| matches!(form.shape, Shape::Peak(middle, _) if (-20.0..79.0).contains(&middle));
+        assert!(places.iter().all(inside), "{places:?}");
     }
 
     #[test]

@@ -34,11 +34,11 @@ pub(super) fn empirical_designs(scene: &Scene, frame: &Frame, model: &Model) -> 
     forms.flatten().filter(unnamed).filter_map(|form| as_design(form, scene, frame)).collect()
 }
 
-/// Bent lines that grow with the speed: two drivers together, where nothing simpler tells.
-pub(super) fn designs_with_the_speed(scene: &Scene, frame: &Frame) -> Vec<Design> {
+/// Bent lines that grow with the speed or the acceleration: two drivers together, where nothing simpler tells.
+pub(super) fn products(scene: &Scene, frame: &Frame) -> Vec<Design> {
     let mut channels = empirical_channels(scene);
     channels.extend([SIMULATED_CUT, SIMULATED_CUT_PER_KRPM].map(str::to_owned));
-    let factors = [Factor::WithTheSpeed, Factor::WithTheSpeedSquared];
+    let factors = [Factor::WithTheSpeed, Factor::WithTheSpeedSquared, Factor::WithTheAcceleration];
     let forms = channels.iter().flat_map(|channel| factors.map(|factor| form(scene, frame, channel, factor)));
     forms.flatten().filter_map(|form| as_design(form, scene, frame)).collect()
 }

@@ -40,6 +40,14 @@ pub(super) fn waves(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma)
     waves_along(tracks, scene, frame, residual, noise)
 }
 
+/// The waves over a recorded position of a friction: a nut that is tighter at one place of every turn.
+#[must_use]
+pub(super) fn waves_of_friction(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
+    let positions = scene.column_names().filter(|name| name.contains("position"));
+    let tracks = positions.chain([TIME]).map(|over| (over, Factor::AgainstMotion));
+    waves_along(tracks, scene, frame, residual, noise)
+}
+
 /// The waves over the clock that explain most of this residual, per group, of this noise: what comes again and again,
 /// whatever the machine does.
 #[must_use]
@@ -200,6 +208,9 @@ mod tests {
         let mut recording = Recording::new("test", (0..rows).map(count).collect(), None);
         recording.set_column("force_n", Cells::Numbers(Numbers::full(vec![1.0; rows])));
         recording.set_column("position_mm", Cells::Numbers(Numbers::full(position.clone())));
+        let moved = position.windows(2).map(|pair| 60.0 * (pair[1] - pair[0]));
+        let velocity = std::iter::once(60.0).chain(moved).collect();
+        recording.set_column("axis_velocity_mm_min", Cells::Numbers(Numbers::full(velocity)));
         let scene = Scene::new(&recording, "force_n", &Default::default()).expect("a scene");
         let frame = Frame::new(&scene, &units(&scene), 1, |_| true);
         (scene, frame, position, noise)
@@ -218,6 +229,18 @@ mod tests {
             let Shape::Wave(period, among) = found[0].shape else { panic!("{:?}", found[0]) };
             assert!((period / pitch_mm - 1.0).abs() < 0.02 && among > 20, "{period} of {pitch_mm}, one of {among}");
         }
+    }
+
+    #[test]
+    fn a_nut_that_is_tight_once_in_every_turn_is_found_as_a_friction() {
+        let (scene, frame, position, noise) = ride(2000, 5);
+        let direction = |row: usize| if row == 0 { 1.0 } else { (position[row] - position[row - 1]).signum() };
+        let tight = |row: usize| direction(row) * (TAU * position[row] / 10.0 + 0.4).sin();
+        let residual: Vec<f64> = (0..2000).map(|row| 1.2 * tight(row) + noise[row]).collect();
+        let found = waves_of_friction(&scene, &frame, &residual, SLOW);
+        assert_eq!(found[0].factor, Factor::AgainstMotion);
+        let Shape::Wave(period, _) = found[0].shape else { panic!("{:?}", found[0]) };
+        assert!((period / 10.0 - 1.0).abs() < 0.02, "{period}");
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::localised::end_designs;
 use super::model::{Body, simulate};
-use super::offered::{designs_with_the_speed, empirical_designs};
+use super::offered::{empirical_designs, products};
 use super::outdone::LEADING_SHARE;
 use super::periodic::waves;
 use super::scan::{Bank, Score, likeliest, price};
@@ -151,7 +151,7 @@ impl Case<'_> {
         if found.best.members.is_empty() {
             forms.extend(end_designs(&self.scene, &self.frame));
             forms.extend(event_designs(&self.scene, &self.frame, base));
-            forms.extend(designs_with_the_speed(&self.scene, &self.frame));
+            forms.extend(products(&self.scene, &self.frame));
         }
         let frame = self.frame.clone();
         let bank = Bank::new(&forms, &frame);
