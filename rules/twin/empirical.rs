@@ -178,6 +178,7 @@ impl Empirical {
             Factor::AgainstMotion => "(direction of motion) * ",
         };
         let shape = match &self.shape {
+            Shape::Bent(knots) if knots.is_empty() => format!("line over {}", self.channel),
             Shape::Bent(knots) => {
                 let knots: Vec<String> = knots.iter().map(|knot| format!("{knot:.4}")).collect();
                 format!("bent line over {} with bends at {}", self.channel, knots.join(", "))
@@ -311,4 +312,22 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
         part,
         columns,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_without_a_bend_is_a_line() {
+        let over = |knots: Vec<f64>| Empirical {
+            channel: "depth_mm".to_owned(),
+            shape: Shape::Bent(knots),
+            origin: 0.0,
+            scale: 1.0,
+            factor: Factor::InTheCut,
+        };
+        assert_eq!(over(Vec::new()).equation(), "y = engaged * line over depth_mm");
+        assert_eq!(over(vec![1.5]).equation(), "y = engaged * bent line over depth_mm with bends at 1.5000");
+    }
 }
