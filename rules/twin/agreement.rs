@@ -40,17 +40,27 @@ pub(super) fn differs_by_run(fit: &Fit, frame: &Frame, part: usize) -> bool {
     if !is_of_the_machine(&fit.parts[part].kind) || !is_law(&fit.parts[part]) {
         return false;
     }
-    let runs: Vec<Option<usize>> = frame.unit.iter().map(|unit| Some(*unit)).collect();
-    let told = disagreements(fit, frame, part, &runs);
-    !told.is_empty() && told.iter().all(|told| told.share > SHARE && told.deviate() > DEVIATE)
+    Columns::of(fit, frame, part).disagree(&runs(frame), SHARE, DEVIATE)
 }
 
-/// Does no parameter of this part have one value for all groups, by more than this share of it and far beyond chance?
-/// `group` tells which one a row is of, if any.
+/// Is there, in one of these groupings, no parameter of this part with one value for all groups?
 #[must_use]
-pub(super) fn disagrees_between(fit: &Fit, frame: &Frame, part: usize, group: &[Option<usize>], share: f64) -> bool {
-    let told = disagreements(fit, frame, part, group);
-    !told.is_empty() && told.iter().all(|told| told.share > share && told.deviate() > FAR_DEVIATE)
+pub(super) fn differs_in_any(fit: &Fit, frame: &Frame, part: usize, groupings: &[Grouping]) -> bool {
+    let columns = Columns::of(fit, frame, part);
+    groupings.iter().any(|grouping| columns.disagree(&grouping.group, grouping.share_max, FAR_DEVIATE))
+}
+
+/// How the fitted rows fall into groups.
+pub(super) struct Grouping {
+    /// Which group each row is of, if any.
+    pub(super) group: Vec<Option<usize>>,
+    /// The share of a coefficient by which groups may differ.
+    pub(super) share_max: f64,
+}
+
+/// The unit of hold-out of each row.
+pub(super) fn runs(frame: &Frame) -> Vec<Option<usize>> {
+    frame.unit.iter().map(|unit| Some(*unit)).collect()
 }
 
 /// Does a coefficient of this kind belong to the machine?
@@ -58,12 +68,30 @@ pub(super) fn is_of_the_machine(kind: &str) -> bool {
     !OWN.contains(&kind)
 }
 
-/// How far groups disagree on each parameter of a part of which enough of them tell something.
-fn disagreements(fit: &Fit, frame: &Frame, part: usize, group: &[Option<usize>]) -> Vec<Disagreement> {
-    let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| frame.whiten(column, fit.noise)).collect();
-    let innovations = fit.innovations(frame);
-    let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
-    of_part.filter_map(|index| disagreement(fit, group, &cleared(&white, index), &innovations, index)).collect()
+/// What the rows tell of each parameter of a part.
+struct Columns<'a> {
+    fit: &'a Fit,
+    innovations: Vec<f64>,
+    /// Free parameter, and its whitened tangent with those of all others taken out.
+    own: Vec<(usize, Vec<f64>)>,
+}
+
+impl<'a> Columns<'a> {
+    fn of(fit: &'a Fit, frame: &Frame, part: usize) -> Self {
+        let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| frame.whiten(column, fit.noise)).collect();
+        let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
+        let own = of_part.map(|index| (index, cleared(&white, index))).collect();
+        Self { fit, innovations: fit.innovations(frame), own }
+    }
+
+    /// Does no parameter have one value for all groups, by more than this share of it and this far beyond chance, where
+    /// enough of them tell something?
+    fn disagree(&self, group: &[Option<usize>], share: f64, deviate: f64) -> bool {
+        let told =
+            self.own.iter().filter_map(|(index, own)| disagreement(self.fit, group, own, &self.innovations, *index));
+        let told: Vec<Disagreement> = told.collect();
+        !told.is_empty() && told.iter().all(|told| told.share > share && told.deviate() > deviate)
+    }
 }
 
 fn is_law(part: &Part) -> bool {

@@ -47,6 +47,11 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
     }
 }
 
+/// The recorded positions of slides.
+pub(super) fn positions(scene: &Scene) -> impl Iterator<Item = &str> {
+    scene.column_names().filter(|name| name.contains("position"))
+}
+
 /// A channel that is made of a column named in its own name.
 fn derived<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     if let Some(column) = name.strip_prefix(TIME_SINCE_CHANGE_OF) {

@@ -1,7 +1,8 @@
 //! What puts a name in doubt although nothing else explains as much: rows that took no part show little of it, or tools,
 //! operations, parts and passes each ask for a coefficient of their own where a law of the machine has one for all.
 
-use super::agreement::{disagrees_between, is_of_the_machine};
+use super::agreement::{Grouping, differs_in_any, is_of_the_machine, runs};
+use super::designs::AT_EDGES;
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::frame::Frame;
@@ -16,15 +17,14 @@ const SHOWN_MIN: f64 = 0.65;
 const DEVIATE: f64 = 1.8;
 /// Robust deviations of the innovations beyond which a row is stray.
 const STRAY: f64 = 6.0;
-/// Kinds that show in a few rows at edges only, of which the rows held out may have none.
-const AT_EDGES: [&str; 3] = ["clock_lag", "meter_window", "override_delay"];
 /// Columns of words whose groups must agree, and the share of a coefficient by which they may differ.
 const GROUPS: [&str; 4] = ["tool", "operation", "part", "lot"];
 const SHARE_MAX: f64 = 0.45;
 /// The same for passes: the same law is not quite the same in every one.
 const SHARE_OF_PASSES_MAX: f64 = 0.65;
 /// Kinds that follow a tool's use or warm up anew in every pass, or that drift, or whose size is that of few rows.
-const MAY_DIFFER: [&str; 4] = ["flank_wear", "bearing_warm_up", "zero_drift", "override_delay"];
+const MAY_DIFFER: [&str; 6] =
+    ["flank_wear", "bearing_warm_up", "zero_drift", "override_delay", "clock_lag", "meter_window"];
 
 /// The outputs that two fits simulate for every row.
 pub(super) struct Totals<'a> {
@@ -76,24 +76,21 @@ impl Case<'_> {
     pub(super) fn doubted(&self, best: &Hypothesis, shown: Option<Shown>) -> Option<String> {
         let kind = |position: usize| best.fit.parts[best.first_part() + position].kind.as_str();
         let mut members = 0..best.members.len();
+        // Of edges the rows held out may have none.
         let follows_a_law = |position: usize| is_of_the_machine(kind(position)) && !AT_EDGES.contains(&kind(position));
         if shown.is_some_and(Shown::is_too_little) && members.clone().all(follows_a_law) {
             return members.next().map(|position| kind(position).to_owned());
         }
         let groupings = self.groupings();
         let differs = |position: usize| {
-            let part = best.first_part() + position;
-            let between = |(group, share): &(Vec<Option<usize>>, f64)| {
-                disagrees_between(&best.fit, &self.frame, part, group, *share)
-            };
-            let may = MAY_DIFFER.contains(&kind(position)) || AT_EDGES.contains(&kind(position));
-            !may && groupings.iter().any(between)
+            !MAY_DIFFER.contains(&kind(position))
+                && differs_in_any(&best.fit, &self.frame, best.first_part() + position, &groupings)
         };
         members.find(|position| differs(*position)).map(|position| kind(position).to_owned())
     }
 
-    /// How the fitted rows fall into groups, and by what share of a coefficient these may differ.
-    fn groupings(&self) -> Vec<(Vec<Option<usize>>, f64)> {
+    /// The groups that must agree: tools and other words, runs, passes.
+    fn groupings(&self) -> Vec<Grouping> {
         let groups = 0..self.frame.len();
         let of_column = |name: &&str| {
             let words = self.scene.words(name)?;
@@ -103,14 +100,13 @@ impl Case<'_> {
                 let word = words.get(self.frame.rows(group).start)?;
                 Some(*seen.entry(word.to_owned()).or_insert(next))
             };
-            Some((groups.clone().map(&mut number).collect(), SHARE_MAX))
+            Some(Grouping { group: groups.clone().map(&mut number).collect(), share_max: SHARE_MAX })
         };
         let passes = self.scene.passes();
         let pass = |group: usize| passes.iter().position(|pass| pass.contains(&self.frame.rows(group).start));
-        let runs = self.frame.unit.iter().map(|unit| Some(*unit)).collect();
-        let mut all: Vec<(Vec<Option<usize>>, f64)> = GROUPS.iter().filter_map(of_column).collect();
-        all.extend([(runs, SHARE_MAX), (groups.map(pass).collect(), SHARE_OF_PASSES_MAX)]);
-        all
+        let runs = Grouping { group: runs(&self.frame), share_max: SHARE_MAX };
+        let passes = Grouping { group: groups.clone().map(pass).collect(), share_max: SHARE_OF_PASSES_MAX };
+        GROUPS.iter().filter_map(of_column).chain([runs, passes]).collect()
     }
 }
 

@@ -4,7 +4,7 @@
 //! They are described where nothing is named at all. Beside a name they would only bend along with whatever its law leaves,
 //! for every program repeats.
 
-use super::channel::{LAG_OF, LAG_OF_WHAT, TIME, TIME_SINCE_CHANGE_OF, changes_of, channel_values};
+use super::channel::{LAG_OF, LAG_OF_WHAT, TIME, TIME_SINCE_CHANGE_OF, changes_of, channel_values, positions};
 use super::designs::Design;
 use super::empirical::{Empirical, FADING_PERIODS, Factor, Shape, as_design};
 use super::fit::Fit;
@@ -16,9 +16,9 @@ use super::shots::shots;
 use crate::physics::{OutputKind, Scene};
 use crate::statistics::count;
 
-/// Places over the clock at which something that happens once is tried.
+/// Places over the clock, or along a slide, at which a peak is tried.
 const PLACES: usize = 16;
-/// Half widths of it, as shares of the whole time.
+/// Half widths of it, as shares of the whole.
 const WIDTHS: [f64; 2] = [0.02, 0.06];
 /// Changes of a tool from which what follows them is a condition and not an event.
 const CHANGES_MIN: usize = 3;
@@ -53,37 +53,31 @@ pub(super) fn event_designs(scene: &Scene, frame: &Frame, from: &Fit) -> Vec<Des
 
 /// A peak somewhere over the clock.
 fn once(scene: &Scene) -> Vec<Empirical> {
-    let whole_s = scene.clock_s().last().copied().unwrap_or(0.0);
-    let peak = |place: usize, width: f64| Empirical {
-        channel: TIME.to_owned(),
-        shape: Shape::Peak(whole_s * (count(place) + 0.5) / count(PLACES), width * whole_s),
-        origin: 0.0,
-        scale: whole_s,
-        factor: Factor::Always,
-    };
-    let places = (0..PLACES).filter(|_| whole_s > 0.0);
-    places.flat_map(|place| WIDTHS.map(|width| peak(place, width))).collect()
+    peaks_along(TIME, (0.0, scene.clock_s().last().copied().unwrap_or(0.0)), &[Factor::Always])
 }
 
 /// A peak somewhere along a slide: a chip, a dent, a cover that drags.
 fn at_a_place(scene: &Scene) -> Vec<Empirical> {
     let along = |position: &str| {
         let at = scene.column(position).unwrap_or_default();
-        let (low, high) =
-            at.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-        let peak = |place: usize, width: f64, factor: Factor| Empirical {
-            channel: position.to_owned(),
-            shape: Shape::Peak(low + (high - low) * (count(place) + 0.5) / count(PLACES), width * (high - low)),
-            origin: 0.0,
-            scale: high - low,
-            factor,
-        };
-        let places = (0..PLACES).filter(|_| high > low);
-        let shapes = places.flat_map(|place| WIDTHS.map(|width| (place, width)));
-        let factors = [Factor::Always, Factor::AgainstMotion];
-        shapes.flat_map(|(place, width)| factors.map(|factor| peak(place, width, factor))).collect::<Vec<_>>()
+        let ends = at.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+        peaks_along(position, ends, &[Factor::Always, Factor::AgainstMotion])
     };
-    scene.column_names().filter(|name| name.contains("position")).flat_map(along).collect()
+    positions(scene).flat_map(along).collect()
+}
+
+/// Peaks of two widths at places from one end of a channel to the other; none where they are the same.
+fn peaks_along(channel: &str, (low, high): (f64, f64), factors: &[Factor]) -> Vec<Empirical> {
+    let length = high - low;
+    let peak = |place: usize, width: f64, factor: Factor| Empirical {
+        channel: channel.to_owned(),
+        shape: Shape::Peak(low + length * (count(place) + 0.5) / count(PLACES), width * length),
+        origin: 0.0,
+        scale: length,
+        factor,
+    };
+    let shapes = (0..PLACES).filter(|_| high > low).flat_map(|place| WIDTHS.map(|width| (place, width)));
+    shapes.flat_map(|(place, width)| factors.iter().map(move |factor| peak(place, width, *factor))).collect()
 }
 
 /// What each change of the tool begins with and loses over time.

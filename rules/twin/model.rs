@@ -171,12 +171,13 @@ impl Part {
     #[must_use]
     pub fn acts_on_output(&self) -> bool {
         let acting = ["sensor_gain", "supply_voltage", "clock_lag", "meter_window", "saturation"];
-        let over_output = match &self.body {
-            Body::Empirical(form) => form.channel == SIMULATED_OUTPUT,
-            Body::Expression(expression) => expression.inputs().iter().any(|input| input == SIMULATED_OUTPUT),
-            _ => false,
-        };
+        let over_output = self.is_drawn_over(|channel| channel == SIMULATED_OUTPUT);
         over_output || self.has_form("clipped") || acting.contains(&self.kind.as_str())
+    }
+
+    /// Is it a form or a formula over such a channel?
+    fn is_drawn_over(&self, such: impl Fn(&str) -> bool) -> bool {
+        matches!(&self.body, Body::Empirical(_) | Body::Expression(_)) && self.inputs().into_iter().any(such)
     }
 
     /// Does it read the load that the cut simulates?
@@ -184,9 +185,7 @@ impl Part {
     pub fn reads_load(&self) -> bool {
         match &self.body {
             Body::Effect(effect, _) => effect.reads_load(),
-            Body::Empirical(form) => is_simulated(&form.channel),
-            Body::Expression(expression) => expression.inputs().iter().any(|input| is_simulated(input)),
-            Body::Linear(_) | Body::Table(_) => false,
+            _ => self.is_drawn_over(is_simulated),
         }
     }
 

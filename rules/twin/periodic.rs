@@ -5,7 +5,7 @@
 //! The periods that stand out in what a fit leaves over are found by a periodogram over the position (Lomb,
 //! Astrophysics and Space Science 39 (1976)), the noise's own colour taken into account, and become empirical forms.
 
-use super::channel::{TIME, TIME_IN_CUT, channel_values};
+use super::channel::{TIME, TIME_IN_CUT, channel_values, positions};
 use super::empirical::{Empirical, Factor, Shape, factor_values};
 use super::frame::Frame;
 use super::linear::dot;
@@ -35,16 +35,14 @@ const WEIGHED: usize = 6;
 #[must_use]
 pub(super) fn waves(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
     let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut];
-    let positions = scene.column_names().filter(|name| name.contains("position"));
-    let tracks = positions.chain([TIME_IN_CUT]).flat_map(|position| factors.map(|factor| (position, factor)));
+    let tracks = positions(scene).chain([TIME_IN_CUT]).flat_map(|position| factors.map(|factor| (position, factor)));
     waves_along(tracks, scene, frame, residual, noise)
 }
 
 /// The waves over a recorded position of a friction: a nut that is tighter at one place of every turn.
 #[must_use]
 pub(super) fn waves_of_friction(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
-    let positions = scene.column_names().filter(|name| name.contains("position"));
-    let tracks = positions.chain([TIME]).map(|over| (over, Factor::AgainstMotion));
+    let tracks = positions(scene).chain([TIME]).map(|over| (over, Factor::AgainstMotion));
     waves_along(tracks, scene, frame, residual, noise)
 }
 
