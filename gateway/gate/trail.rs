@@ -128,7 +128,7 @@ impl Trail {
     /// Who asked for what this write came from; nobody when the machine was given back.
     fn author(&self, written: &Written) -> Author {
         let before = self.authors.iter().rev().find(|(at_ns, _)| *at_ns <= written.sample_ns);
-        let author = before.filter(|_| written.occasion != Occasion::Release);
+        let author = before.filter(|_| !matches!(written.occasion, Occasion::Release | Occasion::Leftover));
         author.map_or(Author::default(), |(_, author)| author.clone())
     }
 
@@ -172,7 +172,7 @@ fn outcome(verdict: &Verdict) -> &'static str {
     match verdict.outcome {
         Outcome::Held(_) => "held",
         Outcome::Refused => "refused",
-        Outcome::Limited(_) => "limited",
+        Outcome::Limited(_) | Outcome::DialCounts(_) => "limited",
         Outcome::Permitted if verdict.armed => "permitted",
         Outcome::Permitted => "shadow",
     }
