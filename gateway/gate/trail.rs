@@ -18,6 +18,8 @@ const ROWS_PER_S: f64 = 10.0;
 const ROWS_AT_ONCE: f64 = 200.0;
 /// A script's words in the audit are cut at so many characters.
 const WORDS_MAX: usize = 200;
+/// What went wrong begins with the address of the source, and ends with what to do.
+const FAULT_MAX: usize = 600;
 
 /// What was last recorded of requests.
 #[derive(Debug, Clone, PartialEq)]
@@ -162,7 +164,7 @@ impl Trail {
 /// Why it was written, and by whose words; or what went wrong.
 fn why(written: &Written, reason: &str) -> String {
     match &written.fault {
-        Some(fault) => words(&fault.to_string()),
+        Some(fault) => fault.to_string().chars().take(FAULT_MAX).collect(),
         None if reason.is_empty() => written.occasion.words().to_owned(),
         None => format!("{}: {reason}", written.occasion.words()),
     }
