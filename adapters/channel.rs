@@ -2,8 +2,11 @@
 //!
 //! A channel's name ends in its unit; the names are those of the recording format.
 
+mod control;
+mod declared;
 mod paths;
 
+pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
 pub use paths::{PATHS, on_path};
 
 use std::fmt;
@@ -62,12 +65,20 @@ const fn text(name: &'static str, en: &'static str, zh: &'static str) -> Channel
 /// Every channel the gateway knows. The position is the [`ChannelId`]; new channels are appended.
 pub static CHANNELS: &[Channel] = &ALL;
 
-static ALL: [Channel; FIRST.len() + paths::FURTHER.as_flattened().len()] = {
-    let (mut all, further) =
-        ([FIRST[0]; FIRST.len() + paths::FURTHER.as_flattened().len()], paths::FURTHER.as_flattened());
+const PATH_ROWS: &[Channel] = paths::FURTHER.as_flattened();
+
+static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + control::LATER.len()] = {
+    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + control::LATER.len()];
     let mut index = 0;
     while index < all.len() {
-        all[index] = if index < FIRST.len() { FIRST[index] } else { further[index - FIRST.len()] };
+        let behind = FIRST.len() + PATH_ROWS.len();
+        all[index] = if index < FIRST.len() {
+            FIRST[index]
+        } else if index < behind {
+            PATH_ROWS[index - FIRST.len()]
+        } else {
+            control::LATER[index - behind]
+        };
         index += 1;
     }
     all
@@ -258,33 +269,35 @@ const FIRST: &[Channel] = &[
     number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关"),
 ];
 
-/// Index into [`CHANNELS`].
+/// Index into [`CHANNELS`], and behind them into what a configuration has declared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ChannelId(u16);
 
 impl ChannelId {
-    /// How many channels there are.
+    /// How many channels there are. It grows while a configuration is read; whoever keeps something per channel looks
+    /// once, and meets a later channel as one that is not there.
     #[must_use]
     pub fn count() -> usize {
-        CHANNELS.len()
+        CHANNELS.len() + declared::count()
     }
 
     /// The channel of this name. A linear search: look names up once, not in a loop.
     #[must_use]
     pub fn of(name: &str) -> Option<Self> {
-        let index = CHANNELS.iter().position(|channel| channel.name == name)?;
+        let known = CHANNELS.iter().position(|channel| channel.name == name);
+        let index = known.or_else(|| declared::find(name).map(|place| CHANNELS.len() + place))?;
         u16::try_from(index).ok().map(Self)
     }
 
     /// The channel at this position of the table.
     #[must_use]
     pub fn at(index: usize) -> Option<Self> {
-        (index < CHANNELS.len()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
+        (index < Self::count()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
     }
 
     /// Every channel, in the order of the table.
     pub fn all() -> impl Iterator<Item = Self> {
-        (0..CHANNELS.len()).filter_map(Self::at)
+        (0..Self::count()).filter_map(|index| u16::try_from(index).ok().map(Self))
     }
 
     /// Position in the table.
@@ -296,7 +309,9 @@ impl ChannelId {
     /// The row of the table.
     #[must_use]
     pub fn channel(self) -> &'static Channel {
-        &CHANNELS[usize::from(self.0)]
+        let index = usize::from(self.0);
+        // An id is only made of a row that is there, and no row is ever taken away.
+        CHANNELS.get(index).or_else(|| declared::at(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
     }
 
     /// Name, as everywhere.

@@ -101,6 +101,9 @@ pub fn open(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenError> {
                     crate::fanuc::open::vendor(address.text(), library, at, *path, options)
                 }
             };
+            if let Some(what) = opened.refused {
+                return Err(OpenError::Refused { address: address.text().to_owned(), what });
+            }
             let (sources, actuator, offsets) = (opened.sources, opened.actuator, opened.offsets);
             Ok(Opened { sources, actuator, offsets, simulated: None, refused: Refused::default() })
         }

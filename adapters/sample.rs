@@ -21,6 +21,9 @@ impl Slot {
     }
 }
 
+/// Of a channel that was declared after the sample was made.
+static NOT_PROVIDED: Slot = Slot { value: Err(Absence::NotProvided), age_ns: 0 };
+
 /// Every channel of the table at one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
@@ -39,11 +42,14 @@ impl Sample {
     /// What is known of `channel`.
     #[must_use]
     pub fn slot(&self, channel: ChannelId) -> &Slot {
-        &self.slots[channel.index()]
+        self.slots.get(channel.index()).unwrap_or(&NOT_PROVIDED)
     }
 
     /// Replaces what is known of `channel`.
     pub fn set(&mut self, channel: ChannelId, slot: Slot) {
+        if channel.index() >= self.slots.len() {
+            self.slots.resize(channel.index() + 1, NOT_PROVIDED.clone());
+        }
         self.slots[channel.index()] = slot;
     }
 

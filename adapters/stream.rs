@@ -59,19 +59,31 @@ pub(crate) enum Short {
 }
 
 /// Fills all of `into`, waiting until `until` at most.
-pub(crate) fn fill(stream: &mut TcpStream, mut into: &mut [u8], until: Instant) -> Result<(), Short> {
-    while !into.is_empty() {
+///
+/// # Errors
+/// Why it could not.
+pub(crate) fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Short> {
+    fill_counting(stream, into, until).map_err(|(_, short)| short)
+}
+
+/// The same, for callers to whom an answer that has begun means something.
+///
+/// # Errors
+/// How many bytes had come, and why no more did.
+pub(crate) fn fill_counting(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), (usize, Short)> {
+    let mut got = 0;
+    while got < into.len() {
         let left = until.saturating_duration_since(Instant::now());
         if left.is_zero() {
-            return Err(Short::Silent);
+            return Err((got, Short::Silent));
         }
-        stream.set_read_timeout(Some(left)).map_err(Short::Broken)?;
-        match stream.read(into) {
-            Ok(0) => return Err(Short::Closed),
-            Ok(count) => into = &mut into[count..],
-            Err(error) if is_silence(&error) => return Err(Short::Silent),
+        stream.set_read_timeout(Some(left)).map_err(|error| (got, Short::Broken(error)))?;
+        match stream.read(&mut into[got..]) {
+            Ok(0) => return Err((got, Short::Closed)),
+            Ok(count) => got += count,
+            Err(error) if is_silence(&error) => return Err((got, Short::Silent)),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(Short::Broken(error)),
+            Err(error) => return Err((got, Short::Broken(error))),
         }
     }
     Ok(())

@@ -3,9 +3,14 @@
 use super::keys::Keys;
 use crate::channel::PATHS;
 use crate::fanuc::dial::Dial;
+use crate::fanuc::extra::AxisName;
 use crate::fanuc::feed_override;
-use crate::fanuc::item::Area;
+use crate::fanuc::item::{Area, Position};
+use crate::fanuc::own::OwnChannel;
 use std::time::Duration;
+
+/// Most axes that have channels of their own names.
+const AXES_MAX: usize = 16;
 
 /// How the feed override reaches the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +66,16 @@ pub struct FanucOptions {
     pub settle: Duration,
     /// Texts of further addresses that may be written.
     pub allow: Vec<String>,
+    /// Axes that have channels of their own names.
+    pub axes: Vec<AxisName>,
+    /// Which positions of those axes are read besides those of the machine.
+    pub positions: Vec<Position>,
+    /// Spindles that are read; the first one has the plain names.
+    pub spindles: u8,
+    /// Does the slow group read times, texts, codes and tool life?
+    pub details: bool,
+    /// The user's own channels, which the configuration adds.
+    pub own: Vec<OwnChannel>,
 }
 
 impl Default for FanucOptions {
@@ -80,7 +95,13 @@ impl FanucOptions {
             keys.problem(format!("allow={text}: write addresses like R900-R904, #500-#509 or EXT"));
         }
         let write = write(keys);
+        let (axes, positions) = axes(keys);
         Self {
+            axes,
+            positions,
+            spindles: keys.number("spindles", 1, 1, 8),
+            details: keys.choice("details", &[("yes", true), ("no", false)]),
+            own: Vec::new(),
             further: Vec::new(),
             period: ms(keys, "period_ms", 100, 20, 60_000),
             slow: ms(keys, "slow_ms", 1000, 100, 600_000),
@@ -94,6 +115,30 @@ impl FanucOptions {
             allow,
         }
     }
+}
+
+/// `axes=X1,C1,B` and `positions=absolute,relative,to_go`.
+fn axes(keys: &mut Keys) -> (Vec<AxisName>, Vec<Position>) {
+    let words = [("absolute", Position::Absolute), ("relative", Position::Relative), ("to_go", Position::ToGo)];
+    let mut axes = Vec::new();
+    for text in keys.text("axes").iter().flat_map(|text| text.split(',')).map(str::trim) {
+        match AxisName::read(text) {
+            Some(axis) if axes.len() < AXES_MAX => axes.push(axis),
+            Some(_) => keys.problem(format!("axes=: at most {AXES_MAX} axes have channels")),
+            None => keys.problem(format!("axes={text}: name axes as on the control, for example axes=X1,Z1,C1,W:deg")),
+        }
+    }
+    let mut positions = Vec::new();
+    for text in keys.text("positions").iter().flat_map(|text| text.split(',')).map(str::trim) {
+        match words.iter().find(|(word, _)| *word == text) {
+            Some((_, position)) => positions.push(*position),
+            None => keys.problem(format!("positions={text}: write absolute, relative or to_go, one or several")),
+        }
+    }
+    if axes.is_empty() && !positions.is_empty() {
+        keys.problem("positions= is about the axes that axes= names; name them".to_owned());
+    }
+    (axes, positions)
 }
 
 /// `paths=2,1`: the first has the plain channel names and is the one that is written to, the others have a prefix.

@@ -14,6 +14,7 @@ pub use target::{
     Speed, Target,
 };
 
+use crate::fanuc::own::OwnChannel;
 use keys::Keys;
 use std::fmt;
 use std::str::FromStr;
@@ -56,6 +57,23 @@ impl Address {
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The same with the user's own channels, all of which are declared, as are those of further axes and spindles.
+    ///
+    /// # Errors
+    /// Which channel cannot be read there, and why.
+    pub fn with_channels(mut self, own: Vec<OwnChannel>) -> Result<Self, String> {
+        let first = own.first().map(|own| own.new.name.clone());
+        match (&mut self.target, first) {
+            (Target::Fanuc { path, options, .. }, _) => {
+                options.own = own;
+                let declared = crate::fanuc::extra::declared(options, *path);
+                declared.map(|_| self).map_err(|(name, error)| format!("channel {name}: {error}"))
+            }
+            (_, None) => Ok(self),
+            (_, Some(name)) => Err(format!("channel {name}: only fanuc:// sources have channels of your own")),
+        }
     }
 
     /// What it means.

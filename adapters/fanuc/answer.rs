@@ -1,7 +1,8 @@
 //! What a controller answers, typed. Numbers are in the unit that the question implies.
 
-use super::code::ReturnCode;
+use super::code::{Consequence, ReturnCode};
 use crate::driver::SEE_DOCTOR;
+use crate::reading::Absence;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -44,6 +45,99 @@ pub struct Status {
     pub edit: i16,
 }
 
+/// Unit of a speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum SpeedUnit {
+    /// Millimetres (degrees of a rotary axis) per minute.
+    MmMin,
+    /// Inches per minute.
+    InchMin,
+    /// Revolutions per minute.
+    Rpm,
+    /// Millimetres per revolution of the spindle.
+    MmRev,
+    /// Inches per revolution of the spindle.
+    InchRev,
+    /// A number that is in no manual; nothing in this unit is passed on.
+    Unknown(i16),
+}
+
+impl SpeedUnit {
+    /// Every known unit with its number in the library's `SPEEDELM.unit`. Source: FOCAS2 manual, `cnc_rdspeed`.
+    const ALL: [(Self, i16); 5] =
+        [(Self::MmMin, 0), (Self::InchMin, 1), (Self::Rpm, 2), (Self::MmRev, 3), (Self::InchRev, 4)];
+    /// What newer controls add to the library's number on the wire. Source: `libfwlib32` 1.0.5, which takes it off.
+    const WIRE_OFFSET: i16 = 3;
+
+    /// The unit with this number in the library.
+    #[must_use]
+    pub fn of_library(number: i16) -> Self {
+        Self::ALL.iter().find(|(_, known)| *known == number).map_or(Self::Unknown(number), |(unit, _)| *unit)
+    }
+
+    /// Its number in the library.
+    #[must_use]
+    pub fn library_number(self) -> i16 {
+        match self {
+            Self::Unknown(number) => number,
+            known => Self::ALL.iter().find(|(unit, _)| *unit == known).map_or(0, |(_, number)| *number),
+        }
+    }
+
+    /// The unit of the feed from the number on the wire of a newer control.
+    #[must_use]
+    pub fn of_newer(number: i16) -> Self {
+        match Self::of_library(number.saturating_sub(Self::WIRE_OFFSET)) {
+            Self::Unknown(_) => Self::Unknown(number),
+            known => known,
+        }
+    }
+
+    /// Its number on the wire of a newer control.
+    #[must_use]
+    pub fn newer_number(self) -> i16 {
+        match self {
+            Self::Unknown(number) => number,
+            known => known.library_number() + Self::WIRE_OFFSET,
+        }
+    }
+
+    /// The unit of the feed from the number on the wire of an older control, which tells only millimetres (0) from
+    /// inches. Source: `libfwlib32` 1.0.5.
+    #[must_use]
+    pub fn of_older(number: i16) -> Self {
+        if number == 0 { Self::MmMin } else { Self::InchMin }
+    }
+
+    /// Its number on the wire of an older control.
+    #[must_use]
+    pub fn older_number(self) -> i16 {
+        i16::from(self.is_inch())
+    }
+
+    /// The same length per revolution of the spindle.
+    #[must_use]
+    pub fn per_revolution(self) -> Self {
+        match self {
+            Self::MmMin => Self::MmRev,
+            Self::InchMin => Self::InchRev,
+            other => other,
+        }
+    }
+
+    /// Is it a length per revolution of the spindle?
+    #[must_use]
+    pub fn is_per_revolution(self) -> bool {
+        matches!(self, Self::MmRev | Self::InchRev)
+    }
+
+    /// Is it in inches?
+    #[must_use]
+    pub fn is_inch(self) -> bool {
+        matches!(self, Self::InchMin | Self::InchRev)
+    }
+}
+
 /// One alarm.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Alarm {
@@ -53,6 +147,26 @@ pub struct Alarm {
     pub kind: i32,
     /// Axis from 1; 0 none.
     pub axis: i32,
+    /// Its text.
+    pub text: String,
+}
+
+/// An alarm that has been.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct PastAlarm {
+    /// Which.
+    pub alarm: Alarm,
+    /// Year, month, day, hour, minute and second at which it came, on the control's clock.
+    pub at: [i16; 6],
+}
+
+/// A message to the operator.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Message {
+    /// Its number; -1 where there is none.
+    pub number: i32,
+    /// 0 to 3 messages of the ladder, 4 of a macro program.
+    pub kind: i32,
     /// Its text.
     pub text: String,
 }
@@ -84,12 +198,27 @@ pub enum Answer {
         /// The name.
         name: String,
     },
+    /// The unit of a speed.
+    Unit(SpeedUnit),
     /// Names of axes or spindles.
     Names(Vec<String>),
     /// A text.
     Text(String),
     /// The alarms that are on.
     Alarms(Vec<Alarm>),
+    /// Messages to the operator.
+    Messages(Vec<Message>),
+    /// Alarms that have been, the oldest first.
+    History(Vec<PastAlarm>),
+    /// Life of the tools of a group.
+    Life {
+        /// Tools of the group.
+        tools: i32,
+        /// Their life, in uses or minutes as the control counts it.
+        life: i32,
+        /// How much of it is used.
+        count: i32,
+    },
     /// A modal word; flags as on the wire.
     Modal {
         /// Its value without a decimal point.
@@ -135,6 +264,8 @@ pub enum ItemError {
     Refused(Refusal),
     /// Its answer makes no sense.
     Malformed(String),
+    /// What runs the vendor's library ended or hung in this question.
+    Failed(String),
     /// This way of talking to the control cannot ask for it.
     NotOffered,
 }
@@ -143,19 +274,34 @@ impl fmt::Display for ItemError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refused(refusal) => refusal.code.fmt(f),
-            Self::Malformed(what) => f.write_str(what),
+            Self::Malformed(what) | Self::Failed(what) => f.write_str(what),
             Self::NotOffered => f.write_str("the control, or this way of talking to it, does not have it"),
         }
     }
 }
 
 impl ItemError {
+    /// The reason that a reading without this item has.
+    #[must_use]
+    pub fn absence(&self) -> Absence {
+        match self {
+            Self::Refused(refusal) if refusal.code == ReturnCode::PATH => Absence::Refused,
+            Self::Refused(refusal) => match refusal.code.consequence() {
+                Consequence::NotSupported | Consequence::Wrong => Absence::NotSupported,
+                _ => Absence::Refused,
+            },
+            Self::Malformed(_) => Absence::OutOfRange,
+            Self::Failed(_) => Absence::Disconnected,
+            Self::NotOffered => Absence::NotSupported,
+        }
+    }
+
     /// What to do next.
     #[must_use]
     pub fn next(&self) -> &'static str {
         match self {
             Self::Refused(refusal) => refusal.code.next(),
-            Self::Malformed(_) | Self::NotOffered => SEE_DOCTOR,
+            Self::Malformed(_) | Self::Failed(_) | Self::NotOffered => SEE_DOCTOR,
         }
     }
 }

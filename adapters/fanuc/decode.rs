@@ -1,9 +1,10 @@
 //! The data of an answer, typed. Every length is checked: the vendor's own library does not, and takes nothing for a
 //! value.
 
-use super::answer::{Alarm, Answer, Status, System};
+use super::answer::{Alarm, Answer, SpeedUnit, Status, System};
 use super::item::{Item, Spindle, Width};
 use super::opening::Generation;
+use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
 
 /// Types of parameters and diagnosis numbers whose values are reals.
@@ -33,7 +34,13 @@ pub fn answer(item: Item, generation: Generation, data: &[u8]) -> Result<Answer,
         Item::Spindles(_) | Item::Servos(_) | Item::Position(..) => {
             Answer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
         }
-        Item::HandleRetrace | Item::ToolMode | Item::Count(_) | Item::SpeedUnit(_) | Item::TuningMode => {
+        Item::FeedUnit => Answer::Unit(unit(generation, cursor.i16()?)),
+        Item::SpindleUnit => {
+            // The library says rpm whatever the number is.
+            cursor.i16()?;
+            Answer::Unit(SpeedUnit::Rpm)
+        }
+        Item::HandleRetrace | Item::ToolMode | Item::Count(_) | Item::TuningMode => {
             Answer::Whole(i32::from(cursor.i16()?))
         }
         Item::Sequence | Item::BlockCount | Item::AlarmBits => Answer::Whole(cursor.i32()?),
@@ -59,9 +66,29 @@ pub fn answer(item: Item, generation: Generation, data: &[u8]) -> Result<Answer,
         Item::ExecutedText(_) => Answer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
         Item::Timer(_) => Answer::Time { minutes: cursor.i32()?, milliseconds: cursor.i32()? },
         Item::PanelSignals(_) => Answer::Signals(each(&mut cursor, 2, |cursor| cursor.i16())?),
+        Item::CncId => Answer::Text(super::records::cnc_id(&mut cursor)?),
+        Item::Messages(_) => Answer::Messages(each(&mut cursor, 12 + MESSAGE_TEXT_LEN, super::records::message)?),
+        Item::HistoryCount => Answer::Whole(cursor.i32()?),
+        Item::AlarmHistory(..) => {
+            Answer::History(each(&mut cursor, 28 + HISTORY_TEXT_LEN, super::records::past_alarm)?)
+        }
+        Item::GCodes => Answer::Names(each(&mut cursor, 12, super::records::g_code)?),
+        Item::ToolGroup => {
+            let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
+            cursor.bytes(cursor.left())?;
+            Answer::Whole(in_use)
+        }
+        Item::ToolLife(group) => super::records::life(&mut cursor, group)?,
     };
     cursor.end()?;
     Ok(answer)
+}
+
+fn unit(generation: Generation, number: i16) -> SpeedUnit {
+    match generation {
+        Generation::Newer(_) => SpeedUnit::of_newer(number),
+        Generation::Older(_) => SpeedUnit::of_older(number),
+    }
 }
 
 fn mismatch(what: &'static str, expected: usize, found: usize) -> WireError {
@@ -88,7 +115,7 @@ fn each<T>(
 
 /// Text up to the first NUL, without the blanks around it. Controllers of Asian shops send other character sets; what
 /// is not UTF-8 is replaced.
-fn text(bytes: &[u8]) -> String {
+pub(super) fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
@@ -159,6 +186,7 @@ fn parameter(
             let number = number(cursor)?;
             Ok(if kind == real { number.measured() } else { Some(f64::from(number.mantissa)) })
         })?,
+        Generation::Older(_) if kind == real => each(cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?,
         Generation::Older(_) => each(cursor, 4, |cursor| Ok(Some(f64::from(cursor.i32()?))))?,
     };
     if axis >= 0 {

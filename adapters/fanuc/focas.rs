@@ -45,6 +45,14 @@ pub enum FocasError {
     /// The connection broke.
     #[error("the connection broke: {0}")]
     Broken(String),
+    /// An answer began and did not end: the control lives, and the line or the control is at fault.
+    #[error("the answer ended after {got} bytes{}", if .waited.is_some() { "; nothing more came" } else { ", then the connection" })]
+    Cut {
+        /// Bytes that came.
+        got: usize,
+        /// How long more was waited for; `None` when the connection was closed.
+        waited: Option<Duration>,
+    },
     /// No answer in time.
     #[error("no answer within {} ms", .0.as_millis())]
     Timeout(Duration),
@@ -76,7 +84,9 @@ impl FocasError {
             Self::Unreachable(_) => "Check power, cable and address of the controller",
             Self::Name(_) => "Write the number of the host, or put its name into the hosts file",
             Self::NoSession => "Close other programs that read this controller, or wait until their connections expire",
-            Self::Broken(_) | Self::Timeout(_) => "It is tried again by itself; if it lasts, look at cable and switch",
+            Self::Broken(_) | Self::Timeout(_) | Self::Cut { .. } => {
+                "It is tried again by itself; if it lasts, look at cable and switch"
+            }
             Self::Protocol(_) => "Check that this is the FOCAS2 port of a FANUC controller",
             Self::Refused(refusal) => return refusal.code.next().to_owned(),
             Self::Library(_) => "The child process is started again by itself; backend=native needs no library",

@@ -1,5 +1,7 @@
 //! What can be asked of a controller and what can be written to it, in the words of the control.
 
+pub use super::pmc::{Area, Stretch, Width};
+pub use super::word::Word;
 use serde::{Deserialize, Serialize};
 
 /// Which position of the axes.
@@ -13,6 +15,17 @@ pub enum Position {
     Relative,
     /// Still to go in this block.
     ToGo,
+}
+
+impl Position {
+    /// Every position with its number on the wire, in the order in which the library's calls give them.
+    pub const ALL: [(Self, i32); 4] = [(Self::Absolute, 4), (Self::Machine, 1), (Self::Relative, 6), (Self::ToGo, 7)];
+
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        numbered(&Self::ALL, self)
+    }
 }
 
 /// What of the spindles.
@@ -32,6 +45,24 @@ pub enum Spindle {
     MotorSpeed,
 }
 
+impl Spindle {
+    /// Every quantity with its number on the wire.
+    pub const ALL: [(Self, i32); 6] = [
+        (Self::PlainLoad, 0),
+        (Self::MaxSpeed, 1),
+        (Self::Gear, 2),
+        (Self::Speed, 3),
+        (Self::Load, 4),
+        (Self::MotorSpeed, 5),
+    ];
+
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        numbered(&Self::ALL, self)
+    }
+}
+
 /// What of the axis drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Servo {
@@ -43,144 +74,20 @@ pub enum Servo {
     Current,
 }
 
-/// Area of PMC memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Area {
-    /// Signals from the ladder to the control.
-    G,
-    /// Signals from the control to the ladder.
-    F,
-    /// Outputs to the machine.
-    Y,
-    /// Inputs from the machine.
-    X,
-    /// Message requests.
-    A,
-    /// Internal relays; cleared at power-on up to the battery-backed part.
-    R,
-    /// Timers.
-    T,
-    /// Keep relays.
-    K,
-    /// Counters.
-    C,
-    /// Data table, battery-backed.
-    D,
-    /// Extra relays, shared between PMCs.
-    E,
-}
-
-impl Area {
-    /// Every area with its letter and its number.
-    pub const ALL: [(Self, char, i32); 11] = [
-        (Self::G, 'G', 0),
-        (Self::F, 'F', 1),
-        (Self::Y, 'Y', 2),
-        (Self::X, 'X', 3),
-        (Self::A, 'A', 4),
-        (Self::R, 'R', 5),
-        (Self::T, 'T', 6),
-        (Self::K, 'K', 7),
-        (Self::C, 'C', 8),
-        (Self::D, 'D', 9),
-        (Self::E, 'E', 12),
-    ];
-
-    /// Its number on the wire and in the library.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        Self::ALL.iter().find(|(area, ..)| *area == self).map_or(0, |(.., number)| *number)
-    }
-
-    /// Its letter.
-    #[must_use]
-    pub fn letter(self) -> char {
-        Self::ALL.iter().find(|(area, ..)| *area == self).map_or('?', |(_, letter, _)| *letter)
-    }
-
-    /// The area with this number.
-    #[must_use]
-    pub fn of_number(number: i32) -> Option<Self> {
-        Self::ALL.iter().find(|(.., known)| *known == number).map(|(area, ..)| *area)
-    }
-
-    /// The area with this letter.
-    #[must_use]
-    pub fn of_letter(letter: char) -> Option<Self> {
-        Self::ALL.iter().find(|(_, known, _)| *known == letter.to_ascii_uppercase()).map(|(area, ..)| *area)
-    }
-}
-
-/// Bytes of one element of PMC memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Width {
-    /// One byte, 0 to 255.
-    Byte,
-    /// Two bytes, signed.
-    Word,
-    /// Four bytes, signed.
-    Long,
-}
-
-impl Width {
-    /// Number of bytes.
-    #[must_use]
-    pub fn bytes(self) -> u16 {
-        match self {
-            Self::Byte => 1,
-            Self::Word => 2,
-            Self::Long => 4,
-        }
-    }
+impl Servo {
+    /// Every quantity with its number on the wire.
+    pub const ALL: [(Self, i32); 3] = [(Self::Load, 1), (Self::Speed, 2), (Self::Current, 3)];
 
     /// Its number on the wire.
     #[must_use]
     pub fn number(self) -> i32 {
-        match self {
-            Self::Byte => 0,
-            Self::Word => 1,
-            Self::Long => 2,
-        }
-    }
-
-    /// The width with this number.
-    #[must_use]
-    pub fn of_number(number: i32) -> Option<Self> {
-        [Self::Byte, Self::Word, Self::Long].into_iter().find(|width| width.number() == number)
+        numbered(&Self::ALL, self)
     }
 }
 
-/// A stretch of PMC memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Stretch {
-    /// Where.
-    pub area: Area,
-    /// First byte.
-    pub from: u16,
-    /// Last byte.
-    pub to: u16,
-    /// Size of the elements.
-    pub width: Width,
-}
-
-impl Stretch {
-    /// So many single bytes.
-    #[must_use]
-    pub fn bytes(area: Area, from: u16, count: u16) -> Self {
-        Self { area, from, to: from.saturating_add(count.saturating_sub(1)), width: Width::Byte }
-    }
-
-    /// Number of bytes; 0 when it ends before it begins.
-    #[must_use]
-    pub fn len(self) -> usize {
-        usize::from(self.to) + 1 - usize::from(self.from.min(self.to.saturating_add(1)))
-    }
-
-    /// Does it end before it begins?
-    #[must_use]
-    pub fn is_empty(self) -> bool {
-        self.to < self.from
-    }
+/// The number that stands beside a value in its table.
+fn numbered<T: PartialEq>(table: &[(T, i32)], wanted: T) -> i32 {
+    table.iter().find(|(known, _)| *known == wanted).map_or(0, |(_, number)| *number)
 }
 
 /// Meters of time.
@@ -194,6 +101,17 @@ pub enum Timer {
     Cutting,
     /// This cycle.
     Cycle,
+}
+
+impl Timer {
+    /// Every meter with its number on the wire and in the library.
+    pub const ALL: [(Self, i32); 4] = [(Self::PowerOn, 0), (Self::Operating, 1), (Self::Cutting, 2), (Self::Cycle, 3)];
+
+    /// Its number on the wire and in the library.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        numbered(&Self::ALL, self)
+    }
 }
 
 /// One thing to be read.
@@ -223,8 +141,10 @@ pub enum Item {
     AxisNames,
     /// Names of the spindles; the argument that the generations want differently.
     SpindleNames(i16),
-    /// Unit of a speed: 3 feed, 4 spindle, 0 the feed on older controls.
-    SpeedUnit(i16),
+    /// Unit of [`Item::Feed`].
+    FeedUnit,
+    /// Unit of [`Item::SpindleSpeed`].
+    SpindleUnit,
     /// Numbers of the program running and of the main program.
     Program,
     /// Name and number of the program running.
@@ -243,8 +163,8 @@ pub enum Item {
     Alarms(u16),
     /// Modal G codes: of one group, or all with -1.
     ModalGroup(i16),
-    /// Modal word by its number: F 5, M 11, S 20, T 22 (others in the reference).
-    ModalWord(i16),
+    /// A modal word.
+    ModalWord(Word),
     /// A position of one axis from 1, or all with -1.
     Position(Position, i16),
     /// A custom macro variable.
@@ -267,6 +187,20 @@ pub enum Item {
     TuningMode,
     /// Signals of the software operator's panel.
     PanelSignals(u16),
+    /// The number of the control, four words.
+    CncId,
+    /// Messages to the operator, at most so many.
+    Messages(u16),
+    /// How many alarms the control remembers.
+    HistoryCount,
+    /// Remembered alarms from the first to the last, counted from 1, the oldest first.
+    AlarmHistory(u16, u16),
+    /// G codes in force.
+    GCodes,
+    /// The group of tools in use, where their life is counted.
+    ToolGroup,
+    /// Life of the tools of a group.
+    ToolLife(u16),
 }
 
 /// An item of one path of the control. PMC memory belongs to no path: it is the same whichever path asks.

@@ -3,8 +3,9 @@
 //! which is a state and not a fault.
 
 use super::allow::AllowList;
-use super::answer::{Answer, ItemError, ItemResult, System};
+use super::answer::{ItemError, ItemResult};
 use super::code::Consequence;
+use super::facts::Facts;
 use super::focas::{Focas, FocasError};
 use super::item::{Item, Question, Write};
 use super::opening::Opening;
@@ -23,32 +24,6 @@ const STARTING_NS: i64 = 180 * crate::clock::SECOND_NS;
 /// Next step where something listens and has never opened a session: perhaps it is no controller.
 const NEVER_OPENED: &str = "Something listens there and opens no session: is it the FOCAS2 port (8193 unless changed), and \
                             has the controller a connection left?";
-
-/// Parameter 1001, bit 0: the machine measures in inches.
-const INCH_MACHINE: Item = Item::Parameter(1001, 0);
-
-/// What does not change while a connection lasts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Facts {
-    /// Generation, axes, spindles.
-    pub opening: Opening,
-    /// Kind and series, if the control says them.
-    pub system: Option<System>,
-    /// Names of the axes, in the order of every answer about axes.
-    pub axes: Vec<String>,
-    /// Names of the axes of each further path that is read.
-    pub further: Vec<(u8, Vec<String>)>,
-    /// Does the machine measure in inches?
-    pub inch: bool,
-}
-
-impl Facts {
-    /// Names of the axes of a path.
-    #[must_use]
-    pub fn axes_of(&self, path: u8) -> &[String] {
-        self.further.iter().find(|(further, _)| *further == path).map_or(&self.axes, |(_, axes)| axes)
-    }
-}
 
 /// How a line has been doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -169,6 +144,12 @@ impl Line {
         self.locked(|inner| inner.write(clock, write))
     }
 
+    /// The path that is meant when none is named.
+    #[must_use]
+    pub fn path(&self) -> u8 {
+        self.locked(|inner| inner.paths.0)
+    }
+
     /// How the line has been doing.
     #[must_use]
     pub fn counts(&self) -> LineCounts {
@@ -187,7 +168,11 @@ impl Inner {
         let facts = self.connected(clock)?;
         let known = |question: &Question| !self.unsupported.contains(question);
         let wanted: Vec<Question> = questions.iter().copied().filter(known).collect();
-        let (began_ns, found) = self.round(clock, &wanted)?;
+        // What the control has not told of itself yet travels with every round until it has.
+        let open: Vec<Question> = facts.open.iter().map(|(question, _)| *question).collect();
+        let both = [wanted.as_slice(), &open].concat();
+        let (began_ns, mut found) = self.round(clock, &both)?;
+        let facts = self.learn_facts(&open, &found.split_off(wanted.len()), facts);
         self.learn(&wanted, &found);
         let mut found = wanted.iter().zip(found).peekable();
         let answer = |question: &Question| {
@@ -196,6 +181,18 @@ impl Inner {
         };
         let results = questions.iter().map(answer).collect();
         Ok(Asked { facts, path: self.paths.0, questions, results, began_ns, ended_ns: clock.now_ns() })
+    }
+
+    /// Takes what has been told at last.
+    fn learn_facts(&mut self, open: &[Question], found: &[ItemResult], facts: Arc<Facts>) -> Arc<Facts> {
+        if open.is_empty() {
+            return facts;
+        }
+        let mut learnt = Facts::clone(&facts);
+        open.iter().zip(found).for_each(|(question, result)| learnt.take(*question, result));
+        let learnt = Arc::new(learnt);
+        self.facts = Some(learnt.clone());
+        learnt
     }
 
     /// One round of questions on an open connection, not before the duty cycle allows it.
@@ -250,12 +247,11 @@ impl Inner {
         self.focas = Some(focas);
         self.unsupported.clear();
         let (own, further) = self.paths.clone();
-        let names = further.iter().map(|path| Item::AxisNames.on(*path));
-        let questions: Vec<Question> =
-            [Item::System, INCH_MACHINE, Item::AxisNames].map(|item| item.on(own)).into_iter().chain(names).collect();
-        let (_, found) = self.round(clock, &questions)?;
-        let facts = Arc::new(facts(opening, &questions, &found, own));
-        self.facts = Some(facts.clone());
+        let paths: Vec<u8> = std::iter::once(own).chain(further).collect();
+        let facts = Arc::new(Facts::unknown(opening, &paths));
+        let open: Vec<Question> = facts.open.iter().map(|(question, _)| *question).collect();
+        let (_, found) = self.round(clock, &open)?;
+        let facts = self.learn_facts(&open, &found, facts);
         self.counts.connections += 1;
         self.lost_ns = None;
         self.known = true;
@@ -347,28 +343,16 @@ fn told(name: &str, error: &FocasError, request: &str, next: String) -> SourceEr
             deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
             next,
         },
+        FocasError::Cut { waited: Some(waited), .. } => SourceError::Timeout {
+            source_name,
+            request: format!("{request} ({what})"),
+            deadline_ms: u64::try_from(waited.as_millis()).unwrap_or(u64::MAX),
+            next,
+        },
         FocasError::Protocol(_) => SourceError::Decode { source_name, request, what: format!("{what}. {next}") },
         FocasError::NoSession | FocasError::Refused(_) | FocasError::NotAllowed(_) => {
             SourceError::Refused { source_name, request, what, next }
         }
         _ => SourceError::Line { source_name, what, next },
     }
-}
-
-fn facts(opening: Opening, questions: &[Question], found: &[ItemResult], own: u8) -> Facts {
-    let mut facts = Facts { opening, system: None, axes: Vec::new(), further: Vec::new(), inch: false };
-    for (question, answer) in questions.iter().zip(found) {
-        match answer {
-            Ok(Answer::System(system)) => facts.system = Some(system.clone()),
-            Ok(Answer::Names(names)) if question.path == own => facts.axes.clone_from(names),
-            Ok(Answer::Names(names)) => facts.further.push((question.path, names.clone())),
-            Err(_) if question.path != own => facts.further.push((question.path, Vec::new())),
-            Ok(Answer::Data { values, .. }) => {
-                let bits = values.first().copied().flatten().unwrap_or(0.0);
-                facts.inch = bits.rem_euclid(2.0) >= 1.0;
-            }
-            _ => {}
-        }
-    }
-    facts
 }

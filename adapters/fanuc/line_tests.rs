@@ -1,17 +1,20 @@
 //! The line with a controller that is a list of answers, on a clock that stands still.
 
 use super::allow::AllowList;
-use super::answer::{Answer, ItemError, ItemResult, Refusal};
+use super::answer::{Answer, ItemError, ItemResult, Refusal, System};
 use super::code::ReturnCode;
+use super::facts::INCH_MACHINE;
 use super::focas::{Focas, FocasError};
 use super::item::{Item, Question, Stretch, Write};
 use super::line::{Connect, Line};
 use super::opening::{Generation, Opening};
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::driver::SourceError;
+use crate::reading::Absence;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// What the mock has been told to do, and what it was asked.
 #[derive(Default)]
@@ -22,6 +25,24 @@ struct Told {
     connect: Mutex<Option<FocasError>>,
     fail: Mutex<Option<FocasError>>,
     results: Mutex<HashMap<Item, ItemResult>>,
+}
+
+/// What the mock answers unless it is told otherwise.
+fn usual(item: Item) -> ItemResult {
+    Ok(match item {
+        Item::System => Answer::System(System {
+            additional: 0,
+            axes_max: 32,
+            kind: "31".into(),
+            machine: "M".into(),
+            series: "G421".into(),
+            version: "27.0".into(),
+            axes: "02".into(),
+        }),
+        Item::AxisNames => Answer::Names(vec!["X".into(), "Z".into()]),
+        Item::Parameter(..) => Answer::Data { kind: 0, values: vec![Some(0.0); 2] },
+        _ => Answer::Whole(1),
+    })
 }
 
 struct Mock(Arc<Told>, Opening);
@@ -39,7 +60,7 @@ impl Focas for Mock {
         }
         let results = self.0.results.lock().expect("sound");
         out.extend(
-            questions.iter().map(|question| results.get(&question.item).cloned().unwrap_or(Ok(Answer::Whole(1)))),
+            questions.iter().map(|question| results.get(&question.item).cloned().unwrap_or(usual(question.item))),
         );
         Ok(())
     }
@@ -143,6 +164,39 @@ fn off_is_what_was_on_before() {
     assert!(matches!(error, SourceError::Line { .. }), "the host lives and nobody listens: {error}");
     *told.connect.lock().expect("sound") = Some(FocasError::Unreachable("no route".into()));
     assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Off { .. })), "however long");
+}
+
+#[test]
+fn facts_that_are_refused_for_now_are_asked_for_again_with_every_round() {
+    for code in [-1, 7, 11] {
+        let (line, told, clock) = line(100);
+        let questions = [Item::AxisNames, INCH_MACHINE];
+        questions.iter().for_each(|item| drop(told.results.lock().expect("sound").insert(*item, refused(code))));
+        let asked = line.ask(&clock, &[Item::Feed]).expect("well");
+        assert_eq!(asked.facts.inch, Err(Absence::Refused), "no guess while the control says {code}");
+        assert_eq!(asked.facts.axes_of(1), Err(Absence::Refused));
+        told.results.lock().expect("sound").clear();
+        let asked = line.ask(&clock, &[Item::Feed]).expect("well");
+        assert_eq!((asked.facts.inch, asked.facts.axes_of(1).map(<[String]>::len)), (Ok(false), Ok(2)));
+        assert_eq!(line.counts().connections, 1, "on the same connection");
+        let before = told.asked.load(Ordering::SeqCst);
+        line.ask(&clock, &[Item::Feed]).expect("well");
+        assert_eq!(told.asked.load(Ordering::SeqCst) - before, 1, "nothing is asked twice once it is known");
+    }
+}
+
+#[test]
+fn an_answer_that_was_cut_off_is_no_machine_that_is_off() {
+    let (line, told, clock) = line(100);
+    line.ask(&clock, &[Item::Feed]).expect("on");
+    *told.fail.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited: None });
+    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    for waited in [None, Some(Duration::from_secs(2))] {
+        *told.connect.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited });
+        let error = line.ask(&clock, &[Item::Feed]).expect_err("an opening that was cut off");
+        assert!(!matches!(error, SourceError::Off { .. }), "{error}");
+        assert!(error.to_string().contains("20 bytes"), "{error}");
+    }
 }
 
 #[test]

@@ -12,17 +12,21 @@
 //! | file | what |
 //! |---|---|
 //! | `wire` | frames, blocks, numbers: pure |
-//! | `item`, `answer` | what can be asked and written, what comes back, typed |
+//! | `item`, `pmc`, `word`, `answer` | what can be asked and written, what comes back, typed |
+//! | `table` | the one table of what goes over the wire |
 //! | `opening` | generation, axes and spindles from the opening of a connection |
-//! | `request`, `decode` | items as blocks and data as answers, in the encoding of the generation |
+//! | `request`, `decode`, `records` | items as blocks and data as answers, in the encoding of the generation |
 //! | `code` | every return code as cause and next step |
 //! | `focas` | the one narrow trait over what the adapter needs |
 //! | `native` | FOCAS2/Ethernet spoken by ourselves |
 //! | `vendor` | the vendor's library in a child process |
+//! | `facts` | what a control says once of itself, asked for until it has |
 //! | `statistics` | what the round trips cost |
 //! | `line` | the one connection that everything shares: opening, loss, power-off, duty cycle, allowed writes |
 //! | `poll`, `source` | what is asked for at which pace; the groups as sources |
-//! | `states`, `readings` | status words and signals as states, answers as channels; pure |
+//! | `states`, `view`, `readings` | status words and signals as states, answers as channels; pure |
+//! | `details` | the slow group: parts, times, texts, codes, tool life |
+//! | `extra`, `own` | further axes and spindles, and the user's own channels |
 //! | `feed_override` | the inverted byte, and nothing else |
 //! | `allow` | what may be written |
 //! | `dial` | where the operator's dial stands |
@@ -52,7 +56,10 @@ pub mod answer;
 mod asking;
 pub mod code;
 pub mod decode;
+mod details;
 pub mod dial;
+pub mod extra;
+pub mod facts;
 pub mod feed_override;
 pub mod focas;
 pub mod item;
@@ -60,16 +67,22 @@ pub mod line;
 pub mod native;
 pub mod open;
 pub mod opening;
+pub mod own;
 pub mod pace;
+mod pmc;
 pub mod poll;
 pub mod readings;
+mod records;
 pub mod request;
 pub mod server;
 pub mod source;
 pub mod states;
 pub mod statistics;
+pub mod table;
 pub mod vendor;
+mod view;
 pub mod wire;
+mod word;
 pub mod work_offset;
 
 #[cfg(test)]

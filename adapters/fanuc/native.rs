@@ -199,18 +199,26 @@ fn send(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), F
 
 fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<Frame, FocasError> {
     let mut head = [0; HEADER_LEN];
-    fill(stream, &mut head, deadline, timeout)?;
+    fill(stream, &mut head, deadline, 0, timeout)?;
     let header = Header::of(&head).map_err(|error| protocol(&error))?;
     let mut body = vec![0; header.body_len];
-    fill(stream, &mut body, deadline, timeout)?;
+    fill(stream, &mut body, deadline, HEADER_LEN, timeout)?;
     Ok(Frame { version: header.version, kind: header.kind, body })
 }
 
-/// Reads until the buffer is full or the deadline is over.
-fn fill(stream: &mut TcpStream, buffer: &mut [u8], deadline: Instant, timeout: Duration) -> Result<(), FocasError> {
-    stream::fill(stream, buffer, deadline).map_err(|short| match short {
-        Short::Silent => FocasError::Timeout(timeout),
-        Short::Closed => FocasError::Broken("the controller closed it".to_owned()),
-        Short::Broken(error) => FocasError::Broken(error.to_string()),
+/// Reads until the buffer is full or the deadline is over; `before` bytes of the same answer have come already.
+fn fill(
+    stream: &mut TcpStream,
+    buffer: &mut [u8],
+    deadline: Instant,
+    before: usize,
+    timeout: Duration,
+) -> Result<(), FocasError> {
+    stream::fill_counting(stream, buffer, deadline).map_err(|(got, short)| match (before + got, short) {
+        (0, Short::Silent) => FocasError::Timeout(timeout),
+        (0, Short::Closed) => FocasError::Broken("the controller closed it".to_owned()),
+        (0, Short::Broken(error)) => FocasError::Broken(error.to_string()),
+        (got, Short::Silent) => FocasError::Cut { got, waited: Some(timeout) },
+        (got, Short::Closed | Short::Broken(_)) => FocasError::Cut { got, waited: None },
     })
 }

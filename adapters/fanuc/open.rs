@@ -2,10 +2,12 @@
 
 use super::actuator::FanucActuator;
 use super::allow::{AllowList, Allowed};
+use super::extra;
 use super::feed_override;
 use super::item::Area;
 use super::line::{Connect, Line};
 use super::native::{Native, NativeSettings};
+use super::own::Pace;
 use super::pace::SharedPace;
 use super::poll;
 use super::readings::Manner;
@@ -27,6 +29,8 @@ pub struct OpenedFanuc {
     pub offsets: Option<Box<dyn OffsetSink>>,
     /// The connection they share.
     pub line: Line,
+    /// Why further channels could not be added; none of them is read then.
+    pub refused: Option<String>,
 }
 
 /// Opens a controller that we talk to ourselves. Nothing is sent before the first poll.
@@ -64,15 +68,20 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
         dial: options.dial,
     };
     let pace = SharedPace::new(options.duty_pct);
+    let (extras, refused) = match extra::declared(options, path) {
+        Ok(extras) => (extras, None),
+        Err((channel, error)) => (Vec::new(), Some(format!("channel {channel}: {error}"))),
+    };
+    let of = |pace| extras.iter().filter(move |(own, _)| *own == pace).map(|(_, extra)| extra.clone()).collect();
     let sources: Vec<Box<dyn Source>> = vec![
-        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace)),
-        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace)),
+        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace, of(Pace::Fast))),
+        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace, of(Pace::Slow))),
     ];
     let actuator = FanucActuator::new(name, line.clone(), path, options);
     let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);
     let shiftable = options.allow.iter().any(|text| Allowed::read(text) == Some(Allowed::ExternalOffset));
     let offsets = shiftable.then(|| Box::new(ExternalOffsets::new(name, line.clone())) as Box<dyn OffsetSink>);
-    OpenedFanuc { sources, actuator, offsets, line }
+    OpenedFanuc { sources, actuator, offsets, line, refused }
 }
 
 /// What the way of writing needs, and what the address allows besides. Without a way of writing the feed override there is

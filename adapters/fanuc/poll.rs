@@ -1,7 +1,7 @@
 //! What is asked for, group by group. Every group is a source with its own period; both share one connection. The
 //! questions of all paths travel together.
 
-use super::item::{Area, Item, Position, Question, Servo, Spindle, Stretch};
+use super::item::{Area, Item, Position, Question, Servo, Spindle, Stretch, Word};
 
 /// Signals of one path lie this many bytes after those of the one before.
 const PATH_STEP: u16 = 1000;
@@ -27,23 +27,24 @@ pub fn ladder_signals(path: u8) -> Stretch {
 /// Where [`ladder_signals`] begins.
 pub const FIRST_LADDER_BYTE: u16 = 6;
 
-/// Numbers of the modal words F, S and T.
-pub const MODAL_F: Item = Item::ModalWord(5);
+/// The modal words F, S and T.
+pub const MODAL_F: Item = Item::ModalWord(Word::F);
 /// See [`MODAL_F`].
-pub const MODAL_S: Item = Item::ModalWord(20);
+pub const MODAL_S: Item = Item::ModalWord(Word::S);
 /// See [`MODAL_F`].
-pub const MODAL_T: Item = Item::ModalWord(22);
+pub const MODAL_T: Item = Item::ModalWord(Word::T);
 
-/// Unit of the feed.
-pub const FEED_UNIT: Item = Item::SpeedUnit(3);
-/// Unit of the feed on older controls.
-pub const FEED_UNIT_OLDER: Item = Item::SpeedUnit(0);
+/// The modal group of feed per minute (0) and per revolution ([`PER_REVOLUTION`]): group 05 of the manuals, G94 and G95
+/// on a mill, G98 and G99 on a lathe with the codes of system A.
+pub const FEED_GROUP: Item = Item::ModalGroup(4);
+/// Feed per revolution in [`FEED_GROUP`]. Source: FOCAS2 manual, `cnc_modal`; `libfwlib32` 1.0.5 takes 1 for it.
+pub const PER_REVOLUTION: u8 = 1;
 
 /// The alarms, asked for only when the status says that there are some.
 pub const ALARMS: Item = Item::Alarms(8);
 
 /// What changes quickly on every path.
-fn quick(path: u8) -> [Item; 15] {
+fn quick(path: u8) -> [Item; 16] {
     [
         Item::Status,
         // Before what the vendor's call for the positions answers besides.
@@ -58,7 +59,8 @@ fn quick(path: u8) -> [Item; 15] {
         MODAL_F,
         MODAL_S,
         MODAL_T,
-        FEED_UNIT,
+        Item::FeedUnit,
+        FEED_GROUP,
         Item::Pmc(control_signals(path)),
         Item::Pmc(ladder_signals(path)),
     ]
@@ -77,12 +79,8 @@ pub fn further(path: u8) -> Vec<Question> {
     quick(path).map(|item| item.on(path)).to_vec()
 }
 
-/// Parameter of the number of parts.
-pub const PART_COUNT: Item = Item::Parameter(6711, 0);
 /// Temperature of the winding of the spindle motor, °C.
 pub const MOTOR_TEMPERATURE: Item = Item::Diagnosis(403, 1);
-/// Gear stages of the spindles.
-pub const GEAR: Item = Item::Spindles(Spindle::Gear);
 
 /// Power of the spindle drive, W, in this diagnosis number.
 #[must_use]
@@ -90,8 +88,8 @@ pub fn power(diagnosis: u16) -> Item {
     Item::Diagnosis(diagnosis, 1)
 }
 
-/// What changes slowly.
+/// What changes slowly: parts and gear stage, without the details that a source asks for besides.
 #[must_use]
 pub fn slow(path: u8) -> Vec<Question> {
-    [PART_COUNT, GEAR].map(|item| item.on(path)).to_vec()
+    super::details::questions(path, false)
 }

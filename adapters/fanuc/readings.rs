@@ -1,12 +1,13 @@
 //! Answers to channels: units, states, and a reason where there is no value. Pure.
 
-use super::answer::{Answer, ItemError, Status};
-use super::code::Consequence;
+use super::answer::{Answer, Status};
 use super::dial::Dial;
+use super::extra::Extra;
 use super::item::{Item, Position, Servo, Spindle};
 use super::line::Asked;
 use super::poll;
-use super::states::{self, Signals};
+use super::states::{self, Found};
+use super::view::{View, flag, number, text, word};
 use crate::channel::{ChannelId, on_path};
 use crate::reading::{Absence, Reading, Stamp, Value};
 use std::sync::Arc;
@@ -51,14 +52,6 @@ pub const OPERATION: &str = "operation";
 /// The power of the spindle drive, where the address names a diagnosis number for it.
 pub const POWER: &str = "spindle_power_w";
 
-/// Channels of the slow group, in the order of [`slow`].
-/// Only values that hold between readings: one that is interpolated would keep all the others waiting for it.
-pub const SLOW: [&str; 2] = ["part_count", "gear_stage"];
-
-const MM_PER_INCH: f64 = 25.4;
-
-type Found<T> = Result<T, Absence>;
-
 /// The ids of channels by their names.
 #[must_use]
 pub fn ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
@@ -71,126 +64,6 @@ pub fn ids<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<ChannelId> {
 pub fn columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>) -> Vec<Option<ChannelId>> {
     let named = |name: &str| further.map_or_else(|| ChannelId::of(name), |path| ChannelId::of(&on_path(name, path)));
     FAST.into_iter().chain([OPERATION]).chain(names).map(named).collect()
-}
-
-/// A look at the results of one poll.
-struct View<'a> {
-    asked: &'a Asked,
-    path: u8,
-}
-
-fn absence(error: &ItemError) -> Absence {
-    match error {
-        ItemError::Refused(refusal) => match refusal.code.consequence() {
-            Consequence::NotSupported | Consequence::Wrong => Absence::NotSupported,
-            _ => Absence::Refused,
-        },
-        ItemError::Malformed(_) => Absence::OutOfRange,
-        ItemError::NotOffered => Absence::NotSupported,
-    }
-}
-
-impl View<'_> {
-    fn answer(&self, item: Item) -> Found<&Answer> {
-        match self.asked.on(item.on(self.path)) {
-            Some(Ok(answer)) => Ok(answer),
-            Some(Err(error)) => Err(absence(error)),
-            None => Err(Absence::NotSupported),
-        }
-    }
-
-    fn number(&self, item: Item) -> Found<f64> {
-        match self.answer(item)? {
-            Answer::Number(number) => number.ok_or(Absence::OutOfRange),
-            Answer::Whole(whole) => Ok(f64::from(*whole)),
-            Answer::Modal { value, flags } => Ok(f64::from(*value) / 10f64.powi(i32::from(flags[1] & 0x07))),
-            Answer::Data { values, .. } => values.first().copied().flatten().ok_or(Absence::OutOfRange),
-            Answer::Numbers(numbers) => numbers.first().copied().flatten().ok_or(Absence::NotSupported),
-            _ => Err(Absence::OutOfRange),
-        }
-    }
-
-    fn status(&self) -> Found<Status> {
-        match self.answer(Item::Status)? {
-            Answer::Status(status) => Ok(*status),
-            _ => Err(Absence::OutOfRange),
-        }
-    }
-
-    fn signals(&self) -> Signals {
-        let bytes = |stretch| match self.answer(Item::Pmc(stretch)) {
-            Ok(Answer::Memory(bytes)) => Some(bytes.as_slice()),
-            _ => None,
-        };
-        Signals::new(bytes(poll::control_signals(self.path)), bytes(poll::ladder_signals(self.path)))
-    }
-
-    /// The operator's dial, %, where the address says in which byte it stands.
-    fn dial(&self, dial: Option<Dial>) -> Found<f64> {
-        let dial = dial.ok_or(Absence::NotSupported)?;
-        match self.answer(Item::Pmc(dial.stretch()))? {
-            Answer::Memory(bytes) => dial.read(bytes).map(|pct| f64::from(pct.percent())).ok_or(Absence::OutOfRange),
-            _ => Err(Absence::OutOfRange),
-        }
-    }
-
-    /// A quantity of the axis of this letter.
-    fn axis(&self, item: Item, letter: &str) -> Found<f64> {
-        let at = self.asked.facts.axes_of(self.path).iter().position(|name| name.eq_ignore_ascii_case(letter));
-        let at = at.ok_or(Absence::NotSupported)?;
-        match self.answer(item)? {
-            Answer::Numbers(numbers) => numbers.get(at).copied().flatten().ok_or(Absence::NotSupported),
-            _ => Err(Absence::OutOfRange),
-        }
-    }
-
-    fn position_mm(&self, letter: &str) -> Found<f64> {
-        let position = self.axis(Item::Position(Position::Machine, -1), letter)?;
-        Ok(if self.asked.facts.inch { position * MM_PER_INCH } else { position })
-    }
-
-    /// Unit of the feed: 0 mm/min, 1 inch/min, 3 mm/rev, 4 inch/rev. Controls that cannot tell mean millimetres, or
-    /// inches when the program is in inches.
-    fn feed_unit(&self, signals: &Signals) -> f64 {
-        let told = self.number(poll::FEED_UNIT).or_else(|_| self.number(poll::FEED_UNIT_OLDER));
-        told.unwrap_or(f64::from(u8::from(signals.inch() == Some(true))))
-    }
-
-    fn feed_mm_min(&self, item: Item, signals: &Signals) -> Found<f64> {
-        let (feed, unit) = (self.number(item)?, self.feed_unit(signals));
-        let per_rev = unit >= 3.0;
-        let inch = unit == 1.0 || unit == 4.0;
-        let feed = if inch { feed * MM_PER_INCH } else { feed };
-        Ok(if per_rev { feed * self.number(Item::SpindleSpeed)?.abs() } else { feed })
-    }
-
-    fn program(&self) -> Found<String> {
-        match self.answer(Item::ProgramName) {
-            Ok(Answer::Named { name, .. }) if !name.is_empty() => return Ok(name.clone()),
-            Ok(Answer::Named { number, .. }) => return Ok(format!("O{number}")),
-            _ => {}
-        }
-        match self.answer(Item::Program)? {
-            Answer::Program { running, .. } => Ok(format!("O{running}")),
-            _ => Err(Absence::OutOfRange),
-        }
-    }
-}
-
-fn number(found: Found<f64>) -> Found<Value> {
-    found.and_then(Value::number)
-}
-
-fn flag(found: Option<bool>) -> Found<Value> {
-    found.map(|on| Value::Number(f64::from(u8::from(on)))).ok_or(Absence::NotSupported)
-}
-
-fn word(found: Found<Option<&str>>) -> Found<Value> {
-    found.and_then(|word| word.map(|word| Value::Text(Arc::from(word))).ok_or(Absence::OutOfRange))
-}
-
-fn text(found: Found<String>) -> Found<Value> {
-    found.map(|text| Value::Text(Arc::from(text)))
 }
 
 /// Does the answer say that alarms of this path have to be asked for?
@@ -235,24 +108,24 @@ pub fn fast(
     let pct = signals.feed_override(manner.second_override);
     let status = view.status();
     let axes = ["X", "Y", "Z"];
-    let position = axes.map(|letter| number(view.position_mm(letter)));
+    let position = axes.map(|letter| number(view.position(Position::Machine, letter, false)));
     let load = axes.map(|letter| number(view.axis(Item::Servos(Servo::Load), letter)));
     let current = axes.map(|letter| number(view.axis(Item::Servos(Servo::Current), letter)));
-    let single_block = signals.single_block() == Some(true);
+    let single_block = signals.single_block() == Ok(true);
     let values = [
         number(view.number(poll::MODAL_S)),
-        number(view.feed_mm_min(poll::MODAL_F, &signals)),
+        number(view.feed_mm_min(poll::MODAL_F, view.programmed_unit(&signals))),
         number(view.number(Item::SpindleSpeed)),
-        number(view.feed_mm_min(Item::Feed, &signals)),
-        number(pct.ok_or(Absence::NotSupported)),
-        number(signals.spindle_override().ok_or(Absence::NotSupported)),
+        number(view.feed_mm_min(Item::Feed, view.feed_unit(&signals))),
+        number(pct),
+        number(signals.spindle_override()),
         number(view.number(Item::Spindles(Spindle::Load))),
     ];
     let words = [
         flag(signals.rapid()),
         flag(signals.drives_ready()),
         word(status.map(|status| states::mode(&status, single_block))),
-        word(status.map(|status| states::execution(&status, pct))),
+        word(status.map(|status| states::execution(&status, pct.ok()))),
         text(view.program()),
         text(view.number(Item::Sequence).map(|number| format!("N{number}"))),
         text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
@@ -265,7 +138,7 @@ pub fn fast(
     ];
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
     let all = values.into_iter().chain(position).chain(load).chain(current).chain(words);
-    let operation = signals.operation().map(Arc::from).map(Value::Text).ok_or(Absence::NotSupported);
+    let operation = signals.operation().map(Arc::from).map(Value::Text);
     let power = number(manner.power_diagnosis.ok_or(Absence::NotSupported).and_then(|at| view.number(poll::power(at))));
     let named = columns.iter().zip(all.chain([operation, power]));
     out.extend(named.filter_map(|(channel, value)| channel.map(|channel| reading(channel, stamp, value))));
@@ -277,18 +150,16 @@ fn alarm_text(status: &Status, view: &View<'_>, alarms: Option<&Asked>) -> Strin
         Some(Ok(Answer::Alarms(alarms))) => alarms.as_slice(),
         _ => &[],
     };
-    states::alarm(status, alarms, view.asked.facts.axes_of(view.path))
+    states::alarm(status, alarms, view.asked.facts.axes_of(view.path).unwrap_or_default())
 }
 
-/// The readings of the slow group.
-pub fn slow(channels: &[ChannelId], asked: &Asked, out: &mut Vec<Reading>) {
-    let view = View { asked, path: asked.path };
-    let values = [poll::PART_COUNT, poll::GEAR].map(|item| number(view.number(item)));
+/// The readings of channels that an address or a configuration adds.
+pub(super) fn extra(extras: &[Extra], asked: &Asked, out: &mut Vec<Reading>) {
     let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
-    out.extend(channels.iter().zip(values).map(|(channel, value)| reading(*channel, stamp, value)));
+    out.extend(extras.iter().map(|extra| reading(extra.channel, stamp, extra.read(asked))));
 }
 
-fn reading(channel: ChannelId, stamp: Stamp, value: Found<Value>) -> Reading {
+pub(super) fn reading(channel: ChannelId, stamp: Stamp, value: Found<Value>) -> Reading {
     match value {
         Ok(Value::Number(value)) => Reading::number(channel, stamp, value),
         Ok(Value::Text(text)) => Reading::text(channel, stamp, text),

@@ -1,110 +1,24 @@
 //! Items and writes as blocks on the wire, in the encoding of the controller's generation.
 
-use super::item::{Item, Position, Servo, Spindle, Timer, Write};
+use super::item::{Item, Write};
 use super::opening::{Generation, Opening};
 use super::wire::{Number, Request};
 
-/// Numbers of the functions that are asked.
-pub mod function {
-    #![expect(missing_docs, reason = "the names of the items say it")]
-    pub const TOOL_OFFSET: u16 = 0x08;
-    pub const TOOL_OFFSET_WRITE: u16 = 0x09;
-    pub const WORK_OFFSET: u16 = 0x0B;
-    pub const WORK_OFFSET_WRITE: u16 = 0x0C;
-    pub const PARAMETER_OLDER: u16 = 0x0E;
-    pub const MACRO: u16 = 0x15;
-    pub const MACRO_WRITE: u16 = 0x16;
-    pub const SYSTEM: u16 = 0x18;
-    pub const STATUS: u16 = 0x19;
-    pub const ALARM_BITS: u16 = 0x1A;
-    pub const PROGRAM: u16 = 0x1C;
-    pub const SEQUENCE: u16 = 0x1D;
-    pub const EXECUTED_TEXT: u16 = 0x20;
-    pub const MODAL_GROUP: u16 = 0x21;
-    pub const MODAL_WORD: u16 = 0x22;
-    pub const ALARMS: u16 = 0x23;
-    pub const FEED: u16 = 0x24;
-    pub const SPINDLE_SPEED: u16 = 0x25;
-    pub const POSITION: u16 = 0x26;
-    pub const DIAGNOSIS_OLDER: u16 = 0x30;
-    pub const BLOCK_COUNT: u16 = 0x35;
-    pub const SPINDLES: u16 = 0x40;
-    pub const SERVOS: u16 = 0x56;
-    pub const TUNING_MODE: u16 = 0x57;
-    pub const PANEL_SIGNALS: u16 = 0x5D;
-    pub const PANEL_SIGNALS_WRITE: u16 = 0x5E;
-    pub const SPEED_UNIT: u16 = 0x88;
-    pub const AXIS_NAMES: u16 = 0x89;
-    pub const SPINDLE_NAMES: u16 = 0x8A;
-    pub const PARAMETER: u16 = 0x8D;
-    pub const DIAGNOSIS: u16 = 0x93;
-    pub const TOOL_MODE: u16 = 0x98;
-    pub const COUNT: u16 = 0xA4;
-    pub const MAIN_PROGRAM: u16 = 0xB9;
-    pub const PROGRAM_NAME: u16 = 0xCF;
-    pub const HANDLE_RETRACE: u16 = 0xE1;
-    pub const STATUS_LONG: u16 = 0xE2;
-    pub const PROGRAM_PATH: u16 = 0xFC;
-    pub const TIMER: u16 = 0x120;
-    pub const PMC_READ: u16 = 0x8001;
-    pub const PMC_WRITE: u16 = 0x8002;
-}
+pub use super::table::function;
+
+/// Whose unit is asked for, on newer controls; older ones know the feed only, as 0.
+pub const UNIT_OF_FEED: i32 = 3;
+/// See [`UNIT_OF_FEED`].
+pub const UNIT_OF_SPINDLE: i32 = 4;
 
 /// Longest text of an alarm that is asked for.
 pub const ALARM_TEXT_LEN: usize = 64;
 
-impl Position {
-    /// Its number on the wire.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        match self {
-            Self::Absolute => 4,
-            Self::Machine => 1,
-            Self::Relative => 6,
-            Self::ToGo => 7,
-        }
-    }
-}
+/// Length of the text of an alarm that has been.
+pub const HISTORY_TEXT_LEN: usize = 32;
 
-impl Spindle {
-    /// Its number on the wire.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        match self {
-            Self::PlainLoad => 0,
-            Self::MaxSpeed => 1,
-            Self::Gear => 2,
-            Self::Speed => 3,
-            Self::Load => 4,
-            Self::MotorSpeed => 5,
-        }
-    }
-}
-
-impl Servo {
-    /// Its number on the wire.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        match self {
-            Self::Load => 1,
-            Self::Speed => 2,
-            Self::Current => 3,
-        }
-    }
-}
-
-impl Timer {
-    /// Its number on the wire and in the library.
-    #[must_use]
-    pub fn number(self) -> i32 {
-        match self {
-            Self::PowerOn => 0,
-            Self::Operating => 1,
-            Self::Cutting => 2,
-            Self::Cycle => 3,
-        }
-    }
-}
+/// Length of the text of a message to the operator.
+pub const MESSAGE_TEXT_LEN: usize = 256;
 
 fn by_generation(generation: Generation, newer: u16, older: u16) -> u16 {
     if matches!(generation, Generation::Newer(_)) { newer } else { older }
@@ -128,7 +42,10 @@ pub fn reading(item: Item, generation: Generation) -> Request {
         Item::Count(what) => Request::cnc(f::COUNT, &[number(what)]),
         Item::AxisNames => Request::cnc(f::AXIS_NAMES, &[]),
         Item::SpindleNames(which) => Request::cnc(f::SPINDLE_NAMES, &[number(which)]),
-        Item::SpeedUnit(of) => Request::cnc(f::SPEED_UNIT, &[number(of)]),
+        Item::FeedUnit => {
+            Request::cnc(f::SPEED_UNIT, &[if matches!(generation, Generation::Newer(_)) { UNIT_OF_FEED } else { 0 }])
+        }
+        Item::SpindleUnit => Request::cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
         Item::Program => Request::cnc(f::PROGRAM, &[]),
         Item::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
         Item::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
@@ -138,7 +55,7 @@ pub fn reading(item: Item, generation: Generation) -> Request {
         Item::AlarmBits => Request::cnc(f::ALARM_BITS, &[]),
         Item::Alarms(most) => Request::cnc(f::ALARMS, &[-1, i32::from(most), 2, signed(ALARM_TEXT_LEN)]),
         Item::ModalGroup(group) => Request::cnc(f::MODAL_GROUP, &[number(group)]),
-        Item::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[number(word)]),
+        Item::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[word.number()]),
         Item::Position(what, axis) => Request::cnc(f::POSITION, &[what.number(), number(axis)]),
         Item::Macro(variable) => Request::cnc(f::MACRO, &twice(variable)),
         Item::Parameter(parameter, axis) => {
@@ -156,6 +73,16 @@ pub fn reading(item: Item, generation: Generation) -> Request {
         Item::Timer(timer) => Request::cnc(f::TIMER, &[timer.number()]),
         Item::TuningMode => Request::cnc(f::TUNING_MODE, &[]),
         Item::PanelSignals(mask) => Request::cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
+        Item::CncId => Request::cnc(f::CNC_ID, &[]),
+        Item::Messages(most) => match generation {
+            Generation::Newer(_) => Request::cnc(f::MESSAGES, &[0, -1, i32::from(most)]),
+            Generation::Older(_) => Request::cnc(f::MESSAGES_OLDER, &[-1]),
+        },
+        Item::HistoryCount => Request::cnc(f::ALARM_HISTORY_COUNT, &[]),
+        Item::AlarmHistory(first, last) => Request::cnc(f::ALARM_HISTORY, &[first.into(), last.into(), 1]),
+        Item::GCodes => Request::cnc(f::G_CODES, &[-1, 0]),
+        Item::ToolGroup => Request::cnc(f::TOOL_GROUP, &[]),
+        Item::ToolLife(group) => Request::cnc(f::TOOL_LIFE, &twice(group)),
     }
 }
 
@@ -235,6 +162,12 @@ pub fn answer_len(item: Item, opening: &Opening) -> usize {
         Item::ProgramPath | Item::MainProgram => 256,
         Item::ProgramName | Item::PanelSignals(_) => 40,
         Item::Pmc(stretch) => stretch.len(),
+        Item::Messages(most) => usize::from(most.max(1)) * (12 + MESSAGE_TEXT_LEN),
+        Item::AlarmHistory(first, last) => (usize::from(last.saturating_sub(first)) + 1) * (28 + HISTORY_TEXT_LEN),
+        // Controls that are known have up to 28 groups.
+        Item::GCodes => 28 * 12,
+        Item::ToolLife(_) => 24,
+        Item::CncId => 16,
         Item::System | Item::StatusLong => 22,
         Item::Status => 14,
         _ => Number::LEN,

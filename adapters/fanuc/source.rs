@@ -1,7 +1,10 @@
 //! The groups of a controller as sources.
 
+use super::details;
+use super::extra::Extra;
+use super::facts::Facts;
 use super::item::{Item, Question};
-use super::line::{Asked, Facts, Line};
+use super::line::{Asked, Line};
 use super::pace::{GroupPace, SharedPace};
 use super::poll;
 use super::readings::{self, Manner};
@@ -9,7 +12,7 @@ use crate::address::FanucOptions;
 use crate::channel::{ChannelId, on_path};
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError};
-use crate::reading::Reading;
+use crate::reading::{Absence, Reading};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,6 +32,10 @@ pub struct FanucSource {
     /// Each path with its channels at the places of [`readings::columns`]; the slow group has them in its order.
     paths: Vec<(Manner, Vec<Option<ChannelId>>)>,
     channels: Vec<ChannelId>,
+    /// Channels that the address and the configuration add to this group.
+    extras: Vec<Extra>,
+    /// Does the slow group read more than parts and gear stage?
+    details: bool,
     pace: GroupPace,
     facts: Option<Arc<Facts>>,
 }
@@ -37,7 +44,14 @@ impl FanucSource {
     /// What changes quickly: motion, loads, states, program. One frame per poll where it holds all paths, and another
     /// one while there is an alarm.
     #[must_use]
-    pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions, shared: &SharedPace) -> Self {
+    pub fn fast(
+        name: &str,
+        line: Line,
+        manner: Manner,
+        options: &FanucOptions,
+        shared: &SharedPace,
+        extras: Vec<Extra>,
+    ) -> Self {
         let power = manner.power_diagnosis;
         // Whatever its number, the path that is written to has the plain names.
         let own = readings::columns(None, power.map(|_| readings::POWER));
@@ -47,23 +61,37 @@ impl FanucSource {
         questions.extend(power.map(|number| poll::power(number).on(manner.path)));
         questions.extend(manner.dial.map(|dial| Item::Pmc(dial.stretch()).on(manner.path)));
         questions.extend(options.further.iter().flat_map(|path| poll::further(*path)));
-        let channels = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten()).collect();
+        add(&mut questions, &extras);
+        let own = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten());
+        let channels = own.chain(extras.iter().map(|extra| extra.channel)).collect();
         let (name, pace) = (name.to_owned(), shared.group(options.period));
-        Self { name, line, group: Group::Fast, questions, paths, channels, pace, facts: None }
+        Self { name, line, group: Group::Fast, questions, paths, channels, extras, details: false, pace, facts: None }
     }
 
-    /// What changes slowly and holds in between: parts, gear stage. Of the first path only.
+    /// What changes slowly and holds in between: parts, times, texts, codes. Of the first path only.
     #[must_use]
-    pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions, shared: &SharedPace) -> Self {
+    pub fn slow(
+        name: &str,
+        line: Line,
+        manner: Manner,
+        options: &FanucOptions,
+        shared: &SharedPace,
+        extras: Vec<Extra>,
+    ) -> Self {
         let joint = if name.contains('?') { '&' } else { '?' };
-        let channels = readings::ids(readings::SLOW);
+        let mut channels = details::channels(options.details);
+        channels.extend(extras.iter().map(|extra| extra.channel));
+        let mut questions = details::questions(manner.path, options.details);
+        add(&mut questions, &extras);
         Self {
             name: format!("{name}{joint}group=slow"),
             line,
             group: Group::Slow,
-            questions: poll::slow(manner.path),
+            questions,
             paths: Vec::new(),
             channels,
+            extras,
+            details: options.details,
             pace: shared.group(options.slow),
             facts: None,
         }
@@ -99,8 +127,11 @@ impl Source for FanucSource {
         let asked = self.line.ask_on(clock, &self.questions)?;
         self.facts = Some(asked.facts.clone());
         if self.group == Group::Slow {
-            self.pace.took(busy(&asked));
-            readings::slow(&self.channels, &asked, out);
+            let further = details::further(&asked);
+            let further = if further.is_empty() { None } else { Some(self.line.ask_on(clock, &further)?) };
+            self.pace.took(busy(&asked) + further.as_ref().map(busy).unwrap_or_default());
+            details::readings(&asked, further.as_ref(), self.details, out);
+            readings::extra(&self.extras, &asked, out);
             return Ok(());
         }
         let alarms = self.alarms(clock, &asked)?;
@@ -108,6 +139,7 @@ impl Source for FanucSource {
         for (manner, columns) in &self.paths {
             readings::fast(columns, &asked, alarms.as_ref(), *manner, out);
         }
+        readings::extra(&self.extras, &asked, out);
         Ok(())
     }
 
@@ -115,7 +147,7 @@ impl Source for FanucSource {
         let paced = paced(&self.pace, self.group);
         match (&self.facts, self.group) {
             (Some(facts), Group::Fast) => {
-                identity(facts).into_iter().chain(experience(&self.line)).chain(paced).collect()
+                identity(facts, self.line.path()).into_iter().chain(experience(&self.line)).chain(paced).collect()
             }
             (Some(_), Group::Slow) => paced.collect(),
             (None, _) => Vec::new(),
@@ -142,8 +174,22 @@ fn paced(pace: &GroupPace, group: Group) -> impl Iterator<Item = Fact> {
     answered.into_iter().chain([ms("period", period), ms("period_wanted", wanted)])
 }
 
-/// Who answers.
-fn identity(facts: &Facts) -> Vec<Fact> {
+/// What further channels need, each question once.
+fn add(questions: &mut Vec<Question>, extras: &[Extra]) {
+    for question in extras.iter().map(Extra::question) {
+        if !questions.contains(&question) {
+            questions.push(question);
+        }
+    }
+}
+
+/// In the place of a fact.
+fn not_told(reason: Absence) -> String {
+    format!("not told ({})", reason.word())
+}
+
+/// Who answers. The path `own` has the plain names.
+fn identity(facts: &Facts, own: u8) -> Vec<Fact> {
     let opening = &facts.opening;
     let mut known = vec![Fact::text("make", "FANUC")];
     if let Some(system) = &facts.system {
@@ -155,9 +201,16 @@ fn identity(facts: &Facts) -> Vec<Fact> {
     if opening.paths > 1 {
         known.push(Fact::number("paths", f64::from(opening.paths)));
     }
-    known.push(Fact::text("axes", facts.axes.join(" ")));
-    known.extend(facts.further.iter().map(|(path, axes)| Fact::text(on_path("axes", *path), axes.join(" "))));
-    known.push(Fact::text("unit", if facts.inch { "inch" } else { "mm" }));
+    for (path, axes) in facts.axes() {
+        let name = if path == own { "axes".to_owned() } else { on_path("axes", path) };
+        known.push(Fact::text(name, axes.map_or_else(not_told, |axes| axes.join(" "))));
+    }
+    let unit = facts.inch.map_or_else(not_told, |inch| if inch { "inch" } else { "mm" }.to_owned());
+    known.push(Fact::text("unit", unit));
+    if !facts.open.is_empty() {
+        let open = facts.open.iter().map(|(question, why)| format!("{:?}: {why}", question.item));
+        known.push(Fact::text("not_answered_yet", open.collect::<Vec<_>>().join("; ")));
+    }
     known
 }
 

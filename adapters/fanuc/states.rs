@@ -4,6 +4,7 @@
 
 use super::answer::{Alarm, Status};
 use super::feed_override;
+use crate::reading::Absence;
 use crate::units::OverridePct;
 use crate::words::{execution, mode, operation};
 
@@ -14,109 +15,135 @@ const ALARM_KINDS: [&str; 16] =
 /// At most so many alarms stand in the channel.
 const ALARMS_SHOWN: usize = 4;
 
-/// Bytes F000 to F004 and G006 to G030 of a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// A signal, or why it is not known.
+pub type Found<T> = Result<T, Absence>;
+
+/// Bytes F000 to F004 and G006 to G030 of a path, each with the reason where they could not be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Signals {
-    control: Option<[u8; 5]>,
-    ladder: Option<[u8; 25]>,
+    control: Found<[u8; 5]>,
+    ladder: Found<[u8; 25]>,
 }
 
 impl Signals {
     /// From the two stretches, where they could be read.
     #[must_use]
-    pub fn new(control: Option<&[i32]>, ladder: Option<&[i32]>) -> Self {
+    pub fn new(control: Found<&[i32]>, ladder: Found<&[i32]>) -> Self {
         Self { control: control.and_then(bytes), ladder: ladder.and_then(bytes) }
     }
 
-    fn f(&self, byte: usize, bit: u8) -> Option<bool> {
+    fn f(&self, byte: usize, bit: u8) -> Found<bool> {
         self.control.map(|bytes| bytes[byte] >> bit & 1 == 1)
     }
 
-    fn g(&self, byte: usize) -> Option<u8> {
+    fn g(&self, byte: usize) -> Found<u8> {
         self.ladder.map(|bytes| bytes[byte - 6])
     }
 
     /// F000.6 SA: the drives are ready.
-    #[must_use]
-    pub fn drives_ready(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// Why it is not known, here and below.
+    pub fn drives_ready(&self) -> Found<bool> {
         self.f(0, 6)
     }
 
     /// F001.5 TAP: tapping.
-    #[must_use]
-    pub fn tapping(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn tapping(&self) -> Found<bool> {
         self.f(1, 5)
     }
 
     /// F002.0 INCH: the program is in inches.
-    #[must_use]
-    pub fn inch(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn inch(&self) -> Found<bool> {
         self.f(2, 0)
     }
 
     /// F002.1 RPDO: rapid traverse.
-    #[must_use]
-    pub fn rapid(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn rapid(&self) -> Found<bool> {
         self.f(2, 1)
     }
 
     /// F002.7 MDRN: dry run is on.
-    #[must_use]
-    pub fn dry_run(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn dry_run(&self) -> Found<bool> {
         self.f(2, 7)
     }
 
     /// F002.3 THRD: a thread is cut.
-    #[must_use]
-    pub fn threading(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn threading(&self) -> Found<bool> {
         self.f(2, 3)
     }
 
     /// F004.3 MSBK: single block is on.
-    #[must_use]
-    pub fn single_block(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn single_block(&self) -> Found<bool> {
         self.f(4, 3)
     }
 
     /// G006.4 OVC: overrides are cancelled.
-    #[must_use]
-    pub fn override_cancelled(&self) -> Option<bool> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn override_cancelled(&self) -> Found<bool> {
         self.g(6).map(|byte| byte >> 4 & 1 == 1)
     }
 
     /// The feed override in force, %: G012, and G013 where the machine has the second one; 100 where the control takes
     /// none.
-    #[must_use]
-    pub fn feed_override(&self, second: bool) -> Option<f64> {
+    ///
+    /// # Errors
+    /// As above.
+    pub fn feed_override(&self, second: bool) -> Found<f64> {
         let first = self.g(12)?;
-        if self.override_cancelled() == Some(true) || self.tapping() == Some(true) || self.threading() == Some(true) {
-            return Some(100.0);
+        if self.override_cancelled() == Ok(true) || self.tapping() == Ok(true) || self.threading() == Ok(true) {
+            return Ok(100.0);
         }
         let percent = |byte| f64::from(feed_override::decode(byte).percent());
         let second = if second { percent(self.g(13)?) } else { 100.0 };
-        Some((percent(first) * second / 100.0).min(f64::from(u8::MAX - 1)))
+        Ok((percent(first) * second / 100.0).min(f64::from(u8::MAX - 1)))
     }
 
     /// G030: spindle override, %, straight binary.
-    #[must_use]
-    pub fn spindle_override(&self) -> Option<f64> {
-        self.g(30).and_then(OverridePct::new).map(|pct| f64::from(pct.percent()))
+    ///
+    /// # Errors
+    /// As above.
+    pub fn spindle_override(&self) -> Found<f64> {
+        let pct = OverridePct::new(self.g(30)?).ok_or(Absence::OutOfRange)?;
+        Ok(f64::from(pct.percent()))
     }
 
-    /// What the feed follows the spindle in, if anything.
-    #[must_use]
-    pub fn operation(&self) -> Option<&'static str> {
-        match (self.threading(), self.tapping()) {
-            (_, Some(true)) => Some(operation::TAPPING),
-            (Some(true), _) => Some(operation::THREADING),
-            _ => None,
+    /// What the feed follows the spindle in.
+    ///
+    /// # Errors
+    /// As above; nothing of the kind is *not supported*.
+    pub fn operation(&self) -> Found<&'static str> {
+        match (self.threading()?, self.tapping()?) {
+            (_, true) => Ok(operation::TAPPING),
+            (true, _) => Ok(operation::THREADING),
+            _ => Err(Absence::NotSupported),
         }
     }
 }
 
-fn bytes<const N: usize>(values: &[i32]) -> Option<[u8; N]> {
+fn bytes<const N: usize>(values: &[i32]) -> Found<[u8; N]> {
     let bytes: Vec<u8> = values.iter().filter_map(|value| u8::try_from(*value).ok()).collect();
-    bytes.try_into().ok()
+    bytes.try_into().map_err(|_| Absence::OutOfRange)
 }
 
 /// The word of the channel `mode`; `None` when the control shows none.
@@ -184,7 +211,7 @@ pub fn alarm(status: &Status, alarms: &[Alarm], axes: &[String]) -> String {
     texts.join("; ")
 }
 
-fn one(alarm: &Alarm, axes: &[String]) -> String {
+pub(super) fn one(alarm: &Alarm, axes: &[String]) -> String {
     let kind = usize::try_from(alarm.kind).ok().and_then(|kind| ALARM_KINDS.get(kind)).copied().unwrap_or("");
     let axis = usize::try_from(alarm.axis - 1).ok().and_then(|axis| axes.get(axis));
     let axis = axis.map_or(String::new(), |axis| format!(" ({axis})"));
@@ -207,7 +234,7 @@ mod tests {
             let place = if *letter == 'F' { &mut control[*byte] } else { &mut ladder[byte - 6] };
             *place = i32::from(*value);
         }
-        Signals::new(Some(&control), Some(&ladder))
+        Signals::new(Ok(&control), Ok(&ladder))
     }
 
     #[test]
@@ -232,24 +259,27 @@ mod tests {
 
     #[test]
     fn overrides_as_the_signals_give_them() {
-        assert_eq!(signals(&[]).feed_override(false), Some(100.0));
-        assert_eq!(signals(&[('G', 12, 0xAF)]).feed_override(false), Some(80.0));
-        assert_eq!(signals(&[('G', 12, 0x00)]).feed_override(false), Some(0.0), "all bits 0 are 0 %, not 255 %");
-        assert_eq!(signals(&[('G', 12, 0xFF)]).feed_override(false), Some(0.0));
-        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 13, 0xCD)]).feed_override(true), Some(40.0));
-        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 6, 0x10)]).feed_override(false), Some(100.0), "cancelled");
-        assert_eq!(signals(&[('G', 12, 0xAF), ('F', 2, 0x08)]).feed_override(false), Some(100.0), "threading");
-        assert_eq!(signals(&[]).spindle_override(), Some(100.0));
-        assert_eq!(Signals::new(None, None).feed_override(false), None);
+        assert_eq!(signals(&[]).feed_override(false), Ok(100.0));
+        assert_eq!(signals(&[('G', 12, 0xAF)]).feed_override(false), Ok(80.0));
+        assert_eq!(signals(&[('G', 12, 0x00)]).feed_override(false), Ok(0.0), "all bits 0 are 0 %, not 255 %");
+        assert_eq!(signals(&[('G', 12, 0xFF)]).feed_override(false), Ok(0.0));
+        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 13, 0xCD)]).feed_override(true), Ok(40.0));
+        assert_eq!(signals(&[('G', 12, 0xAF), ('G', 6, 0x10)]).feed_override(false), Ok(100.0), "cancelled");
+        assert_eq!(signals(&[('G', 12, 0xAF), ('F', 2, 0x08)]).feed_override(false), Ok(100.0), "threading");
+        assert_eq!(signals(&[]).spindle_override(), Ok(100.0));
+        assert_eq!(
+            Signals::new(Err(Absence::Refused), Err(Absence::Refused)).feed_override(false),
+            Err(Absence::Refused)
+        );
     }
 
     #[test]
     fn threads_and_single_block_are_told_by_signals() {
-        assert_eq!(signals(&[('F', 1, 0x20)]).operation(), Some("tapping"));
-        assert_eq!(signals(&[('F', 2, 0x08)]).operation(), Some("threading"));
-        assert_eq!(signals(&[]).operation(), None);
-        assert_eq!(signals(&[('F', 4, 0x08)]).single_block(), Some(true));
-        assert_eq!(signals(&[('F', 2, 0x02)]).rapid(), Some(true));
+        assert_eq!(signals(&[('F', 1, 0x20)]).operation(), Ok("tapping"));
+        assert_eq!(signals(&[('F', 2, 0x08)]).operation(), Ok("threading"));
+        assert_eq!(signals(&[]).operation(), Err(Absence::NotSupported));
+        assert_eq!(signals(&[('F', 4, 0x08)]).single_block(), Ok(true));
+        assert_eq!(signals(&[('F', 2, 0x02)]).rapid(), Ok(true));
     }
 
     #[test]

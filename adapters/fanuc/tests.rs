@@ -29,7 +29,10 @@ fn lathe_with(times: f64, with: impl FnOnce(SimulatedControl) -> SimulatedContro
     let clock = Arc::new(ScaledClock::new(times));
     let origin_ns = clock.now_ns() - 1800 * crate::clock::SECOND_NS;
     let machine = Simulated::new("simulated://lathe", SimulatedSettings::default(), origin_ns);
-    (serve(Box::new(with(SimulatedControl::new(machine.clone(), clock, 4)))), machine)
+    let server = serve(Box::new(with(SimulatedControl::new(machine.clone(), clock, 4))));
+    // The morning is simulated at the first look, which a client must not wait for.
+    server.with(|_| ());
+    (server, machine)
 }
 
 fn dial_at(percent: u8) -> impl FnOnce(SimulatedControl) -> SimulatedControl {

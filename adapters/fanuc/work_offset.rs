@@ -34,9 +34,11 @@ impl ExternalOffsets {
             return Ok(number);
         }
         let facts = self.line.ask(clock, &[Item::Status])?.facts;
-        let place = facts.axes.iter().position(|name| name.eq_ignore_ascii_case(axis.word()));
+        let not_told = |_| self.refused(axis, "the control has not told the names of its axes", SEE_DOCTOR);
+        let axes = facts.axes_of(self.line.path()).map_err(not_told)?;
+        let place = axes.iter().position(|name| name.eq_ignore_ascii_case(axis.word()));
         let number = place.and_then(|place| i16::try_from(place + 1).ok());
-        let next = format!("Its axes are {}; correct `axes` under [gate.offset]", facts.axes.join(", "));
+        let next = format!("Its axes are {}; correct `axes` under [gate.offset]", axes.join(", "));
         self.numbers[axis.index()] = number;
         number.ok_or_else(|| self.refused(axis, "the control has no axis of this name", &next))
     }
@@ -65,13 +67,12 @@ impl OffsetSink for ExternalOffsets {
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
         let item = Item::WorkOffset(0, self.number(clock, axis)?);
         let asked = self.line.ask(clock, &[Item::Status, item])?;
-        if asked.facts.inch {
-            return Err(self.refused(
-                axis,
-                "the machine measures in inches",
-                "Only machines in millimetres are shifted",
-            ));
-        }
+        let unit = match asked.facts.inch {
+            Ok(false) => Ok(()),
+            Ok(true) => Err(("the machine measures in inches", "Only machines in millimetres are shifted")),
+            Err(_) => Err(("the control has not told whether it measures in inches", "It is asked again by itself")),
+        };
+        unit.map_err(|(what, next)| self.refused(axis, what, next))?;
         let at_rest = match asked.of(Item::Status) {
             Some(Ok(Answer::Status(Status { run, .. }))) => Some(*run == 0),
             _ => None,

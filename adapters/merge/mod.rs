@@ -121,6 +121,8 @@ pub struct Merge {
     tracks: Vec<Track>,
     /// Track of (source, channel), or [`NO_TRACK`].
     lookup: Vec<u16>,
+    /// Channels that there were when the merge was made.
+    channels: usize,
     delay_ns: i64,
     last_tick_ns: TimeNs,
     tick_steps: u64,
@@ -132,6 +134,7 @@ impl Merge {
     #[must_use]
     pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
         let delay_ns = delay_of(plans, delay);
+        let channels = ChannelId::count();
         let pace = |plan: &SourcePlan| Pace::new(nanoseconds(plan.period), delay_ns);
         let mut merge = Self {
             sources: plans
@@ -146,12 +149,13 @@ impl Merge {
                 .collect(),
             lanes: Vec::new(),
             tracks: Vec::new(),
-            lookup: vec![NO_TRACK; plans.len() * ChannelId::count()],
+            lookup: vec![NO_TRACK; plans.len() * channels],
+            channels,
             delay_ns,
             last_tick_ns: TimeNs::MIN,
             tick_steps: 0,
         };
-        ChannelId::all().for_each(|channel| merge.add_lane(plans, channel));
+        ChannelId::all().take(channels).for_each(|channel| merge.add_lane(plans, channel));
         merge
     }
 
@@ -159,7 +163,7 @@ impl Merge {
         let first = self.tracks.len();
         for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
             let track = self.tracks.len();
-            self.lookup[source * ChannelId::count() + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
+            self.lookup[source * self.channels + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
             self.tracks.push(Track::new(channel, source, self.sources[source].pace));
         }
         if self.tracks.len() > first {
@@ -198,7 +202,9 @@ impl Merge {
     pub fn push(&mut self, source: SourceId, reading: Reading) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
         state.counts.readings += 1;
-        let track = self.lookup[source.0 * ChannelId::count() + reading.channel.index()];
+        // A channel that was declared later has no track.
+        let known = reading.channel.index() < self.channels;
+        let track = if known { self.lookup[source.0 * self.channels + reading.channel.index()] } else { NO_TRACK };
         let Some(track) = self.tracks.get_mut(usize::from(track)) else {
             state.counts.unannounced += 1;
             return;

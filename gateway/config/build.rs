@@ -4,7 +4,7 @@ use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
 use super::{
     Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Http, Log, Offset, Operations, Scripts, Source,
-    Twin,
+    Twin, channels,
 };
 use crate::log::LogFormat;
 use adapters::Axis;
@@ -19,6 +19,11 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     let sources: Option<Vec<Source>> = reading.sources.iter().map(source).collect();
     check_names(reading);
     check_gate(reading);
+    let sources = sources.map(|mut sources| {
+        let written = reading.sources.clone();
+        sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
+        sources
+    });
     let gateway = gateway(reading, base)?;
     Some(Config {
         alignment: Alignment {

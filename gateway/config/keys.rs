@@ -1,5 +1,6 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
+use super::channel_keys;
 pub use super::shown::{example, table};
 
 /// What a key accepts.
@@ -68,6 +69,11 @@ const fn section(name: &'static str, en: &'static str) -> Section {
 pub const SECTIONS: &[Section] = &[
     section("gateway", "the box itself"),
     Section { name: "source", repeated: true, en: "one controller or meter; write the section once for each" },
+    Section {
+        name: channel_keys::SECTION,
+        repeated: true,
+        en: "below a fanuc:// source: a variable, parameter, diagnosis number or PMC byte as a channel of your own",
+    },
     section("alignment", "one time base: how late each power meter is against the controller"),
     section("scripts", "the rules that the integrator edits"),
     section("operations", "how each stretch of an NC program cuts, which no controller can be asked for"),
@@ -93,7 +99,10 @@ use Absent::{Default, Optional, Required};
 use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
 
 /// Every key the gateway knows.
-pub const KEYS: &[Key] = &[
+pub static KEYS: &[Key] = &channel_keys::ALL;
+
+/// Every key but those of channels.
+pub(super) const FIRST: &[Key] = &[
     key(
         ("gateway", "name"),
         Text,

@@ -6,6 +6,8 @@
 //! Nothing is guessed: an unknown key, a wrong type or a value out of range refuses the file, all of them at once.
 
 mod build;
+mod channel_keys;
+mod channels;
 mod check_value;
 pub mod keys;
 mod problem;

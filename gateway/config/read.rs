@@ -1,5 +1,6 @@
 //! From text to checked values: walks the file by the table of keys and collects every problem on the way.
 
+use super::channel_keys;
 use super::check_value::{Scalar, check_scalar, check_written};
 use super::keys::{Absent, Key, SECTIONS, Section, find, find_section, keys_of};
 use super::problem::Problem;
@@ -30,7 +31,18 @@ pub(super) struct Found {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Values {
     pub(super) found: BTreeMap<&'static str, Found>,
+    /// Sections written several times below this one.
+    pub(super) inner: Vec<Values>,
     offset: Option<usize>,
+}
+
+impl Values {
+    /// Where a key was written, or where its section begins.
+    pub(super) fn origin(&self, key: &str) -> Origin {
+        let section = self.offset.map_or(Origin::Default, Origin::File);
+        let written = self.found.get(key).map(|found| found.origin.clone());
+        written.filter(|origin| *origin != Origin::Default).unwrap_or(section)
+    }
 }
 
 /// Everything found in the file and the environment.
@@ -121,13 +133,37 @@ impl<'a> Reading<'a> {
         }
     }
 
+    /// A section below another one; those that can stand there several times belong to the one above.
+    fn within(&mut self, section: &'static Section, value: &Spanned<DeValue<'_>>, offset: usize) -> Vec<Values> {
+        match (section.repeated, value.get_ref()) {
+            (false, DeValue::Table(table)) => {
+                let found = self.values(section, table, offset);
+                self.single.insert(section.name, found);
+                Vec::new()
+            }
+            (true, DeValue::Array(items)) if items.iter().all(|item| matches!(item.get_ref(), DeValue::Table(_))) => {
+                let tables = items.iter().filter_map(|item| match item.get_ref() {
+                    DeValue::Table(table) => Some((table, item.span().start)),
+                    _ => None,
+                });
+                tables.map(|(table, start)| self.values(section, table, start)).collect()
+            }
+            (repeated, _) => {
+                let (open, close) = if repeated { ("[[", "]]") } else { ("[", "]") };
+                let next = format!("write {open}{}{close}", section.name);
+                self.problem(&Origin::File(offset), format!("{} is a section", section.name), next);
+                Vec::new()
+            }
+        }
+    }
+
     fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> Values {
         let mut values = Values { offset: Some(offset), ..Values::default() };
         for (name, value) in table.iter() {
             let within = find_section(&format!("{}.{}", section.name, name.get_ref()));
-            if let (Some(within), DeValue::Table(inner)) = (within, value.get_ref()) {
-                let found = self.values(within, inner, name.span().start);
-                self.single.insert(within.name, found);
+            if let Some(within) = within {
+                let found = self.within(within, value, name.span().start);
+                values.inner.extend(found);
                 continue;
             }
             let Some(key) = find(section.name, name.get_ref()) else {
@@ -197,9 +233,12 @@ impl<'a> Reading<'a> {
             self.single.insert(section.name, values);
         }
         let mut sources = std::mem::take(&mut self.sources);
-        let section = find_section("source");
+        let (section, channel) = (find_section("source"), find_section(channel_keys::SECTION));
         for values in &mut sources {
             section.into_iter().for_each(|section| self.fill(section, values));
+            for inner in &mut values.inner {
+                channel.into_iter().for_each(|section| self.fill(section, inner));
+            }
         }
         self.sources = sources;
     }

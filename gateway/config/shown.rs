@@ -48,12 +48,20 @@ pub fn example() -> String {
         String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
     for section in SECTIONS {
         let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
-        text += &format!("\n{open}{}{close}{}# {}\n", section.name, " ", section.en);
+        // What may stand below another section several times need not stand there at all.
+        let begin = if section.repeated && section.name.contains('.') { "# " } else { "" };
+        text += &format!("\n{begin}{open}{}{close}{}# {}\n", section.name, " ", section.en);
         for key in keys_of(section.name) {
-            text += &example_line(key);
+            text += &if begin.is_empty() { example_line(key) } else { example_below(key) };
         }
     }
     text
+}
+
+fn example_below(key: &Key) -> String {
+    let value = if let Default(value) = key.absent { value } else { "..." };
+    let written = format!("# {} = {value}", key.name);
+    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
 }
 
 fn example_line(key: &Key) -> String {

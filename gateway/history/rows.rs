@@ -154,12 +154,15 @@ fn append_words(words: &mut Column, have: usize, more: &[(u32, Word)], rows: &Ra
 pub(crate) struct Rows {
     pub(crate) at_ns: Vec<TimeNs>,
     pub(crate) columns: Vec<Column>,
+    /// How many of the columns, from the first on, are channels.
+    channels: usize,
 }
 
 impl Rows {
     /// No rows yet of these series.
     pub(crate) fn of(series: &[Series]) -> Self {
-        Self { at_ns: Vec::new(), columns: series.iter().map(|series| Column::new(series.kind)).collect() }
+        let channels = series.iter().take_while(|series| !series.estimated).count();
+        Self { channels, at_ns: Vec::new(), columns: series.iter().map(|series| Column::new(series.kind)).collect() }
     }
 
     /// No rows yet of the same series.
@@ -168,7 +171,7 @@ impl Rows {
             Column::Numbers { .. } => Column::Numbers { values: Vec::new(), missing: Vec::new() },
             Column::Words(_) => Column::Words(Vec::new()),
         });
-        Self { at_ns: Vec::new(), columns: columns.collect() }
+        Self { channels: self.channels, at_ns: Vec::new(), columns: columns.collect() }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -189,8 +192,8 @@ impl Rows {
     pub(crate) fn push(&mut self, sample: &Sample, extras: &[ExtraValue<'_>], reasons: &mut Reasons) {
         let row = self.at_ns.len();
         self.at_ns.push(sample.at_ns);
-        let channel_count = ChannelId::count().min(self.columns.len());
-        let (channels, estimates) = self.columns.split_at_mut(channel_count);
+        let channels = self.channels.min(self.columns.len());
+        let (channels, estimates) = self.columns.split_at_mut(channels);
         for (channel, column) in ChannelId::all().zip(channels) {
             match &sample.slot(channel).value {
                 Ok(Value::Number(number)) => column.push_number(row, *number),

@@ -4,7 +4,7 @@ use super::error::HistoryError;
 use super::options::{ExtraSeries, Fidelity, Options, SeriesKind};
 use super::rounding::{PLACES_MAX, rounded};
 use adapters::ChannelId;
-use adapters::channel::{CHANNELS, Channel, Kind};
+use adapters::channel::{Channel, Kind};
 use std::sync::Arc;
 
 /// One stored series.
@@ -85,7 +85,7 @@ pub fn as_stored(channel: ChannelId, number: f64) -> f64 {
 /// Every series a writer stores, channels first. The `id` is still 0.
 pub(crate) fn stored_series(options: &Options) -> Result<Vec<Series>, HistoryError> {
     let mut series: Vec<Series> =
-        CHANNELS.iter().map(|channel| Series::of_channel(channel, options.fidelity)).collect();
+        ChannelId::all().map(|id| Series::of_channel(id.channel(), options.fidelity)).collect();
     for extra in &options.extras {
         if extra.name.is_empty() || series.iter().any(|known| *known.name == *extra.name) {
             let name = &extra.name;
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn channels_keep_their_place() {
         let series = stored_series(&Options::default()).expect("fine");
-        assert_eq!(series.len(), CHANNELS.len());
-        assert!(series.iter().zip(CHANNELS).all(|(series, channel)| *series.name == *channel.name));
+        assert_eq!(series.len(), ChannelId::count());
+        assert!(series.iter().zip(ChannelId::all()).all(|(series, channel)| *series.name == *channel.name()));
     }
 }

@@ -1,6 +1,8 @@
 /* A library with the vendor's functions and none of its code: fixed values of a lathe that cuts, and faults on purpose.
  * The file named by FAKE_LIBRARY_FAULT holds "KIND FUNCTION [CODE]"; KIND is hang, abort, overrun or code. "wait any MS"
  * makes every call that a real library sends take so long. The second path cuts at half the speed of the first.
+ * FAKE_LIBRARY_FEED holds "DATA DECIMALS UNIT GROUP INCH": the feed of cnc_rdspeed, the modal group of feed per revolution,
+ * and whether the machine measures in inches.
  * Compiled by the tests with the system's compiler. */
 #include <pthread.h>
 #include <stdint.h>
@@ -15,6 +17,7 @@ static pthread_t owner;
 static int32_t macro_value = 254;
 static int16_t macro_places = 1;
 static uint8_t memory_r[1000];
+static int feed_data = 240, feed_decimals, feed_unit, feed_group, inch;
 
 /* 0 go on, 1 return *code. */
 static int fault(const char *function, void *out, size_t size, int16_t *code) {
@@ -53,6 +56,8 @@ struct element { int32_t data; int16_t dec, unit; char name, suff1, suff2, reser
 
 int16_t cnc_startupprocess(int32_t level, const char *file) {
     (void)file;
+    const char *feed = getenv("FAKE_LIBRARY_FEED");
+    if (feed) sscanf(feed, "%d %d %d %d %d", &feed_data, &feed_decimals, &feed_unit, &feed_group, &inch);
     started = 1;
     return level > 3 ? 3 : 0;
 }
@@ -113,6 +118,17 @@ int16_t cnc_acts(uint16_t h, int32_t *out) {
     (void)h;
     CHECKED(out, 8);
     out[1] = 1200 / path_now;
+    return 0;
+}
+
+int16_t cnc_rdspeed(uint16_t h, int16_t kind, void *out) {
+    struct { int32_t data; int16_t dec, unit, disp; char name, suff; } values[2] = {
+        {feed_data / path_now, (int16_t)feed_decimals, (int16_t)feed_unit, 1, 'F', 0},
+        {1200 / path_now, 0, 2, 1, 'S', '1'},
+    };
+    (void)h;
+    CHECKED(out, 24);
+    memcpy(out, values, kind == 0 ? 12 : 24);
     return 0;
 }
 
@@ -182,6 +198,10 @@ int16_t cnc_rddynamic2(uint16_t h, int16_t axis, int16_t length, int32_t *out) {
 int16_t cnc_modal(uint16_t h, int16_t kind, int16_t block, int32_t *out) {
     (void)h, (void)block;
     CHECKED(out, 260);
+    if (kind < 100) {
+        ((uint8_t *)out)[4] = kind == 4 ? (uint8_t)feed_group : 0;
+        return 0;
+    }
     out[1] = kind == 103 ? 250 / path_now : kind == 107 ? 1200 / path_now : kind == 108 ? 303 : 0;
     return 0;
 }
@@ -206,7 +226,7 @@ int16_t cnc_rdparam(uint16_t h, int16_t number, int16_t axis, int16_t length, in
     (void)h, (void)axis;
     CHECKED(out, 12);
     if (number == 6711 && length < 8) return 2;
-    out[1] = number == 6711 ? 17 : 0;
+    out[1] = number == 6711 ? 17 : number == 1001 ? inch : 0;
     return 0;
 }
 

@@ -1,7 +1,7 @@
 //! What the channels say, for three generations.
 
 use crate::support::{CUT, address, controller, number, opened, poll, serve, text, value};
-use adapters::fanuc::answer::Alarm;
+use adapters::fanuc::answer::{Alarm, SpeedUnit};
 use adapters::fanuc::item::Area;
 use adapters::fanuc::server::ServerSettings;
 use adapters::fanuc::wire::Number;
@@ -70,9 +70,8 @@ fn the_power_that_a_drive_shows_of_itself_is_read_where_the_address_says_so() {
 #[test]
 fn inches_become_millimetres_and_feed_per_turn_becomes_feed() {
     let mut control = controller(4);
-    control.parameter(1001, 0, Number::decimal(1, 0));
-    control.speed_units = [4, 2];
-    control.feed = Number::decimal(8, 3);
+    control.measure_in_inches(true);
+    control.feed_in(SpeedUnit::InchRev, Number::decimal(8, 3));
     control.axes[0].positions[1] = Number::decimal(20_000, 4);
     let server = serve(control, ServerSettings::default());
     let mut opened = opened(&server, "");

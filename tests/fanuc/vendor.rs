@@ -35,7 +35,11 @@ fn opened(library: &Library) -> OpenedFanuc {
 
 /// With the keys of this address.
 pub(crate) fn opened_with(library: &Library, address: &str) -> OpenedFanuc {
-    let settings = settings(library);
+    opened_in(settings(library), address)
+}
+
+/// With these settings of the child.
+pub(crate) fn opened_in(settings: VendorSettings, address: &str) -> OpenedFanuc {
     let connect: Connect = Box::new(move || Ok(Box::new(Vendor::connect(settings.clone())?)));
     let address: Address = address.parse().expect("usable");
     let Target::Fanuc { path, options, .. } = address.target() else { panic!("{address}") };

@@ -1,7 +1,7 @@
 //! The control that stood behind the captured frames.
 
 use crate::fanuc::answer::{Alarm, Status, System};
-use crate::fanuc::item::Area;
+use crate::fanuc::item::{Area, Word};
 use crate::fanuc::server::{Axis, Controller};
 use crate::fanuc::wire::Number;
 
@@ -29,7 +29,7 @@ pub(super) fn controller(version: u16) -> Controller {
         Alarm { number: 100, kind: 3, axis: 0, text: "PARAMETER ENABLE SWITCH ON".into() },
         Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".into() },
     ];
-    control.modal_words.extend([(5, 1200), (11, 3), (22, 12)]);
+    control.modal([(Word::F, 1200), (Word::M, 3), (Word::T, 12)]);
     control.macros.insert(500, Some(25.4));
     control.parameter(6711, 3, Number::decimal(456, 0));
     [3106, 3107, 9936].into_iter().for_each(|number| control.parameter(number, 3, Number::decimal(0, 0)));
@@ -51,7 +51,7 @@ fn axes() -> Vec<Axis> {
         ('Z', 118, [10_500, -10_500, -3000, -250]),
     ];
     let axis = |(name, load, positions): (char, i32, [i32; 4])| {
-        let mut axis = Axis::new(name);
+        let mut axis = Axis::new(&name.to_string());
         axis.load = Number::decimal(load, 0);
         axis.positions = positions.map(|position| Number::decimal(position, 3));
         axis

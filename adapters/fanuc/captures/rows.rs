@@ -1,6 +1,6 @@
 //! The captured calls about state, speeds, program and positions; the others stand in `values`.
 
-use crate::fanuc::answer::{Answer, ItemError, ItemResult, Refusal, Status, System};
+use crate::fanuc::answer::{Answer, ItemError, ItemResult, Refusal, SpeedUnit, Status, System};
 use crate::fanuc::code::ReturnCode;
 use crate::fanuc::item::{Area, Item, Position, Servo, Spindle, Stretch, Write};
 
@@ -143,7 +143,6 @@ fn state() -> Vec<Row> {
 }
 
 fn speeds() -> Vec<Row> {
-    use Answer::Whole;
     let none = |parameter| (Item::Parameter(parameter, 0), data(3, 0.0));
     vec![
         read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(Item::Feed, number(1200.0))]),
@@ -160,12 +159,12 @@ fn speeds() -> Vec<Row> {
             "cnc_rdspeed",
             NEWER,
             "1/a4 3 | 1/8a 1 | 1/88 3 | 1/88 4 | 1/24 | 1/25 | 1/a4 3",
-            "0001 | 53310000 | 0000 | 0002 | 000004b0000a0000 | 00001f40000a0000 | 0001",
+            "0001 | 53310000 | 0003 | 0003 | 000004b0000a0000 | 00001f40000a0000 | 0001",
             vec![
                 count(3, 1),
                 (Item::SpindleNames(1), names(&["S1"])),
-                (Item::SpeedUnit(3), Whole(0)),
-                (Item::SpeedUnit(4), Whole(2)),
+                (Item::FeedUnit, Answer::Unit(SpeedUnit::MmMin)),
+                (Item::SpindleUnit, Answer::Unit(SpeedUnit::Rpm)),
                 (Item::Feed, number(1200.0)),
                 (Item::SpindleSpeed, number(8000.0)),
                 count(3, 1),
@@ -180,7 +179,7 @@ fn speeds() -> Vec<Row> {
             vec![
                 (Item::Feed, number(1200.0)),
                 (Item::SpindleSpeed, number(8000.0)),
-                (Item::SpeedUnit(0), Whole(0)),
+                (Item::FeedUnit, Answer::Unit(SpeedUnit::MmMin)),
                 none(3106),
                 none(3107),
                 none(9936),

@@ -2,7 +2,7 @@
 
 use super::rows::{ALL, NEWER, OLDER, Row, data, modal, number, read, refused, write};
 use crate::fanuc::answer::{Alarm, Answer};
-use crate::fanuc::item::{Area, Item, Stretch, Timer, Width, Write};
+use crate::fanuc::item::{Area, Item, Stretch, Timer, Width, Word, Write};
 
 pub(super) fn all() -> Vec<Row> {
     [values(), variables(), parameters(), writes(), rest()].into_iter().flatten().collect()
@@ -16,9 +16,9 @@ fn values() -> Vec<Row> {
     // 1704562278 / 2^26, which is how an older control holds 25.4.
     let nearly = f64::from(0x6599_9999u32) / f64::from(1u32 << 26);
     vec![
-        read("cnc_modal of F", ALL, "1/22 5", "000004b0 40000000", vec![(Item::ModalWord(5), modal(1200))]),
-        read("cnc_modal of M", ALL, "1/22 b", "00000003 40000000", vec![(Item::ModalWord(11), modal(3))]),
-        read("cnc_modal of T", ALL, "1/22 16", "0000000c 40000000", vec![(Item::ModalWord(22), modal(12))]),
+        read("cnc_modal of F", ALL, "1/22 5", "000004b0 40000000", vec![(Item::ModalWord(Word::F), modal(1200))]),
+        read("cnc_modal of M", ALL, "1/22 b", "00000003 40000000", vec![(Item::ModalWord(Word::M), modal(3))]),
+        read("cnc_modal of T", ALL, "1/22 16", "0000000c 40000000", vec![(Item::ModalWord(Word::T), modal(12))]),
         read(
             "cnc_rdalmmsg2",
             ALL,

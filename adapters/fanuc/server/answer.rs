@@ -1,11 +1,13 @@
 //! One question to one answer, in the encoding of the generation.
 
+use super::axes::{self, places};
 use super::controller::{Controller, Data};
-use super::write;
-use crate::fanuc::answer::{Alarm, System};
-use crate::fanuc::item::{Area, Stretch, Width};
+use super::encode::{long, longs, shorts, text};
+use super::{message, program, tool, write};
+use crate::fanuc::answer::System;
+use crate::fanuc::item::{Area, Spindle, Stretch, Width};
 use crate::fanuc::opening::Generation;
-use crate::fanuc::request::{ALARM_TEXT_LEN, function as f};
+use crate::fanuc::request::function as f;
 use crate::fanuc::wire::{Device, Number, ReplyBlock, Request, reply_body};
 
 /// What a question yields: data, or a return code.
@@ -57,38 +59,44 @@ fn data(controller: &mut Controller, request: &Request) -> Data8 {
 
 /// Identity, state, program, alarms.
 fn state(controller: &Controller, request: &Request) -> Option<Data8> {
-    let first = request.arguments[0];
+    let [first, second, third, fourth, ..] = request.arguments;
     let status = controller.status;
     let seven =
         [status.automatic, status.run, status.motion, status.auxiliary, status.emergency, status.alarm, status.edit];
     Some(Ok(match request.function {
         f::SYSTEM => system(&controller.system),
+        f::CNC_ID => controller.id.iter().flat_map(|word| word.to_be_bytes()).collect(),
         f::STATUS => shorts(&seven),
         f::STATUS_LONG => shorts(&[&seven[..], &[0; 4]].concat()),
         f::HANDLE_RETRACE | f::TOOL_MODE | f::TUNING_MODE => shorts(&[0]),
         f::PROGRAM => longs(&[controller.program.0, controller.program.1]),
-        f::PROGRAM_NAME => {
-            let name = format!("O{}", controller.program.0);
-            [longs(&[controller.program.0]), text(&name, 36)].concat()
-        }
+        f::PROGRAM_NAME => program::name(controller),
         f::PROGRAM_PATH | f::MAIN_PROGRAM => text(&controller.program_path, 256),
         f::SEQUENCE => longs(&[controller.sequence]),
         f::BLOCK_COUNT => longs(&[controller.blocks]),
-        f::EXECUTED_TEXT => {
-            let most = usize::try_from(first).unwrap_or(0).min(controller.executed.1.len());
-            [&longs(&[controller.executed.0])[..], &controller.executed.1.as_bytes()[..most]].concat()
-        }
+        f::EXECUTED_TEXT => program::executed(controller, first),
+        f::PROGRAM_LIST => program::list(controller, first, second),
+        f::PROGRAM_COUNTS => program::counts(controller),
         f::ALARM_BITS => longs(&[controller.alarm_bits]),
-        f::ALARMS => {
-            controller.alarms.iter().take(usize::try_from(request.arguments[1]).unwrap_or(0)).flat_map(alarm).collect()
-        }
+        f::ALARMS => message::alarms(controller, second, fourth),
+        f::ALARM_HISTORY_COUNT => longs(&[long(controller.alarm_history.len())]),
+        f::ALARM_HISTORY => return Some(message::history(controller, first, second)),
+        f::MESSAGES_OLDER => message::messages(controller, first, usize::MAX),
+        f::CLOCK => shorts(&controller.clock),
         f::TIMER => return Some(timer(controller, first)),
-        f::PANEL_SIGNALS => {
-            // The mask stands before the signals in the vendor's structure, not on the wire.
-            shorts(&controller.panel)
-        }
+        // The mask stands before the signals in the vendor's structure, not on the wire.
+        f::PANEL_SIGNALS => shorts(&controller.panel),
+        _ if !is_newer(controller) => return None,
+        f::MESSAGES => message::messages(controller, second, usize::try_from(third).unwrap_or(0)),
+        f::CURRENT_FOLDER => text(program::FOLDER, 256),
+        f::FOLDER => return Some(program::folder(controller, request)),
+        f::FOLDER_COUNTS => return Some(program::folder_counts(controller, request)),
         _ => return None,
     }))
+}
+
+fn is_newer(controller: &Controller) -> bool {
+    matches!(controller.opening.generation, Generation::Newer(_))
 }
 
 fn timer(controller: &Controller, which: i32) -> Data8 {
@@ -96,79 +104,57 @@ fn timer(controller: &Controller, which: i32) -> Data8 {
     Ok(longs(&[timer.0, timer.1]))
 }
 
-/// Axes, spindles, modal values, variables, parameters.
+/// Axes, spindles, modal values, variables, parameters, tools.
 fn motion(controller: &Controller, request: &Request) -> Data8 {
     let [first, second, third, ..] = request.arguments;
     match request.function {
         f::FEED => Ok(controller.feed.bytes().to_vec()),
-        f::SPINDLE_SPEED => spindles(controller, 3).map(|bytes| bytes.get(..8).unwrap_or_default().to_vec()),
-        f::SPINDLES => spindles(controller, first),
-        f::SERVOS => servos(controller, first),
-        f::POSITION => positions(controller, first, second),
-        f::COUNT => Ok(shorts(&[count(controller, first)])),
-        f::AXIS_NAMES => Ok(controller.axes.iter().flat_map(|axis| [axis.name as u8, 0, 0, 0]).collect()),
-        f::SPINDLE_NAMES => Ok((1..=controller.spindles.len()).flat_map(|n| [b'S', b'0' + n as u8, 0, 0]).collect()),
-        f::SPEED_UNIT => Ok(shorts(&[controller.speed_units[usize::from(first == 4)]])),
-        f::MODAL_WORD => {
-            let value = controller.modal_words.get(&first).ok_or(NUMBER)?;
-            Ok([&longs(&[*value])[..], &[0x40, 0, 0, 0]].concat())
+        f::SPINDLE_SPEED => {
+            let speeds = axes::spindles(controller, Spindle::Speed.number())?;
+            Ok(speeds.get(..Number::LEN).unwrap_or_default().to_vec())
         }
-        f::MODAL_GROUP => groups(controller, first),
+        f::SPINDLES => axes::spindles(controller, first),
+        f::SERVOS => axes::servos(controller, first),
+        f::POSITION => axes::positions(controller, first, second),
+        f::COUNT => Ok(axes::count(controller, first)),
+        f::AXIS_NAMES => Ok(axes::names(controller, first)),
+        f::SPINDLE_NAMES => Ok(axes::spindle_names(controller)),
+        f::SPEED_UNIT => Ok(axes::units(controller, first)),
+        f::POSITION_SHOWN if is_newer(controller) => Ok(axes::shown(controller)),
+        f::FIGURES => Ok(figures(controller)),
+        f::MODAL_WORD => program::modal_word(controller, first),
+        f::MODAL_GROUP => program::groups(controller, first),
+        f::G_CODES => program::g_codes(controller, first),
+        f::COMMANDS => program::commands(controller, first),
         f::MACRO => macros(controller, first, second),
+        f::MACRO_DOUBLE => doubles(controller, first, second),
         f::PARAMETER | f::PARAMETER_OLDER => parameter(controller, request, &controller.parameters),
         f::DIAGNOSIS | f::DIAGNOSIS_OLDER => parameter(controller, request, &controller.diagnoses),
-        f::TOOL_OFFSET => {
-            let value = controller.tool_offsets.get(&(first, third - 1000)).copied().unwrap_or(0);
-            Ok(Number::decimal(value, 3).bytes().to_vec())
-        }
-        f::WORK_OFFSET => offset(controller, first, third),
+        f::TOOL_OFFSET => tool::offsets(controller, first, second, third),
+        f::TOOL_OFFSET_INFO => Ok(tool::info(controller)),
+        f::WORK_OFFSET => tool::work(controller, first, second, third),
+        f::TOOL_GROUP => Ok(longs(&controller.tool_group)),
+        f::TOOL_GROUP_COUNT => Ok(longs(&[long(controller.tool_groups.len())])),
+        f::TOOL_GROUP_OPTION if is_newer(controller) => Ok(longs(&[first, 0])),
+        f::TOOL_LIFE => tool::life(controller, first, second),
         _ => Err(FUNC),
     }
 }
 
-fn count(controller: &Controller, which: i32) -> i16 {
-    let count = if matches!(which, 1 | 3) { controller.spindles.len() } else { controller.axes.len() };
-    i16::try_from(count).unwrap_or(0)
+/// Places after the point of positions: three, in and out, of every axis.
+fn figures(controller: &Controller) -> Vec<u8> {
+    let axes = controller.axes.len();
+    [longs(&[long(axes)]), shorts(&[3, 3].repeat(axes))].concat()
 }
 
-fn spindles(controller: &Controller, what: i32) -> Data8 {
-    let what = usize::try_from(what).ok().filter(|what| *what < 6).ok_or(ATTRIB)?;
-    Ok(controller.spindles.iter().flat_map(|spindle| spindle.quantities[what].bytes()).collect())
-}
-
-/// Places for every axis the controller could have; those without an axis are zero.
-fn places(controller: &Controller, of: impl Fn(usize) -> Option<Number>) -> Vec<u8> {
-    let places = usize::from(controller.opening.axes_max);
-    (0..places).flat_map(|axis| of(axis).unwrap_or(Number::decimal(0, 0)).bytes()).collect()
-}
-
-fn servos(controller: &Controller, what: i32) -> Data8 {
-    let quantity = |axis: &super::Axis| match what {
-        1 => Some(axis.load),
-        2 => Some(axis.speed),
-        3 => Some(axis.current),
-        _ => None,
+/// Variables as doubles; a vacant one is no number.
+fn doubles(controller: &Controller, first: i32, count: i32) -> Data8 {
+    let last = first.saturating_add(count.clamp(0, 100) - 1);
+    let each = |number| {
+        let value = controller.macros.get(&number).ok_or(NUMBER)?;
+        Ok(value.unwrap_or(f64::NAN).to_be_bytes())
     };
-    if !(1..=3).contains(&what) {
-        return Err(ATTRIB);
-    }
-    Ok(places(controller, |axis| controller.axes.get(axis).and_then(quantity)))
-}
-
-fn positions(controller: &Controller, what: i32, axis: i32) -> Data8 {
-    let what = [4, 1, 6, 7].iter().position(|known| *known == what).ok_or(ATTRIB)?;
-    if axis == -1 {
-        return Ok(places(controller, |axis| controller.axes.get(axis).map(|axis| axis.positions[what])));
-    }
-    let axis = usize::try_from(axis - 1).ok().and_then(|axis| controller.axes.get(axis)).ok_or(ATTRIB)?;
-    Ok(axis.positions[what].bytes().to_vec())
-}
-
-fn groups(controller: &Controller, group: i32) -> Data8 {
-    if group == -1 {
-        return Ok(controller.modal_groups.values().flat_map(|code| [*code, 0]).collect());
-    }
-    controller.modal_groups.get(&group).map(|code| vec![*code, 0]).ok_or(NUMBER)
+    (first..=last).map(each).collect::<Result<Vec<_>, i16>>().map(|all| all.concat())
 }
 
 fn macros(controller: &Controller, first: i32, last: i32) -> Data8 {
@@ -182,18 +168,9 @@ fn macros(controller: &Controller, first: i32, last: i32) -> Data8 {
     (first..=last).map(each).collect::<Result<Vec<_>, _>>().map(|all| all.concat())
 }
 
-fn offset(controller: &Controller, number: i32, axis: i32) -> Data8 {
-    let axes = i32::from(controller.opening.axes);
-    if !(0..=54).contains(&number) || !(1..=axes).contains(&axis) {
-        return Err(if (0..=54).contains(&number) { ATTRIB } else { NUMBER });
-    }
-    let value = controller.work_offsets.get(&(number, axis)).copied().unwrap_or(0);
-    Ok(Number::decimal(value, 3).bytes().to_vec())
-}
-
 fn parameter(controller: &Controller, request: &Request, table: &std::collections::BTreeMap<i32, Data>) -> Data8 {
     let [number, _, axis, ..] = request.arguments;
-    let newer = matches!(controller.opening.generation, Generation::Newer(_));
+    let newer = is_newer(controller);
     if newer != matches!(request.function, f::PARAMETER | f::DIAGNOSIS) {
         return Err(FUNC);
     }
@@ -229,23 +206,4 @@ fn system(system: &System) -> Vec<u8> {
         bytes.extend(padded(text, len));
     }
     bytes
-}
-
-fn alarm(alarm: &Alarm) -> Vec<u8> {
-    let length = i32::try_from(alarm.text.len().min(ALARM_TEXT_LEN)).unwrap_or(0);
-    [longs(&[alarm.number, alarm.kind, alarm.axis, length]), text(&alarm.text, ALARM_TEXT_LEN)].concat()
-}
-
-fn text(text: &str, len: usize) -> Vec<u8> {
-    let mut bytes = text.as_bytes().to_vec();
-    bytes.resize(len, 0);
-    bytes
-}
-
-fn shorts(numbers: &[i16]) -> Vec<u8> {
-    numbers.iter().flat_map(|number| number.to_be_bytes()).collect()
-}
-
-fn longs(numbers: &[i32]) -> Vec<u8> {
-    numbers.iter().flat_map(|number| number.to_be_bytes()).collect()
 }

@@ -1,16 +1,25 @@
 //! What a control holds, as plain values.
 
 use super::Memory;
-use crate::fanuc::answer::{Alarm, Status, System};
+use crate::fanuc::answer::{Alarm, Message, PastAlarm, SpeedUnit, Status, System};
+use crate::fanuc::item::Word;
 use crate::fanuc::opening::{Generation, Opening};
+use crate::fanuc::poll;
 use crate::fanuc::wire::Number;
 use std::collections::BTreeMap;
+
+/// The modal group of feed per minute and per revolution, and the parameter that shows the feed per revolution.
+const FEED_GROUP: i32 = 4;
+const FEED_CODES: i16 = 4;
+const FEED_SHOWN: i32 = 3107;
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axis {
-    /// Its letter.
-    pub name: char,
+    /// Its name: a letter, or a letter and a number.
+    pub name: String,
+    /// Does it turn? Its positions are degrees then.
+    pub rotary: bool,
     /// Load meter, percent; signed.
     pub load: Number,
     /// Speed of the motor.
@@ -22,11 +31,19 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A standing axis at zero.
+    /// A standing axis at zero. A, B and C turn, by custom.
     #[must_use]
-    pub fn new(name: char) -> Self {
+    pub fn new(name: &str) -> Self {
         let zero = Number::decimal(0, 0);
-        Self { name, load: zero, speed: zero, current: zero, positions: [Number::decimal(0, 3); 4] }
+        let rotary = name.starts_with(['A', 'B', 'C']);
+        Self {
+            name: name.to_owned(),
+            rotary,
+            load: zero,
+            speed: zero,
+            current: zero,
+            positions: [Number::decimal(0, 3); 4],
+        }
     }
 }
 
@@ -35,6 +52,28 @@ impl Axis {
 pub struct SpindleState {
     /// The six quantities in the order of their numbers: plain load, greatest speed, gear, speed, load, motor speed.
     pub quantities: [Number; 6],
+}
+
+/// A file in the memory for programs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProgramFile {
+    /// Number, as in O1234.
+    pub number: i32,
+    /// Size.
+    pub bytes: i32,
+    /// Comment behind the number.
+    pub comment: String,
+}
+
+/// A group of tools whose life is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ToolGroup {
+    /// Tools of the group.
+    pub tools: i32,
+    /// Their life, in uses or minutes.
+    pub life: i32,
+    /// How much of it is used.
+    pub count: i32,
 }
 
 /// A parameter or diagnosis number.
@@ -53,12 +92,18 @@ pub struct Controller {
     pub opening: Opening,
     /// Kind and series.
     pub system: System,
+    /// The number of the control, four words.
+    pub id: [u32; 4],
+    /// Does the machine measure in inches?
+    pub inch: bool,
+    /// Year, month, day, hour, minute and second of the control's clock.
+    pub clock: [i16; 6],
     /// What the control does.
     pub status: Status,
     /// Feed along the path.
     pub feed: Number,
-    /// Units of feed and spindle speed as numbered on the wire.
-    pub speed_units: [i16; 2],
+    /// Unit of `feed`, as newer controls tell it; see [`Controller::feed_in`].
+    pub feed_unit: SpeedUnit,
     /// Its spindles.
     pub spindles: Vec<SpindleState>,
     /// Its axes.
@@ -75,8 +120,16 @@ pub struct Controller {
     pub alarm_bits: i32,
     /// Alarms that are on.
     pub alarms: Vec<Alarm>,
-    /// Modal words by their number.
-    pub modal_words: BTreeMap<i32, i32>,
+    /// Alarms that have been, the oldest first.
+    pub alarm_history: Vec<PastAlarm>,
+    /// Messages to the operator.
+    pub messages: Vec<Message>,
+    /// Programs in memory.
+    pub programs: Vec<ProgramFile>,
+    /// G codes in force by their group, as the program writes them.
+    pub g_codes: BTreeMap<i16, Number>,
+    /// Modal words.
+    pub modal_words: BTreeMap<Word, Number>,
     /// Modal codes by their group.
     pub modal_groups: BTreeMap<i32, u8>,
     /// Custom macro variables; `None` is vacant. What is not here does not exist.
@@ -87,6 +140,12 @@ pub struct Controller {
     pub diagnoses: BTreeMap<i32, Data>,
     /// PMC memory.
     pub memory: Memory,
+    /// How many tool offsets there are.
+    pub tool_offset_count: i32,
+    /// Groups of tools by their number.
+    pub tool_groups: BTreeMap<i32, ToolGroup>,
+    /// The group of tools that comes next, the one in use and the one selected; 0 none.
+    pub tool_group: [i32; 3],
     /// Tool offsets by number and type, least input increments.
     pub tool_offsets: BTreeMap<(i32, i32), i32>,
     /// Work offsets by number and axis, least input increments.
@@ -110,7 +169,7 @@ pub struct Controller {
 impl Controller {
     /// A control with these axes and one spindle, of the generation of this version word.
     #[must_use]
-    pub fn new(version: u16, axes: &[char]) -> Self {
+    pub fn new(version: u16, axes: &[impl ToString]) -> Self {
         let generation = Generation::of(version);
         let older = matches!(generation, Generation::Older(_));
         let (family, axes_max, spindles_max) = if older { (3, 8, 4) } else { (5, 32, 8) };
@@ -120,23 +179,33 @@ impl Controller {
         Self {
             opening,
             system: system(older, axes.len()),
+            id: [0x0001_0002, 0x0003_0004, 0x0005_0006, 0x0007_0008],
+            inch: false,
+            clock: [2026, 1, 1, 0, 0, 0],
             status: Status { automatic: 1, ..Status::default() },
             feed: zero,
-            speed_units: [0, 2],
+            feed_unit: SpeedUnit::MmMin,
             spindles: vec![SpindleState { quantities: [zero; 6] }],
-            axes: axes.iter().map(|name| Axis::new(*name)).collect(),
+            axes: axes.iter().map(|name| Axis::new(&name.to_string())).collect(),
             program: (0, 0),
             program_path: String::new(),
             sequence: 0,
             blocks: 0,
             alarm_bits: 0,
             alarms: Vec::new(),
-            modal_words: (0..=28).map(|word| (word, 0)).collect(),
+            alarm_history: Vec::new(),
+            messages: Vec::new(),
+            programs: Vec::new(),
+            g_codes: BTreeMap::new(),
+            modal_words: Word::ALL.into_iter().map(|(word, _)| (word, zero)).collect(),
             modal_groups: (0..=40).map(|group| (group, 0)).collect(),
             macros: (1..=33).chain(100..=199).chain(500..=999).map(|number| (number, None)).collect(),
             parameters: BTreeMap::new(),
             diagnoses: BTreeMap::new(),
             memory: Memory::default(),
+            tool_offset_count: 99,
+            tool_groups: BTreeMap::new(),
+            tool_group: [0; 3],
             tool_offsets: BTreeMap::new(),
             work_offsets: BTreeMap::new(),
             offsets_only_at_rest: false,
@@ -149,9 +218,18 @@ impl Controller {
         }
     }
 
+    /// The same with these axes in the place of its own; they stand at zero.
+    #[must_use]
+    pub fn with_axes(mut self, axes: &[impl ToString]) -> Self {
+        self.axes = axes.iter().map(|name| Axis::new(&name.to_string())).collect();
+        self.opening.axes = u16::try_from(axes.len()).unwrap_or(0);
+        self.system.axes = format!("{:02}", axes.len());
+        self
+    }
+
     /// One path more, with these axes and a spindle of its own.
     #[must_use]
-    pub fn with_path(mut self, axes: &[char]) -> Self {
+    pub fn with_path(mut self, axes: &[impl ToString]) -> Self {
         self.further.push(Self::new(self.opening.generation.version(), axes));
         self.opening.paths = u16::try_from(self.further.len() + 1).unwrap_or(u16::MAX);
         self
@@ -172,6 +250,33 @@ impl Controller {
             let own = further(path).map_or(&self.opening, |path| &path.opening);
             (own.axes, own.spindles)
         })
+    }
+
+    /// Puts a feed in this unit there, and what an older control is asked for besides: the bit of the parameter that
+    /// shows it per revolution, and the modal group.
+    pub fn feed_in(&mut self, unit: SpeedUnit, feed: Number) {
+        (self.feed, self.feed_unit) = (feed, unit);
+        let group = if unit.is_per_revolution() { poll::PER_REVOLUTION } else { 0 };
+        self.modal_groups.insert(FEED_GROUP, group);
+        let code = if unit.is_per_revolution() { 95 } else { 94 };
+        self.g_codes.insert(FEED_CODES, Number::decimal(code, 0));
+        self.parameter(FEED_SHOWN, 0, Number::decimal(8, 0));
+    }
+
+    /// Puts modal words without decimals there.
+    pub fn modal(&mut self, words: impl IntoIterator<Item = (Word, i32)>) {
+        self.modal_words.extend(words.into_iter().map(|(word, value)| (word, Number::decimal(value, 0))));
+    }
+
+    /// Puts the machine into inches or millimetres, with the parameter that says so.
+    pub fn measure_in_inches(&mut self, inch: bool) {
+        self.inch = inch;
+        self.parameter(1001, 0, Number::decimal(i32::from(inch), 0));
+    }
+
+    /// Puts a value of every axis into a diagnosis number.
+    pub fn diagnosis_of_axes(&mut self, number: i32, kind: i16, values: Vec<Number>) {
+        self.diagnoses.insert(number, Data { kind, values });
     }
 
     /// Puts a parameter without axes there.

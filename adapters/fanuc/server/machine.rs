@@ -3,12 +3,12 @@
 use super::controller::{Controller, Data};
 use super::ladder::{Ladder, SCAN_NS};
 use super::listen::Served;
-use super::second_path;
+use super::{screen, second_path};
 use crate::address::SimulatedMachine;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::{Actuator, LadderRequest, LadderRule};
 use crate::fanuc::answer::{Alarm, Status};
-use crate::fanuc::item::Area;
+use crate::fanuc::item::{Area, Word};
 use crate::fanuc::wire::Number;
 use crate::simulated::{Moment, Panel, Simulated};
 use crate::units::OverridePct;
@@ -50,8 +50,11 @@ impl SimulatedControl {
         let mut controller = Controller::new(version, axes);
         controller.system.machine = if lathe { "T" } else { "M" }.to_owned();
         controller.offsets_only_at_rest = true;
-        controller.parameter(1001, 0, Number::decimal(0, 0));
-        [3106, 3107, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
+        controller.measure_in_inches(false);
+        // What the vendor's library asks older controls for besides the feed.
+        [3106, 9936].into_iter().for_each(|number| controller.parameter(number, 3, Number::decimal(0, 0)));
+        controller.parameters.insert(3115, Data { kind: 0, values: vec![Number::decimal(0, 0); axes.len()] });
+        screen::parameters(&mut controller);
         let scanned_ns = clock.now_ns();
         let (ladder, written) = (Ladder::default(), OverridePct::FULL);
         let requests = LadderRequest::ALL.map(|request| Requested { request, told: false, stood: false });
@@ -65,7 +68,8 @@ impl SimulatedControl {
         self.controller = self.controller.with_path(&['X', 'Z']);
         for control in &mut self.controller.further {
             control.offsets_only_at_rest = true;
-            control.parameter(1001, 0, Number::decimal(0, 0));
+            control.measure_in_inches(false);
+            screen::parameters(control);
         }
         let mut ladder = Ladder::of_path(2);
         (ladder.dial, ladder.rule) = (self.ladder.dial, self.ladder.rule);
@@ -139,6 +143,7 @@ impl Served for SimulatedControl {
         self.scan(now_ns);
         self.requests(&moment.panel);
         show(&mut self.controller, &moment);
+        screen::show(&mut self.controller, &moment, now_ns);
         for (ladder, control) in self.further.iter_mut().zip(&mut self.controller.further) {
             second_path::show(control, &mut self.controller.memory, ladder, &moment);
         }
@@ -160,9 +165,9 @@ fn show(control: &mut Controller, moment: &Moment) {
     control.program_path = format!("//CNC_MEM/USER/PATH1/O{:04}", panel.program);
     control.sequence = i32::from(panel.block);
     control.executed = (i32::from(panel.block), format!("N{} F{:.0}\n%", panel.block, panel.feed_programmed_mm_min));
-    let modal = [(5, panel.feed_programmed_mm_min), (20, panel.spindle_programmed_rpm.abs())];
-    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value).mantissa)));
-    control.modal_words.insert(22, i32::from(panel.tool));
+    let modal = [(Word::F, panel.feed_programmed_mm_min), (Word::S, panel.spindle_programmed_rpm.abs())];
+    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value))));
+    control.modal([(Word::T, i32::from(panel.tool))]);
     let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
     control.parameters.insert(6711, Data { kind: 3, values: vec![Number::decimal(parts, 0)] });
     control.diagnosis(403, 1, whole(moment.electric.motor_temperature_c));
@@ -199,9 +204,9 @@ pub(super) fn status(panel: &Panel) -> Status {
 /// Positions in micrometres. The load of an axis is what its friction takes: 3 % and 1 % more per 200 mm/min.
 fn axes(control: &mut Controller, panel: &Panel) {
     for axis in &mut control.axes {
-        let index = match axis.name {
-            'X' => 0,
-            'Y' => 1,
+        let index = match axis.name.as_str() {
+            "X" => 0,
+            "Y" => 1,
             _ => 2,
         };
         let position = Number { exponent: 3, ..whole(panel.position_mm[index] * 1000.0) };

@@ -6,25 +6,34 @@
 //! | `controller` | what a control holds, as plain values |
 //! | `memory` | PMC memory |
 //! | `answer` | one question to one answer, in the encoding of the generation |
+//! | `axes`, `program`, `message`, `tool` | what it shows of them |
+//! | `encode` | values as bytes |
 //! | `write` | what a question writes |
 //! | `listen` | connections, sessions, frames |
 //! | `fault` | faults on purpose |
 //! | `ladder` | the ladder of the sample machine: who decides about the feed override |
 //! | `machine` | the simulated machine behind a control |
+//! | `screen` | what its control shows besides motion and states |
 //! | `second_path` | what its second turret shows |
 
 mod answer;
+mod axes;
 mod controller;
+mod encode;
 mod fault;
 pub mod ladder;
 mod listen;
 mod machine;
 mod memory;
+mod message;
+mod program;
+mod screen;
 mod second_path;
+mod tool;
 mod write;
 
 pub use answer::answer_body;
-pub use controller::{Axis, Controller, Data, SpindleState};
+pub use controller::{Axis, Controller, Data, ProgramFile, SpindleState, ToolGroup};
 pub use fault::Fault;
 pub use listen::{Served, Server, ServerSettings};
 pub use machine::SimulatedControl;

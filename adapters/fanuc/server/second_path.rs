@@ -7,7 +7,7 @@ use super::ladder::Ladder;
 use super::machine::{status, whole};
 use super::memory::Memory;
 use crate::driver::LadderRequest;
-use crate::fanuc::item::Area;
+use crate::fanuc::item::{Area, Word};
 use crate::fanuc::poll::signal;
 use crate::fanuc::wire::Number;
 use crate::simulated::Moment;
@@ -45,9 +45,9 @@ pub(super) fn show(control: &mut Controller, memory: &mut Memory, ladder: &mut L
     }
     let program = i32::from(panel.program) + PROGRAM_STEP * (i32::from(path) - 1);
     (control.program, control.sequence) = ((program, program), i32::from(panel.block));
-    let modal = [(5, panel.feed_programmed_mm_min / 2.0), (20, panel.spindle_programmed_rpm.abs() / 2.0)];
-    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value).mantissa)));
-    control.modal_words.insert(22, 20 + i32::from(panel.tool));
+    let modal = [(Word::F, panel.feed_programmed_mm_min / 2.0), (Word::S, panel.spindle_programmed_rpm.abs() / 2.0)];
+    control.modal_words.extend(modal.map(|(word, value)| (word, whole(value))));
+    control.modal([(Word::T, 20 + i32::from(panel.tool))]);
     // Half the speed at half the load.
     let power = whole(moment.truth.spindle_power_w / 40.0).mantissa.saturating_mul(10);
     control.diagnosis(4902, 2, Number::decimal(power, 0));

@@ -91,7 +91,7 @@ impl Vendor {
             if matches!(answers.last(), Some(Err(ItemError::Malformed(_)))) { Taken::Suspect } else { Taken::Good }
         };
         if let Err((fatal, error)) = self.child.told_each(questions, &Ask::Read(questions.to_vec()), take) {
-            answers.push(Err(ItemError::Malformed(format!("the library failed in {fatal:?}: {error}"))));
+            answers.push(Err(ItemError::Failed(format!("the library failed in {fatal:?}: {error}"))));
         }
         Ok(answers)
     }

@@ -11,6 +11,7 @@ pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize) -> Option<Answer>
     let whole = |at| dynamic.i32(at);
     let number = |at| Answer::Number(Some(f64::from(whole(at))));
     Some(match item {
+        // Without its unit and decimals: only where `cnc_rdspeed` is not to be had.
         Item::Feed => number(offset_of!(OdbDy2, actf)),
         Item::SpindleSpeed => number(offset_of!(OdbDy2, acts)),
         Item::Sequence => Answer::Whole(whole(offset_of!(OdbDy2, seqnum))),

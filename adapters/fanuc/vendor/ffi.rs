@@ -16,6 +16,26 @@ functions! {
     cnc_statinfo(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_actf(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_acts(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdspeed(handle: u16 => u16, kind: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_acts2(handle: u16 => u16, spindle: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_diagnoss(handle: u16 => u16, number: i16 => i16, axis: i16 => i16, length: i16 => i16,
+        out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdspdlname(handle: u16 => u16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdtimer(handle: u16 => u16, kind: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdtofs(handle: u16 => u16, number: i16 => i16, kind: i16 => i16, length: i16 => i16,
+        out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdexecprog(handle: u16 => u16, length: &mut u16 => *mut u16, block: &mut i16 => *mut i16,
+        out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdopmsg3(handle: u16 => u16, kind: i16 => i16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdgcode(handle: u16 => u16, kind: i16 => i16, block: i16 => i16, count: &mut i16 => *mut i16,
+        out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdalmhisno(handle: u16 => u16, count: &mut u16 => *mut u16) -> i16;
+    cnc_rdalmhistry(handle: u16 => u16, first: u16 => u16, last: u16 => u16, length: u16 => u16,
+        out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdtlusegrp(handle: u16 => u16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdlife(handle: u16 => u16, group: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdcount(handle: u16 => u16, group: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
+    cnc_rdntool(handle: u16 => u16, group: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdspmeter(handle: u16 => u16, kind: i16 => i16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdspgear(handle: u16 => u16, spindle: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdsvmeter(handle: u16 => u16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;

@@ -33,6 +33,17 @@ pub(super) struct OdbAct {
     pub(super) data: i32,
 }
 
+/// `SPEEDELM`; `ODBSPEED` is two of them, feed and spindle.
+#[repr(C)]
+pub(super) struct SpeedElm {
+    pub(super) data: i32,
+    pub(super) dec: i16,
+    pub(super) unit: i16,
+    pub(super) disp: i16,
+    pub(super) name: u8,
+    pub(super) suff: u8,
+}
+
 #[repr(C)]
 pub(super) struct LoadElm {
     pub(super) data: i32,
@@ -132,6 +143,7 @@ pub(super) const PMC_HEAD_LEN: usize = 8;
 const _: () = assert!(size_of::<OdbSys>() == 18 && offset_of!(OdbSys, series) == 8);
 const _: () = assert!(size_of::<OdbSt>() == 18 && offset_of!(OdbSt, aut) == 4);
 const _: () = assert!(size_of::<OdbAct>() == 8 && offset_of!(OdbAct, data) == 4);
+const _: () = assert!(size_of::<SpeedElm>() == 12 && offset_of!(SpeedElm, unit) == 6);
 const _: () = assert!(size_of::<LoadElm>() == 12 && offset_of!(LoadElm, name) == 8);
 const _: () = assert!(size_of::<OdbSpLoad>() == 24);
 const _: () = assert!(size_of::<OdbSpn>() == 20 && offset_of!(OdbSpn, data) == 4);

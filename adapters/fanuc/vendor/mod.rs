@@ -16,7 +16,8 @@
 //! |---|---|
 //! | `message` | what parent and child say |
 //! | `client` | the parent's side: [`Focas`](super::focas::Focas) through the child |
-//! | `child` | the child's side: items to calls, structures to answers |
+//! | `child` | the child's side: the connection of the library |
+//! | `calls`, `texts` | items as calls, structures as answers |
 //! | `dynamic` | the call for the positions, and what it answers besides |
 //! | `layout` | the structures as the library lays them out, with their sizes asserted |
 //! | `structure` | a structure that was filled in, read field by field |
@@ -25,6 +26,7 @@
 //! A symbol that the library does not have makes its items *not offered*; nothing else suffers. Layouts were measured
 //! against version 1.0.5 for Linux, in which `long` has 32 bits whatever the header says.
 
+mod calls;
 mod child;
 mod client;
 mod dynamic;
@@ -32,6 +34,7 @@ mod ffi;
 mod layout;
 mod message;
 mod structure;
+mod texts;
 
 pub use child::child;
 pub use client::{Vendor, VendorSettings};

@@ -9,13 +9,17 @@ mod waveform;
 use super::{CannotRun, CommandResult, Outcome};
 use crate::signals::{Request, Signals};
 use adapters::Address;
-use adapters::address::{Speed, Target};
+use adapters::address::{SimulatedTarget, Speed, Target};
 use adapters::clock::{Clock, ScaledClock};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use clap::{Args, Subcommand};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The control of a simulated machine answers so long after the machine's day has begun: it is switched on after some
+/// seconds and then starts.
+const STARTED_S: f64 = 30.0;
 
 /// What is served.
 #[derive(Debug, Subcommand)]
@@ -65,8 +69,10 @@ impl Common {
             return Err(CannotRun::new("a served machine lives by the clock", "give a factor, for example speed=10"));
         };
         let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
-        let begun_ns = adapters::open::begun(target, clock.now_ns());
-        let machine = Simulated::new(address.text(), SimulatedSettings::of(target), begun_ns);
+        // A partner answers from its first moment: the machine has been switched on and its control has started.
+        let target = SimulatedTarget { begun_s: target.begun_s.max(STARTED_S), ..*target };
+        let begun_ns = adapters::open::begun(&target, clock.now_ns());
+        let machine = Simulated::new(address.text(), SimulatedSettings::of(&target), begun_ns);
         Ok(Running { machine, clock })
     }
 }

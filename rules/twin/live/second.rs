@@ -87,8 +87,10 @@ impl Seconds {
         for (id, slot) in sample.provided() {
             match &slot.value {
                 Ok(Value::Number(number)) => {
-                    let sum = &mut self.sums[id.index()];
-                    *sum = (sum.0 + number, sum.1 + 1);
+                    // A channel that was declared later is not gathered.
+                    if let Some(sum) = self.sums.get_mut(id.index()) {
+                        *sum = (sum.0 + number, sum.1 + 1);
+                    }
                 }
                 Ok(Value::Text(text)) if self.row.words.get(&id.index()) != Some(text) => {
                     self.row.words.insert(id.index(), text.clone());

@@ -127,6 +127,7 @@ impl Window {
         let start_ns = rows.first().map_or(0, |(row, _)| row.at_ns);
         let time_s = rows.iter().map(|(row, _)| seconds(row.at_ns - start_ns)).collect();
         let mut recording = Recording::new("live", time_s, Some(start_ns));
+        let number = |row: &Row, index: usize| row.numbers.get(index).copied().flatten();
         for id in ChannelId::all() {
             let index = id.index();
             if id.channel().kind == Kind::Text {
@@ -135,8 +136,8 @@ impl Window {
                     let words: Vec<Arc<str>> = rows.iter().map(|(row, _)| word(row)).collect();
                     recording.set_column(id.name(), Cells::Words(words.iter().map(|word| &**word).collect::<Words>()));
                 }
-            } else if rows.iter().any(|(row, _)| row.numbers[index].is_some()) {
-                let numbers = rows.iter().map(|(row, _)| row.numbers[index]).collect::<Numbers>();
+            } else if rows.iter().any(|(row, _)| number(row, index).is_some()) {
+                let numbers = rows.iter().map(|(row, _)| number(row, index)).collect::<Numbers>();
                 recording.set_column(id.name(), Cells::Numbers(numbers));
             }
         }

@@ -1,0 +1,224 @@
+//! Channels besides those of the table: further axes and spindles by their own names, and the user's own. They are declared
+//! when the source is opened, and travel with the quick or with the slow group.
+
+use super::answer::Answer;
+use super::item::{Item, Position, Question, Servo, Spindle};
+use super::line::Asked;
+use super::own::{OwnChannel, Pace};
+use super::states::Found;
+use super::view::{View, number};
+use crate::address::FanucOptions;
+use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare};
+use crate::reading::{Absence, Value};
+
+/// An axis that has channels of its own.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AxisName {
+    /// Its name on the control: a letter, or a letter and a number.
+    pub name: String,
+    /// Does it turn? Its positions are degrees then.
+    pub rotary: bool,
+    /// Path from 1; `None` is the one that is written to.
+    pub path: Option<u8>,
+}
+
+impl AxisName {
+    /// `X1`, `B`, `W:deg`, or `Z2@2` of path 2. A, B and C turn unless `:mm` says otherwise, by custom.
+    #[must_use]
+    pub fn read(text: &str) -> Option<Self> {
+        let (text, path) = match text.split_once('@') {
+            Some((text, path)) => (text, Some(path.parse().ok().filter(|path| (1..=10).contains(path))?)),
+            None => (text, None),
+        };
+        let (name, unit) = text.split_once(':').map_or((text, None), |(name, unit)| (name, Some(unit)));
+        let usable = (1..=3).contains(&name.len())
+            && name.starts_with(|letter: char| letter.is_ascii_alphabetic())
+            && name.chars().all(|letter| letter.is_ascii_alphanumeric());
+        let name = name.to_ascii_uppercase();
+        let rotary = match unit {
+            None => name.starts_with(['A', 'B', 'C']),
+            Some("deg") => true,
+            Some("mm") => false,
+            Some(_) => return None,
+        };
+        usable.then_some(Self { name, rotary, path })
+    }
+}
+
+/// What of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Of {
+    Position(Position),
+    Load,
+    Current,
+    MotorTemperature,
+    EncoderTemperature,
+}
+
+/// Diagnosis numbers of the temperatures of a servo motor and of its encoder, °C. Source: B-64305EN, 30i maintenance
+/// manual, diagnosis 308 and 309.
+const MOTOR_TEMPERATURE: Item = Item::Diagnosis(308, -1);
+const ENCODER_TEMPERATURE: Item = Item::Diagnosis(309, -1);
+
+/// Where a further channel comes from.
+#[derive(Debug, Clone, PartialEq)]
+enum From {
+    Axis(AxisName, Of),
+    /// A quantity of the spindle at this place, counted from 0.
+    Spindle(usize, Spindle),
+    Own(OwnChannel),
+}
+
+/// A channel besides those of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extra {
+    /// Its place in the table of channels.
+    pub channel: ChannelId,
+    path: u8,
+    from: From,
+}
+
+const PLACES: (f64, f64) = (-1e6, 1e6);
+const LOADS: (f64, f64) = (-500.0, 500.0);
+const CURRENTS: (f64, f64) = (-1000.0, 1000.0);
+const TEMPERATURES: (f64, f64) = (-50.0, 300.0);
+const SPEEDS: (f64, f64) = (-100_000.0, 100_000.0);
+
+impl Of {
+    fn item(self) -> Item {
+        match self {
+            Self::Position(which) => Item::Position(which, -1),
+            Self::Load => Item::Servos(Servo::Load),
+            Self::Current => Item::Servos(Servo::Current),
+            Self::MotorTemperature => MOTOR_TEMPERATURE,
+            Self::EncoderTemperature => ENCODER_TEMPERATURE,
+        }
+    }
+
+    fn pace(self) -> Pace {
+        if matches!(self, Self::MotorTemperature | Self::EncoderTemperature) { Pace::Slow } else { Pace::Fast }
+    }
+
+    /// Ending of the name, unit, range, and what it is in English and Chinese.
+    fn words(self, rotary: bool) -> (String, &'static str, (f64, f64), &'static str, &'static str) {
+        let (ending, unit) = if rotary { ("deg", "°") } else { ("mm", "mm") };
+        let place = |which: &str| format!("{which}_{ending}");
+        match self {
+            Self::Position(Position::Machine) => (place("position"), unit, PLACES, "position", "轴位置"),
+            Self::Position(Position::Absolute) => {
+                (place("absolute"), unit, PLACES, "position in the work coordinates", "轴绝对坐标")
+            }
+            Self::Position(Position::Relative) => (place("relative"), unit, PLACES, "relative position", "轴相对坐标"),
+            Self::Position(Position::ToGo) => (place("to_go"), unit, PLACES, "distance to go", "轴剩余移动量"),
+            Self::Load => ("load_pct".to_owned(), "%", LOADS, "load", "轴负载"),
+            Self::Current => ("current_a".to_owned(), "A", CURRENTS, "current", "轴电流"),
+            Self::MotorTemperature => {
+                ("motor_temperature_c".to_owned(), "°C", TEMPERATURES, "motor temperature", "轴电机温度")
+            }
+            Self::EncoderTemperature => {
+                ("encoder_temperature_c".to_owned(), "°C", TEMPERATURES, "encoder temperature", "轴编码器温度")
+            }
+        }
+    }
+}
+
+/// Channels that an address and a configuration add, each with its pace.
+///
+/// # Errors
+/// The name of the channel and why it cannot be added.
+pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(Pace, Extra)>, (String, DeclareError)> {
+    let mut extras = Vec::new();
+    for axis in &options.axes {
+        for of in quantities(options) {
+            let (ending, unit, range, en, zh) = of.words(axis.rotary);
+            let name = format!("{}_axis_{ending}", axis.name.to_lowercase());
+            if crate::channel::CHANNELS.iter().any(|known| known.name == name) {
+                // X, Y and Z have it already.
+                continue;
+            }
+            let kind = if of.pace() == Pace::Slow { Kind::Held } else { Kind::Continuous };
+            let (en, zh) = (format!("{} axis {en}", axis.name), format!("{}{zh}", axis.name));
+            let new = NewChannel { name, unit: unit.to_owned(), range, kind, en, zh };
+            extras.push((of.pace(), put(&new, axis.path.unwrap_or(path), From::Axis(axis.clone(), of))?));
+        }
+    }
+    for number in 2..=options.spindles {
+        for (what, ending, unit, range, en, zh) in [
+            (Spindle::Speed, "speed_rpm", "rpm", SPEEDS, "actual speed", "转速"),
+            (Spindle::Load, "load_pct", "%", LOADS, "load", "负载"),
+        ] {
+            let name = format!("spindle{number}_{ending}");
+            let (en, zh) = (format!("Spindle {number}: {en}"), format!("主轴{number}{zh}"));
+            let new = NewChannel { name, unit: unit.to_owned(), range, kind: Kind::Continuous, en, zh };
+            extras.push((Pace::Fast, put(&new, path, From::Spindle(usize::from(number) - 1, what))?));
+        }
+    }
+    for own in &options.own {
+        let path = own.path.unwrap_or(path);
+        extras.push((own.pace, put(&own.new, path, From::Own(own.clone()))?));
+    }
+    Ok(extras)
+}
+
+fn quantities(options: &FanucOptions) -> Vec<Of> {
+    let positions = [Position::Machine].into_iter().chain(options.positions.iter().copied()).map(Of::Position);
+    positions.chain([Of::Load, Of::Current, Of::MotorTemperature, Of::EncoderTemperature]).collect()
+}
+
+fn put(new: &NewChannel, path: u8, from: From) -> Result<Extra, (String, DeclareError)> {
+    let channel = declare(new).map_err(|error| (new.name.clone(), error))?;
+    Ok(Extra { channel, path, from })
+}
+
+impl Extra {
+    /// What has to be asked for.
+    #[must_use]
+    pub fn question(&self) -> Question {
+        let item = match &self.from {
+            From::Axis(_, of) => of.item(),
+            From::Spindle(_, what) => Item::Spindles(*what),
+            From::Own(own) => own.item,
+        };
+        item.on(self.path)
+    }
+
+    /// The channel's value in what was answered.
+    pub(super) fn read(&self, asked: &Asked) -> Found<Value> {
+        let view = View { asked, path: self.path };
+        match &self.from {
+            From::Axis(axis, Of::Position(which)) => number(view.position(*which, &axis.name, axis.rotary)),
+            From::Axis(axis, of @ (Of::Load | Of::Current)) => number(view.axis(of.item(), &axis.name)),
+            From::Axis(axis, of) => number(place(&view, of.item(), view.place(&axis.name)?)),
+            From::Spindle(at, what) => number(place(&view, Item::Spindles(*what), *at)),
+            From::Own(own) => number(own.value(view.answer(own.item)?)),
+        }
+    }
+}
+
+/// The value at a place of an answer that has one per axis or spindle.
+fn place(view: &View<'_>, item: Item, place: usize) -> Found<f64> {
+    match view.answer(item)? {
+        Answer::Numbers(values) | Answer::Data { values, .. } => {
+            values.get(place).copied().flatten().ok_or(Absence::NotSupported)
+        }
+        _ => Err(Absence::OutOfRange),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_named_as_on_the_control() {
+        let read = |text| AxisName::read(text).map(|axis| (axis.name, axis.rotary));
+        assert_eq!(read("x1"), Some(("X1".to_owned(), false)));
+        assert_eq!(read("B"), Some(("B".to_owned(), true)));
+        assert_eq!(read("C1:mm"), Some(("C1".to_owned(), false)));
+        assert_eq!(read("W:deg"), Some(("W".to_owned(), true)));
+        assert_eq!(AxisName::read("Z2@2").and_then(|axis| axis.path), Some(2));
+        for wrong in ["", "Z2@0", "Z2@x", "1X", "X:inch", "XYZW", "X-1", ":mm"] {
+            assert_eq!(read(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Places in the memory of the programmable machine controller, where the ladder runs.
+
+use serde::{Deserialize, Serialize};
+
+/// Area of PMC memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Area {
+    /// Signals from the ladder to the control.
+    G,
+    /// Signals from the control to the ladder.
+    F,
+    /// Outputs to the machine.
+    Y,
+    /// Inputs from the machine.
+    X,
+    /// Message requests.
+    A,
+    /// Internal relays; cleared at power-on up to the battery-backed part.
+    R,
+    /// Timers.
+    T,
+    /// Keep relays.
+    K,
+    /// Counters.
+    C,
+    /// Data table, battery-backed.
+    D,
+    /// Extra relays, shared between PMCs.
+    E,
+}
+
+impl Area {
+    /// Every area with its letter and its number.
+    pub const ALL: [(Self, char, i32); 11] = [
+        (Self::G, 'G', 0),
+        (Self::F, 'F', 1),
+        (Self::Y, 'Y', 2),
+        (Self::X, 'X', 3),
+        (Self::A, 'A', 4),
+        (Self::R, 'R', 5),
+        (Self::T, 'T', 6),
+        (Self::K, 'K', 7),
+        (Self::C, 'C', 8),
+        (Self::D, 'D', 9),
+        (Self::E, 'E', 12),
+    ];
+
+    /// Its number on the wire and in the library.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        Self::ALL.iter().find(|(area, ..)| *area == self).map_or(0, |(.., number)| *number)
+    }
+
+    /// Its letter.
+    #[must_use]
+    pub fn letter(self) -> char {
+        Self::ALL.iter().find(|(area, ..)| *area == self).map_or('?', |(_, letter, _)| *letter)
+    }
+
+    /// The area with this number.
+    #[must_use]
+    pub fn of_number(number: i32) -> Option<Self> {
+        Self::ALL.iter().find(|(.., known)| *known == number).map(|(area, ..)| *area)
+    }
+
+    /// The area with this letter.
+    #[must_use]
+    pub fn of_letter(letter: char) -> Option<Self> {
+        Self::ALL.iter().find(|(_, known, _)| *known == letter.to_ascii_uppercase()).map(|(area, ..)| *area)
+    }
+}
+
+/// Bytes of one element of PMC memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Width {
+    /// One byte, 0 to 255.
+    Byte,
+    /// Two bytes, signed.
+    Word,
+    /// Four bytes, signed.
+    Long,
+}
+
+impl Width {
+    /// Number of bytes.
+    #[must_use]
+    pub fn bytes(self) -> u16 {
+        match self {
+            Self::Byte => 1,
+            Self::Word => 2,
+            Self::Long => 4,
+        }
+    }
+
+    /// Its number on the wire.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::Byte => 0,
+            Self::Word => 1,
+            Self::Long => 2,
+        }
+    }
+
+    /// The width with this number.
+    #[must_use]
+    pub fn of_number(number: i32) -> Option<Self> {
+        [Self::Byte, Self::Word, Self::Long].into_iter().find(|width| width.number() == number)
+    }
+}
+
+/// A stretch of PMC memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Stretch {
+    /// Where.
+    pub area: Area,
+    /// First byte.
+    pub from: u16,
+    /// Last byte.
+    pub to: u16,
+    /// Size of the elements.
+    pub width: Width,
+}
+
+impl Stretch {
+    /// So many single bytes.
+    #[must_use]
+    pub fn bytes(area: Area, from: u16, count: u16) -> Self {
+        Self { area, from, to: from.saturating_add(count.saturating_sub(1)), width: Width::Byte }
+    }
+
+    /// Number of bytes; 0 when it ends before it begins.
+    #[must_use]
+    pub fn len(self) -> usize {
+        usize::from(self.to) + 1 - usize::from(self.from.min(self.to.saturating_add(1)))
+    }
+
+    /// Does it end before it begins?
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.to < self.from
+    }
+}

@@ -1,0 +1,68 @@
+//! Records within the data of an answer: messages, remembered alarms, G codes, tool life. What is known of their layout
+//! comes from what the vendor's library makes of them.
+
+use super::answer::{Alarm, Answer, Message, PastAlarm};
+use super::decode::text;
+use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
+use super::wire::{Cursor, WireError};
+
+type Read<T> = Result<T, WireError>;
+
+/// Four words, as `cnc_rdcncid` is usually written.
+pub(super) fn cnc_id(cursor: &mut Cursor<'_>) -> Read<String> {
+    let word = |cursor: &mut Cursor<'_>| cursor.i32().map(|word| format!("{word:08x}"));
+    Ok([word(cursor)?, word(cursor)?, word(cursor)?, word(cursor)?].join("-"))
+}
+
+/// Text of so many bytes, of which the first `told` count.
+fn told(cursor: &mut Cursor<'_>, told: i32, length: usize) -> Read<String> {
+    let bytes = cursor.bytes(length)?;
+    let told = usize::try_from(told).unwrap_or(0).min(bytes.len());
+    Ok(text(&bytes[..told]))
+}
+
+pub(super) fn message(cursor: &mut Cursor<'_>) -> Read<Message> {
+    let (number, kind, length) = (cursor.i32()?, cursor.i32()?, cursor.i32()?);
+    Ok(Message { number, kind, text: told(cursor, length, MESSAGE_TEXT_LEN)? })
+}
+
+pub(super) fn past_alarm(cursor: &mut Cursor<'_>) -> Read<PastAlarm> {
+    let (number, kind, axis) = (cursor.i32()?, cursor.i32()?, cursor.i32()?);
+    let mut at = [0; 6];
+    for part in &mut at {
+        *part = cursor.i16()?;
+    }
+    let length = cursor.i32()?;
+    let text = told(cursor, length, HISTORY_TEXT_LEN)?;
+    Ok(PastAlarm { alarm: Alarm { number, kind, axis, text }, at })
+}
+
+/// `G54.3` from group, flag, 543 and one place.
+pub(super) fn g_code(cursor: &mut Cursor<'_>) -> Read<String> {
+    let (_group, _flag, code) = (cursor.i16()?, cursor.i16()?, cursor.i32()?);
+    let (_unused, places) = (cursor.i16()?, cursor.i16()?);
+    Ok(match places {
+        0 => format!("G{code:02}"),
+        _ => {
+            let places = usize::try_from(places).unwrap_or(0).min(4);
+            let power = 10f64.powi(i32::try_from(places).unwrap_or(0));
+            format!("G{:.places$}", f64::from(code) / power)
+        }
+    })
+}
+
+pub(super) fn life(cursor: &mut Cursor<'_>, wanted: u16) -> Read<Answer> {
+    let found = cursor.i32()?;
+    if found != i32::from(wanted) {
+        let what = "number of a group of tools";
+        return Err(WireError::Mismatch { what, expected: i64::from(wanted), found: i64::from(found) });
+    }
+    let tools = cursor.i32()?;
+    cursor.i32()?;
+    let life = cursor.i32()?;
+    cursor.i32()?;
+    let count = cursor.i32()?;
+    // What stands behind is not known; controls may send more.
+    cursor.bytes(cursor.left())?;
+    Ok(Answer::Life { tools, life, count })
+}

@@ -1,0 +1,109 @@
+//! Programs: what runs, what there is, and the modal state of the block.
+
+use super::answer::{ATTRIB, Data8, NUMBER};
+use super::controller::{Controller, ProgramFile};
+use super::encode::{long, longs, shorts, text};
+use crate::fanuc::item::Word;
+use crate::fanuc::wire::{Number, Request};
+
+/// The folder that older clients and the library mean when they name none.
+pub(super) const FOLDER: &str = "//CNC_MEM/USER/PATH1/";
+
+/// Longest list of a directory in one answer.
+const LISTED_MAX: usize = 20;
+
+/// Bytes of memory for programs of which those that are there take their part.
+const MEMORY_BYTES: i32 = 512 * 1024;
+
+pub(super) fn name(controller: &Controller) -> Vec<u8> {
+    let name = format!("O{}", controller.program.0);
+    [longs(&[controller.program.0]), text(&name, 36)].concat()
+}
+
+pub(super) fn executed(controller: &Controller, most: i32) -> Vec<u8> {
+    let most = usize::try_from(most).unwrap_or(0).min(controller.executed.1.len());
+    let text = controller.executed.1.as_bytes().get(..most).unwrap_or_default();
+    [&longs(&[controller.executed.0])[..], text].concat()
+}
+
+/// Programs from a number on; what there is besides the number follows from the kind.
+pub(super) fn list(controller: &Controller, first: i32, most: i32) -> Vec<u8> {
+    let most = usize::try_from(most).unwrap_or(0).min(LISTED_MAX);
+    let record = |file: &ProgramFile| [longs(&[file.number, file.bytes]), text(&file.comment, 64)].concat();
+    controller.programs.iter().filter(|file| file.number >= first).take(most).flat_map(record).collect()
+}
+
+pub(super) fn counts(controller: &Controller) -> Vec<u8> {
+    let used: i32 = controller.programs.iter().map(|file| file.bytes).sum();
+    let known = long(controller.programs.len());
+    longs(&[known, 400 - known.min(400), used, MEMORY_BYTES - used.min(MEMORY_BYTES)])
+}
+
+/// The path that a request about a folder carries.
+fn is_folder(request: &Request) -> bool {
+    let end = request.data.iter().position(|byte| *byte == 0).unwrap_or(request.data.len());
+    let asked = String::from_utf8_lossy(&request.data[..end]);
+    asked.trim_end_matches('/').eq_ignore_ascii_case(FOLDER.trim_end_matches('/'))
+}
+
+pub(super) fn folder_counts(controller: &Controller, request: &Request) -> Data8 {
+    if is_folder(request) { Ok(longs(&[0, long(controller.programs.len())])) } else { Err(NUMBER) }
+}
+
+/// Files of the folder: kind, time, size, attributes, name, comment, and the time of the last run.
+pub(super) fn folder(controller: &Controller, request: &Request) -> Data8 {
+    if !is_folder(request) {
+        return Err(NUMBER);
+    }
+    let [first, most, ..] = request.arguments.map(|argument| usize::try_from(argument).unwrap_or(0));
+    let entry = |file: &ProgramFile| {
+        let time = shorts(&controller.clock);
+        let sizes = longs(&[file.bytes, 0]);
+        let (name, comment) = (text(&format!("O{:04}", file.number), 36), text(&file.comment, 52));
+        [shorts(&[1]), time.clone(), vec![0; 6], sizes, name, comment, time].concat()
+    };
+    Ok(controller.programs.iter().skip(first).take(most.min(LISTED_MAX)).flat_map(entry).collect())
+}
+
+pub(super) fn modal_word(controller: &Controller, number: i32) -> Data8 {
+    let word = Word::of_number(number).ok_or(NUMBER)?;
+    let value = controller.modal_words.get(&word).ok_or(NUMBER)?;
+    let places = u8::try_from(value.exponent).unwrap_or(0) & 0x07;
+    Ok([&longs(&[value.mantissa])[..], &[0x40, places, 0, 0]].concat())
+}
+
+pub(super) fn groups(controller: &Controller, group: i32) -> Data8 {
+    if group == -1 {
+        return Ok(controller.modal_groups.values().flat_map(|code| [*code, 0]).collect());
+    }
+    controller.modal_groups.get(&group).map(|code| vec![*code, 0]).ok_or(NUMBER)
+}
+
+/// G codes as the program writes them: group, flag, code with its places.
+pub(super) fn g_codes(controller: &Controller, group: i32) -> Data8 {
+    let record = |(group, code): (&i16, &Number)| {
+        [shorts(&[*group, 1]), longs(&[code.mantissa]), shorts(&[0, code.exponent])].concat()
+    };
+    let wanted: Vec<u8> = controller
+        .g_codes
+        .iter()
+        .filter(|(own, _)| group == -1 || i32::from(**own) == group)
+        .flat_map(record)
+        .collect();
+    if wanted.is_empty() { Err(ATTRIB) } else { Ok(wanted) }
+}
+
+/// Words of the block: letter, number of the M, flags, value, places. `which` counts the letters from A.
+pub(super) fn commands(controller: &Controller, which: i32) -> Data8 {
+    let letter = |word: Word| format!("{word:?}").bytes().next().unwrap_or(b'?');
+    let is_wanted = |word: Word| which == -1 || i32::from(letter(word) - b'A') == which;
+    let words = controller.modal_words.iter().filter(|(word, value)| {
+        !matches!(word, Word::Unused14 | Word::Unused15) && is_wanted(**word) && (which != -1 || value.mantissa != 0)
+    });
+    let record = |(word, value): (&Word, &Number)| {
+        let head = vec![letter(*word), 0, 0, 1];
+        [head, longs(&[value.mantissa, i32::from(value.exponent)])].concat()
+    };
+    let found: Vec<u8> = words.flat_map(record).collect();
+    if found.is_empty() && which != -1 { Err(ATTRIB) } else { Ok(found) }
+}

@@ -1,0 +1,270 @@
+//! Items as calls of the library, and the structures that it fills in as answers.
+
+use super::child::{Session, pmc_words};
+use super::layout::{
+    LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbExePrg, OdbM, OdbPro, OdbSeq,
+    OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, SpeedElm, ZOFS_LEN,
+};
+use super::structure::{Bytes, POSITION_PLACES, checked, decimal, filled};
+use crate::child::Guarded;
+use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Refusal, SpeedUnit, Status, System};
+use crate::fanuc::code::ReturnCode;
+use crate::fanuc::item::{Item, Servo, Spindle, Stretch, Width, Word};
+use std::mem::{offset_of, size_of};
+
+/// Most alarms, spindles and PMC bytes that are asked for at a time.
+const COUNT_MAX: u16 = 64;
+
+/// Bytes that a value of a parameter or a diagnosis number can have: byte or bits, word, two words, real. The library
+/// refuses with `EW_LENGTH` what is too short.
+const SIZES: [usize; 4] = [1, 2, 4, 8];
+
+fn count(found: i16, most: usize) -> usize {
+    usize::try_from(found).unwrap_or(0).min(most)
+}
+
+impl Session {
+    pub(super) fn read(&mut self, item: Item) -> ItemResult {
+        let (f, h) = (&self.functions, self.handle);
+        match item {
+            Item::System => self.system().map(Answer::System),
+            Item::Status => self.status().map(Answer::Status),
+            Item::Feed => filled(size_of::<OdbAct>(), |out| f.cnc_actf(h, out)).map(|bytes| act(&bytes)),
+            Item::SpindleSpeed => filled(size_of::<OdbAct>(), |out| f.cnc_acts(h, out)).map(|bytes| act(&bytes)),
+            Item::Spindles(Spindle::Load) => self.spindle_meter(0, 0),
+            Item::Spindles(Spindle::MotorSpeed) => self.spindle_meter(1, size_of::<LoadElm>()),
+            Item::Spindles(Spindle::Gear) => {
+                let bytes = filled(size_of::<OdbSpn>(), |out| f.cnc_rdspgear(h, -1, out))?;
+                let gear = bytes.i16(offset_of!(OdbSpn, data));
+                Ok(Answer::Numbers(vec![Some(f64::from(gear))]))
+            }
+            Item::Servos(Servo::Load) => self.servo_meter().map(|(_, loads)| Answer::Numbers(loads)),
+            Item::AxisNames => self.servo_meter().map(|(names, _)| Answer::Names(names)),
+            Item::Servos(Servo::Current) => self.servo_current(),
+            Item::Program => {
+                let bytes = filled(size_of::<OdbPro>(), |out| f.cnc_rdprgnum(h, out))?;
+                let number = |at| i32::from(bytes.i16(at));
+                Ok(Answer::Program {
+                    running: number(offset_of!(OdbPro, data)),
+                    main: number(offset_of!(OdbPro, mdata)),
+                })
+            }
+            Item::ProgramName => {
+                let bytes = filled(size_of::<OdbExePrg>(), |out| f.cnc_exeprgname(h, out))?;
+                let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text(0, 36));
+                Ok(Answer::Named { number, name })
+            }
+            Item::Sequence => {
+                let bytes = filled(size_of::<OdbSeq>(), |out| f.cnc_rdseqnum(h, out))?;
+                Ok(Answer::Whole(bytes.i32(offset_of!(OdbSeq, data))))
+            }
+            Item::AlarmBits => {
+                let mut bits = 0;
+                checked(f.cnc_alarm2(h, &mut bits)).map(|()| Answer::Whole(bits))
+            }
+            Item::Alarms(most) => self.alarms(most.min(COUNT_MAX)),
+            Item::ModalWord(word) => self.modal(word),
+            Item::ModalGroup(group @ 0..) => {
+                let bytes = filled(LONG_LEN, |out| f.cnc_modal(h, group, 0, out))?;
+                Ok(Answer::Groups(vec![bytes.array::<1>(4)[0]]))
+            }
+            Item::Macro(number) => self.variable(number),
+            Item::Parameter(..) | Item::Diagnosis(..) => self.data(item),
+            Item::Timer(timer) => {
+                let which = i16::try_from(timer.number()).unwrap_or(0);
+                let bytes = filled(8, |out| f.cnc_rdtimer(h, which, out))?;
+                Ok(Answer::Time { minutes: bytes.i32(0), milliseconds: bytes.i32(4) })
+            }
+            Item::ToolOffset(number, kind) => {
+                let short = |number: u16| i16::try_from(number).unwrap_or(i16::MAX);
+                let bytes = filled(8, |out| f.cnc_rdtofs(h, short(number), short(kind), 8, out))?;
+                Ok(Answer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
+            }
+            Item::ExecutedText(_) | Item::Messages(_) | Item::GCodes => self.text(item),
+            Item::HistoryCount | Item::AlarmHistory(..) => self.history(item),
+            Item::ToolGroup | Item::ToolLife(_) => self.tool_life(item),
+            Item::Spindles(Spindle::Speed) => {
+                // The call does not say how many spindles there are.
+                let mut found = 8;
+                filled(4 * 8, |out| f.cnc_rdspdlname(h, &mut found, out))?;
+                let bytes = filled(36, |out| f.cnc_acts2(h, -1, out))?;
+                let speed = |at: usize| Some(f64::from(bytes.i32(4 + 4 * at)));
+                Ok(Answer::Numbers((0..count(found, 8)).map(speed).collect()))
+            }
+            Item::Pmc(stretch) => self.memory(stretch),
+            Item::WorkOffset(number, axis) => {
+                let number = i16::try_from(number).unwrap_or(i16::MAX);
+                let bytes = filled(ZOFS_LEN, |out| f.cnc_rdzofs(h, number, axis, 8, out))?;
+                Ok(Answer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
+            }
+            _ => Err(ItemError::NotOffered),
+        }
+    }
+
+    pub(super) fn system(&self) -> Result<System, ItemError> {
+        let bytes = filled(size_of::<OdbSys>(), |out| self.functions.cnc_sysinfo(self.handle, out))?;
+        Ok(System {
+            additional: bytes.i16(offset_of!(OdbSys, addinfo)),
+            axes_max: bytes.i16(offset_of!(OdbSys, max_axis)),
+            kind: bytes.text(offset_of!(OdbSys, cnc_type), 2),
+            machine: bytes.text(offset_of!(OdbSys, mt_type), 2),
+            series: bytes.text(offset_of!(OdbSys, series), 4),
+            version: bytes.text(offset_of!(OdbSys, version), 4),
+            axes: bytes.text(offset_of!(OdbSys, axes), 2),
+        })
+    }
+
+    fn status(&self) -> Result<Status, ItemError> {
+        let bytes = filled(size_of::<OdbSt>(), |out| self.functions.cnc_statinfo(self.handle, out))?;
+        Ok(Status {
+            automatic: bytes.i16(offset_of!(OdbSt, aut)),
+            run: bytes.i16(offset_of!(OdbSt, run)),
+            motion: bytes.i16(offset_of!(OdbSt, motion)),
+            auxiliary: bytes.i16(offset_of!(OdbSt, mstb)),
+            emergency: bytes.i16(offset_of!(OdbSt, emergency)),
+            alarm: bytes.i16(offset_of!(OdbSt, alarm)),
+            edit: bytes.i16(offset_of!(OdbSt, edit)),
+        })
+    }
+
+    /// Load or speed; the half that was not asked for is not written.
+    fn spindle_meter(&self, kind: i16, offset: usize) -> ItemResult {
+        let mut found = 4;
+        let length = size_of::<OdbSpLoad>() * 4;
+        let bytes = filled(length, |out| self.functions.cnc_rdspmeter(self.handle, kind, &mut found, out))?;
+        let at = |spindle| spindle * size_of::<OdbSpLoad>() + offset;
+        Ok(Answer::Numbers((0..count(found, 4)).map(|spindle| bytes.element(at(spindle))).collect()))
+    }
+
+    fn servo_meter(&self) -> Result<(Vec<String>, Vec<Option<f64>>), ItemError> {
+        let mut found = i16::try_from(MAX_AXIS).unwrap_or(32);
+        let length = size_of::<LoadElm>() * MAX_AXIS;
+        let bytes = filled(length, |out| self.functions.cnc_rdsvmeter(self.handle, &mut found, out))?;
+        let at = |axis| axis * size_of::<LoadElm>();
+        let axes = 0..count(found, MAX_AXIS);
+        let names = axes.clone().map(|axis| bytes.text(at(axis) + offset_of!(LoadElm, name), 2)).collect();
+        Ok((names, axes.map(|axis| bytes.element(at(axis))).collect()))
+    }
+
+    /// Class 2 (axis drives), type 2 (current in amperes).
+    fn servo_current(&self) -> ItemResult {
+        let (mut kind, mut found) = (2, i16::try_from(MAX_AXIS).unwrap_or(32));
+        let length = size_of::<OdbAxDt>() * MAX_AXIS;
+        let call = |out: &mut Guarded| self.functions.cnc_rdaxisdata(self.handle, 2, &mut kind, 1, &mut found, out);
+        let bytes = filled(length, call)?;
+        let value = |axis: usize| {
+            let at = axis * size_of::<OdbAxDt>();
+            decimal(bytes.i32(at + offset_of!(OdbAxDt, data)), bytes.i16(at + offset_of!(OdbAxDt, dec)))
+        };
+        Ok(Answer::Numbers((0..count(found, MAX_AXIS)).map(value).collect()))
+    }
+
+    fn alarms(&self, most: u16) -> ItemResult {
+        let mut found = i16::try_from(most).unwrap_or(8);
+        let length = size_of::<OdbAlmMsg2>() * usize::from(most);
+        let bytes = filled(length, |out| self.functions.cnc_rdalmmsg2(self.handle, -1, &mut found, out))?;
+        let alarm = |index: usize| {
+            let at = index * size_of::<OdbAlmMsg2>();
+            let length = count(bytes.i16(at + offset_of!(OdbAlmMsg2, msg_len)), 64);
+            Alarm {
+                number: bytes.i32(at),
+                kind: i32::from(bytes.i16(at + offset_of!(OdbAlmMsg2, kind))),
+                axis: i32::from(bytes.i16(at + offset_of!(OdbAlmMsg2, axis))),
+                text: bytes.text(at + offset_of!(OdbAlmMsg2, alm_msg), length),
+            }
+        };
+        Ok(Answer::Alarms((0..count(found, usize::from(most))).map(alarm).collect()))
+    }
+
+    /// Feed with its decimals and its unit, once per poll.
+    pub(super) fn feed_with_unit(&mut self) -> Result<(Option<f64>, SpeedUnit), ItemError> {
+        if let Some(known) = self.speed {
+            return Ok(known);
+        }
+        let call = |out: &mut Guarded| self.functions.cnc_rdspeed(self.handle, 0, out);
+        let bytes = filled(2 * size_of::<SpeedElm>(), call)?;
+        let feed = decimal(bytes.i32(offset_of!(SpeedElm, data)), bytes.i16(offset_of!(SpeedElm, dec)));
+        let found = (feed, SpeedUnit::of_library(bytes.i16(offset_of!(SpeedElm, unit))));
+        self.speed = Some(found);
+        Ok(found)
+    }
+
+    fn modal(&self, word: Word) -> ItemResult {
+        let number = word.library_number().ok_or(ItemError::NotOffered)?;
+        let bytes = filled(LONG_LEN, |out| self.functions.cnc_modal(self.handle, number, 0, out))?;
+        let [first, second] = bytes.array(8);
+        Ok(Answer::Modal { value: bytes.i32(4), flags: [first, second] })
+    }
+
+    pub(super) fn every_axis(&self) -> Result<Bytes, ItemError> {
+        let length = i16::try_from(ODBDY2_ALL_LEN).unwrap_or(540);
+        filled(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))
+    }
+
+    fn variable(&self, number: u16) -> ItemResult {
+        let number = i16::try_from(number).map_err(|_| ItemError::NotOffered)?;
+        let bytes = filled(size_of::<OdbM>(), |out| self.functions.cnc_rdmacro(self.handle, number, 10, out))?;
+        let (value, places) = (bytes.i32(offset_of!(OdbM, mcr_val)), bytes.i16(offset_of!(OdbM, dec_val)));
+        Ok(Answer::Number(decimal(value, places)))
+    }
+
+    /// A parameter or a diagnosis number, of no axis, of one or of all. Its size is found out once.
+    fn data(&mut self, item: Item) -> ItemResult {
+        let (number, axis) = match item {
+            Item::Parameter(number, axis) | Item::Diagnosis(number, axis) => (number, axis),
+            _ => return Err(ItemError::NotOffered),
+        };
+        let number = i16::try_from(number).map_err(|_| ItemError::NotOffered)?;
+        let places = if axis == -1 { MAX_AXIS } else { 1 };
+        let known = self.sizes.get(&item).copied();
+        for size in SIZES.into_iter().filter(|size| known.is_none_or(|known| known == *size)) {
+            let length = i16::try_from(4 + size * places).unwrap_or(i16::MAX);
+            let (f, h) = (&self.functions, self.handle);
+            let found = filled(4 + 8 * MAX_AXIS, |out| match item {
+                Item::Parameter(..) => f.cnc_rdparam(h, number, axis, length, out),
+                _ => f.cnc_diagnoss(h, number, axis, length, out),
+            });
+            match found {
+                Ok(bytes) => {
+                    self.sizes.insert(item, size);
+                    let count = if axis == -1 { self.axes_max } else { 1 };
+                    let values = (0..count).map(|at| sized(&bytes, 4 + at * size, size)).collect();
+                    return Ok(Answer::Data { kind: i16::try_from(size).unwrap_or(0), values });
+                }
+                Err(ItemError::Refused(refusal)) if refusal.code == ReturnCode::LENGTH => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(ItemError::Refused(Refusal { code: ReturnCode::LENGTH, detail: 0 }))
+    }
+
+    fn memory(&self, stretch: Stretch) -> ItemResult {
+        let total = PMC_HEAD_LEN + stretch.len();
+        let length = u16::try_from(total).map_err(|_| ItemError::NotOffered)?;
+        let (area, width) = pmc_words(stretch);
+        let (from, to) = (stretch.from, stretch.to);
+        let call = |out: &mut Guarded| self.functions.pmc_rdpmcrng(self.handle, area, width, from, to, length, out);
+        let bytes = filled(total, call)?;
+        let step = usize::from(stretch.width.bytes());
+        let element = |at: usize| match stretch.width {
+            Width::Byte => i32::from(bytes.array::<1>(at)[0]),
+            Width::Word => i32::from(bytes.i16(at)),
+            Width::Long => bytes.i32(at),
+        };
+        Ok(Answer::Memory((PMC_HEAD_LEN..total).step_by(step).map(element).collect()))
+    }
+}
+
+/// A value of so many bytes; a real has its places behind it.
+fn sized(bytes: &Bytes, at: usize, size: usize) -> Option<f64> {
+    match size {
+        1 => Some(f64::from(bytes.array::<1>(at)[0])),
+        2 => Some(f64::from(bytes.i16(at))),
+        4 => Some(f64::from(bytes.i32(at))),
+        _ => decimal(bytes.i32(at), i16::try_from(bytes.i32(at + 4)).unwrap_or(-1)),
+    }
+}
+
+fn act(bytes: &Bytes) -> Answer {
+    Answer::Number(Some(f64::from(bytes.i32(offset_of!(OdbAct, data)))))
+}
