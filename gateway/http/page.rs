@@ -3,13 +3,14 @@
 use axum::extract::{Path, State};
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
+use axum::routing::get;
 
-use super::Shared;
 use super::problem::ApiProblem;
+use super::route::Route;
+use super::{Shared, headers};
 use rules::physics::explain::Language;
 
 const INDEX: &str = include_str!("../web/index.html");
-const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
@@ -22,17 +23,16 @@ const FILES: [(&str, &str, &str); 5] = [
     ("icon.svg", "image/svg+xml", include_str!("../web/icon.svg")),
 ];
 
-/// Only what this box serves may run or load; nothing may frame it.
-const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'";
+pub(super) const ROUTES: &[Route] = &[Route::read("/", || get(page)), Route::file("/web/{file}", || get(web))];
 
 /// `GET /`
 pub(super) async fn page(State(shared): State<Shared>) -> Response {
     let chosen = match shared.language {
-        None => return file(HTML, INDEX),
+        None => return headers::page(INDEX),
         Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",
         Some(Language::Zh) => "<html lang=\"zh-CN\" data-opens=\"zh\">",
     };
-    file(HTML, INDEX.replacen("<html lang=\"en\">", chosen, 1))
+    headers::page(&INDEX.replacen("<html lang=\"en\">", chosen, 1))
 }
 
 /// `GET /web/{file}`
@@ -47,8 +47,6 @@ fn file(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-        (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
-        (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
     ];
     (headers, content).into_response()
 }
