@@ -1,5 +1,6 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
+use super::keys_of_outputs::OUTPUTS;
 pub use super::shown::{example, table};
 
 /// What a key accepts.
@@ -19,6 +20,8 @@ pub enum Kind {
     Listen,
     /// The address of a source, as listed in the table of sources.
     Address,
+    /// The address of a sink.
+    SinkAddress,
 }
 
 /// What happens when a key is not written.
@@ -74,12 +77,18 @@ pub const SECTIONS: &[Section] = &[
     section("gate", "what may be written to the machine"),
     section("gate.offset", "thermal offsets that scripts propose, written between programs; needs the same arming"),
     section("history", "what is remembered"),
+    Section {
+        name: "sink",
+        repeated: true,
+        en: "one receiver of what leaves the box; write the section once for each",
+    },
+    section("outbox", "what the sinks are sent, and how much of it waits for them during an outage"),
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
     section("log", "what is written to the standard error output"),
 ];
 
-const fn key(
+pub(super) const fn key(
     path: (&'static str, &'static str),
     kind: Kind,
     absent: Absent,
@@ -93,7 +102,20 @@ use Absent::{Default, Optional, Required};
 use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
 
 /// Every key the gateway knows.
-pub const KEYS: &[Key] = &[
+pub static KEYS: &[Key] = &ALL;
+
+static ALL: [Key; CORE.len() + OUTPUTS.len()] = {
+    let mut all = [CORE[0]; CORE.len() + OUTPUTS.len()];
+    let mut index = 0;
+    while index < all.len() {
+        all[index] = if index < CORE.len() { CORE[index] } else { OUTPUTS[index - CORE.len()] };
+        index += 1;
+    }
+    all
+};
+
+/// Every key but those of the outputs.
+const CORE: &[Key] = &[
     key(
         ("gateway", "name"),
         Text,

@@ -40,6 +40,7 @@ pub(super) struct Reading<'a> {
     text: &'a str,
     single: BTreeMap<&'static str, Values>,
     pub(super) sources: Vec<Values>,
+    pub(super) sinks: Vec<Values>,
     pub(super) problems: Vec<Problem>,
 }
 
@@ -111,7 +112,7 @@ impl<'a> Reading<'a> {
         match item.get_ref() {
             DeValue::Table(table) => {
                 let values = self.values(section, table, start);
-                self.sources.push(values);
+                self.list(section).push(values);
             }
             other => self.problem(
                 &Origin::File(start),
@@ -163,7 +164,8 @@ impl<'a> Reading<'a> {
         let Some(known) = find_section(section) else {
             return self.problem(&origin, unknown_section(section), section_hint(section));
         };
-        if known.repeated != index.is_some() || index.is_some_and(|index| index > self.sources.len()) {
+        let count = self.list(known).len();
+        if known.repeated != index.is_some() || index.is_some_and(|index| index > count) {
             return self.problem(&origin, "this variable names no key", variable_form(prefix));
         }
         let Some(key) = find(known.name, key_name) else {
@@ -179,11 +181,12 @@ impl<'a> Reading<'a> {
     fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut Values {
         match index {
             Some(index) => {
-                if index >= self.sources.len() {
-                    self.sources.push(Values::default());
+                let list = self.list(section);
+                if index >= list.len() {
+                    list.push(Values::default());
                 }
-                let last = self.sources.len() - 1;
-                &mut self.sources[index.min(last)]
+                let last = list.len() - 1;
+                &mut list[index.min(last)]
             }
             None => self.single.entry(section.name).or_default(),
         }
@@ -196,12 +199,16 @@ impl<'a> Reading<'a> {
             self.fill(section, &mut values);
             self.single.insert(section.name, values);
         }
-        let mut sources = std::mem::take(&mut self.sources);
-        let section = find_section("source");
-        for values in &mut sources {
-            section.into_iter().for_each(|section| self.fill(section, values));
+        for section in SECTIONS.iter().filter(|section| section.repeated) {
+            let mut list = std::mem::take(self.list(section));
+            list.iter_mut().for_each(|values| self.fill(section, values));
+            *self.list(section) = list;
         }
-        self.sources = sources;
+    }
+
+    /// What is collected of a section that may stand there several times.
+    fn list(&mut self, section: &Section) -> &mut Vec<Values> {
+        if section.name == "sink" { &mut self.sinks } else { &mut self.sources }
     }
 
     fn fill(&mut self, section: &Section, values: &mut Values) {
@@ -270,5 +277,5 @@ fn key_hint(section: &str, name: &str) -> String {
 }
 
 fn variable_form(prefix: &str) -> String {
-    format!("write {prefix}SECTION__KEY, for sources {prefix}SOURCE__0__ADDRESS; the sources count from 0")
+    format!("write {prefix}SECTION__KEY, for sources {prefix}SOURCE__0__ADDRESS; sources and sinks count from 0")
 }

@@ -14,7 +14,7 @@ impl Kind {
             Self::Flag => "true, false".to_string(),
             Self::Path => "path".to_string(),
             Self::Listen => "HOST:PORT".to_string(),
-            Self::Address => "address".to_string(),
+            Self::Address | Self::SinkAddress => "address".to_string(),
         }
     }
 }
@@ -48,7 +48,9 @@ pub fn example() -> String {
         String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
     for section in SECTIONS {
         let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
-        text += &format!("\n{open}{}{close}{}# {}\n", section.name, " ", section.en);
+        // The gateway runs without a sink, but not without a source.
+        let mark = if section.name == "sink" { "# " } else { "" };
+        text += &format!("\n{mark}{open}{}{close}{}# {}\n", section.name, " ", section.en);
         for key in keys_of(section.name) {
             text += &example_line(key);
         }
@@ -58,6 +60,7 @@ pub fn example() -> String {
 
 fn example_line(key: &Key) -> String {
     let written = match key.absent {
+        Required if key.kind == Kind::SinkAddress => format!("# {} = \"mqtts://broker:8883/plant\"", key.name),
         Required => format!("{} = \"simulated://lathe\"", key.name),
         Optional => format!("# {} = ...", key.name),
         Default(value) => format!("# {} = {value}", key.name),

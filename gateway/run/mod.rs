@@ -9,6 +9,7 @@ pub mod hand;
 pub mod health;
 pub mod keep;
 pub mod open;
+pub mod outputs;
 pub mod pace;
 pub mod priority;
 pub mod recent;
@@ -40,6 +41,7 @@ use hand::{Hand, Tools};
 use health::Health;
 use keep::Kept;
 use open::{MachineSpeed, Sources, Way};
+use outputs::Outputs;
 use shifting::Shifting;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -81,9 +83,10 @@ type Orders = mpsc::Receiver<control::Posted>;
 /// # Errors
 /// Everything that makes it impossible to begin.
 pub fn run(plan: Plan) -> Result<(), CannotRun> {
+    let outputs = Outputs::of(&plan.config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
-        .max_blocking_threads(4)
+        .max_blocking_threads(4 + outputs.as_ref().map_or(0, Outputs::threads))
         .thread_name("serve")
         .enable_all()
         .build()
@@ -92,12 +95,12 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
     let wishes = Arc::new(Wishes::default());
     let (report, port) = watch::channel(None);
     let (order, orders) = control::queue();
-    let (ticker, live) = ticker(&plan, &wishes, port, orders)?;
+    let (ticker, live) = ticker(&plan, &wishes, port, orders, outputs.as_ref())?;
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, listener, live, &wishes, (report, order)));
+    runtime.block_on(serve(&plan, listener, live, &wishes, (report, order), outputs.as_ref()));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -124,6 +127,7 @@ fn ticker(
     wishes: &Arc<Wishes>,
     port: watch::Receiver<Option<String>>,
     orders: Orders,
+    outputs: Option<&Outputs>,
 ) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
@@ -136,7 +140,8 @@ fn ticker(
     let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let beside = [pipeline.series(), alignment::series(), beside].concat();
-    let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let outbox = outputs.map(|outputs| outputs.outbox.clone());
+    let kept = Kept::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &kept, clock.now_ns());
@@ -174,6 +179,7 @@ fn ticker(
             operations,
             twin,
             wear,
+            sinks: outputs.map(|outputs| outputs.board.clone()).unwrap_or_default(),
             scripts: watched,
             health,
             wishes,
@@ -264,7 +270,9 @@ async fn serve(
     live: watch::Receiver<Option<Published>>,
     wishes: &Arc<Wishes>,
     (report, orders): (watch::Sender<Option<String>>, mpsc::SyncSender<control::Posted>),
+    outputs: Option<&Outputs>,
 ) {
+    let sinks = outputs.map(Outputs::start);
     let _listening = control::listen(&plan.config.gateway.data_dir, orders);
     let shared = Shared::new(live.clone(), plan.config.history.path.clone(), plan.config.gateway.language);
     let server = match address(plan) {
@@ -274,6 +282,10 @@ async fn serve(
     tokio::select! {
         () = obey(wishes) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
         () = until_closed(live) => {}
+    }
+    // What the sinks have delivered is noted by the last commit of the history.
+    if let Some(sinks) = sinks {
+        sinks.stop().await;
     }
     wishes.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {
