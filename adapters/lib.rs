@@ -32,6 +32,7 @@ pub mod serial;
 pub mod simulated;
 pub(crate) mod stream;
 pub mod temperature;
+pub mod tls;
 pub mod units;
 pub mod waveform;
 pub mod words;

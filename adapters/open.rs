@@ -206,28 +206,9 @@ fn read(address: &Address, target: &ReplayTarget, origin_ns: TimeNs) -> Result<(
     Ok((replay, Refused { rows: read.refused, problems: read.problems }))
 }
 
-/// Why nothing can be read at this address, whatever is there: this build has no driver for it.
-#[must_use]
-pub fn missing_driver(address: &Address) -> Option<OpenError> {
-    match address.target() {
-        Target::Simulated(_)
-        | Target::Replay(_)
-        | Target::ModbusTcp { .. }
-        | Target::ModbusRtu { .. }
-        | Target::Eda9033a { .. }
-        | Target::Temperature { .. }
-        | Target::Waveform { .. }
-        | Target::Fanuc { .. } => None,
-        Target::NcLink(target) if !target.tls => None,
-        Target::HncNet(_) => None,
-        other => Some(not_built(address, other)),
-    }
-}
-
 fn not_built(address: &Address, target: &Target) -> OpenError {
     let address = address.text().to_owned();
     let what = match target {
-        Target::NcLink(target) if target.tls => crate::nclink::NO_TLS,
         Target::Waveform { .. } => "a stream of samples becomes a channel in the box only: run and doctor read it",
         _ => "a real device keeps its own pace: run reads it, without --speed",
     };

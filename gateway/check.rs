@@ -5,8 +5,8 @@ use crate::config::{self, Config, Problem};
 use crate::http::Certificate;
 use crate::operations;
 use crate::reload::read_directory;
-use adapters::address::{FanucBackend, Target};
-use adapters::open::missing_driver;
+use crate::sinks::broker::broker_files;
+use adapters::address::{FanucBackend, NcLinkTarget, Target};
 use adapters::recording::{RecordingError, read_path};
 use rules::estimators::StateBasis;
 use rules::{script, twin};
@@ -69,6 +69,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
             check_model(&config, &mut report);
             check_sources(&name, &config, &mut report);
             report.read.extend(state_basis(&name, &config));
+            check_sinks(&name, &config, &mut report);
         }
         Err(problems) => report.problems = problems,
     }
@@ -183,18 +184,33 @@ fn check_model(config: &Config, report: &mut Report) {
     }
 }
 
+/// The files that the addresses of the sinks name.
+fn check_sinks(name: &str, config: &Config, report: &mut Report) {
+    for sink in &config.sinks {
+        let problems = sink.address.check();
+        if problems.is_empty() {
+            report
+                .read
+                .push(format!("{name}: sends to {}; `cnc-gateway doctor` with this address connects", sink.address));
+        }
+        let problem = |(what, next)| Problem::of(name, format!("sink {}: {what}", sink.name), next);
+        report.problems.extend(problems.into_iter().map(problem));
+    }
+}
+
+/// The files that the address of a broker names.
+fn check_broker(name: &str, source: &str, target: &NcLinkTarget, report: &mut Report) {
+    for (what, next) in broker_files(target.tls.as_ref(), &target.login) {
+        report.problems.push(Problem::of(name, format!("source {source}: {what}"), next));
+    }
+}
+
 fn check_sources(name: &str, config: &Config, report: &mut Report) {
     for source in &config.sources {
-        if let Some(error) = missing_driver(&source.address) {
-            report.problems.push(Problem::of(
-                name,
-                error.to_string(),
-                "name a source that is there, or wait for the driver",
-            ));
-        }
         match source.address.target() {
             Target::Replay(replay) => check_recording(&replay.file, report),
             Target::Fanuc { backend: FanucBackend::Vendor(library), .. } => check_library(library, report),
+            Target::NcLink(target) => check_broker(name, &source.name, target, report),
             Target::HncNet(target) => check_library(&target.vendor_library, report),
             _ => {}
         }

@@ -24,6 +24,7 @@ pub mod replay;
 pub mod run;
 pub mod samples;
 pub mod signals;
+pub mod sinks;
 pub mod status;
 pub mod twin;
 pub mod usage;

@@ -350,6 +350,9 @@ pub struct Status {
     pub wear: Option<WearStatus>,
     /// The store.
     pub history: HistoryStatus,
+    /// What leaves the box, where a sink is configured.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sinks: Vec<crate::sinks::SinkStatus>,
     /// What does not work while the box goes on.
     pub problems: Vec<Problem>,
 }

@@ -2,9 +2,11 @@
 
 use super::keys::Keys;
 use super::meter::{self, WaveformKeep};
+use super::secured::{Login, tls_files};
 use super::target::{Endpoint, Target, endpoint, library};
 use crate::nclink::mailbox::{Mailbox, Register};
 use crate::nclink::offset_mailbox::OffsetMailbox;
+use crate::tls::TlsFiles;
 use std::path::PathBuf;
 
 /// A Huazhong controller behind a broker.
@@ -14,12 +16,10 @@ pub struct NcLinkTarget {
     pub at: Endpoint,
     /// Serial number of the device.
     pub serial: String,
-    /// Encrypted?
-    pub tls: bool,
-    /// User at the broker.
-    pub user: Option<String>,
-    /// File that holds the user's password.
-    pub password_file: Option<PathBuf>,
+    /// The files of TLS, where the line is secured.
+    pub tls: Option<TlsFiles>,
+    /// User and password at the broker.
+    pub login: Login,
     /// Pace of the queries, ms.
     pub period_ms: u64,
     /// Index of the channel's first F word: 2560 in configuration HNC-30, 6400 in HNC-80.
@@ -77,7 +77,7 @@ pub enum HncOffset {
 }
 
 pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, String> {
-    let (user, password_file) = (keys.text("user"), keys.text("password_file").map(PathBuf::from));
+    let (login, files) = (Login::of(keys), tls_files(keys, tls));
     let period_ms = keys.number("period_ms", 100, 10, 60_000);
     let f_channel = keys.number("f_channel", 2560, 0, 65_535);
     let spindle_axis = keys.optional("spindle_axis", 0, 63);
@@ -95,9 +95,8 @@ pub(super) fn nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<Target, S
     Ok(Target::NcLink(NcLinkTarget {
         at,
         serial,
-        tls,
-        user,
-        password_file,
+        tls: files,
+        login,
         period_ms,
         f_channel,
         spindle_axis,

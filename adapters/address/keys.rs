@@ -5,14 +5,17 @@ use std::fmt::Display;
 use std::str::FromStr;
 
 /// `key=value` pairs joined by `&`; values may hold `%20`-style escapes.
-pub(super) struct Keys {
+#[derive(Debug)]
+pub struct Keys {
     given: Vec<(String, String)>,
     known: Vec<&'static str>,
     problems: Vec<String>,
 }
 
 impl Keys {
-    pub(super) fn of(query: &str) -> Self {
+    /// The keys of a text `a=1&b=2`.
+    #[must_use]
+    pub fn of(query: &str) -> Self {
         let mut keys = Self { given: Vec::new(), known: Vec::new(), problems: Vec::new() };
         for pair in query.split('&').filter(|pair| !pair.is_empty()) {
             match pair.split_once('=') {
@@ -30,19 +33,20 @@ impl Keys {
         self.given.push((key.to_owned(), unescaped(value)));
     }
 
-    pub(super) fn problem(&mut self, problem: String) {
+    /// Notes a problem.
+    pub fn problem(&mut self, problem: String) {
         self.problems.push(problem);
     }
 
     /// The text of a key, if it was given.
-    pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+    pub fn text(&mut self, key: &'static str) -> Option<String> {
         self.known.push(key);
         let at = self.given.iter().position(|(given, _)| given == key)?;
         Some(self.given.swap_remove(at).1)
     }
 
     /// A number within a range, or the default.
-    pub(super) fn number<T>(&mut self, key: &'static str, default: T, least: T, greatest: T) -> T
+    pub fn number<T>(&mut self, key: &'static str, default: T, least: T, greatest: T) -> T
     where
         T: FromStr + PartialOrd + Display + Copy,
     {
@@ -57,7 +61,7 @@ impl Keys {
     }
 
     /// A number within a range, if it was given.
-    pub(super) fn optional<T>(&mut self, key: &'static str, least: T, greatest: T) -> Option<T>
+    pub fn optional<T>(&mut self, key: &'static str, least: T, greatest: T) -> Option<T>
     where
         T: FromStr + PartialOrd + Display + Copy,
     {
@@ -67,7 +71,7 @@ impl Keys {
     }
 
     /// One of several words, or the first of them.
-    pub(super) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> T {
+    pub fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> T {
         let Some(text) = self.text(key) else { return choices[0].1 };
         if let Some((_, value)) = choices.iter().find(|(word, _)| *word == text) {
             return *value;
@@ -78,7 +82,8 @@ impl Keys {
     }
 
     /// Every problem, with the keys that nobody asked for.
-    pub(super) fn finish(mut self) -> Vec<String> {
+    #[must_use]
+    pub fn finish(mut self) -> Vec<String> {
         for (key, _) in std::mem::take(&mut self.given) {
             let hint = match nearest(&key, self.known.iter().copied()) {
                 Some(near) => format!("; did you mean {near}?"),

@@ -4,18 +4,20 @@ mod fanuc;
 mod huazhong;
 mod keys;
 mod meter;
+mod secured;
 mod target;
 
 pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
+pub use keys::Keys;
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
+pub use secured::{Login, tls_files};
 pub use target::{
     Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
-    Speed, Target,
+    Speed, Target, endpoint,
 };
 
 use crate::fanuc::own::OwnChannel;
-use keys::Keys;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -150,6 +152,7 @@ mod tests {
             "nclink://broker:1883/SERIAL",
             "nclink://broker/SN1?user=u&password_file=/etc/pw&period_ms=50&f_channel=6400&spindle_axis=3",
             "nclinks://broker:8883/SERIAL",
+            "nclinks://broker/SERIAL?user=u&password_file=/etc/pw&ca=/etc/ca.pem&cert=/etc/box.pem&key=/etc/box.key",
             "hncnet://10.0.0.6:10001?library=/opt/hnc/libhncnet.so",
             "nclink://broker/SN1?sample=yes&keep=/var/lib/waveforms&keep_above_a=40",
             "hncnet://cnc?library=x.so&sample=yes&sample_scale_a=0.001",

@@ -313,7 +313,11 @@ fn serial(body: &str, keys: &mut Keys) -> Result<SerialTarget, String> {
     Ok(SerialTarget { port: PathBuf::from(port), baud, parity })
 }
 
-pub(super) fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
+/// Host and port of `//HOST:PORT`, or of `HOST` with the default port.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn endpoint(body: &str, default_port: Option<u16>) -> Result<Endpoint, String> {
     let text = body.strip_prefix("//").unwrap_or(body).trim_end_matches('/');
     let (host, port) = split_port(text);
     let host = host.trim_start_matches('[').trim_end_matches(']');

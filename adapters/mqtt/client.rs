@@ -1,13 +1,13 @@
 //! One connection to a broker.
 
 use super::inbox::Inbox;
-use super::packet::{self, Frames, Incoming, Qos};
+use super::incoming::{Allows, Frames, Incoming};
+use super::packet::{self, Qos};
 use super::reader::{READ_PAUSE, Reader, Writer};
-use super::{Message, MqttError, Options};
+use super::{Message, MqttError, Options, Version, words};
 use crate::address::Endpoint;
 use crate::stream;
-use std::io::{Read, Write};
-use std::net::TcpStream;
+use crate::tls::{Line, TlsError, TlsFiles};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::JoinHandle;
@@ -20,6 +20,8 @@ pub struct Client {
     inbox: Arc<Inbox>,
     next_id: AtomicU16,
     deadline: Duration,
+    version: Version,
+    allows: Allows,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -27,22 +29,50 @@ impl Client {
     /// Connects, with a clean session. Takes at most the deadline of the options.
     ///
     /// # Errors
-    /// [`MqttError::Unreachable`], [`MqttError::Refused`] in the broker's words, or [`MqttError::Closed`].
+    /// [`MqttError::Unreachable`], [`MqttError::Tls`], [`MqttError::Refused`] in the broker's words, or
+    /// [`MqttError::Closed`].
     pub fn connect(options: &Options) -> Result<Self, MqttError> {
         let at = Endpoint { host: options.host.clone(), port: options.port };
         let broker = || format!("{}:{}", options.host, options.port);
         let io = |error: std::io::Error| MqttError::Unreachable { broker: broker(), what: error.to_string() };
-        let mut stream = stream::connect(&at, Instant::now() + options.deadline).map_err(io)?;
+        let until = Instant::now() + options.deadline;
+        let lines = options.tls.as_ref().map(TlsFiles::config).transpose()?;
+        let stream = stream::connect(&at, until).map_err(io)?;
+        let pause = stream.try_clone().map_err(io)?;
         stream.set_write_timeout(Some(options.deadline)).map_err(io)?;
-        stream.set_read_timeout(Some(READ_PAUSE.min(options.deadline))).map_err(io)?;
-        stream.write_all(&packet::connect(options)?).map_err(io)?;
-        let frames = greeted(&mut stream, options.deadline)?;
-        let writer = Arc::new(Writer::new(stream.try_clone().map_err(io)?));
+        stream.set_read_timeout(Some(options.deadline)).map_err(io)?;
+        let broken = |error: std::io::Error| match TlsError::within(&error, &options.host) {
+            Some(error) => MqttError::Tls(error),
+            None => MqttError::Closed(error.to_string()),
+        };
+        let line = Arc::new(Line::over(stream, &options.host, &lines).map_err(broken)?);
+        pause.set_read_timeout(Some(READ_PAUSE.min(options.deadline))).map_err(io)?;
+        line.write_all(&packet::connect(options)?).map_err(broken)?;
+        let (frames, allows) = greeted(&line, options, until)?;
+        let writer = Arc::new(Writer::new(line));
         let inbox = Arc::new(Inbox::default());
-        let keep_alive = options.keep_alive.max(Duration::from_secs(1));
-        let reader = Reader { stream, frames, writer: writer.clone(), inbox: inbox.clone(), keep_alive };
+        let asked = options.keep_alive.max(Duration::from_secs(1));
+        let keep_alive = allows.keep_alive_s.map_or(asked, |seconds| asked.min(Duration::from_secs(seconds.into())));
+        let reader = Reader { frames, writer: writer.clone(), inbox: inbox.clone(), keep_alive };
         let thread = std::thread::Builder::new().name("mqtt".to_owned()).spawn(move || reader.run()).map_err(io)?;
-        Ok(Self { writer, inbox, next_id: AtomicU16::new(1), deadline: options.deadline, thread: Some(thread) })
+        Ok(Self {
+            writer,
+            inbox,
+            next_id: AtomicU16::new(1),
+            deadline: options.deadline,
+            version: options.version,
+            allows,
+            thread: Some(thread),
+        })
+    }
+
+    /// What the broker has said it allows.
+    pub(super) fn allows(&self) -> Allows {
+        self.allows
+    }
+
+    pub(super) fn version(&self) -> Version {
+        self.version
     }
 
     /// Subscribes and waits for the broker's consent.
@@ -51,29 +81,14 @@ impl Client {
     /// [`MqttError::Refused`] names the filters that the broker does not grant.
     pub fn subscribe(&self, filters: &[String], qos: Qos) -> Result<(), MqttError> {
         let id = self.id();
-        self.send(&packet::subscribe(id, filters, qos)?)?;
+        self.send(&packet::subscribe(self.version, id, filters, qos)?)?;
         let codes = self.acknowledged(id, "a subscription")?;
         let refused: Vec<&str> =
-            filters.iter().zip(&codes).filter(|(_, code)| **code == 0x80).map(|(filter, _)| filter.as_str()).collect();
+            filters.iter().zip(&codes).filter(|(_, code)| **code >= 0x80).map(|(filter, _)| filter.as_str()).collect();
         if refused.is_empty() {
             Ok(())
         } else {
             Err(MqttError::Refused(format!("to subscribe {}", refused.join(", "))))
-        }
-    }
-
-    /// Sends a message; with [`Qos::AtLeastOnce`] it waits for the broker's acknowledgement.
-    ///
-    /// # Errors
-    /// See [`MqttError`].
-    pub fn publish(&self, topic: &str, payload: &[u8], qos: Qos) -> Result<(), MqttError> {
-        match qos {
-            Qos::AtMostOnce => self.send(&packet::publish(topic, payload, None)?),
-            Qos::AtLeastOnce => {
-                let id = self.id();
-                self.send(&packet::publish(topic, payload, Some(id))?)?;
-                self.acknowledged(id, "a message").map(|_| ())
-            }
         }
     }
 
@@ -97,7 +112,7 @@ impl Client {
         self.inbox.dropped()
     }
 
-    fn send(&self, packet: &[u8]) -> Result<(), MqttError> {
+    pub(super) fn send(&self, packet: &[u8]) -> Result<(), MqttError> {
         self.writer.write(packet).map_err(|error| {
             // Half a packet may be on the line: nothing can follow it.
             let why = MqttError::Closed(error.to_string());
@@ -107,13 +122,13 @@ impl Client {
         })
     }
 
-    fn acknowledged(&self, id: u16, what: &'static str) -> Result<Vec<u8>, MqttError> {
+    pub(super) fn acknowledged(&self, id: u16, what: &'static str) -> Result<Vec<u8>, MqttError> {
         let found = self.inbox.take_acknowledgement(id, Instant::now() + self.deadline)?;
         found.ok_or(MqttError::Unacknowledged { what, deadline_ms: self.deadline.as_millis() })
     }
 
     /// 1 to 65535, around and around.
-    fn id(&self) -> u16 {
+    pub(super) fn id(&self) -> u16 {
         self.next_id
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |id| Some(id.checked_add(1).unwrap_or(1)))
             .unwrap_or(1)
@@ -132,41 +147,40 @@ impl Drop for Client {
 }
 
 /// Waits for `CONNACK` (section 3.2); what came after it stays in the frames.
-fn greeted(stream: &mut TcpStream, deadline: Duration) -> Result<Frames, MqttError> {
-    let until = Instant::now() + deadline;
-    let (mut frames, mut buffer) = (Frames::default(), [0; 1024]);
+fn greeted(line: &Line, options: &Options, until: Instant) -> Result<(Frames, Allows), MqttError> {
+    let (mut frames, mut buffer) = (Frames::of(options.version), [0; 1024]);
     while Instant::now() < until {
-        match stream.read(&mut buffer) {
-            Ok(0) => return Err(MqttError::Closed("the broker hung up at once".to_owned())),
+        match line.read(&mut buffer) {
+            Ok(0) => return Err(hung_up(line)),
             Ok(count) => frames.push(&buffer[..count]),
             Err(error) if stream::is_silence(&error) => continue,
-            Err(error) => return Err(MqttError::Closed(error.to_string())),
+            Err(error) => {
+                let within = TlsError::within(&error, &options.host);
+                return Err(within.map_or_else(|| MqttError::Closed(error.to_string()), MqttError::Tls));
+            }
         }
         match frames.next().map_err(MqttError::Closed)? {
-            Some(Incoming::ConnAck { code: 0 }) => return Ok(frames),
-            Some(Incoming::ConnAck { code }) => return Err(MqttError::Refused(refusal(code))),
+            Some(Incoming::ConnAck { code: 0, allows }) => return Ok((frames, allows)),
+            Some(Incoming::ConnAck { code, .. }) => {
+                return Err(MqttError::Refused(words::connection(options.version, code)));
+            }
             Some(_) => return Err(MqttError::Closed("something else than a greeting came first".to_owned())),
             None => {}
         }
     }
-    Err(MqttError::Unacknowledged { what: "the connection", deadline_ms: deadline.as_millis() })
+    Err(MqttError::Unacknowledged { what: "the connection", deadline_ms: options.deadline.as_millis() })
 }
 
-/// Table 3.1 of the standard.
-fn refusal(code: u8) -> String {
-    match code {
-        1 => "it does not speak MQTT 3.1.1".to_owned(),
-        2 => "the name of this client".to_owned(),
-        3 => "it is not available now".to_owned(),
-        4 => "user or password are wrong".to_owned(),
-        5 => "this user may not connect".to_owned(),
-        other => format!("code {other}"),
-    }
+/// A broker that wants TLS, or another kind of it, says nothing and goes.
+fn hung_up(line: &Line) -> MqttError {
+    let hint = if line.is_secured() { "" } else { "; a port that wants TLS does so, usually 8883" };
+    MqttError::Closed(format!("the broker hung up at once{hint}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::{Read, Write};
     use std::net::TcpListener;
 
     fn options(port: u16) -> Options {

@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     fn message(bytes: usize) -> Message {
-        Message { topic: String::new(), payload: vec![0; bytes], arrived: Instant::now() }
+        Message { topic: String::new(), payload: vec![0; bytes], arrived: Instant::now(), retained: false }
     }
 
     #[test]

@@ -1,7 +1,9 @@
-//! A small synchronous MQTT 3.1.1 client: what a driver on its own thread needs of a broker, and nothing else.
+//! A small synchronous MQTT client for 3.1.1 and 5: what a driver or a sink needs of a broker, and nothing else.
 //!
-//! - Quality of service 0 and 1, clean session, keep-alive, user and password. No TLS, no will, no retained messages of
-//!   its own, no session that outlives the connection: the protocols above ask again after a reconnect.
+//! - Quality of service 0 and 1, clean session, keep-alive, user and password, TLS with client certificates, a will,
+//!   retained messages. No session that outlives the connection: the protocols above ask or send again after a reconnect.
+//! - Many messages may be on their way at once ([`Client::publish_all`]): a line with a round trip of 50 ms would
+//!   otherwise carry 20 messages a second.
 //! - `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before, 40 ms and more.
 //! - One thread per connection reads, answers the broker and fills a bounded queue, so that a message is stamped when it
 //!   arrives and not when somebody has time for it. When nobody takes, the oldest message goes and is counted.
@@ -10,16 +12,22 @@
 //!
 //! Limits: a packet of at most [`PACKET_MAX`] bytes, a queue of at most [`QUEUE_MESSAGES`] messages and [`QUEUE_BYTES`].
 //!
-//! Source: MQTT Version 3.1.1, OASIS Standard, 29 October 2014 (sections are named beside the code).
+//! Sources: MQTT Version 3.1.1, OASIS Standard, 29 October 2014 (sections are named beside the code), and MQTT Version 5.0,
+//! OASIS Standard, 7 March 2019 (sections are named with a 5 before them).
 
 mod client;
 mod inbox;
+mod incoming;
 mod packet;
+mod publishing;
 mod reader;
+mod words;
 
 pub use client::Client;
 pub use packet::Qos;
+pub use publishing::Outgoing;
 
+use crate::tls::{TlsError, TlsFiles};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -29,6 +37,29 @@ pub const PACKET_MAX: usize = 8 * 1024 * 1024;
 pub const QUEUE_MESSAGES: usize = 4096;
 /// At most so many bytes of payload wait to be taken.
 pub const QUEUE_BYTES: usize = 32 * 1024 * 1024;
+
+/// The version that is spoken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Version {
+    /// MQTT 3.1.1, which every broker speaks.
+    #[default]
+    V3,
+    /// MQTT 5, in which a broker says why it refuses something.
+    V5,
+}
+
+/// What the broker publishes in our name when the connection breaks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Will {
+    /// Its topic.
+    pub topic: String,
+    /// What it says.
+    pub payload: Vec<u8>,
+    /// How hard it is delivered.
+    pub qos: Qos,
+    /// Does the broker keep it for later subscribers?
+    pub retain: bool,
+}
 
 /// How to talk to a broker.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,6 +72,12 @@ pub struct Options {
     pub client_id: String,
     /// User and password, where the broker wants them.
     pub login: Option<(String, String)>,
+    /// The version that is spoken.
+    pub version: Version,
+    /// TLS, where the line is secured. The files are read at every connection: renewed ones count from the next on.
+    pub tls: Option<TlsFiles>,
+    /// What the broker publishes when the connection breaks.
+    pub will: Option<Will>,
     /// Longest silence: half of it without a packet and the broker is asked for a sign of life.
     pub keep_alive: Duration,
     /// Longest wait for the connection and for each acknowledgement.
@@ -53,7 +90,8 @@ impl Options {
     pub fn new(host: &str, port: u16, role: &str) -> Self {
         let client_id = format!("{role}-{}", unique());
         let (keep_alive, deadline) = (Duration::from_secs(20), Duration::from_secs(2));
-        Self { host: host.to_owned(), port, client_id, login: None, keep_alive, deadline }
+        let (version, tls, will, login) = (Version::default(), None, None, None);
+        Self { host: host.to_owned(), port, client_id, login, version, tls, will, keep_alive, deadline }
     }
 }
 
@@ -73,6 +111,8 @@ pub struct Message {
     pub payload: Vec<u8>,
     /// When its last byte had arrived.
     pub arrived: Instant,
+    /// Did the broker keep it from before the subscription?
+    pub retained: bool,
 }
 
 /// Why the broker cannot be used.
@@ -86,7 +126,10 @@ pub enum MqttError {
         /// What the system said.
         what: String,
     },
-    /// The broker refused the connection or a subscription.
+    /// The other side cannot be trusted, or does not trust us.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    /// The broker refused the connection, a subscription or a message.
     #[error("the broker refuses: {0}")]
     Refused(String),
     /// The connection broke.
@@ -103,4 +146,19 @@ pub enum MqttError {
     /// The message cannot be sent at all.
     #[error("the message cannot be sent: {0}")]
     Unsendable(String),
+}
+
+impl MqttError {
+    /// What to do next.
+    #[must_use]
+    pub fn next(&self) -> &str {
+        match self {
+            Self::Unreachable { .. } => "Check that the broker runs there and that the network lets its port through.",
+            Self::Tls(error) => &error.next,
+            Self::Refused(_) => "Check user and password_file in the address, and what the broker allows this user.",
+            Self::Closed(_) => "Look at the broker's log; two clients of one name throw each other out.",
+            Self::Unacknowledged { .. } => "Look whether the broker is overloaded, and whether this port speaks MQTT.",
+            Self::Unsendable(_) => "Shorten what is sent, or raise the broker's limit.",
+        }
+    }
 }

@@ -1,6 +1,6 @@
-//! Packets as bytes (MQTT 3.1.1, sections 2 and 3). Pure: bytes in, packets out.
+//! What this client sends, as bytes (MQTT 3.1.1, sections 2 and 3). Pure.
 
-use super::{MqttError, Options, PACKET_MAX};
+use super::{MqttError, Options, PACKET_MAX, Version};
 
 /// How hard a message is delivered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,30 +20,30 @@ impl Qos {
     }
 }
 
-/// What a broker sends.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Incoming {
-    ConnAck { code: u8 },
-    Publish { topic: String, payload: Vec<u8>, acknowledge: Option<u16> },
-    PubAck(u16),
-    SubAck { id: u16, codes: Vec<u8> },
-    PingResp,
-}
-
 /// `PINGREQ` (section 3.12).
 pub(super) const PING: [u8; 2] = [0xc0, 0];
-/// `DISCONNECT` (section 3.14).
+/// `DISCONNECT` (section 3.14): the will is not published.
 pub(super) const DISCONNECT: [u8; 2] = [0xe0, 0];
+/// No properties (section 5-2.2.2).
+const NO_PROPERTIES: u8 = 0;
 
 /// `CONNECT` with a clean session (section 3.1).
 pub(super) fn connect(options: &Options) -> Result<Vec<u8>, MqttError> {
+    let five = options.version == Version::V5;
     let mut body = Vec::new();
     text(&mut body, "MQTT")?;
     let login = if options.login.is_some() { 0xc0 } else { 0 };
+    let will = options.will.as_ref().map_or(0, |will| 0x04 | (will.qos.level() << 3) | (u8::from(will.retain) << 5));
     let keep_alive_s = u16::try_from(options.keep_alive.as_secs()).unwrap_or(u16::MAX);
-    body.extend([4, 0x02 | login]);
+    body.extend([if five { 5 } else { 4 }, 0x02 | login | will]);
     body.extend(keep_alive_s.to_be_bytes());
+    body.extend(five.then_some(NO_PROPERTIES));
     text(&mut body, &options.client_id)?;
+    if let Some(will) = &options.will {
+        body.extend(five.then_some(NO_PROPERTIES));
+        text(&mut body, &will.topic)?;
+        bytes(&mut body, &will.payload, "a will")?;
+    }
     if let Some((user, password)) = &options.login {
         text(&mut body, user)?;
         text(&mut body, password)?;
@@ -52,15 +52,22 @@ pub(super) fn connect(options: &Options) -> Result<Vec<u8>, MqttError> {
 }
 
 /// `PUBLISH` (section 3.3); with an identifier the receiver acknowledges.
-pub(super) fn publish(topic: &str, payload: &[u8], id: Option<u16>) -> Result<Vec<u8>, MqttError> {
+pub(super) fn publish(
+    version: Version,
+    topic: &str,
+    payload: &[u8],
+    id: Option<u16>,
+    retain: bool,
+) -> Result<Vec<u8>, MqttError> {
     if topic.is_empty() || topic.contains(['+', '#', '\0']) {
         return Err(MqttError::Unsendable(format!("{topic:?} is no topic to publish to")));
     }
-    let mut body = Vec::with_capacity(topic.len() + payload.len() + 4);
+    let mut body = Vec::with_capacity(topic.len() + payload.len() + 5);
     text(&mut body, topic)?;
     body.extend(id.iter().flat_map(|id| id.to_be_bytes()));
+    body.extend((version == Version::V5).then_some(NO_PROPERTIES));
     body.extend_from_slice(payload);
-    framed(0x30 | if id.is_some() { 0x02 } else { 0 }, &body)
+    framed(0x30 | u8::from(retain) | if id.is_some() { 0x02 } else { 0 }, &body)
 }
 
 /// `PUBACK` (section 3.4).
@@ -70,8 +77,9 @@ pub(super) fn acknowledge(id: u16) -> [u8; 4] {
 }
 
 /// `SUBSCRIBE` (section 3.8).
-pub(super) fn subscribe(id: u16, filters: &[String], qos: Qos) -> Result<Vec<u8>, MqttError> {
+pub(super) fn subscribe(version: Version, id: u16, filters: &[String], qos: Qos) -> Result<Vec<u8>, MqttError> {
     let mut body = id.to_be_bytes().to_vec();
+    body.extend((version == Version::V5).then_some(NO_PROPERTIES));
     for filter in filters {
         text(&mut body, filter)?;
         body.push(qos.level());
@@ -80,10 +88,16 @@ pub(super) fn subscribe(id: u16, filters: &[String], qos: Qos) -> Result<Vec<u8>
 }
 
 fn text(body: &mut Vec<u8>, text: &str) -> Result<(), MqttError> {
-    let length = u16::try_from(text.len());
-    let length = length.map_err(|_| MqttError::Unsendable(format!("a text of {} bytes", text.len())))?;
+    bytes(body, text.as_bytes(), "a text")
+}
+
+fn bytes(body: &mut Vec<u8>, bytes: &[u8], what: &str) -> Result<(), MqttError> {
+    let length = u16::try_from(bytes.len());
+    let length = length.map_err(|_| {
+        MqttError::Unsendable(format!("{what} of {} bytes where at most {} fit", bytes.len(), u16::MAX))
+    })?;
     body.extend(length.to_be_bytes());
-    body.extend_from_slice(text.as_bytes());
+    body.extend_from_slice(bytes);
     Ok(())
 }
 
@@ -106,147 +120,41 @@ fn framed(first: u8, body: &[u8]) -> Result<Vec<u8>, MqttError> {
     Ok(packet)
 }
 
-/// Bytes as they come, cut into packets.
-#[derive(Debug, Default)]
-pub(super) struct Frames {
-    bytes: Vec<u8>,
-    used: usize,
-}
-
-impl Frames {
-    pub(super) fn push(&mut self, bytes: &[u8]) {
-        if self.used > 0 {
-            self.bytes.drain(..self.used);
-            self.used = 0;
-        }
-        self.bytes.extend_from_slice(bytes);
-    }
-
-    /// The next whole packet; `None` when more bytes are needed. After an error the line is of no use any more.
-    pub(super) fn next(&mut self) -> Result<Option<Incoming>, String> {
-        let waiting = &self.bytes[self.used..];
-        let Some((length, header)) = remaining_length(waiting)? else { return Ok(None) };
-        let Some(body) = waiting.get(header..header + length) else { return Ok(None) };
-        let packet = decode(waiting[0], body)?;
-        self.used += header + length;
-        Ok(Some(packet))
-    }
-}
-
-/// Length of the body, and of the header before it.
-fn remaining_length(bytes: &[u8]) -> Result<Option<(usize, usize)>, String> {
-    let mut length = 0;
-    for index in 0..4 {
-        let Some(byte) = bytes.get(1 + index) else { return Ok(None) };
-        length |= usize::from(byte & 0x7f) << (7 * index);
-        if byte & 0x80 == 0 {
-            return match length <= PACKET_MAX {
-                true => Ok(Some((length, 2 + index))),
-                false => Err(format!("a packet of {length} bytes; at most {PACKET_MAX} are taken")),
-            };
-        }
-    }
-    Err("a length of more than four bytes: this is not MQTT".to_owned())
-}
-
-fn decode(first: u8, body: &[u8]) -> Result<Incoming, String> {
-    let short = || format!("a packet of type {} is too short", first >> 4);
-    match (first >> 4, body) {
-        (2, [_, code]) => Ok(Incoming::ConnAck { code: *code }),
-        (3, _) => decode_publish(first, body).ok_or_else(short),
-        (4, [high, low]) => Ok(Incoming::PubAck(u16::from_be_bytes([*high, *low]))),
-        (9, [high, low, codes @ ..]) => {
-            Ok(Incoming::SubAck { id: u16::from_be_bytes([*high, *low]), codes: codes.to_vec() })
-        }
-        (13, []) => Ok(Incoming::PingResp),
-        (2 | 4 | 9 | 13, _) => Err(short()),
-        (other, _) => Err(format!("a packet of type {other}, which a broker does not send here")),
-    }
-}
-
-fn decode_publish(first: u8, body: &[u8]) -> Option<Incoming> {
-    let (length, rest) = body.split_first_chunk::<2>()?;
-    let (topic, rest) = rest.split_at_checked(usize::from(u16::from_be_bytes(*length)))?;
-    let topic = String::from_utf8(topic.to_vec()).ok()?;
-    if (first >> 1) & 3 == 0 {
-        return Some(Incoming::Publish { topic, payload: rest.to_vec(), acknowledge: None });
-    }
-    let (id, payload) = rest.split_first_chunk::<2>()?;
-    Some(Incoming::Publish { topic, payload: payload.to_vec(), acknowledge: Some(u16::from_be_bytes(*id)) })
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Will;
     use super::*;
     use std::time::Duration;
 
-    #[test]
-    fn a_connection_is_asked_for_as_the_standard_writes_it() {
-        let options = Options {
-            host: String::new(),
-            port: 1,
+    fn options() -> Options {
+        Options {
             client_id: "ab".to_owned(),
             login: Some(("u".to_owned(), "p".to_owned())),
             keep_alive: Duration::from_secs(20),
-            deadline: Duration::ZERO,
-        };
+            ..Options::new("", 1, "")
+        }
+    }
+
+    #[test]
+    fn a_connection_is_asked_for_as_the_standard_writes_it() {
         let expected = b"\x10\x14\x00\x04MQTT\x04\xc2\x00\x14\x00\x02ab\x00\x01u\x00\x01p";
-        assert_eq!(connect(&options).expect("short enough"), expected);
+        assert_eq!(connect(&options()).expect("short enough"), expected);
+        let will = Will { topic: "t".to_owned(), payload: b"xyz".to_vec(), qos: Qos::AtLeastOnce, retain: true };
+        let five = Options { version: Version::V5, will: Some(will), login: None, ..options() };
+        let expected = b"\x10\x1a\x00\x04MQTT\x05\x2e\x00\x14\x00\x00\x02ab\x00\x00\x01t\x00\x03xyz";
+        assert_eq!(connect(&five).expect("short enough")[2..], expected[2..]);
     }
 
     #[test]
     fn messages_and_subscriptions_have_their_identifiers() {
+        let publish = |topic: &str, payload, id| publish(Version::V3, topic, payload, id, false);
         assert_eq!(publish("a/b", b"xy", None).expect("fits"), b"\x30\x07\x00\x03a/bxy");
         assert_eq!(publish("a/b", b"xy", Some(258)).expect("fits"), b"\x32\x09\x00\x03a/b\x01\x02xy");
         let two = ["a/#".to_owned(), "b".to_owned()];
         assert_eq!(
-            subscribe(10, &two, Qos::AtLeastOnce).expect("fits"),
+            subscribe(Version::V3, 10, &two, Qos::AtLeastOnce).expect("fits"),
             b"\x82\x0c\x00\x0a\x00\x03a/#\x01\x00\x01b\x01"
         );
         assert!(publish("a/#", b"", None).is_err() && publish(&"x".repeat(70_000), b"", None).is_err());
-    }
-
-    #[test]
-    fn packets_survive_any_cut_of_the_line() {
-        let mut line = b"\x20\x02\x00\x00\x90\x03\x00\x0a\x80\xd0\x00".to_vec();
-        line.extend(publish("t", &[7; 300], Some(9)).expect("fits"));
-        let expected = [
-            Incoming::ConnAck { code: 0 },
-            Incoming::SubAck { id: 10, codes: vec![0x80] },
-            Incoming::PingResp,
-            Incoming::Publish { topic: "t".to_owned(), payload: vec![7; 300], acknowledge: Some(9) },
-        ];
-        for size in [1, 2, 3, 5, 64, 1000] {
-            let (mut frames, mut found) = (Frames::default(), Vec::new());
-            for part in line.chunks(size) {
-                frames.push(part);
-                while let Some(packet) = frames.next().expect("well formed") {
-                    found.push(packet);
-                }
-            }
-            assert_eq!(found, expected, "{size} bytes at a time");
-        }
-    }
-
-    #[test]
-    fn what_is_not_mqtt_is_refused_in_words() {
-        let said = |bytes: &[u8]| {
-            let mut frames = Frames::default();
-            frames.push(bytes);
-            frames.next().expect_err("refused")
-        };
-        assert!(said(b"\x30\xff\xff\xff\xff\xff").contains("not MQTT"));
-        assert!(said(b"\x30\xff\xff\xff\x7f").contains("bytes"));
-        assert!(said(b"\x30\x01\x00").contains("too short"));
-        assert!(said(b"\x50\x00").contains("type 5"));
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn no_bytes_make_it_panic(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..64)) {
-            let mut frames = Frames::default();
-            frames.push(&bytes);
-            while let Ok(Some(_)) = frames.next() {}
-        }
     }
 }

@@ -1,11 +1,12 @@
 //! The thread that reads: it fills the inbox, acknowledges, and keeps the connection alive.
 
 use super::inbox::Inbox;
-use super::packet::{Frames, Incoming, PING, acknowledge};
-use super::{Message, MqttError};
+use super::incoming::{Frames, Incoming};
+use super::packet::{PING, acknowledge};
+use super::{Message, MqttError, words};
 use crate::stream::is_silence;
-use std::io::{ErrorKind, Read, Write};
-use std::net::TcpStream;
+use crate::tls::Line;
+use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -15,33 +16,33 @@ pub(super) const READ_PAUSE: Duration = Duration::from_millis(200);
 /// The writing half of the connection; one packet at a time.
 #[derive(Debug)]
 pub(super) struct Writer {
-    stream: Mutex<(TcpStream, Instant)>,
+    line: Arc<Line>,
+    /// When something was sent last. Held while it is sent: one packet at a time.
+    sent: Mutex<Instant>,
 }
 
 impl Writer {
-    pub(super) fn new(stream: TcpStream) -> Self {
-        Self { stream: Mutex::new((stream, Instant::now())) }
+    pub(super) fn new(line: Arc<Line>) -> Self {
+        Self { line, sent: Mutex::new(Instant::now()) }
     }
 
     pub(super) fn write(&self, packet: &[u8]) -> std::io::Result<()> {
-        let mut held = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        held.1 = Instant::now();
-        held.0.write_all(packet)
+        let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
+        *sent = Instant::now();
+        self.line.write_all(packet)
     }
 
     /// Ends the connection in both directions; the reading thread ends by it.
     pub(super) fn shut(&self) {
-        let held = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        let _already_gone = held.0.shutdown(std::net::Shutdown::Both);
+        self.line.shut();
     }
 
     fn idle(&self, now: Instant) -> Duration {
-        now.saturating_duration_since(self.stream.lock().unwrap_or_else(PoisonError::into_inner).1)
+        now.saturating_duration_since(*self.sent.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 pub(super) struct Reader {
-    pub(super) stream: TcpStream,
     pub(super) frames: Frames,
     pub(super) writer: Arc<Writer>,
     pub(super) inbox: Arc<Inbox>,
@@ -61,7 +62,7 @@ impl Reader {
         let mut heard = Instant::now();
         self.dispatch()?;
         loop {
-            match self.stream.read(&mut buffer) {
+            match self.writer.line.read(&mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(count) => {
                     heard = Instant::now();
@@ -79,14 +80,15 @@ impl Reader {
     fn dispatch(&mut self) -> Result<(), String> {
         while let Some(packet) = self.frames.next()? {
             match packet {
-                Incoming::Publish { topic, payload, acknowledge: id } => {
-                    self.inbox.put(Message { topic, payload, arrived: Instant::now() });
+                Incoming::Publish { topic, payload, acknowledge: id, retained } => {
+                    self.inbox.put(Message { topic, payload, arrived: Instant::now(), retained });
                     if let Some(id) = id {
                         self.writer.write(&acknowledge(id)).map_err(|error| error.to_string())?;
                     }
                 }
-                Incoming::PubAck(id) => self.inbox.acknowledge(id, Vec::new()),
+                Incoming::PubAck(id, code) => self.inbox.acknowledge(id, vec![code]),
                 Incoming::SubAck { id, codes } => self.inbox.acknowledge(id, codes),
+                Incoming::Disconnect(code) => return Err(format!("the broker ends it: {}", words::reason(code))),
                 Incoming::PingResp | Incoming::ConnAck { .. } => {}
             }
         }

@@ -6,6 +6,7 @@ use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use crate::driver::SourceError;
 use crate::mqtt::{self, Client, Message, MqttError, Qos};
+use crate::tls::TlsFiles;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -28,6 +29,8 @@ pub struct Link {
     pub serial: String,
     /// User and password at the broker.
     pub login: Option<(String, String)>,
+    /// The files of TLS, where the line is secured.
+    pub tls: Option<TlsFiles>,
     /// Longest wait for an answer.
     pub deadline: Duration,
 }
@@ -42,6 +45,7 @@ impl Link {
             port: target.at.port,
             serial: target.serial.clone(),
             login,
+            tls: target.tls.clone(),
             deadline: DEADLINE,
         }
     }
@@ -77,6 +81,7 @@ impl Connection {
     pub fn open(link: &Link, samples: bool) -> Result<Self, SourceError> {
         let mut options = mqtt::Options::new(&link.host, link.port, "cnc-gateway");
         options.login.clone_from(&link.login);
+        options.tls.clone_from(&link.tls);
         options.deadline = link.deadline;
         let fault = |error| broker_fault(link, error);
         let client = Client::connect(&options).map_err(fault)?;
@@ -234,11 +239,8 @@ fn broker_fault(link: &Link, error: MqttError) -> SourceError {
             what: format!("the broker refuses: {what}"),
             next: "Check user and password_file in the address, and what the broker allows this user.".to_owned(),
         },
-        other => SourceError::Line {
-            source_name,
-            what: other.to_string(),
-            next: "Check that the broker runs there and that the network lets its port through.".to_owned(),
-        },
+        MqttError::Tls(error) => SourceError::Line { source_name, what: error.what, next: error.next },
+        other => SourceError::Line { source_name, next: other.next().to_owned(), what: other.to_string() },
     }
 }
 

@@ -35,7 +35,7 @@
 //! everything is refused.
 //!
 //! **Limits.** A model of at most [`model::ITEMS_MAX`] items, [`sample::VALUES_MAX`] values in a sample message, one
-//! request at a time. `nclinks://` (TLS) is refused: this build has no TLS.
+//! request at a time. `nclinks://` is the same over TLS.
 //!
 //! **Certain and not.** Topics and messages are those of open implementations and their recorded wire samples. Not
 //! published anywhere and to be checked on a machine: the meaning of the status item's numbers (so mode and execution are
@@ -63,6 +63,6 @@ mod track;
 pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
 pub use message::{Answer, Ask, Params};
-pub use open::{NO_TLS, open, open_sampled};
+pub use open::{open, open_sampled};
 pub use source::{BlockSink, NcLinkSource};
 pub use track::{ChannelTrack, Track};

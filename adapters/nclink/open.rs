@@ -11,13 +11,10 @@ use crate::driver::Actuator;
 use crate::offset::OffsetSink;
 use crate::open::{OpenError, Opened, Refused};
 
-/// What `nclinks://` is answered with.
-pub const NO_TLS: &str = "this build has no TLS for MQTT; use nclink:// to a broker on this box or behind a tunnel";
-
 /// Opens an NC-Link address; nothing is connected before the first poll.
 ///
 /// # Errors
-/// TLS, which this build does not have; a password file that cannot be read.
+/// A password file that cannot be read.
 pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenError> {
     open_sampled(address, target, None)
 }
@@ -27,10 +24,10 @@ pub fn open(address: &Address, target: &NcLinkTarget) -> Result<Opened, OpenErro
 /// # Errors
 /// See [`open`].
 pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<BlockSink>) -> Result<Opened, OpenError> {
-    if target.tls {
-        return Err(OpenError::Unsuitable { address: address.text().to_owned(), what: NO_TLS });
-    }
-    let login = login(target)?;
+    let login = target
+        .login
+        .read()
+        .map_err(|(file, error)| OpenError::Secret { file: file.display().to_string(), what: error.to_string() })?;
     let link = Link::of(address.text(), target, login.clone());
     let mut source = NcLinkSource::new(address.text(), target, login);
     if let Some(sink) = sink {
@@ -43,14 +40,4 @@ pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<Block
 
 fn offsets(link: Link, f_channel: u32, first: Register) -> Box<dyn OffsetSink> {
     Box::new(LadderOffsets::new(NcLinkRegisters::new(link, f_channel), first))
-}
-
-fn login(target: &NcLinkTarget) -> Result<Option<(String, String)>, OpenError> {
-    let Some(user) = &target.user else { return Ok(None) };
-    let password = match &target.password_file {
-        Some(file) => std::fs::read_to_string(file)
-            .map_err(|error| OpenError::Secret { file: file.display().to_string(), what: error.to_string() })?,
-        None => String::new(),
-    };
-    Ok(Some((user.clone(), password.trim_end_matches(['\r', '\n']).to_owned())))
 }

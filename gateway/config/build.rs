@@ -3,6 +3,7 @@
 mod http;
 
 use super::check_value::Scalar;
+use super::outputs;
 use super::read::{Found, Origin, Reading, Values};
 use super::{
     Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Log, Offset, Operations, Scripts, Source, Twin,
@@ -27,6 +28,8 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
         sources
     });
+    let sinks = outputs::sinks(reading);
+    let outbox = outputs::outbox(reading);
     let gateway = gateway(reading, base)?;
     Some(Config {
         alignment: Alignment {
@@ -37,6 +40,8 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         operations: Operations { path: text(reading, "operations", "path").map(|path| base.join(path)) },
         gate: gate(reading)?,
         history: history(reading, &gateway.data_dir)?,
+        sinks: sinks?,
+        outbox: outbox?,
         http: http::http(reading, base)?,
         twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
         log: log(reading)?,
@@ -151,7 +156,7 @@ fn source(values: &Values) -> Option<Source> {
     })
 }
 
-fn source_name(values: &Values) -> Option<String> {
+pub(super) fn source_name(values: &Values) -> Option<String> {
     let named = |key| values.found.get(key).and_then(as_text).map(str::to_owned);
     named("name").or_else(|| named("address"))
 }
@@ -172,7 +177,7 @@ fn check_names(reading: &mut Reading<'_>) {
     }
 }
 
-fn origin_of_name(values: &Values) -> Origin {
+pub(super) fn origin_of_name(values: &Values) -> Origin {
     let found = values.found.get("name").or_else(|| values.found.get("address"));
     found.map_or(Origin::Default, |found| found.origin.clone())
 }
@@ -263,7 +268,7 @@ fn quoted(names: &[String]) -> String {
     names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
 }
 
-fn as_text(found: &Found) -> Option<&str> {
+pub(super) fn as_text(found: &Found) -> Option<&str> {
     match &found.value {
         Scalar::Text(text) => Some(text),
         _ => None,
@@ -277,11 +282,11 @@ fn as_number(found: &Found) -> Option<f64> {
     }
 }
 
-fn text(reading: &Reading<'_>, section: &str, key: &str) -> Option<String> {
+pub(super) fn text(reading: &Reading<'_>, section: &str, key: &str) -> Option<String> {
     reading.get(section, key).and_then(as_text).map(str::to_owned)
 }
 
-fn number(reading: &Reading<'_>, section: &str, key: &str) -> Option<f64> {
+pub(super) fn number(reading: &Reading<'_>, section: &str, key: &str) -> Option<f64> {
     reading.get(section, key).and_then(as_number)
 }
 

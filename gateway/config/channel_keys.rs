@@ -1,6 +1,6 @@
 //! The keys of `[[source.channel]]`: the user's own channels.
 
-use super::keys::{Absent, FIRST, Key, Kind};
+use super::keys::{Absent, Key, Kind};
 
 /// The section, below a source.
 pub(super) const SECTION: &str = "source.channel";
@@ -65,14 +65,3 @@ pub(super) const KEYS: [Key; 9] = [
         "通道号",
     ),
 ];
-
-/// The keys of every section, these behind the others.
-pub(super) static ALL: [Key; FIRST.len() + KEYS.len()] = {
-    let mut all = [FIRST[0]; FIRST.len() + KEYS.len()];
-    let mut index = 0;
-    while index < all.len() {
-        all[index] = if index < FIRST.len() { FIRST[index] } else { KEYS[index - FIRST.len()] };
-        index += 1;
-    }
-    all
-};

@@ -1,7 +1,9 @@
 //! One value against one row of the table of keys.
 
 use super::keys::{Key, Kind};
+use crate::sinks::SinkAddress;
 use adapters::Address;
+use adapters::address::AddressError;
 use adapters::channel::nearest;
 use toml::de::DeValue;
 
@@ -55,7 +57,7 @@ fn needed(kind: Kind) -> &'static str {
         Kind::Flag => "true or false",
         Kind::Path => "a path in quotes",
         Kind::Listen => "HOST:PORT in quotes",
-        Kind::Address => "an address in quotes",
+        Kind::Address | Kind::SinkAddress => "an address in quotes",
     }
 }
 
@@ -67,6 +69,7 @@ fn example(key: &Key) -> String {
         Kind::Flag => "true".to_owned(),
         Kind::Listen => "\"127.0.0.1:8080\"".to_owned(),
         Kind::Address => "\"simulated://lathe\"".to_owned(),
+        Kind::SinkAddress => "\"mqtts://broker:8883/plant\"".to_owned(),
     };
     format!("for example {} = {value}", key.name)
 }
@@ -83,7 +86,8 @@ pub(super) fn check_scalar(key: &Key, text: &str) -> Result<Scalar, Refusal> {
         _ if text.trim().is_empty() => Err((format!("`{}` is empty", key.name), example(key))),
         Kind::OneOf(words) => word(key, text, words),
         Kind::Listen => listen(key, text),
-        Kind::Address => address(text),
+        Kind::Address => address(text, text.parse::<Address>().map(drop)),
+        Kind::SinkAddress => address(text, text.parse::<SinkAddress>().map(drop)),
         Kind::Text | Kind::Path => Ok(Scalar::Text(text.to_owned())),
     }
 }
@@ -121,8 +125,8 @@ fn listen(key: &Key, text: &str) -> Result<Scalar, Refusal> {
     ))
 }
 
-fn address(text: &str) -> Result<Scalar, Refusal> {
-    match text.parse::<Address>() {
+fn address(text: &str, parsed: Result<(), AddressError>) -> Result<Scalar, Refusal> {
+    match parsed {
         Ok(_) => Ok(Scalar::Text(text.to_owned())),
         Err(error) => {
             let next = "`cnc-gateway doctor ADDRESS` tries an address and says what is wrong".to_owned();

@@ -1,6 +1,7 @@
 //! The one table of configuration keys: what is read, refused, suggested, printed by `check --keys` and explained.
 
 use super::channel_keys;
+use super::keys_of_outputs::OUTPUTS;
 pub use super::shown::{example, table};
 
 /// What a key accepts.
@@ -20,6 +21,8 @@ pub enum Kind {
     Listen,
     /// The address of a source, as listed in the table of sources.
     Address,
+    /// The address of a sink.
+    SinkAddress,
 }
 
 /// What happens when a key is not written.
@@ -80,12 +83,18 @@ pub const SECTIONS: &[Section] = &[
     section("gate", "what may be written to the machine"),
     section("gate.offset", "thermal offsets that scripts propose, written between programs; needs the same arming"),
     section("history", "what is remembered"),
+    Section {
+        name: "sink",
+        repeated: true,
+        en: "one receiver of what leaves the box; write the section once for each",
+    },
+    section("outbox", "what the sinks are sent, and how much of it waits for them during an outage"),
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
     section("log", "what is written to the standard error output"),
 ];
 
-const fn key(
+pub(super) const fn key(
     path: (&'static str, &'static str),
     kind: Kind,
     absent: Absent,
@@ -99,10 +108,27 @@ use Absent::{Default, Optional, Required};
 use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
 
 /// Every key the gateway knows.
-pub static KEYS: &[Key] = &channel_keys::ALL;
+pub static KEYS: &[Key] = &ALL;
 
-/// Every key but those of channels.
-pub(super) const FIRST: &[Key] = &[
+/// The rows of every part of the table, one part behind the other.
+static ALL: [Key; CORE.len() + OUTPUTS.len() + channel_keys::KEYS.len()] = {
+    let mut all = [CORE[0]; CORE.len() + OUTPUTS.len() + channel_keys::KEYS.len()];
+    let parts: [&[Key]; 3] = [CORE, OUTPUTS, &channel_keys::KEYS];
+    let (mut part, mut filled) = (0, 0);
+    while part < parts.len() {
+        let mut index = 0;
+        while index < parts[part].len() {
+            all[filled] = parts[part][index];
+            filled += 1;
+            index += 1;
+        }
+        part += 1;
+    }
+    all
+};
+
+/// Every key but those of the outputs and of channels.
+const CORE: &[Key] = &[
     key(
         ("gateway", "name"),
         Text,

@@ -10,13 +10,17 @@ mod channel_keys;
 mod channels;
 mod check_value;
 pub mod keys;
+mod keys_of_outputs;
+mod outputs;
 mod problem;
 mod read;
 mod shown;
 
 pub use problem::Problem;
 
+use crate::history::OutboxSettings;
 use crate::log::LogFormat;
+use crate::sinks::SinkAddress;
 use adapters::{Address, Axis};
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
@@ -50,6 +54,10 @@ pub struct Config {
     pub gate: Gate,
     /// What is remembered.
     pub history: History,
+    /// Where it is sent to.
+    pub sinks: Vec<Sink>,
+    /// What the sinks are sent, and how much of it is kept for them.
+    pub outbox: OutboxSettings,
     /// The page.
     pub http: Http,
     /// The simulation.
@@ -224,6 +232,15 @@ pub struct History {
     pub max_gb: f64,
     /// Time between two commits.
     pub commit: Duration,
+}
+
+/// One `[[sink]]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sink {
+    /// Where it is and how to talk to it.
+    pub address: SinkAddress,
+    /// Short name; the text of the address when none was given.
+    pub name: String,
 }
 
 /// `[http]`.

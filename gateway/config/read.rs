@@ -52,6 +52,7 @@ pub(super) struct Reading<'a> {
     text: &'a str,
     single: BTreeMap<&'static str, Values>,
     pub(super) sources: Vec<Values>,
+    pub(super) sinks: Vec<Values>,
     pub(super) problems: Vec<Problem>,
 }
 
@@ -123,7 +124,7 @@ impl<'a> Reading<'a> {
         match item.get_ref() {
             DeValue::Table(table) => {
                 let values = self.values(section, table, start);
-                self.sources.push(values);
+                self.list(section).push(values);
             }
             other => self.problem(
                 &Origin::File(start),
@@ -199,7 +200,8 @@ impl<'a> Reading<'a> {
         let Some(known) = find_section(section) else {
             return self.problem(&origin, unknown_section(section), section_hint(section));
         };
-        if known.repeated != index.is_some() || index.is_some_and(|index| index > self.sources.len()) {
+        let count = self.list(known).len();
+        if known.repeated != index.is_some() || index.is_some_and(|index| index > count) {
             return self.problem(&origin, "this variable names no key", variable_form(prefix));
         }
         let Some(key) = find(known.name, key_name) else {
@@ -215,11 +217,12 @@ impl<'a> Reading<'a> {
     fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut Values {
         match index {
             Some(index) => {
-                if index >= self.sources.len() {
-                    self.sources.push(Values::default());
+                let list = self.list(section);
+                if index >= list.len() {
+                    list.push(Values::default());
                 }
-                let last = self.sources.len() - 1;
-                &mut self.sources[index.min(last)]
+                let last = list.len() - 1;
+                &mut list[index.min(last)]
             }
             None => self.single.entry(section.name).or_default(),
         }
@@ -232,15 +235,23 @@ impl<'a> Reading<'a> {
             self.fill(section, &mut values);
             self.single.insert(section.name, values);
         }
-        let mut sources = std::mem::take(&mut self.sources);
-        let (section, channel) = (find_section("source"), find_section(channel_keys::SECTION));
-        for values in &mut sources {
-            section.into_iter().for_each(|section| self.fill(section, values));
-            for inner in &mut values.inner {
-                channel.into_iter().for_each(|section| self.fill(section, inner));
-            }
+        for section in SECTIONS.iter().filter(|section| section.repeated && section.name != channel_keys::SECTION) {
+            let mut list = std::mem::take(self.list(section));
+            list.iter_mut().for_each(|values| self.fill_with_channels(section, values));
+            *self.list(section) = list;
         }
-        self.sources = sources;
+    }
+
+    /// What is collected of a section that may stand there several times.
+    fn list(&mut self, section: &Section) -> &mut Vec<Values> {
+        if section.name == "sink" { &mut self.sinks } else { &mut self.sources }
+    }
+
+    fn fill_with_channels(&mut self, section: &Section, values: &mut Values) {
+        self.fill(section, values);
+        for channel in &mut values.inner {
+            find_section(channel_keys::SECTION).into_iter().for_each(|section| self.fill(section, channel));
+        }
     }
 
     fn fill(&mut self, section: &Section, values: &mut Values) {
@@ -309,5 +320,5 @@ fn key_hint(section: &str, name: &str) -> String {
 }
 
 fn variable_form(prefix: &str) -> String {
-    format!("write {prefix}SECTION__KEY, for sources {prefix}SOURCE__0__ADDRESS; the sources count from 0")
+    format!("write {prefix}SECTION__KEY, for sources {prefix}SOURCE__0__ADDRESS; sources and sinks count from 0")
 }

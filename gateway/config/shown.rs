@@ -14,7 +14,7 @@ impl Kind {
             Self::Flag => "true, false".to_string(),
             Self::Path => "path".to_string(),
             Self::Listen => "HOST:PORT".to_string(),
-            Self::Address => "address".to_string(),
+            Self::Address | Self::SinkAddress => "address".to_string(),
         }
     }
 }
@@ -48,27 +48,25 @@ pub fn example() -> String {
         String::from("# cnc-gateway.toml: every key with its default; a line that starts with # may be left out.\n");
     for section in SECTIONS {
         let (open, close) = if section.repeated { ("[[", "]]") } else { ("[", "]") };
-        // What may stand below another section several times need not stand there at all.
-        let begin = if section.repeated && section.name.contains('.') { "# " } else { "" };
+        // The gateway runs without a sink, and without channels of one's own below a source, but not without a source.
+        let begin = if section.repeated && section.name != "source" { "# " } else { "" };
         text += &format!("\n{begin}{open}{}{close}{}# {}\n", section.name, " ", section.en);
         for key in keys_of(section.name) {
-            text += &if begin.is_empty() { example_line(key) } else { example_below(key) };
+            text += &example_line(key, !begin.is_empty());
         }
     }
     text
 }
 
-fn example_below(key: &Key) -> String {
-    let value = if let Default(value) = key.absent { value } else { "..." };
-    let written = format!("# {} = {value}", key.name);
-    format!("{written:40} # {} ({})\n", key.en, key.kind.range())
-}
-
-fn example_line(key: &Key) -> String {
-    let written = match key.absent {
-        Required => format!("{} = \"simulated://lathe\"", key.name),
-        Optional => format!("# {} = ...", key.name),
-        Default(value) => format!("# {} = {value}", key.name),
+/// A key as it is written in the example. A line of a section that need not stand there is a comment.
+fn example_line(key: &Key, commented: bool) -> String {
+    let value = match (key.absent, key.kind) {
+        (Default(value), _) => value,
+        (Required, Kind::Address) => "\"simulated://lathe\"",
+        (Required, Kind::SinkAddress) => "\"mqtts://broker:8883/plant\"",
+        (Required | Optional, _) => "...",
     };
+    let mark = if commented || key.absent != Required { "# " } else { "" };
+    let written = format!("{mark}{} = {value}", key.name);
     format!("{written:40} # {} ({})\n", key.en, key.kind.range())
 }

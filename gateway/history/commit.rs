@@ -3,6 +3,7 @@
 use super::block::Block;
 use super::error::{Doing, HistoryError};
 use super::keeper::{Keeper, Segment};
+use super::outbox::Gatherer;
 use super::record_sql;
 use super::{pyramid, tail};
 use rusqlite::{Connection, params};
@@ -61,6 +62,7 @@ pub(crate) fn commit(
     db: &mut Connection,
     keeper: &mut Keeper,
     slots: &mut TailSlots,
+    outbox: &mut Option<Gatherer>,
     origin: &str,
     with_tail: bool,
 ) -> Result<bool, HistoryError> {
@@ -73,10 +75,18 @@ pub(crate) fn commit(
     if last && with_tail {
         put_tail(&writing, keeper, &mut replaced)?;
     }
-    let records = keeper.records_through(rows_end(keeper, blocks, with_tail));
+    let end_row = rows_end(keeper, blocks, with_tail);
+    let records = keeper.records_through(end_row);
     let mut storing = keeper.records.iter().take(records);
     storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
+    let items = outbox
+        .as_ref()
+        .map(|outbox| outbox.put(&writing, keeper.records.iter().take(records), keeper.opened_row, end_row));
+    let items = items.transpose()?;
     writing.commit().doing("making samples durable")?;
+    if let (Some(outbox), Some(items)) = (outbox, items) {
+        outbox.committed(items, &keeper.reasons);
+    }
     keeper.segments.clear();
     keeper.blocks.drain(..blocks);
     *slots = replaced;

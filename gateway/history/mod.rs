@@ -34,6 +34,9 @@
 //! each hold the hash of the one before ([`Reader::verify_audit`]). Retention takes the oldest of them last of all, and says
 //! through which number.
 //!
+//! # The outbox
+//! What other systems are sent is numbered and kept beside the samples until every sink has delivered it: see [`Outbox`].
+//!
 //! # Who does what
 //! `mailbox` takes in, `keeper` gathers and seals, `commit` makes durable, `house` keeps order, all on `thread`;
 //! [`Reader`] answers on connections of its own: `walk` goes through a range, `query`, `overview`, `list`, `sql` and
@@ -53,6 +56,7 @@ mod list;
 mod lock;
 mod mailbox;
 mod options;
+mod outbox;
 mod overview;
 mod pyramid;
 mod query;
@@ -83,6 +87,10 @@ pub use export::Format;
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, Span, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
+pub use outbox::{
+    Cell, Content, Feed, Figures, Head, Item, Outbox, Position, Reading, SeriesInfo, Settings as OutboxSettings,
+    Standing, Stretch,
+};
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};
 pub use reader::Reader;

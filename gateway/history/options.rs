@@ -1,5 +1,6 @@
 //! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
 
+use super::outbox::Outbox;
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::time::Duration;
 
@@ -155,6 +156,8 @@ pub struct Options {
     pub goes_on: bool,
     /// Room reserved on disk so that a full disk can still be tidied up, bytes.
     pub reserve_bytes: u64,
+    /// What is on its way to other systems; `None` where no sink is configured.
+    pub outbox: Option<Outbox>,
 }
 
 impl Default for Options {
@@ -170,6 +173,7 @@ impl Default for Options {
             origin: "live".to_owned(),
             goes_on: false,
             reserve_bytes: 8_192_000,
+            outbox: None,
         }
     }
 }

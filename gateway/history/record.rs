@@ -4,7 +4,7 @@ use adapters::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Event {
     /// When.
     pub at_ns: TimeNs,
@@ -19,7 +19,7 @@ pub struct Event {
 }
 
 /// An alarm that begins. Raising one that is already raised counts up and changes nothing else.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Alarm {
     /// When it was raised.
     pub at_ns: TimeNs,
@@ -36,7 +36,7 @@ pub struct Alarm {
 }
 
 /// An alarm that ends.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AlarmClear {
     /// When it was cleared.
     pub at_ns: TimeNs,
@@ -47,7 +47,7 @@ pub struct AlarmClear {
 }
 
 /// The machine enters a state; the one before ends at this moment.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StateChange {
     /// Since when.
     pub at_ns: TimeNs,
@@ -60,7 +60,7 @@ pub struct StateChange {
 }
 
 /// A finished part or cycle.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Part {
     /// Beginning of the cycle.
     pub began_ns: TimeNs,
@@ -81,7 +81,7 @@ pub struct Part {
 }
 
 /// What a script wanted, and what the gate made of it.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Decision {
     /// The tick.
     pub at_ns: TimeNs,
@@ -104,7 +104,7 @@ pub struct Decision {
 }
 
 /// A command to the machine, as sent and as read back.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Command {
     /// When it was sent.
     pub at_ns: TimeNs,
@@ -131,7 +131,7 @@ pub struct Command {
 }
 
 /// A model in force from now on.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Model {
     /// Since when.
     pub at_ns: TimeNs,
@@ -144,7 +144,7 @@ pub struct Model {
 }
 
 /// A finished diagnosis.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// When it was finished.
     pub at_ns: TimeNs,
@@ -205,7 +205,7 @@ impl Audit {
 }
 
 /// How long a step of the override took to be seen in force.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReactionTime {
     /// When it was seen.
     pub at_ns: TimeNs,
@@ -226,7 +226,8 @@ pub struct ReactionTime {
 }
 
 /// Any of them, on its way to the writer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Record {
     /// See [`Event`].
     Event(Event),
@@ -250,6 +251,26 @@ pub enum Record {
     Audit(Audit),
     /// See [`ReactionTime`].
     Reaction(ReactionTime),
+}
+
+impl Record {
+    /// When it happened; of a part, when it was finished.
+    #[must_use]
+    pub fn at_ns(&self) -> TimeNs {
+        match self {
+            Self::Event(record) => record.at_ns,
+            Self::Alarm(record) => record.at_ns,
+            Self::AlarmClear(record) => record.at_ns,
+            Self::State(record) => record.at_ns,
+            Self::Part(record) => record.ended_ns,
+            Self::Decision(record) => record.at_ns,
+            Self::Command(record) => record.at_ns,
+            Self::Model(record) => record.at_ns,
+            Self::Diagnosis(record) => record.at_ns,
+            Self::Audit(record) => record.at_ns,
+            Self::Reaction(record) => record.at_ns,
+        }
+    }
 }
 
 macro_rules! into_record {

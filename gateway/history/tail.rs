@@ -38,7 +38,7 @@ pub(crate) fn to_text(rows: &Rows, range: Range<usize>, series: &[Series], reaso
     out
 }
 
-fn comma(out: &mut String, index: usize) {
+pub(super) fn comma(out: &mut String, index: usize) {
     if index > 0 {
         out.push(',');
     }
@@ -61,13 +61,13 @@ fn put_numbers(out: &mut String, values: &[f64], missing: &[u8], decimals: Optio
     out.push(']');
 }
 
-fn put_number(out: &mut String, number: f64) {
+pub(super) fn put_number(out: &mut String, number: f64) {
     // Both forms are the shortest text that reads back to the same number; this one spares the ".0".
     let _ =
         if number.fract() == 0.0 && number.abs() < 1e15 { write!(out, "{number}") } else { write!(out, "{number:?}") };
 }
 
-fn put_missing(out: &mut String, code: u8, reasons: &Reasons) {
+pub(super) fn put_missing(out: &mut String, code: u8, reasons: &Reasons) {
     let _ = write!(out, "{{\"m\":{}}}", Json::from(reasons.word(code)));
 }
 

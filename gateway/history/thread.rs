@@ -7,6 +7,7 @@ use super::house::House;
 use super::keeper::Keeper;
 use super::mailbox::{Delivery, Job, Mailbox};
 use super::options::{Options, WhenFull};
+use super::outbox::Gatherer;
 use super::record_sql::close_state;
 use super::status::Shared;
 use adapters::clock::TimeNs;
@@ -25,6 +26,7 @@ const LAST_ATTEMPTS: usize = 8;
 pub(crate) struct Thread {
     pub(crate) db: Connection,
     pub(crate) keeper: Keeper,
+    pub(crate) outbox: Option<Gatherer>,
     pub(crate) slots: TailSlots,
     pub(crate) house: House,
     pub(crate) mailbox: Arc<Mailbox>,
@@ -67,7 +69,7 @@ impl Thread {
             self.accept(delivery);
             self.commit_if_due(closing);
             self.maintain();
-            let done = rows_too && !self.keeper.is_dirty();
+            let done = rows_too && !self.is_dirty();
             if closing && (done || self.pace.failures >= LAST_ATTEMPTS) {
                 return self.finish();
             }
@@ -91,6 +93,9 @@ impl Thread {
         self.keeper.reasons = delivery.reasons;
         self.keeper.records.extend(delivery.records);
         for batch in delivery.batches {
+            if let Some(outbox) = &mut self.outbox {
+                outbox.gather(&batch, self.keeper.next_row, &self.keeper.series, &self.keeper.reasons);
+            }
             self.keeper.ingest(&batch);
             self.mailbox.recycle(batch);
             if self.keeper.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
@@ -120,7 +125,7 @@ impl Thread {
     fn commit(&mut self, with_tail: bool) {
         let began = Instant::now();
         let wait = self.options.group_commit;
-        if !self.keeper.is_dirty() {
+        if !self.is_dirty() {
             self.pace.next_commit = began + wait;
             return self.acknowledge();
         }
@@ -160,9 +165,14 @@ impl Thread {
     }
 
     fn commit_all(&mut self, with_tail: bool) -> Result<(), HistoryError> {
-        let Self { db, keeper, slots, options, .. } = self;
-        while !commit(db, keeper, slots, &options.origin, with_tail)? {}
+        let Self { db, keeper, slots, outbox, options, .. } = self;
+        while !commit(db, keeper, slots, outbox, &options.origin, with_tail)? {}
         Ok(())
+    }
+
+    /// Is there anything that a commit would make durable?
+    fn is_dirty(&self) -> bool {
+        self.keeper.is_dirty() || self.outbox.as_ref().is_some_and(Gatherer::is_dirty)
     }
 
     fn acknowledge(&mut self) {

@@ -7,6 +7,7 @@ use super::keeper::Keeper;
 use super::lock::Lock;
 use super::mailbox::{Job, Mailbox};
 use super::options::{ExtraValue, Options};
+use super::outbox::Gatherer;
 use super::record::Record;
 use super::recover::recover;
 use super::schema;
@@ -51,12 +52,14 @@ impl Writer {
         schema::register(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
+        let outbox = options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(Shared::default());
         let house = House::new(path, options.retention, options.reserve_bytes);
         house.bound_log(&db)?;
         let thread = Thread {
             keeper: Keeper::new(series, end)?,
+            outbox,
             slots: TailSlots::load(&db)?,
             house,
             db,

@@ -3,8 +3,8 @@
 use super::recent::{self, Recent};
 use crate::config;
 use crate::history::{
-    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Reader, Record, Retention, Span, Writer,
-    disk_room,
+    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record, Retention, Span,
+    Writer, disk_room,
 };
 use crate::log::{Notice, Severity};
 use crate::pipeline::Store;
@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 const RETRY: Duration = Duration::from_secs(10);
 /// So many alarms are looked through for some that stand.
 const ALARMS_MAX: u32 = 10_000;
+/// Longest time between two commits while there are sinks: live data arrives within a second then.
+const COMMIT_WITH_SINKS: Duration = Duration::from_millis(500);
 /// A rate of growth is told after this much machine time.
 const RATE_AFTER_S: f64 = 600.0;
 
@@ -46,14 +48,18 @@ pub struct Kept {
 
 impl Kept {
     /// Opens the history of the configuration, or goes on without it where the disk does not let it. `beside` is stored
-    /// beside the channels.
+    /// beside the channels, `outbox` is what leaves the box.
     ///
     /// # Errors
     /// A history that belongs to somebody else: another gateway, a newer version, another program.
-    pub fn open(config: &config::History, beside: Vec<ExtraSeries>) -> Result<Self, HistoryError> {
+    pub fn open(
+        config: &config::History,
+        beside: Vec<ExtraSeries>,
+        outbox: Option<Outbox>,
+    ) -> Result<Self, HistoryError> {
         let mut kept = Self {
             path: config.path.clone(),
-            options: options(config, beside),
+            options: options(config, beside, outbox),
             writer: None,
             recent: None,
             closed: None,
@@ -231,7 +237,7 @@ fn foreign(error: &HistoryError) -> bool {
     matches!(error, HistoryError::InUse { .. } | HistoryError::NewerSchema { .. } | HistoryError::NotAHistory { .. })
 }
 
-fn options(config: &config::History, beside: Vec<ExtraSeries>) -> Options {
+fn options(config: &config::History, beside: Vec<ExtraSeries>, outbox: Option<Outbox>) -> Options {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -239,7 +245,9 @@ fn options(config: &config::History, beside: Vec<ExtraSeries>) -> Options {
     )]
     let max_bytes = (config.max_gb * 1e9) as u64;
     let retention = Retention { raw_days: config.retention_days, max_bytes, ..Retention::default() };
-    Options { group_commit: config.commit, retention, extras: beside, ..Options::default() }
+    // What is sent is durable first, so the pace of the commits is part of the delay of live data.
+    let group_commit = if outbox.is_some() { config.commit.min(COMMIT_WITH_SINKS) } else { config.commit };
+    Options { group_commit, retention, extras: beside, outbox, ..Options::default() }
 }
 
 /// Bytes that may still be used.

@@ -9,6 +9,7 @@ pub mod hand;
 pub mod health;
 pub mod keep;
 pub mod open;
+pub mod outputs;
 pub mod pace;
 pub mod priority;
 pub mod recent;
@@ -42,6 +43,7 @@ use hand::{Hand, Tools};
 use health::Health;
 use keep::Kept;
 use open::{MachineSpeed, Sources, Way};
+use outputs::Outputs;
 use shifting::Shifting;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -84,9 +86,10 @@ type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
 /// # Errors
 /// Everything that makes it impossible to begin.
 pub fn run(plan: Plan) -> Result<(), CannotRun> {
+    let outputs = Outputs::of(&plan.config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
-        .max_blocking_threads(BLOCKING_MAX)
+        .max_blocking_threads(BLOCKING_MAX + outputs.as_ref().map_or(0, Outputs::threads))
         .thread_name("serve")
         .on_thread_start(priority::give_way)
         .enable_all()
@@ -97,12 +100,12 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
     let wishes = Arc::new(Wishes::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
-    let (ticker, live) = ticker(&plan, &wishes, port, inbox)?;
+    let (ticker, live) = ticker(&plan, &wishes, port, inbox, outputs.as_ref())?;
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, (listener, certificate), live, &wishes, (report, post)));
+    runtime.block_on(serve(&plan, (listener, certificate), live, &wishes, (report, post), outputs.as_ref()));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -141,6 +144,7 @@ fn ticker(
     wishes: &Arc<Wishes>,
     port: watch::Receiver<Option<String>>,
     inbox: Inbox,
+    outputs: Option<&Outputs>,
 ) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
@@ -153,7 +157,8 @@ fn ticker(
     let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let beside = [pipeline.series(), alignment::series(), beside].concat();
-    let kept = Kept::open(&config.history, beside).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let outbox = outputs.map(|outputs| outputs.outbox.clone());
+    let kept = Kept::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();
     let start_ns = start_ns(plan, &kept, clock.now_ns());
@@ -192,6 +197,7 @@ fn ticker(
             operations,
             twin,
             wear,
+            sinks: outputs.map(|outputs| outputs.board.clone()).unwrap_or_default(),
             scripts: watched,
             health,
             wishes,
@@ -283,7 +289,9 @@ async fn serve(
     live: watch::Receiver<Option<Published>>,
     wishes: &Arc<Wishes>,
     (report, post): (watch::Sender<Option<String>>, control::Post),
+    outputs: Option<&Outputs>,
 ) {
+    let sinks = outputs.map(Outputs::start);
     let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
     let server = match address(plan) {
         Ok(Some(address)) => {
@@ -299,6 +307,10 @@ async fn serve(
     tokio::select! {
         () = obey(wishes) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
         () = until_closed(live) => {}
+    }
+    // What the sinks have delivered is noted by the last commit of the history.
+    if let Some(sinks) = sinks {
+        sinks.stop().await;
     }
     wishes.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {

@@ -16,6 +16,7 @@ use crate::http::Published;
 use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
+use crate::sinks::Board;
 use crate::status::{AlarmStatus, HistoryStatus, Problem, Status, TickStatus};
 use adapters::Sample;
 use adapters::clock::TimeNs;
@@ -73,6 +74,8 @@ pub struct Ticker {
     pub twin: Option<Twin>,
     /// The wear model of the tool in use, where the library has one.
     pub wear: Wear,
+    /// How the sinks are.
+    pub sinks: Board,
     /// Keeps the scripts as they are on disk.
     pub scripts: Watched,
     /// Store, sources, clock: what may fail while the box goes on.
@@ -207,6 +210,7 @@ impl Ticker {
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
             wear: self.wear.status(),
+            sinks: self.sinks.status(),
             problems: self.problems(&history),
             history,
         }
@@ -228,6 +232,7 @@ impl Ticker {
             .problems(history)
             .into_iter()
             .chain(recipe)
+            .chain(self.sinks.problems())
             .chain(self.commands.problems(self.pipeline.gate()))
             .collect()
     }

@@ -207,9 +207,6 @@ fn how_long_an_answer_takes() {
 
 #[test]
 fn what_cannot_be_opened_says_why() {
-    let secure = address(1, "").text().replace("nclink://", "nclinks://");
-    let error = adapters::open::open(&secure.parse().expect("usable"), 0).err().expect("no TLS");
-    assert!(error.to_string().contains("no TLS"), "{error}");
     let error = adapters::open::open(&address(1, "?user=a&password_file=/does/not/exist"), 0).err().expect("no file");
     assert!(error.to_string().contains("/does/not/exist"), "{error}");
     let opened = adapters::open::open(&address(1, "?period_ms=250"), 0).expect("opens without a connection");

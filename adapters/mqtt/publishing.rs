@@ -1,0 +1,82 @@
+//! Messages on their way: many at once, each acknowledged.
+
+use super::client::Client;
+use super::packet::{self, Qos};
+use super::{MqttError, words};
+use std::collections::VecDeque;
+
+/// A message to send.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Its topic.
+    pub topic: String,
+    /// What it says.
+    pub payload: Vec<u8>,
+    /// Does the broker keep it for later subscribers?
+    pub retain: bool,
+}
+
+/// Messages on their way at once; brokers take at least 20 of version 3.1.1 clients, and say what they take in version 5.
+const ON_THEIR_WAY: usize = 20;
+/// Codes of messages that are refused for what they are: name of the topic, size, form of the payload (section 5-2.4).
+const NEVER: [u8; 3] = [0x90, 0x95, 0x99];
+/// A code from here on says no (section 5-2.4).
+const REFUSED: u8 = 0x80;
+
+impl Client {
+    /// Sends a message; with [`Qos::AtLeastOnce`] it waits for the broker's acknowledgement.
+    ///
+    /// # Errors
+    /// See [`MqttError`].
+    pub fn publish(&self, topic: &str, payload: &[u8], qos: Qos) -> Result<(), MqttError> {
+        let message = Outgoing { topic: topic.to_owned(), payload: payload.to_vec(), retain: false };
+        self.publish_all(std::slice::from_ref(&message), qos).map_err(|(_, error)| error)
+    }
+
+    /// Sends messages in this order; with [`Qos::AtLeastOnce`] several are on their way at once, and it returns when the
+    /// broker has acknowledged all of them.
+    ///
+    /// # Errors
+    /// The index of the first message that is not known to have arrived, and why. After [`MqttError::Refused`] and
+    /// [`MqttError::Unsendable`] the connection stands.
+    pub fn publish_all(&self, messages: &[Outgoing], qos: Qos) -> Result<(), (usize, MqttError)> {
+        let mut waiting: VecDeque<(usize, u16)> = VecDeque::new();
+        for (index, message) in messages.iter().enumerate() {
+            let id = (qos == Qos::AtLeastOnce).then(|| self.id());
+            if let Err(error) = self.send_one(message, id) {
+                // What went out before it decides first.
+                waiting.drain(..).try_for_each(|(index, id)| self.arrived(id).map_err(|error| (index, error)))?;
+                return Err((index, error));
+            }
+            waiting.extend(id.map(|id| (index, id)));
+            if waiting.len() >= self.allows().receive_maximum.map_or(ON_THEIR_WAY, usize::from).max(1)
+                && let Some((index, id)) = waiting.pop_front()
+            {
+                self.arrived(id).map_err(|error| (index, error))?;
+            }
+        }
+        waiting.drain(..).try_for_each(|(index, id)| self.arrived(id).map_err(|error| (index, error)))
+    }
+
+    fn send_one(&self, message: &Outgoing, id: Option<u16>) -> Result<(), MqttError> {
+        let Outgoing { topic, payload, retain } = message;
+        let packet = packet::publish(self.version(), topic, payload, id, *retain)?;
+        let limit = self.allows().packet_max.map_or(usize::MAX, |limit| usize::try_from(limit).unwrap_or(usize::MAX));
+        if packet.len() > limit {
+            let what = format!("{} bytes on {topic}; the broker takes at most {limit}", packet.len());
+            return Err(MqttError::Unsendable(what));
+        }
+        self.send(&packet)
+    }
+
+    fn arrived(&self, id: u16) -> Result<(), MqttError> {
+        let code = self.acknowledged(id, "a message")?.first().copied().unwrap_or(0);
+        if NEVER.contains(&code) {
+            return Err(MqttError::Unsendable(format!("the broker will not take it: {}", words::reason(code))));
+        }
+        if code >= REFUSED {
+            return Err(MqttError::Refused(format!("a message: {}", words::reason(code))));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,81 @@
+//! TLS of a client: whom it trusts, how it identifies itself, and what is wrong in words that say what to do next.
+//!
+//! rustls with ring. Trusted are the certificates of the file `ca`, or without one those of the operating system. A
+//! client certificate is shown where the other side asks for it. There is no way to switch the checks off: a box that
+//! trusts whoever answers needs no TLS at all.
+
+mod line;
+mod words;
+
+pub use line::{Line, Lines};
+pub use words::TlsError;
+
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::{ClientConfig, RootCertStore};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Where operating systems keep the certificates they trust.
+const SYSTEM_FILES: [&str; 3] =
+    ["/etc/ssl/certs/ca-certificates.crt", "/etc/pki/tls/certs/ca-bundle.crt", "/etc/ssl/cert.pem"];
+
+/// The files of a client, all PEM.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct TlsFiles {
+    /// Certificates that are trusted; `None`: those of the operating system.
+    pub ca: Option<PathBuf>,
+    /// The client's own certificate, followed by those that vouch for it.
+    pub certificate: Option<PathBuf>,
+    /// Its private key.
+    pub key: Option<PathBuf>,
+}
+
+impl TlsFiles {
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// A file that cannot be read or holds something else, in words.
+    pub fn config(&self) -> Result<Arc<ClientConfig>, TlsError> {
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let builder = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .map_err(|error| TlsError::new(format!("TLS cannot begin: {error}"), ""))?
+            .with_root_certificates(self.roots()?);
+        let config = match (&self.certificate, &self.key) {
+            (Some(certificate), Some(key)) => builder
+                .with_client_auth_cert(certificates(certificate)?, private_key(key)?)
+                .map_err(|error| words::bad_pair(certificate, key, &error))?,
+            _ => builder.with_no_client_auth(),
+        };
+        Ok(Arc::new(config))
+    }
+
+    fn roots(&self) -> Result<RootCertStore, TlsError> {
+        let system = || SYSTEM_FILES.iter().map(PathBuf::from).find(|file| file.is_file());
+        let Some(file) = self.ca.clone().or_else(system) else {
+            let next = "install the package ca-certificates, or name the file with ca=/path/ca.pem";
+            return Err(TlsError::new("this system has no file of trusted certificates", next));
+        };
+        let mut roots = RootCertStore::empty();
+        let (taken, _unusable) = roots.add_parsable_certificates(certificates(&file)?);
+        if taken == 0 {
+            let what = format!("{} holds no certificate that could be trusted", file.display());
+            return Err(TlsError::new(what, "give the certificate of the authority that signed the broker's, as PEM"));
+        }
+        Ok(roots)
+    }
+}
+
+fn certificates(file: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    let read = CertificateDer::pem_file_iter(file).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+    let found = read.map_err(|error| words::bad_file(file, "certificate", &error))?;
+    match found.is_empty() {
+        true => Err(words::bad_file(file, "certificate", &rustls::pki_types::pem::Error::NoItemsFound)),
+        false => Ok(found),
+    }
+}
+
+fn private_key(file: &Path) -> Result<PrivateKeyDer<'static>, TlsError> {
+    PrivateKeyDer::from_pem_file(file).map_err(|error| words::bad_file(file, "private key", &error))
+}

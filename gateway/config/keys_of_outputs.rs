@@ -1,0 +1,58 @@
+//! The rows of the table of keys that concern what leaves the box.
+
+use super::keys::Absent::{Default, Optional, Required};
+use super::keys::Kind::{Number, SinkAddress, Text};
+use super::keys::{Key, key};
+
+/// Keys of `[[sink]]` and `[outbox]`.
+pub(super) const OUTPUTS: &[Key] = &[
+    key(
+        ("sink", "address"),
+        SinkAddress,
+        Required,
+        "Which receiver, and how to reach it: the handbook's chapter on outputs lists the notations",
+        "接收端地址",
+    ),
+    key(
+        ("sink", "name"),
+        Text,
+        Optional,
+        "Short name in messages; what is delivered is remembered under it; default: the address",
+        "接收端名称",
+    ),
+    key(
+        ("outbox", "every_nth"),
+        Number(1.0, 100_000.0),
+        Default("1"),
+        "Only every so many ticks are sent; whole number",
+        "每隔多少个节拍发送一次",
+    ),
+    key(
+        ("outbox", "dead_band"),
+        Text,
+        Optional,
+        "A value that differs from the one sent last by at most this is not sent again: \"spindle_power_w=5, feed_mm_min=1\", each in the unit of its name",
+        "死区：变化不超过此值时不发送",
+    ),
+    key(
+        ("outbox", "refresh_s"),
+        Number(1.0, 86_400.0),
+        Default("60.0"),
+        "All values are sent this often even if none has changed",
+        "全部数值的刷新周期（秒）",
+    ),
+    key(
+        ("outbox", "max_gb"),
+        Number(0.001, 1000.0),
+        Default("1.0"),
+        "Size of what waits for the sinks; beyond it the oldest is dropped and counted",
+        "待发送数据最大容量（GB）",
+    ),
+    key(
+        ("outbox", "max_age_h"),
+        Number(0.01, 100_000.0),
+        Default("168.0"),
+        "What has waited longer than this is dropped and counted",
+        "待发送数据最长保留时间（小时）",
+    ),
+];

@@ -1,0 +1,79 @@
+//! `[[sink]]` and `[outbox]`: from checked values to the configuration.
+
+use super::Sink;
+use super::build::{as_text, number, origin_of_name, source_name, text};
+use super::read::{Origin, Reading, Values};
+use crate::history::OutboxSettings;
+use adapters::channel::{CHANNELS, nearest};
+use std::time::Duration;
+
+/// The sinks; names that are there twice are reported.
+pub(super) fn sinks(reading: &mut Reading<'_>) -> Option<Vec<Sink>> {
+    let sinks: Option<Vec<Sink>> = reading.sinks.iter().map(sink).collect();
+    let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
+    for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
+        if names[..index].contains(name) {
+            let origin = origin_of_name(&reading.sinks[index]);
+            let what = format!("there are two sinks named {:?}", name.clone().unwrap_or_default());
+            reading.problem(&origin, what, "give each [[sink]] its own `name`");
+        }
+    }
+    sinks
+}
+
+fn sink(values: &Values) -> Option<Sink> {
+    let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
+    Some(Sink { name: source_name(values)?, address })
+}
+
+/// What the sinks are sent.
+pub(super) fn outbox(reading: &mut Reading<'_>) -> Option<OutboxSettings> {
+    let every_nth = number(reading, "outbox", "every_nth")?;
+    let origin = reading.get("outbox", "every_nth").map_or(Origin::Default, |found| found.origin.clone());
+    if every_nth.fract() != 0.0 {
+        reading.problem(&origin, format!("`every_nth = {every_nth}` is no whole number"), "write 1, 2, 10, ...");
+    }
+    let dead_bands = dead_bands(reading);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the table holds their ranges")]
+    let (every_nth, max_bytes) = (every_nth as u32, (number(reading, "outbox", "max_gb")? * 1e9) as u64);
+    Some(OutboxSettings {
+        every_nth,
+        dead_bands,
+        refresh: Duration::from_secs_f64(number(reading, "outbox", "refresh_s")?),
+        max_bytes,
+        max_age: Duration::from_secs_f64(number(reading, "outbox", "max_age_h")? * 3600.0),
+    })
+}
+
+/// `spindle_power_w=5, feed_mm_min=1`; what is wrong is reported.
+fn dead_bands(reading: &mut Reading<'_>) -> Vec<(String, f64)> {
+    let Some(written) = text(reading, "outbox", "dead_band") else { return Vec::new() };
+    let origin = reading.get("outbox", "dead_band").map_or(Origin::Default, |found| found.origin.clone());
+    let mut bands = Vec::new();
+    for part in written.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        match dead_band(part) {
+            Ok(band) => bands.push(band),
+            Err((what, next)) => reading.problem(&origin, what, next),
+        }
+    }
+    bands
+}
+
+fn dead_band(part: &str) -> Result<(String, f64), (String, String)> {
+    let form = "write \"spindle_power_w=5, feed_mm_min=1\"".to_owned();
+    let (name, number) = part.split_once('=').ok_or_else(|| (format!("`dead_band` holds {part:?}"), form.clone()))?;
+    let (name, number) = (name.trim(), number.trim());
+    let band = number.parse::<f64>().ok().filter(|band| band.is_finite() && *band >= 0.0);
+    let band =
+        band.ok_or_else(|| (format!("the dead band of {name} is {number:?}, which is no number from 0 up"), form))?;
+    let stored: Vec<String> = crate::pipeline::stored_series().into_iter().map(|series| series.name).collect();
+    let names = || CHANNELS.iter().map(|channel| channel.name).chain(stored.iter().map(String::as_str));
+    if !names().any(|known| known == name) {
+        let next = match nearest(name, names()) {
+            Some(near) => format!("did you mean {near}?"),
+            None => "`cnc-gateway check --vocabulary` prints the names".to_owned(),
+        };
+        return Err((format!("`dead_band` names {name}, which is no channel"), next));
+    }
+    Ok((name.to_owned(), band))
+}

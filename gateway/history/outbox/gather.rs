@@ -1,0 +1,130 @@
+//! On the writer thread: lines of ticks wait here until the commit that makes their rows durable gives them their
+//! numbers.
+
+use super::item::{SeriesInfo, leaves};
+use super::line;
+use super::report::Report;
+use super::shared::{Head, Outbox};
+use super::store::{self, Stored};
+use crate::history::HistoryError;
+use crate::history::mailbox::Posted;
+use crate::history::reason::Reasons;
+use crate::history::rows::Rows;
+use crate::history::series::Series;
+use adapters::clock::TimeNs;
+use rusqlite::Connection;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Lines that may wait for a disk that takes nothing; beyond that the oldest is dropped and counted. At 10 ticks a second
+/// with 20 changing values about four hours.
+const WAITING_BYTES_MAX: usize = 16_000_000;
+
+/// The line of one tick.
+#[derive(Debug)]
+struct Waiting {
+    row: i64,
+    at_ns: TimeNs,
+    text: String,
+}
+
+/// The outbox on the side of the writer.
+#[derive(Debug)]
+pub(crate) struct Gatherer {
+    outbox: Outbox,
+    report: Report,
+    known: Vec<Arc<SeriesInfo>>,
+    waiting: VecDeque<Waiting>,
+    bytes: usize,
+    /// Lines dropped because the disk took nothing for too long; they never got a number.
+    lost: u64,
+    stored: Stored,
+}
+
+/// What a transaction has taken, to be forgotten when it is durable.
+pub(crate) struct Taken {
+    ticks: usize,
+    stored: Stored,
+    items: Vec<(u64, u64)>,
+}
+
+impl Gatherer {
+    /// Creates the tables where they are missing, and finds what each sink still has to deliver.
+    pub(crate) fn open(db: &mut Connection, outbox: Outbox, series: &[Series]) -> Result<Self, HistoryError> {
+        let stored = store::open(db, &outbox)?;
+        let gatherer = Self {
+            report: Report::new(outbox.settings(), series),
+            known: series.iter().map(|series| Arc::new(SeriesInfo::from(series))).collect(),
+            waiting: VecDeque::new(),
+            bytes: 0,
+            lost: 0,
+            stored,
+            outbox,
+        };
+        gatherer.tell(&Reasons::default());
+        Ok(gatherer)
+    }
+
+    /// Takes on a batch of ticks whose first has the number `first_row`.
+    pub(crate) fn gather(&mut self, rows: &Rows, first_row: i64, series: &[Series], reasons: &Reasons) {
+        let Self { report, waiting, bytes, .. } = self;
+        report.lines(rows, series, reasons, |index, text| {
+            *bytes += text.len();
+            waiting.push_back(Waiting { row: first_row + index as i64, at_ns: rows.at_ns[index], text });
+        });
+        while self.bytes > WAITING_BYTES_MAX {
+            let Some(oldest) = self.waiting.pop_front() else { break };
+            self.bytes -= oldest.text.len();
+            self.lost += 1;
+        }
+    }
+
+    /// Would a commit change anything here?
+    pub(crate) fn is_dirty(&self) -> bool {
+        self.outbox.has_news()
+    }
+
+    /// Puts into the running transaction the items of the ticks before row `end_row` and of these records, which belong
+    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow, and notes what the
+    /// sinks have delivered.
+    pub(crate) fn put<'a>(
+        &self,
+        db: &Connection,
+        records: impl Iterator<Item = &'a Posted>,
+        opened_row: i64,
+        end_row: i64,
+    ) -> Result<Taken, HistoryError> {
+        let mut lines: Vec<(TimeNs, std::borrow::Cow<'_, str>)> = Vec::new();
+        let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
+        for posted in records.filter(|posted| leaves(&posted.record)) {
+            let before = opened_row.saturating_add_unsigned(posted.after_rows);
+            while let Some(tick) = ticks.next_if(|tick| tick.row < before) {
+                lines.push((tick.at_ns, tick.text.as_str().into()));
+            }
+            lines.push((posted.record.at_ns(), line::of_record(&posted.record).into()));
+        }
+        lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
+        let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
+        let (stored, items) = store::put(db, &self.outbox, &self.stored, &lines)?;
+        Ok(Taken { ticks, stored, items })
+    }
+
+    /// What was put is durable.
+    pub(crate) fn committed(&mut self, taken: Taken, reasons: &Reasons) {
+        for line in self.waiting.drain(..taken.ticks) {
+            self.bytes -= line.text.len();
+        }
+        self.stored = taken.stored;
+        self.outbox.noted(&taken.items);
+        self.tell(reasons);
+    }
+
+    fn tell(&self, reasons: &Reasons) {
+        let Stored { next_sequence, newest_ns, .. } = self.stored;
+        self.outbox.publish(
+            Head { next_sequence, newest_ns, ready: true },
+            self.stored.figures(self.lost),
+            self.report.latest(&self.known, reasons),
+        );
+    }
+}

@@ -1,0 +1,38 @@
+//! What is on its way to other systems: everything that leaves the box, with one number each, kept until every sink has
+//! delivered it.
+//!
+//! # Why it lies in the history database
+//! An item becomes durable in the same transaction as the sample or record it came from. A box that is killed has
+//! therefore neither sent something it does not remember, nor remembers something that is never sent.
+//!
+//! # Data
+//! An [`Item`] is the values of one tick that changed ([`Settings`] says what counts as a change), or one record: a state,
+//! part, alarm, decision, diagnosis or event. Items are numbered from 1 without holes over the life of the database; the
+//! number together with [`Outbox::box_id`] names an item everywhere. The items of one commit lie in one compressed row of
+//! the table `outbox`; the table `outbox_sinks` holds what each sink still has to deliver.
+//!
+//! # Bounds
+//! The outbox holds at most [`Settings::max_bytes`] and nothing older than [`Settings::max_age`]. What is dropped by
+//! that is counted for each sink that had not delivered it ([`Standing::dropped`]). While no sink is configured nothing
+//! is gathered and the tables do not exist.
+//!
+//! # Who does what
+//! `report` decides which values of a tick are worth sending, `gather` numbers them on the writer thread, `store` puts them
+//! into the transaction of the commit, `position` is the arithmetic of what is delivered, [`Outbox`] is the handle through
+//! which sinks read ([`Feed`]) and acknowledge.
+
+mod feed;
+mod gather;
+mod item;
+mod line;
+mod position;
+mod report;
+mod shared;
+mod store;
+
+pub use feed::{Feed, Stretch};
+pub(crate) use gather::Gatherer;
+pub use item::{Cell, Content, Item, Reading, SeriesInfo};
+pub use position::Position;
+pub use report::Settings;
+pub use shared::{Figures, Head, Outbox, Standing};

@@ -1,0 +1,139 @@
+//! What a sink still has to deliver: everything from one number on, and the gaps before it that an outage left. Pure.
+
+use serde::{Deserialize, Serialize};
+
+/// More gaps are not kept: the sink then delivers in order of the numbers until one is closed. Bounds the position to
+/// about a kilobyte.
+const GAPS_MAX: usize = 64;
+
+/// What a sink still has to deliver.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Position {
+    /// Older stretches `from..to` that are not delivered, in order, apart from each other and below `next`.
+    gaps: Vec<(u64, u64)>,
+    /// From here on nothing is delivered.
+    next: u64,
+}
+
+impl Position {
+    /// Everything before `next` is delivered.
+    #[must_use]
+    pub fn at(next: u64) -> Self {
+        Self { gaps: Vec::new(), next }
+    }
+
+    /// The number from which on nothing is delivered.
+    #[must_use]
+    pub fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// The oldest gap, `from..to`.
+    #[must_use]
+    pub fn oldest_gap(&self) -> Option<(u64, u64)> {
+        self.gaps.first().copied()
+    }
+
+    /// The lowest number that is not delivered.
+    #[must_use]
+    pub fn lowest(&self) -> u64 {
+        self.gaps.first().map_or(self.next, |(from, _)| *from)
+    }
+
+    /// How many items are not delivered, when `head` is the number of the next item that will be made.
+    #[must_use]
+    pub fn waiting(&self, head: u64) -> u64 {
+        self.within(0, head)
+    }
+
+    /// How many of the items `from..to` are not delivered.
+    #[must_use]
+    pub fn within(&self, from: u64, to: u64) -> u64 {
+        let open = (self.next, u64::MAX);
+        let overlap = |(start, end): (u64, u64)| end.min(to).saturating_sub(start.max(from));
+        self.gaps.iter().copied().chain([open]).map(overlap).sum()
+    }
+
+    /// Live data begins at `head`; what lies between becomes a gap. False, and nothing changed, when there are too many
+    /// gaps already.
+    pub fn jump(&mut self, head: u64) -> bool {
+        if head <= self.next {
+            return true;
+        }
+        let full = self.gaps.len() >= GAPS_MAX;
+        match self.gaps.last_mut() {
+            Some((_, end)) if *end == self.next => *end = head,
+            _ if full => return false,
+            _ => self.gaps.push((self.next, head)),
+        }
+        self.next = head;
+        true
+    }
+
+    /// The items `from..to` are delivered, or are not there any more.
+    pub fn done(&mut self, from: u64, to: u64) {
+        let cut = |(start, end): (u64, u64)| [(start, end.min(from)), (start.max(to), end)];
+        let left = |(start, end): &(u64, u64)| start < end;
+        self.gaps = self.gaps.iter().copied().flat_map(cut).filter(left).collect();
+        if from <= self.next && to > self.next {
+            self.next = to;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn an_outage_becomes_a_gap_that_is_closed_piece_by_piece() {
+        let mut position = Position::at(1);
+        position.done(1, 11);
+        assert!(position.jump(101));
+        position.done(101, 111);
+        assert_eq!((position.oldest_gap(), position.next(), position.waiting(121)), (Some((11, 101)), 111, 100));
+        position.done(11, 100);
+        assert_eq!((position.lowest(), position.waiting(111)), (100, 1));
+        position.done(100, 101);
+        assert_eq!((position.oldest_gap(), position.lowest()), (None, 111));
+    }
+
+    #[test]
+    fn the_number_of_gaps_is_bounded_and_nothing_is_forgotten() {
+        let mut position = Position::at(1);
+        let mut head = 1;
+        while position.jump(head + 2) {
+            head += 2;
+            position.done(head, head + 1);
+            head += 1;
+        }
+        assert_eq!(position.gaps.len(), GAPS_MAX);
+        assert_eq!(position.waiting(head), 2 * GAPS_MAX as u64);
+        position.done(1, 3);
+        assert!(position.jump(head + 2));
+    }
+
+    proptest! {
+        #[test]
+        fn it_counts_as_a_set_of_numbers_does(steps in proptest::collection::vec((0u8..3, 1u64..40, 1u64..12), 1..60)) {
+            let (mut position, mut open, mut head) = (Position::at(1), BTreeSet::new(), 1u64);
+            for (step, from, count) in steps {
+                match step {
+                    0 => { open.extend(head..head + count); head += count; }
+                    1 => { position.jump(head); }
+                    _ => {
+                        // A sink delivers from the beginning of its gap or of its live data.
+                        let from = position.oldest_gap().filter(|_| from % 2 == 0).map_or(position.next(), |gap| gap.0);
+                        let to = (from + count).min(head);
+                        position.done(from, to);
+                        open.retain(|number| *number < from || *number >= to);
+                    }
+                }
+                prop_assert_eq!(position.waiting(head), open.len() as u64);
+                prop_assert_eq!(position.lowest().min(head), open.first().copied().unwrap_or(head));
+            }
+        }
+    }
+}

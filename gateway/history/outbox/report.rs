@@ -1,0 +1,251 @@
+//! Which values of a tick are worth sending: those that have changed by more than their dead band, at every n-th tick,
+//! and all of them once in a while, so that a receiver that came late knows everything soon.
+
+use super::item::{Cell, Reading, SeriesInfo};
+use crate::history::reason::{NOT_PROVIDED, PRESENT, Reasons};
+use crate::history::rounding::rounded;
+use crate::history::rows::{Column, Rows, Word};
+use crate::history::series::Series;
+use crate::history::tail::{comma, put_missing, put_number};
+use adapters::clock::TimeNs;
+use serde_json::Value as Json;
+use std::fmt::Write;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What is gathered for the sinks, and how much of it is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Only every so many ticks are looked at; 1 looks at each.
+    pub every_nth: u32,
+    /// A value that differs from the one sent last by at most this, in the unit of the series, is not sent again. A
+    /// series that is not named here is sent when it differs at all in the digits that the history keeps.
+    pub dead_bands: Vec<(String, f64)>,
+    /// All values are sent this often even if none has changed.
+    pub refresh: Duration,
+    /// Greatest size of what waits, bytes on disk.
+    pub max_bytes: u64,
+    /// Greatest age of what waits.
+    pub max_age: Duration,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            every_nth: 1,
+            dead_bands: Vec::new(),
+            refresh: Duration::from_secs(60),
+            max_bytes: 1_000_000_000,
+            max_age: Duration::from_secs(7 * 86_400),
+        }
+    }
+}
+
+/// What a receiver knows of a series.
+#[derive(Debug, Clone, PartialEq)]
+enum Last {
+    Number(f64),
+    Text(Arc<str>),
+    Missing(u8),
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub(super) struct Report {
+    every_nth: u64,
+    refresh_ns: i64,
+    bands: Vec<f64>,
+    last: Vec<Last>,
+    ticks: u64,
+    whole_at: Option<TimeNs>,
+}
+
+impl Report {
+    pub(super) fn new(settings: &Settings, series: &[Series]) -> Self {
+        let band = |series: &Series| {
+            let named = settings.dead_bands.iter().find(|(name, _)| **name == *series.name);
+            named.map_or(0.0, |(_, band)| *band)
+        };
+        Self {
+            every_nth: u64::from(settings.every_nth.max(1)),
+            refresh_ns: i64::try_from(settings.refresh.as_nanos()).unwrap_or(i64::MAX),
+            bands: series.iter().map(band).collect(),
+            last: vec![Last::Missing(NOT_PROVIDED); series.len()],
+            ticks: 0,
+            whole_at: None,
+        }
+    }
+
+    /// Hands the line of each tick that has something to tell to `put`, with the index of its row.
+    pub(super) fn lines(
+        &mut self,
+        rows: &Rows,
+        series: &[Series],
+        reasons: &Reasons,
+        mut put: impl FnMut(usize, String),
+    ) {
+        for row in 0..rows.len() {
+            let due = self.ticks.is_multiple_of(self.every_nth);
+            self.ticks += 1;
+            if !due {
+                continue;
+            }
+            let at_ns = rows.at_ns[row];
+            // A clock that went back begins anew as well.
+            let whole = self.whole_at.is_none_or(|since| at_ns < since || at_ns - since >= self.refresh_ns);
+            if whole {
+                self.whole_at = Some(at_ns);
+            }
+            if let Some(line) = self.line(rows, row, whole, series, reasons) {
+                put(row, line);
+            }
+        }
+    }
+
+    fn line(&mut self, rows: &Rows, row: usize, whole: bool, series: &[Series], reasons: &Reasons) -> Option<String> {
+        let mut out = String::new();
+        let mut count = 0;
+        for (index, (series, column)) in series.iter().zip(&rows.columns).enumerate() {
+            let now = cell(column, row, series.decimals);
+            let known = &self.last[index];
+            let same = is_same(known, &now, self.bands[index]);
+            let never = matches!(now, Last::Missing(NOT_PROVIDED));
+            if same && (!whole || never) {
+                continue;
+            }
+            comma(&mut out, count);
+            count += 1;
+            // Writing to a string cannot fail, here and below.
+            let _ = write!(out, "\"{}\":", series.id);
+            put(&mut out, &now, reasons);
+            self.last[index] = now;
+        }
+        (count > 0).then(|| format!("{{\"t\":{},\"s\":{{{out}}}}}", rows.at_ns[row]))
+    }
+
+    /// What a receiver of everything knows by now.
+    pub(super) fn latest(&self, known: &[Arc<SeriesInfo>], reasons: &Reasons) -> Vec<Reading> {
+        let reading = |(series, last): (&Arc<SeriesInfo>, &Last)| {
+            let value = match last {
+                Last::Number(number) => Cell::Number(*number),
+                Last::Text(text) => Cell::Text(text.clone()),
+                Last::Missing(code) => Cell::Missing(reasons.word(*code).unwrap_or("not_provided").into()),
+            };
+            Reading { series: series.clone(), value }
+        };
+        known.iter().zip(&self.last).map(reading).collect()
+    }
+}
+
+fn cell(column: &Column, row: usize, decimals: Option<u8>) -> Last {
+    match column {
+        Column::Numbers { values, missing } => match missing.get(row) {
+            Some(&PRESENT) => Last::Number(decimals.map_or(values[row], |places| rounded(values[row], places))),
+            Some(code) => Last::Missing(*code),
+            None => Last::Missing(NOT_PROVIDED),
+        },
+        Column::Words(changes) => {
+            let after = changes.partition_point(|(from, _)| *from as usize <= row);
+            match after.checked_sub(1).map(|index| &changes[index].1) {
+                Some(Word::Is(text)) => Last::Text(text.clone()),
+                Some(Word::Missing(code)) => Last::Missing(*code),
+                None => Last::Missing(NOT_PROVIDED),
+            }
+        }
+    }
+}
+
+fn is_same(known: &Last, now: &Last, band: f64) -> bool {
+    match (known, now) {
+        (Last::Number(known), Last::Number(now)) => (known - now).abs() <= band,
+        (known, now) => known == now,
+    }
+}
+
+fn put(out: &mut String, cell: &Last, reasons: &Reasons) {
+    match cell {
+        Last::Number(number) => put_number(out, *number),
+        Last::Text(text) => {
+            let _ = write!(out, "{}", Json::from(&**text));
+        }
+        Last::Missing(code) => put_missing(out, *code, reasons),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::series::stored_series;
+    use crate::history::{ExtraSeries, ExtraValue, Options};
+    use adapters::{Absence, ChannelId, Sample, Slot, Value};
+
+    fn series() -> Vec<Series> {
+        let extras = vec![ExtraSeries::text("state", "", "")];
+        let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
+        (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
+        series
+    }
+
+    /// Power 100.0, 100.0, 100.4, stale, 100.4, ... a tenth of a second apart, and a state that changes once.
+    fn rows(powers: &[Option<f64>]) -> Rows {
+        let mut rows = Rows::of(&series());
+        let mut reasons = Reasons::default();
+        let power = ChannelId::of("spindle_power_w").expect("in the table");
+        for (row, watts) in powers.iter().enumerate() {
+            let mut sample = Sample::empty(row as i64 * 100_000_000);
+            let slot =
+                watts.map_or(Slot::absent(Absence::Stale), |watts| Slot { value: Ok(Value::Number(watts)), age_ns: 0 });
+            sample.set(power, slot);
+            let state = if row < 2 { "idle" } else { "cutting" };
+            rows.push(&sample, &[ExtraValue::Text(state)], &mut reasons);
+        }
+        rows
+    }
+
+    fn lines(settings: &Settings, powers: &[Option<f64>]) -> Vec<(usize, Json)> {
+        let series = series();
+        let mut found = Vec::new();
+        let mut report = Report::new(settings, &series);
+        report.lines(&rows(powers), &series, &Reasons::default(), |row, line| {
+            let line: Json = serde_json::from_str(&line).expect("JSON");
+            found.push((row, line["s"].clone()));
+        });
+        found
+    }
+
+    const POWERS: [Option<f64>; 6] = [Some(100.0), Some(100.0), Some(100.4), None, Some(100.4), Some(100.4)];
+
+    #[test]
+    fn what_does_not_change_is_not_sent_again() {
+        let found = lines(&Settings::default(), &POWERS);
+        let rows: Vec<usize> = found.iter().map(|(row, _)| *row).collect();
+        assert_eq!(rows, [0, 2, 3, 4], "{found:?}");
+        assert_eq!(found[0].1.as_object().map(Map::len), Some(2), "power and state: nobody provides the rest");
+        assert_eq!(found[2].1.as_object().map(Map::len), Some(1), "{found:?}");
+        assert!(found[2].1.to_string().contains("stale"), "an absent value is news: {found:?}");
+    }
+
+    use serde_json::Map;
+
+    #[test]
+    fn a_dead_band_and_every_nth_tick_thin_out() {
+        let banded = Settings { dead_bands: vec![("spindle_power_w".to_owned(), 0.5)], ..Settings::default() };
+        let found = lines(&banded, &POWERS[..3]);
+        assert!(!found[1].1.to_string().contains("100.4"), "within the band; only the state changed: {found:?}");
+        let thinned = Settings { every_nth: 3, ..Settings::default() };
+        let rows: Vec<usize> = lines(&thinned, &POWERS).iter().map(|(row, _)| *row).collect();
+        assert_eq!(rows, [0, 3]);
+    }
+
+    #[test]
+    fn everything_is_sent_again_once_in_a_while() {
+        let often = Settings { refresh: Duration::from_millis(300), ..Settings::default() };
+        let found = lines(&often, &[Some(1.0); 7]);
+        let whole: Vec<usize> = found
+            .iter()
+            .filter(|(_, cells)| cells.as_object().is_some_and(|cells| cells.len() == 2))
+            .map(|it| it.0)
+            .collect();
+        assert_eq!(whole, [0, 3, 6]);
+    }
+}

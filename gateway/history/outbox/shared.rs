@@ -1,0 +1,237 @@
+//! The handle of the outbox: between the writer thread, the sinks, and whoever shows how far they are.
+
+use super::item::Reading;
+use super::position::Position;
+use super::report::Settings;
+use crate::history::HistoryError;
+use adapters::clock::TimeNs;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::watch;
+
+/// How far the outbox is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Head {
+    /// The number of the next item; everything below it is durable.
+    pub next_sequence: u64,
+    /// Time of the newest item.
+    pub newest_ns: Option<TimeNs>,
+    /// Has the history been opened? Before that there is nothing to read.
+    pub ready: bool,
+}
+
+/// How full the outbox is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Figures {
+    /// Bytes on disk.
+    pub bytes: u64,
+    /// Growth while nothing is delivered, bytes per second of machine time; `None` in the first minute.
+    pub bytes_per_s: Option<f64>,
+    /// Time of about the oldest item that is still there.
+    pub oldest_ns: Option<TimeNs>,
+    /// Ticks that never became items because the disk took nothing for too long.
+    pub lost: u64,
+}
+
+impl Figures {
+    /// How long an outage fits from empty, hours, with these bounds.
+    #[must_use]
+    pub fn outage_fits_h(&self, settings: &Settings) -> Option<f64> {
+        let by_size_s = settings.max_bytes as f64 / self.bytes_per_s.filter(|rate| *rate > 0.0)?;
+        Some(by_size_s.min(settings.max_age.as_secs_f64()) / 3600.0)
+    }
+}
+
+/// What a sink has and has not delivered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Standing {
+    /// What it has still to deliver.
+    pub position: Position,
+    /// Items dropped before it had delivered them, since it was first configured.
+    pub dropped: u64,
+}
+
+#[derive(Debug)]
+struct Shared {
+    machine: String,
+    settings: Settings,
+    head: watch::Sender<Head>,
+    sinks: Mutex<BTreeMap<String, Standing>>,
+    news: AtomicBool,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    box_id: String,
+    figures: Figures,
+    latest: Arc<Vec<Reading>>,
+}
+
+/// The handle. Clones are the same outbox.
+#[derive(Debug, Clone)]
+pub struct Outbox {
+    shared: Arc<Shared>,
+}
+
+impl PartialEq for Outbox {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // Everything in there is complete whenever the lock is free.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Outbox {
+    /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
+    #[must_use]
+    pub fn new(machine: &str, settings: Settings, sinks: impl IntoIterator<Item = String>) -> Self {
+        let standing = || Standing { position: Position::at(1), dropped: 0 };
+        let shared = Shared {
+            machine: machine.to_owned(),
+            settings,
+            head: watch::Sender::new(Head::default()),
+            sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
+            news: AtomicBool::new(false),
+            state: Mutex::new(State::default()),
+        };
+        Self { shared: Arc::new(shared) }
+    }
+
+    /// Name of the machine as configured.
+    #[must_use]
+    pub fn machine(&self) -> &str {
+        &self.shared.machine
+    }
+
+    /// Names this box and this history: letters, digits and `-` of the machine's name, `-`, and six digits that were
+    /// made with the outbox. `<box>-<sequence>` names an item everywhere and for ever. Empty until the history is open.
+    #[must_use]
+    pub fn box_id(&self) -> String {
+        locked(&self.shared.state).box_id.clone()
+    }
+
+    /// What is gathered and how much of it is kept.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.shared.settings
+    }
+
+    /// How far it is now, and every change of that.
+    #[must_use]
+    pub fn head(&self) -> watch::Receiver<Head> {
+        self.shared.head.subscribe()
+    }
+
+    /// How full it is.
+    #[must_use]
+    pub fn figures(&self) -> Figures {
+        locked(&self.shared.state).figures
+    }
+
+    /// Every series with what a receiver of all items knows by now; empty until the history is open. All values are
+    /// missing until the first commit.
+    #[must_use]
+    pub fn latest(&self) -> Arc<Vec<Reading>> {
+        locked(&self.shared.state).latest.clone()
+    }
+
+    /// What sink `name` has delivered; `None` for a name that is not configured.
+    #[must_use]
+    pub fn standing(&self, name: &str) -> Option<Standing> {
+        locked(&self.shared.sinks).get(name).cloned()
+    }
+
+    /// Sink `name` has delivered the items `from..to`. Becomes durable with the next commit.
+    pub fn delivered(&self, name: &str, from: u64, to: u64) {
+        self.change(name, |standing| standing.position.done(from, to));
+    }
+
+    /// Sink `name` will never deliver what is left of the items `from..to`; they count as dropped.
+    pub fn give_up(&self, name: &str, from: u64, to: u64) {
+        self.change(name, |standing| {
+            standing.dropped += standing.position.within(from, to);
+            standing.position.done(from, to);
+        });
+    }
+
+    /// Sink `name` goes on with live data; what it has not delivered before the head becomes a gap. See
+    /// [`Position::jump`].
+    pub fn jump(&self, name: &str) -> bool {
+        let head = self.shared.head.borrow().next_sequence;
+        let mut jumped = false;
+        self.change(name, |standing| jumped = standing.position.jump(head));
+        jumped
+    }
+
+    fn change(&self, name: &str, change: impl FnOnce(&mut Standing)) {
+        if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
+            change(standing);
+            self.shared.news.store(true, Ordering::Release);
+        }
+    }
+
+    /// The writer's side: has a sink delivered something since the last commit?
+    pub(super) fn has_news(&self) -> bool {
+        self.shared.news.load(Ordering::Acquire)
+    }
+
+    /// The writer's side: the names of the sinks.
+    pub(super) fn names(&self) -> Vec<String> {
+        locked(&self.shared.sinks).keys().cloned().collect()
+    }
+
+    /// The writer's side: the lowest number that some sink has not delivered.
+    pub(super) fn lowest(&self) -> u64 {
+        locked(&self.shared.sinks).values().map(|standing| standing.position.lowest()).min().unwrap_or(u64::MAX)
+    }
+
+    /// The writer's side: looks at every sink, and may change it. What has been delivered until here is noted.
+    pub(super) fn for_each_sink(
+        &self,
+        mut each: impl FnMut(&str, &mut Standing) -> Result<(), HistoryError>,
+    ) -> Result<(), HistoryError> {
+        self.shared.news.store(false, Ordering::Release);
+        let mut sinks = locked(&self.shared.sinks);
+        let done = sinks.iter_mut().try_for_each(|(name, standing)| each(name, standing));
+        if done.is_err() {
+            self.shared.news.store(true, Ordering::Release);
+        }
+        done
+    }
+
+    /// The writer's side: these stretches are durably gone, delivered or not.
+    pub(super) fn noted(&self, dropped: &[(u64, u64)]) {
+        if dropped.is_empty() {
+            return;
+        }
+        for standing in locked(&self.shared.sinks).values_mut() {
+            for (from, to) in dropped {
+                standing.dropped += standing.position.within(*from, *to);
+                standing.position.done(*from, *to);
+            }
+        }
+    }
+
+    /// The writer's side: the six digits of this history.
+    pub(super) fn name_box(&self, mark: &str) {
+        let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '-' };
+        let name: String = self.shared.machine.chars().map(plain).collect();
+        let name = name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
+        let name = if name.is_empty() { "box".to_owned() } else { name };
+        locked(&self.shared.state).box_id = format!("{name}-{mark}");
+    }
+
+    /// The writer's side: what is durable now.
+    pub(super) fn publish(&self, head: Head, figures: Figures, latest: Vec<Reading>) {
+        let mut state = locked(&self.shared.state);
+        state.figures = figures;
+        state.latest = Arc::new(latest);
+        drop(state);
+        self.shared.head.send_if_modified(|known| std::mem::replace(known, head) != head);
+    }
+}

@@ -1,0 +1,236 @@
+//! The tables of the outbox: one row for the items of a commit, one for each sink.
+
+use super::position::Position;
+use super::shared::{Figures, Outbox, Standing};
+use crate::history::HistoryError;
+use crate::history::error::Doing;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rusqlite::{Connection, OptionalExtension, params};
+use std::borrow::Cow;
+
+/// Made when the first sink is configured; a box without one has a file without these.
+const TABLES: &str = "
+CREATE TABLE IF NOT EXISTS outbox (
+  first_sequence INTEGER PRIMARY KEY,
+  items INTEGER NOT NULL,
+  start_ns INTEGER NOT NULL, end_ns INTEGER NOT NULL,
+  bytes INTEGER NOT NULL,
+  body BLOB NOT NULL              -- one line of JSON per item, zstd
+);
+CREATE TABLE IF NOT EXISTS outbox_sinks (
+  name TEXT PRIMARY KEY,
+  position TEXT NOT NULL,         -- JSON: what it has not delivered, as gaps and the number from which on nothing is
+  dropped INTEGER NOT NULL        -- items that were dropped before it had delivered them
+) WITHOUT ROWID;";
+
+/// zstd level: higher ones gain little on bodies of a kilobyte.
+const LEVEL: i32 = 3;
+/// Rows removed in one commit, so that a commit stays short.
+const ROWS_REMOVED_MAX: usize = 64;
+/// What a row costs beside its body, bytes.
+const ROW_BYTES: u64 = 40;
+
+/// What lies in the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stored {
+    pub(super) next_sequence: u64,
+    pub(super) bytes: u64,
+    pub(super) oldest_ns: Option<TimeNs>,
+    pub(super) newest_ns: Option<TimeNs>,
+    /// Since opening: bytes added, and over how much time of the items.
+    pub(super) added_bytes: u64,
+    pub(super) first_ns: Option<TimeNs>,
+}
+
+impl Stored {
+    pub(super) fn figures(&self, lost: u64) -> Figures {
+        let seconds =
+            self.newest_ns.zip(self.first_ns).map(|(newest, first)| (newest - first) as f64 / SECOND_NS as f64);
+        let rate = seconds.filter(|seconds| *seconds >= 60.0).map(|seconds| self.added_bytes as f64 / seconds);
+        Figures { bytes: self.bytes, bytes_per_s: rate, oldest_ns: self.oldest_ns, lost }
+    }
+}
+
+fn unsigned(number: i64) -> u64 {
+    u64::try_from(number).unwrap_or(0)
+}
+
+fn signed(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
+
+/// Creates the tables, takes up what each sink still has to deliver, and forgets sinks that are configured no more.
+pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<Stored, HistoryError> {
+    let opening = db.transaction().doing("opening the outbox")?;
+    opening.execute_batch(TABLES).doing("creating the outbox")?;
+    outbox.name_box(&box_mark(&opening)?);
+    let next = next_sequence(&opening)?;
+    outbox.for_each_sink(|name, standing| load(&opening, name, next, standing))?;
+    let names = outbox.names();
+    let mut statement = opening.prepare("SELECT name FROM outbox_sinks").doing("reading the sinks")?;
+    let known: Vec<String> =
+        statement.query_map([], |row| row.get(0)).and_then(Iterator::collect).doing("reading the sinks")?;
+    drop(statement);
+    for gone in known.iter().filter(|name| !names.contains(name)) {
+        opening.execute("DELETE FROM outbox_sinks WHERE name = ?1", [gone]).doing("forgetting a sink")?;
+    }
+    let stored = measure(&opening, next)?;
+    opening.commit().doing("opening the outbox")?;
+    Ok(stored)
+}
+
+fn measure(db: &Connection, next_sequence: u64) -> Result<Stored, HistoryError> {
+    db.query_row("SELECT coalesce(sum(bytes), 0), min(start_ns), max(end_ns) FROM outbox", [], |row| {
+        Ok(Stored {
+            next_sequence,
+            bytes: unsigned(row.get(0)?),
+            oldest_ns: row.get(1)?,
+            newest_ns: row.get(2)?,
+            added_bytes: 0,
+            first_ns: None,
+        })
+    })
+    .doing("measuring the outbox")
+}
+
+/// The newest row is never removed: the numbering goes on from it.
+fn next_sequence(db: &Connection) -> Result<u64, HistoryError> {
+    db.query_row("SELECT coalesce(max(first_sequence + items), 1) FROM outbox", [], |row| row.get(0).map(unsigned))
+        .doing("numbering the outbox")
+}
+
+/// Six digits made with the outbox: another database on the same box numbers other items.
+fn box_mark(db: &Connection) -> Result<String, HistoryError> {
+    let found: Option<String> = db
+        .query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = 'outbox_box'", [], |row| row.get(0))
+        .optional()
+        .doing("reading the outbox")?;
+    if let Some(mark) = found {
+        return Ok(mark);
+    }
+    let mark = adapters::mqtt::unique()[..6].to_owned();
+    db.execute("INSERT INTO meta (key, value) VALUES ('outbox_box', ?1)", [&mark]).doing("naming the outbox")?;
+    Ok(mark)
+}
+
+/// A sink that is new begins with what is made from now on.
+fn load(db: &Connection, name: &str, next: u64, standing: &mut Standing) -> Result<(), HistoryError> {
+    let found: Option<(String, i64)> = db
+        .query_row("SELECT position, dropped FROM outbox_sinks WHERE name = ?1", [name], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+        .optional()
+        .doing("reading what a sink has delivered")?;
+    match found {
+        Some((text, dropped)) => {
+            // A text that this version cannot read begins anew rather than sending everything twice.
+            standing.position = serde_json::from_str(&text).unwrap_or(Position::at(next));
+            standing.dropped = unsigned(dropped);
+        }
+        None => {
+            standing.position = Position::at(next);
+            save(db, name, standing)?;
+        }
+    }
+    Ok(())
+}
+
+fn save(db: &Connection, name: &str, standing: &Standing) -> Result<(), HistoryError> {
+    let position = serde_json::to_string(&standing.position).unwrap_or_default();
+    db.prepare_cached("INSERT OR REPLACE INTO outbox_sinks (name, position, dropped) VALUES (?1, ?2, ?3)")
+        .and_then(|mut save| save.execute(params![name, position, signed(standing.dropped)]))
+        .map(drop)
+        .doing("noting what a sink has delivered")
+}
+
+/// Adds these lines, removes what is delivered or beyond the bounds, notes what the sinks have delivered. Gives what lies
+/// in the table afterwards, and the stretches of numbers that were dropped undelivered.
+pub(super) fn put(
+    db: &Connection,
+    outbox: &Outbox,
+    before: &Stored,
+    lines: &[(TimeNs, Cow<'_, str>)],
+) -> Result<(Stored, Vec<(u64, u64)>), HistoryError> {
+    let mut stored = *before;
+    if !lines.is_empty() {
+        add(db, &mut stored, lines)?;
+    }
+    let removed = remove(db, outbox, &mut stored)?;
+    outbox.for_each_sink(|name, standing| {
+        let mut after = standing.clone();
+        let dropped = removed.iter().map(|(from, to)| {
+            let count = after.position.within(*from, *to);
+            after.position.done(*from, *to);
+            count
+        });
+        after.dropped += dropped.sum::<u64>();
+        save(db, name, &after)
+    })?;
+    Ok((stored, removed))
+}
+
+fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -> Result<(), HistoryError> {
+    let times = || lines.iter().map(|(at_ns, _)| *at_ns);
+    let (Some(start_ns), Some(end_ns)) = (times().min(), times().max()) else { return Ok(()) };
+    let text = lines.iter().map(|(_, line)| &**line).collect::<Vec<_>>().join("\n");
+    let body = zstd::bulk::compress(text.as_bytes(), LEVEL)
+        .map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
+    let bytes = body.len() as u64 + ROW_BYTES;
+    db.prepare_cached(
+        "INSERT INTO outbox (first_sequence, items, start_ns, end_ns, bytes, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+    )
+    .and_then(|mut insert| {
+        let first = signed(stored.next_sequence);
+        insert.execute(params![first, lines.len() as i64, start_ns, end_ns, signed(bytes), body])
+    })
+    .doing("storing the outbox")?;
+    stored.next_sequence += lines.len() as u64;
+    stored.bytes += bytes;
+    stored.added_bytes += bytes;
+    stored.first_ns.get_or_insert(start_ns);
+    stored.oldest_ns.get_or_insert(start_ns);
+    stored.newest_ns = Some(end_ns);
+    Ok(())
+}
+
+/// Removes the oldest rows as long as they are delivered, too old, or too much. Gives the stretches that were not delivered
+/// everywhere.
+fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored) -> Result<Vec<(u64, u64)>, HistoryError> {
+    let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
+    let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
+    let horizon_ns = stored.newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
+    let mut dropped = Vec::new();
+    for _ in 0..ROWS_REMOVED_MAX {
+        let Some((first, items, end_ns, bytes)) = oldest(db)? else {
+            stored.oldest_ns = None;
+            break;
+        };
+        let end = first + items;
+        let delivered = end <= lowest;
+        let due = delivered || end_ns < horizon_ns || stored.bytes > settings.max_bytes;
+        if !due || end == stored.next_sequence {
+            stored.oldest_ns = Some(end_ns);
+            break;
+        }
+        db.prepare_cached("DELETE FROM outbox WHERE first_sequence = ?1")
+            .and_then(|mut delete| delete.execute([signed(first)]))
+            .doing("shortening the outbox")?;
+        stored.bytes = stored.bytes.saturating_sub(bytes);
+        if !delivered {
+            dropped.push((first, end));
+        }
+    }
+    Ok(dropped)
+}
+
+/// First number, items, time of the newest, bytes.
+fn oldest(db: &Connection) -> Result<Option<(u64, u64, TimeNs, u64)>, HistoryError> {
+    db.prepare_cached("SELECT first_sequence, items, end_ns, bytes FROM outbox ORDER BY first_sequence LIMIT 1")
+        .and_then(|mut select| {
+            let row = |row: &rusqlite::Row<'_>| {
+                Ok((unsigned(row.get(0)?), unsigned(row.get(1)?), row.get(2)?, unsigned(row.get(3)?)))
+            };
+            select.query_row([], row).optional()
+        })
+        .doing("looking for the oldest of the outbox")
+}

@@ -1,0 +1,107 @@
+//! Addresses of sinks: the notation of sources, with schemes of their own.
+
+use super::mqtt::MqttTarget;
+use adapters::address::{AddressError, Keys};
+use adapters::channel::nearest;
+use std::fmt;
+use std::str::FromStr;
+
+/// The schemes of the notation, each with how an address of it is written.
+pub const SCHEMES: [(&str, &str); 2] = [("mqtt", "mqtt://BROKER:1883/PREFIX"), ("mqtts", "mqtts://BROKER:8883/PREFIX")];
+
+/// What an address means. Each variant belongs to one kind of sink.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SinkTarget {
+    /// JSON documents on plain topics.
+    Mqtt(MqttTarget),
+}
+
+/// Where a sink is, and how to talk to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SinkAddress {
+    text: String,
+    target: SinkTarget,
+}
+
+impl SinkAddress {
+    /// The address as it was written. It never holds a password: those are in files.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What it means.
+    #[must_use]
+    pub fn target(&self) -> &SinkTarget {
+        &self.target
+    }
+
+    /// What is wrong with the files that the address names, each with what to do. Nothing is connected.
+    #[must_use]
+    pub fn check(&self) -> Vec<(String, String)> {
+        match &self.target {
+            SinkTarget::Mqtt(target) => target.broker.check(),
+        }
+    }
+
+    /// The word before the colon.
+    #[must_use]
+    pub fn scheme(&self) -> &str {
+        self.text.split(':').next().unwrap_or_default()
+    }
+
+    /// Does the text begin with a scheme of sinks?
+    #[must_use]
+    pub fn is_one(text: &str) -> bool {
+        let scheme = text.trim().split(':').next().unwrap_or_default();
+        SCHEMES.iter().any(|(known, _)| *known == scheme)
+    }
+}
+
+impl fmt::Display for SinkAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for SinkAddress {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let text = text.trim();
+        let fail = |problems| AddressError { address: text.to_owned(), problems };
+        let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme()]))?;
+        let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
+        let mut keys = Keys::of(query);
+        let target = parse(scheme, body, &mut keys);
+        let mut problems = keys.finish();
+        match target {
+            Ok(target) if problems.is_empty() => Ok(Self { text: text.to_owned(), target }),
+            Ok(_) => Err(fail(problems)),
+            Err(problem) => {
+                problems.insert(0, problem);
+                Err(fail(problems))
+            }
+        }
+    }
+}
+
+fn no_scheme() -> String {
+    let forms: Vec<&str> = SCHEMES.iter().map(|(_, form)| *form).collect();
+    format!("no scheme; write one of {}", forms.join(", "))
+}
+
+fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String> {
+    match scheme {
+        "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
+        _ => Err(unknown(scheme)),
+    }
+}
+
+fn unknown(scheme: &str) -> String {
+    let hint = match nearest(scheme, SCHEMES.iter().map(|(known, _)| *known)) {
+        Some(near) => format!("did you mean {near}:?"),
+        None => no_scheme(),
+    };
+    format!("{scheme}: is no scheme of a sink; {hint}")
+}

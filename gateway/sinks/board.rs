@@ -1,0 +1,114 @@
+//! Where the tasks of the sinks write how they are doing, and the status reads it.
+
+use super::SinkError;
+use super::status::SinkStatus;
+use crate::history::Outbox;
+use crate::status::Problem;
+use adapters::clock::{SECOND_NS, TimeNs};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What one task tells of itself.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Progress {
+    pub(super) state: Option<&'static str>,
+    pub(super) delivered: u64,
+    pub(super) refused: u64,
+    pub(super) connections: u64,
+    pub(super) delay_s: Option<f64>,
+    pub(super) error: Option<String>,
+    pub(super) failing: bool,
+    /// Time of the newest delivered item of the oldest gap, or of live data where there is no gap.
+    pub(super) reached_ns: Option<TimeNs>,
+}
+
+#[derive(Debug)]
+struct Entry {
+    name: String,
+    address: String,
+    progress: Progress,
+}
+
+/// See the [module](self). Clones are the same board.
+#[derive(Debug, Clone, Default)]
+pub struct Board {
+    entries: Arc<Mutex<Vec<Entry>>>,
+    outbox: Option<Outbox>,
+}
+
+impl Board {
+    /// A board for these sinks, each with name and address.
+    #[must_use]
+    pub fn new(outbox: Outbox, sinks: impl IntoIterator<Item = (String, String)>) -> Self {
+        let entry = |(name, address)| Entry { name, address, progress: Progress::default() };
+        Self { entries: Arc::new(Mutex::new(sinks.into_iter().map(entry).collect())), outbox: Some(outbox) }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Entry>> {
+        // An entry is complete whenever the lock is free.
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn change(&self, index: usize, change: impl FnOnce(&mut Progress)) {
+        if let Some(entry) = self.lock().get_mut(index) {
+            change(&mut entry.progress);
+        }
+    }
+
+    /// True when this error is another one than before, or came back: worth telling.
+    pub(super) fn failed(&self, index: usize, error: &SinkError) -> bool {
+        let text = error.to_string();
+        let mut news = false;
+        self.change(index, |progress| {
+            news = !progress.failing || progress.error.as_deref() != Some(&text);
+            progress.state = Some("waiting");
+            progress.error = Some(text);
+            progress.failing = true;
+        });
+        news
+    }
+
+    /// The sinks that fail at the moment.
+    #[must_use]
+    pub fn problems(&self) -> Vec<Problem> {
+        let problem = |entry: &Entry| {
+            let next = "it is tried again by itself; what waits is kept (see `sinks` in the status)".to_owned();
+            let error = entry.progress.error.as_ref().filter(|_| entry.progress.failing)?;
+            Some(Problem { what: format!("sink {}: {error}", entry.name), next })
+        };
+        self.lock().iter().filter_map(problem).collect()
+    }
+
+    /// Every sink at this moment.
+    #[must_use]
+    pub fn status(&self) -> Vec<SinkStatus> {
+        let Some(outbox) = &self.outbox else { return Vec::new() };
+        let (head, figures) = (*outbox.head().borrow(), outbox.figures());
+        let fits = figures.outage_fits_h(outbox.settings());
+        let status = |entry: &Entry| {
+            let Entry { name, address, progress } = entry;
+            let standing = outbox.standing(name);
+            let behind_items = standing.as_ref().map_or(0, |standing| standing.position.waiting(head.next_sequence));
+            let age = head.newest_ns.zip(progress.reached_ns).map(|(newest, reached)| seconds(newest - reached));
+            SinkStatus {
+                name: name.clone(),
+                address: address.clone(),
+                state: progress.state.unwrap_or("waiting"),
+                behind_items,
+                behind_s: if behind_items == 0 { Some(0.0) } else { age.map(|age| age.max(0.0)) },
+                delivered: progress.delivered,
+                delay_s: progress.delay_s,
+                dropped: standing.map_or(0, |standing| standing.dropped),
+                refused: progress.refused,
+                connections: progress.connections,
+                outage_fits_h: fits,
+                error: progress.error.clone(),
+                failing: progress.failing,
+            }
+        };
+        self.lock().iter().map(status).collect()
+    }
+}
+
+pub(super) fn seconds(span_ns: i64) -> f64 {
+    span_ns as f64 / SECOND_NS as f64
+}

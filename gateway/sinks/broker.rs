@@ -1,0 +1,202 @@
+//! What every sink that sends through an MQTT broker has in common: address keys, connection, words.
+
+use super::SinkError;
+use adapters::address::{Endpoint, Keys, Login, endpoint, tls_files};
+use adapters::mqtt::{Client, Message, MqttError, Options, Outgoing, Qos, Version, Will};
+use adapters::tls::TlsFiles;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A connection and each acknowledgement may take this long: a slow line over a mobile network.
+const DEADLINE: Duration = Duration::from_secs(10);
+/// An idle connection is looked at this often.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// A broker as an address names it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BrokerTarget {
+    /// Host and port.
+    pub at: Endpoint,
+    /// The files of TLS, where the line is secured.
+    pub tls: Option<TlsFiles>,
+    /// User and password.
+    pub login: Login,
+    /// The version that is spoken.
+    pub version: Version,
+    /// Name of the client; `None`: one that is made of the names of box and sink.
+    pub client_id: Option<String>,
+    /// Longest silence.
+    pub keep_alive: Duration,
+}
+
+impl BrokerTarget {
+    /// Takes the keys of a broker from an address `//HOST:PORT/REST`, and gives the rest.
+    ///
+    /// # Errors
+    /// The host is none, in words.
+    pub(super) fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), String> {
+        let tls = tls_files(keys, secured);
+        let login = Login::of(keys);
+        let version = keys.choice("protocol", &[("3.1.1", Version::V3), ("5", Version::V5)]);
+        let client_id = keys.text("client_id");
+        let keep_alive = Duration::from_secs(keys.number("keep_alive_s", 20, 2, 3600));
+        let body = body.strip_prefix("//").unwrap_or(body);
+        let (host, rest) = body.split_once('/').unwrap_or((body, ""));
+        let at = endpoint(host, Some(if secured { 8883 } else { 1883 }))?;
+        Ok((Self { at, tls, login, version, client_id, keep_alive }, rest.trim_end_matches('/')))
+    }
+
+    /// What is wrong with the files that the address names, each with what to do.
+    #[must_use]
+    pub fn check(&self) -> Vec<(String, String)> {
+        broker_files(self.tls.as_ref(), &self.login)
+    }
+
+    fn options(&self, name: &str, will: Option<Will>) -> Result<Options, SinkError> {
+        let login = self.login.read().map_err(|(file, error)| {
+            let what = format!("the password file {} cannot be read: {error}", file.display());
+            SinkError::line(what, READABLE)
+        })?;
+        let client_id = self.client_id.clone().unwrap_or_else(|| format!("cnc-gateway-{name}"));
+        Ok(Options {
+            client_id,
+            login,
+            version: self.version,
+            tls: self.tls.clone(),
+            will,
+            keep_alive: self.keep_alive,
+            deadline: DEADLINE,
+            ..Options::new(&self.at.host, self.at.port, "")
+        })
+    }
+}
+
+const READABLE: &str = "make it readable for the gateway's user, or write another path";
+
+/// What is wrong with the files of TLS and of the password, each with what to do.
+#[must_use]
+pub fn broker_files(tls: Option<&TlsFiles>, login: &Login) -> Vec<(String, String)> {
+    let mut problems = Vec::new();
+    if let Some(Err(error)) = tls.map(TlsFiles::config) {
+        problems.push((error.what, error.next));
+    }
+    if let Err((file, error)) = login.read() {
+        problems.push((format!("the password file {} cannot be read: {error}", file.display()), READABLE.to_owned()));
+    }
+    problems
+}
+
+/// A connection to a broker, waited for asynchronously. Without one, nothing can be sent.
+#[derive(Debug, Default)]
+pub(super) struct Link {
+    client: Option<Arc<Client>>,
+}
+
+impl Link {
+    /// Connects anew; an older connection is left.
+    pub(super) async fn connect(
+        &mut self,
+        broker: &BrokerTarget,
+        name: &str,
+        will: Option<Will>,
+    ) -> Result<(), SinkError> {
+        self.leave().await;
+        let options = broker.options(name, will)?;
+        let place = place(broker);
+        let connected = blocking(move || Client::connect(&options)).await?;
+        self.client = Some(Arc::new(connected.map_err(|error| line(&place, error))?));
+        Ok(())
+    }
+
+    /// Says goodbye: the broker does not publish the will.
+    pub(super) async fn leave(&mut self) {
+        if let Some(client) = self.client.take() {
+            // Ending the reading thread takes a moment.
+            let _ended = blocking(move || drop(client)).await;
+        }
+    }
+
+    /// Sends messages in this order; on failure the index of the first that is not known to have arrived.
+    pub(super) async fn publish(
+        &self,
+        messages: Vec<Outgoing>,
+        qos: Qos,
+        broker: &BrokerTarget,
+    ) -> Result<(), (usize, Failure)> {
+        let place = place(broker);
+        let failed = |error| (0, Failure::Line(error));
+        let client = self.client.clone().ok_or_else(|| failed(not_connected(&place)))?;
+        let sent = blocking(move || client.publish_all(&messages, qos)).await.map_err(failed)?;
+        sent.map_err(|(index, error)| match error {
+            MqttError::Unsendable(what) => (index, Failure::Message(what)),
+            other => (index, Failure::Line(line(&place, other))),
+        })
+    }
+
+    pub(super) async fn subscribe(
+        &self,
+        filters: Vec<String>,
+        qos: Qos,
+        broker: &BrokerTarget,
+    ) -> Result<(), SinkError> {
+        let place = place(broker);
+        let client = self.client.clone().ok_or_else(|| not_connected(&place))?;
+        blocking(move || client.subscribe(&filters, qos)).await?.map_err(|error| line(&place, error))
+    }
+
+    /// The next message of a subscription; an error when the connection is over. May be dropped while it waits.
+    pub(super) async fn next(&self, broker: &BrokerTarget) -> Result<Message, SinkError> {
+        loop {
+            let Some(client) = &self.client else { return Err(not_connected(&place(broker))) };
+            match client.receive(Duration::ZERO) {
+                Ok(Some(message)) => return Ok(message),
+                Ok(None) => tokio::time::sleep(LOOK_EVERY).await,
+                Err(error) => return Err(line(&place(broker), error)),
+            }
+        }
+    }
+}
+
+/// Why a message did not arrive.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// The connection is of no use any more, or nothing goes through it now.
+    Line(SinkError),
+    /// This message will never be taken.
+    Message(String),
+}
+
+impl Failure {
+    /// The same for an item.
+    pub(super) fn of_item(self, sequence: u64) -> SinkError {
+        match self {
+            Self::Line(error) => error,
+            Self::Message(what) => {
+                let next = "shorten the topic, or raise the size that the broker takes".to_owned();
+                SinkError::Item { sequence, what, next }
+            }
+        }
+    }
+}
+
+fn place(broker: &BrokerTarget) -> String {
+    format!("{}:{}", broker.at.host, broker.at.port)
+}
+
+fn not_connected(place: &str) -> SinkError {
+    SinkError::line(format!("not connected to {place}"), "")
+}
+
+fn line(place: &str, error: MqttError) -> SinkError {
+    let next = error.next().trim_end_matches('.').to_owned();
+    match error {
+        MqttError::Tls(error) => SinkError::line(error.what, error.next),
+        MqttError::Unreachable { .. } => SinkError::line(error.to_string(), next),
+        other => SinkError::line(format!("{place}: {other}"), next),
+    }
+}
+
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, SinkError> {
+    let ended = tokio::task::spawn_blocking(work).await;
+    ended.map_err(|error| SinkError::line(format!("the task of the connection ended: {error}"), "restart the gateway"))
+}

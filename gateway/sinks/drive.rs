@@ -1,0 +1,277 @@
+//! The task of a sink: connects, sends live data first and old data between, tries again with growing pauses.
+
+use super::board::{Board, seconds};
+use super::{Batch, Sink, SinkAddress, SinkError, open};
+use crate::history::{Feed, Head, Outbox, Stretch};
+use crate::log::{Notice, Severity};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio::time::{sleep, timeout};
+
+/// Pauses between two tries: the first, and the longest.
+const PAUSE_FIRST: Duration = Duration::from_millis(500);
+const PAUSE_MAX: Duration = Duration::from_secs(20);
+/// A sink that is slower than this at connecting or sending a batch has failed. Sinks have deadlines of their own; this one
+/// is for those that forgot.
+const DEADLINE: Duration = Duration::from_secs(60);
+/// How long a farewell may take.
+const FAREWELL: Duration = Duration::from_secs(2);
+/// With more items than this waiting when the connection stands, the sink goes on with live data and fills the gap later;
+/// fewer are sent in their order. At ten items a second this is the delay of a second.
+const JUMP_ITEMS: u64 = 10;
+
+/// The running sinks.
+#[derive(Debug)]
+pub struct Sinks {
+    stop: watch::Sender<bool>,
+    tasks: Vec<JoinHandle<()>>,
+}
+
+/// Starts a task for each of these sinks (name and address), which must be known to outbox and board in this order. The history at `path` may be
+/// opened later. Call it within a runtime.
+#[must_use]
+pub fn start(sinks: &[(String, SinkAddress)], outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
+    let (stop, stopping) = watch::channel(false);
+    let task = |(index, (name, address)): (usize, &(String, SinkAddress))| {
+        let task = Task {
+            index,
+            name: name.clone(),
+            outbox: outbox.clone(),
+            board: board.clone(),
+            path: path.to_owned(),
+            stopping: stopping.clone(),
+            feed: None,
+        };
+        tokio::spawn(task.run(open(address, name, outbox)))
+    };
+    let tasks = sinks.iter().enumerate().map(task).collect();
+    Sinks { stop, tasks }
+}
+
+impl Sinks {
+    /// Lets every sink finish its batch and say goodbye; takes at most a few seconds.
+    pub async fn stop(self) {
+        self.stop.send_replace(true);
+        for mut task in self.tasks {
+            if timeout(2 * FAREWELL, &mut task).await.is_err() {
+                task.abort();
+            }
+        }
+    }
+}
+
+struct Task {
+    index: usize,
+    name: String,
+    outbox: Outbox,
+    board: Board,
+    path: PathBuf,
+    stopping: watch::Receiver<bool>,
+    feed: Option<Feed>,
+}
+
+/// Why a connection was left.
+enum Left {
+    Stop,
+    Failed(SinkError),
+}
+
+impl From<SinkError> for Left {
+    fn from(error: SinkError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+impl Task {
+    async fn run(mut self, mut sink: Box<dyn Sink>) {
+        let mut stopping = self.stopping.clone();
+        let mut head = self.outbox.head();
+        tokio::select! {
+            ready = head.wait_for(|head| head.ready) => if ready.is_err() { return },
+            _ = stopping.wait_for(|stop| *stop) => return,
+        }
+        let mut tries = 0;
+        loop {
+            let left = self.connection(sink.as_mut(), &mut head, &mut tries).await;
+            let error = match left {
+                Left::Stop => break,
+                Left::Failed(error) => error,
+            };
+            if self.board.failed(self.index, &error) {
+                let text = format!("sink {}: {error}", self.name);
+                Notice::new(Severity::Warning, "sink_failed", text).detail(format!("{error:?}")).say();
+            }
+            tries += 1;
+            tokio::select! {
+                () = sleep(pause(&self.name, tries)) => {}
+                _ = stopping.wait_for(|stop| *stop) => break,
+            }
+        }
+        // The receiver finds out by itself where the farewell does not reach it.
+        let _late = timeout(FAREWELL, sink.close()).await;
+        self.board.change(self.index, |progress| progress.state = Some("stopped"));
+    }
+
+    /// From connecting to the end of the connection.
+    async fn connection(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<Head>, tries: &mut u32) -> Left {
+        self.board.change(self.index, |progress| progress.state = Some("connecting"));
+        let mut stopping = self.stopping.clone();
+        let connected = tokio::select! {
+            connected = timeout(DEADLINE, sink.connect()) => connected,
+            _ = stopping.wait_for(|stop| *stop) => return Left::Stop,
+        };
+        if let Err(error) = connected.unwrap_or_else(|_| Err(too_slow("connecting"))) {
+            return Left::Failed(error);
+        }
+        *tries = 0;
+        let mut failed = false;
+        self.board.change(self.index, |progress| {
+            failed = std::mem::replace(&mut progress.failing, false);
+            progress.state = Some("connected");
+            progress.connections += 1;
+        });
+        let text = format!("sink {}: {}", self.name, if failed { "connected again" } else { "connected" });
+        Notice::new(Severity::Info, "sink_connected", text).say();
+        self.begin(sink, head);
+        loop {
+            if *self.stopping.borrow() {
+                return Left::Stop;
+            }
+            if let Err(left) = self.step(sink, head).await {
+                return left;
+            }
+        }
+    }
+
+    /// Live data begins now.
+    fn begin(&self, sink: &dyn Sink, head: &watch::Receiver<Head>) {
+        let next = head.borrow().next_sequence;
+        let Some(standing) = self.outbox.standing(&self.name) else { return };
+        let waiting = standing.position.waiting(next);
+        if !sink.takes_history() {
+            self.outbox.give_up(&self.name, 0, next);
+        } else if waiting > JUMP_ITEMS {
+            // With too many gaps it goes on in the order of the numbers until one is closed.
+            let _jumped = self.outbox.jump(&self.name);
+        }
+    }
+
+    /// One batch of live data, or else one of old data, or else waits for something to happen.
+    async fn step(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<Head>) -> Result<(), Left> {
+        let newest = *head.borrow_and_update();
+        let Some(standing) = self.outbox.standing(&self.name) else { return Err(Left::Stop) };
+        let next = standing.position.next();
+        if next < newest.next_sequence {
+            return self.batch(sink, (next, newest.next_sequence), false).await;
+        }
+        if let Some(gap) = standing.position.oldest_gap() {
+            return self.batch(sink, gap, true).await;
+        }
+        tokio::select! {
+            changed = head.changed() => changed.map_err(|_| Left::Stop),
+            done = sink.idle() => Ok(done?),
+            _ = self.stopping.wait_for(|stop| *stop) => Err(Left::Stop),
+        }
+    }
+
+    async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
+        let stretch = self.read(from, to, sink.items_max().max(1)).await?;
+        if stretch.items.is_empty() {
+            self.outbox.delivered(&self.name, from, stretch.to.max(from + 1));
+            return Ok(());
+        }
+        let items = &stretch.items;
+        let sent = timeout(DEADLINE, sink.send(Batch { items, historical })).await;
+        match sent.unwrap_or_else(|_| Err(too_slow("sending"))) {
+            Ok(()) => self.delivered(&stretch, from, historical),
+            Err(SinkError::Item { sequence, what, next }) => {
+                let error = SinkError::Item { sequence, what, next };
+                self.refused(&error, from, sequence);
+            }
+            Err(error) => return Err(error.into()),
+        }
+        // What the receiver wants is looked at between two batches as well.
+        match timeout(Duration::ZERO, sink.idle()).await {
+            Ok(done) => Ok(done?),
+            Err(_nothing) => Ok(()),
+        }
+    }
+
+    async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<Stretch, Left> {
+        let (feed, path) = (self.feed.take(), self.path.clone());
+        let reading = tokio::task::spawn_blocking(move || {
+            let mut feed = feed.map_or_else(|| Feed::open(&path), Ok)?;
+            feed.read(from, to, items_max).map(|stretch| (feed, stretch))
+        });
+        let failed = |text: String| Left::Failed(SinkError::line(format!("the outbox cannot be read: {text}"), ""));
+        let read = reading.await.map_err(|error| failed(error.to_string()))?;
+        let (feed, stretch) = read.map_err(|error| failed(error.to_string()))?;
+        self.feed = Some(feed);
+        Ok(stretch)
+    }
+
+    fn delivered(&self, stretch: &Stretch, from: u64, historical: bool) {
+        self.outbox.delivered(&self.name, from, stretch.to);
+        let reached_ns = stretch.items.last().map(|item| item.at_ns);
+        let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
+        let delay_s = reached_ns.map(|at_ns| seconds(now_ns() - at_ns));
+        self.board.change(self.index, |progress| {
+            progress.delivered += stretch.items.len() as u64;
+            if historical || !gap {
+                progress.reached_ns = reached_ns;
+            }
+            if !historical {
+                progress.delay_s = delay_s;
+            }
+        });
+    }
+
+    fn refused(&self, error: &SinkError, from: u64, sequence: u64) {
+        self.outbox.delivered(&self.name, from, sequence);
+        self.outbox.delivered(&self.name, sequence, sequence + 1);
+        let mut first = false;
+        self.board.change(self.index, |progress| {
+            progress.refused += 1;
+            progress.delivered += sequence - from;
+            let text = error.to_string();
+            first = progress.error.is_none();
+            progress.error = Some(text);
+        });
+        if first {
+            Notice::new(Severity::Warning, "sink_refused", format!("sink {}: {error}", self.name)).say();
+        }
+    }
+}
+
+fn now_ns() -> i64 {
+    use adapters::clock::Clock;
+    adapters::clock::SystemClock::new().now_ns()
+}
+
+fn too_slow(doing: &str) -> SinkError {
+    let what = format!("{doing} took longer than {} s", DEADLINE.as_secs());
+    SinkError::line(what, "look whether the receiver is overloaded")
+}
+
+/// Doubles from try to try, and differs by up to a quarter between sinks, so that many boxes do not come back in the same
+/// instant.
+fn pause(name: &str, tries: u32) -> Duration {
+    let doubled = PAUSE_FIRST.saturating_mul(1 << tries.saturating_sub(1).min(10)).min(PAUSE_MAX);
+    let spread = name.bytes().fold(u64::from(tries), |sum, byte| sum.wrapping_mul(31).wrapping_add(u64::from(byte)));
+    doubled.mul_f64(1.0 - (spread % 256) as f64 / 1024.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_grow_to_a_bound() {
+        let pauses: Vec<Duration> = (1..20).map(|tries| pause("plant", tries)).collect();
+        assert!(pauses[0] <= PAUSE_FIRST && pauses[0] >= PAUSE_FIRST.mul_f64(0.75));
+        assert!(pauses.iter().all(|pause| *pause <= PAUSE_MAX));
+        assert!(pauses[18] >= PAUSE_MAX.mul_f64(0.75));
+    }
+}

@@ -1,0 +1,121 @@
+//! What leaves the box: one task per `[[sink]]`, each with its own position in the [outbox](crate::history::Outbox).
+//!
+//! # How a sink is written
+//! A receiver is one type that implements [`Sink`]: connect, send some items, look after an idle connection. Everything
+//! else is common: [`drive`] reads the outbox, keeps the position, tries again with growing pauses, sends live data before
+//! what an outage left behind, and tells how it goes. An address names the receiver ([`SinkAddress`]); [`open`] makes
+//! the sink of an address.
+//!
+//! # What is promised
+//! Every item is sent at least once, unless the bounds of the outbox dropped it (counted) or the receiver will never take
+//! it (counted). Its number makes a second delivery recognisable. A box that is killed repeats at most what it had sent
+//! since the last commit. Live data never waits for old data: after an outage the sink goes on with what is new, and
+//! what is missing follows in pieces of [`Sink::items_max`] between two live ones.
+//!
+//! Sinks run on tokio and read the history on connections of their own. No sink can hold up the tick or the writer.
+
+pub mod address;
+mod board;
+pub mod broker;
+pub mod doctor;
+pub mod drive;
+pub mod mqtt;
+pub mod open;
+pub mod status;
+
+pub use address::{SinkAddress, SinkTarget};
+pub use board::Board;
+pub use drive::{Sinks, start};
+pub use open::open;
+pub use status::SinkStatus;
+
+use crate::history::Item;
+use std::fmt;
+use std::pin::Pin;
+
+/// A future that a sink gives back: write `Box::pin(async move { ... })`.
+pub type Pending<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
+
+/// Some items on their way.
+#[derive(Debug, Clone, Copy)]
+pub struct Batch<'a> {
+    /// In the order of their numbers; never empty.
+    pub items: &'a [Item],
+    /// These are older than what has been sent already: they fill the gap that an outage left.
+    pub historical: bool,
+}
+
+/// One receiver.
+///
+/// The futures may be dropped at any point where they wait (the box stops, or a deadline is over); the next call is then
+/// [`Sink::connect`] or [`Sink::close`]. [`Sink::idle`] alone is dropped and called again all the time.
+pub trait Sink: Send {
+    /// Opens the connection and makes it ready to send. Also called again after every failure; leaves nothing of an older
+    /// connection behind.
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>>;
+
+    /// Sends the items and returns when the receiver has taken all of them.
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>>;
+
+    /// Waits until the receiver wants something, does it, and returns; an error when the connection is over. The default
+    /// waits for ever.
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(std::future::pending())
+    }
+
+    /// Says goodbye, where the connection still stands. At most two seconds are waited for it.
+    fn close(&mut self) -> Pending<'_, ()> {
+        Box::pin(std::future::ready(()))
+    }
+
+    /// Can the receiver take old data after new data? Otherwise what an outage left is not sent, and counted as dropped.
+    fn takes_history(&self) -> bool {
+        true
+    }
+
+    /// Greatest number of items in one batch. Live data waits for at most one batch of old data.
+    fn items_max(&self) -> usize {
+        256
+    }
+}
+
+/// Why items could not be sent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SinkError {
+    /// No connection, or it broke, or the receiver cannot take anything now. It is tried again.
+    Line {
+        /// What happened and where, one sentence without the full stop.
+        what: String,
+        /// What to do next.
+        next: String,
+    },
+    /// The receiver will never take this item. Everything before it in the batch is delivered; the item is left out and
+    /// counted, and the connection goes on.
+    Item {
+        /// Its number.
+        sequence: u64,
+        /// What happened and where, one sentence without the full stop.
+        what: String,
+        /// What to do next.
+        next: String,
+    },
+}
+
+impl SinkError {
+    /// A failed line.
+    pub fn line(what: impl Into<String>, next: impl Into<String>) -> Self {
+        Self::Line { what: what.into(), next: next.into() }
+    }
+}
+
+impl fmt::Display for SinkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line { what, next } if next.is_empty() => write!(f, "{what}"),
+            Self::Line { what, next } => write!(f, "{what}: {next}"),
+            Self::Item { sequence, what, next } => write!(f, "item {sequence} is left out, {what}: {next}"),
+        }
+    }
+}
+
+impl std::error::Error for SinkError {}
