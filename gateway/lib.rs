@@ -11,6 +11,7 @@ pub mod control;
 pub mod doctor;
 pub mod files;
 pub mod gate;
+pub mod handbook;
 pub mod history;
 pub mod http;
 pub mod in_charge;

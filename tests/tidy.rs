@@ -226,3 +226,55 @@ fn nothing_banned_came_in() {
     let found = BANNED.iter().filter(|(name, _)| names.contains(*name));
     none(found.map(|(name, reason)| format!("{name}: {reason}")).collect(), "banned");
 }
+
+/// A test that is ignored.
+struct Ignored {
+    path: String,
+    name: String,
+    reason: String,
+}
+
+/// Every ignored test of the four rooms.
+fn ignored() -> Vec<Ignored> {
+    let mark = concat!("#[ign", "ore");
+    let mut found = Vec::new();
+    for (path, text) in texts(&["rs"]) {
+        let lines: Vec<&str> = text.lines().collect();
+        for (index, line) in lines.iter().enumerate().filter(|(_, line)| line.trim_start().starts_with(mark)) {
+            let reason = line.split('"').nth(1).unwrap_or_default().to_owned();
+            let named = lines[index..].iter().find_map(|line| line.trim_start().strip_prefix("fn "));
+            let name = named.and_then(|rest| rest.split('(').next()).unwrap_or_default().to_owned();
+            found.push(Ignored { path: path.clone(), name, reason });
+        }
+    }
+    found
+}
+
+/// "5 minutes: what it shows", or "part of the test that starts it: what it does".
+fn says_how_long_and_what_for(reason: &str) -> bool {
+    let Some((takes, shows)) = reason.split_once(": ") else { return false };
+    let mut words = takes.split(' ');
+    let number = words.next().is_some_and(|word| word.parse::<u32>().is_ok());
+    let unit = words.next().is_some_and(|word| ["second", "minute", "hour"].contains(&word.trim_end_matches('s')));
+    (takes.starts_with("part of ") || number && unit) && shows.split(' ').count() >= 3
+}
+
+#[test]
+fn whatever_is_ignored_says_how_long_it_takes_and_what_it_shows() {
+    let silent = ignored().into_iter().filter(|test| !says_how_long_and_what_for(&test.reason));
+    let told = silent.map(|test| format!("{} {}: {:?}", test.path, test.name, test.reason));
+    none(told.collect(), "ignored without a reason such as \"5 minutes: what it shows\"");
+    assert!(!says_how_long_and_what_for("slow") && !says_how_long_and_what_for("some minutes: it shows a thing"));
+}
+
+#[test]
+fn the_test_map_lists_every_ignored_test_and_no_other() {
+    let map = fs::read_to_string(root().join("gateway/handbook/tests.md")).expect("the chapter is there");
+    let row = |path: &str, name: &str| format!("| `{path}` | `{name}` |");
+    let tests: Vec<String> = ignored().iter().map(|test| row(&test.path, &test.name)).collect();
+    let unlisted = tests.iter().filter(|row| !map.contains(row.as_str())).cloned();
+    none(unlisted.collect(), "ignored, and not in gateway/handbook/tests.md");
+    let listed = map.lines().filter(|line| line.contains(".rs` | `"));
+    let gone = listed.filter(|line| !tests.iter().any(|row| line.starts_with(row.as_str()))).map(str::to_owned);
+    none(gone.collect(), "in gateway/handbook/tests.md, and no longer ignored");
+}

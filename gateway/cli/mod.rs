@@ -9,6 +9,7 @@ mod check;
 mod diagnose;
 mod doctor;
 mod effects;
+mod help;
 mod history;
 mod identify;
 mod person;
@@ -66,7 +67,7 @@ pub type CommandResult = Result<Outcome, CannotRun>;
 
 /// The edge box of one CNC machine: polls, merges, infers, decides, remembers and explains.
 #[derive(Debug, Parser)]
-#[command(name = "cnc-gateway", version, args_conflicts_with_subcommands = true)]
+#[command(name = "cnc-gateway", version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 struct Arguments {
     #[command(flatten)]
     log: LogArguments,
@@ -129,6 +130,8 @@ enum Command {
     /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
     #[command(subcommand)]
     Serve(serve::Served),
+    /// Chapters of the handbook, and what a command takes.
+    Help(help::HelpArguments),
     /// The child process around a vendor's library; started by the gateway itself.
     #[command(hide = true)]
     VendorChild(vendor_child::VendorChildArguments),
@@ -172,7 +175,20 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Rules(rules) => rules::run(&rules),
         Command::Doctor(doctor) => doctor::doctor(&doctor),
         Command::Serve(served) => serve::run(&served),
+        Command::Help(topic) => help::help(&topic),
         Command::VendorChild(child) => vendor_child::run(&child),
+    }
+}
+
+/// Would this process take these arguments? The first one is the name of the program.
+///
+/// # Errors
+/// What would be printed in place of an answer.
+pub fn parses<T: Into<std::ffi::OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
+    match Arguments::try_parse_from(arguments) {
+        Ok(_) => Ok(()),
+        Err(asked) if !asked.use_stderr() => Ok(()),
+        Err(refused) => Err(refused.to_string()),
     }
 }
 

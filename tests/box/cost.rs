@@ -39,7 +39,7 @@ fn ten_seconds_cost_little() {
 }
 
 #[test]
-#[ignore = "takes ten minutes"]
+#[ignore = "10 minutes: memory and processor of the default run"]
 fn ten_minutes_cost_what_was_aimed_at() {
     let (resident_mb, share) = measured(Duration::from_secs(600));
     assert!(resident_mb <= 40.0 && share <= 0.05, "{resident_mb} MB, {share}");

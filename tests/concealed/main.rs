@@ -44,7 +44,7 @@ fn wanted(default_seeds: &str) -> Vec<groups::Order> {
 
 /// Writes cases to `CONCEALED_OUT` and their truth to `CONCEALED_OUT-truth`.
 #[test]
-#[ignore = "writes files; set CONCEALED_OUT"]
+#[ignore = "1 minute: writes concealed recordings and their truth for another program; needs CONCEALED_OUT"]
 fn write_cases() {
     let out = std::env::var("CONCEALED_OUT").expect("set CONCEALED_OUT to the directory to write to");
     let (given, sealed) = (PathBuf::from(&out), PathBuf::from(format!("{out}-truth")));
@@ -100,7 +100,7 @@ fn effects_have_the_wished_size() {
 
 /// The whole table. `CONCEALED_SEEDS` (default 10), `CONCEALED_FILTER`, `CONCEALED_THREADS` (default 2).
 #[test]
-#[ignore = "minutes to hours; run with --ignored --nocapture campaign"]
+#[ignore = "120 minutes: the table of concealed physics for one seed (459 cases)"]
 fn campaign() {
     let threads = std::env::var("CONCEALED_THREADS").ok().and_then(|t| t.parse().ok()).unwrap_or(2);
     let outcomes = score::run(&wanted("10"), threads);
@@ -117,7 +117,7 @@ fn campaign() {
 
 /// Real machines with withheld truth, and long recordings.
 #[test]
-#[ignore = "minutes; run with --ignored --nocapture real_machines"]
+#[ignore = "10 minutes: what is said of five real recordings, and the time for long ones"]
 fn real_machines() {
     println!("{}", real::table());
     println!("{}", score::endurance::long_recordings());
@@ -125,7 +125,7 @@ fn real_machines() {
 
 /// Floors that every build must reach on a few cases of every kind.
 #[test]
-#[ignore = "a minute or two; it joins the normal run as soon as `diagnose` is part of the binary"]
+#[ignore = "2 minutes: floors of the concealed physics on 65 cases"]
 fn short() {
     let outcomes = score::run(&floors::sample(), 2);
     println!("{}", score::tally::table(&outcomes));

@@ -141,7 +141,7 @@ fn without_a_power_meter_on_twenty_seeds() {
 }
 
 #[test]
-#[ignore = "20 seeds of every scenario: about a minute in release"]
+#[ignore = "1 minute: machine states of 20 seeds of every scenario, in release"]
 fn simulated_machine_scored_on_twenty_seeds() {
     score(20, 2400);
 }

@@ -27,7 +27,7 @@ fn an_hour_in_the_default_configuration_writes_nothing() {
 
 /// `cargo test --release --test gate a_day_in -- --ignored --nocapture`
 #[test]
-#[ignore = "a day of machine time: about a minute"]
+#[ignore = "1 minute: a day of machine time in the default configuration writes nothing"]
 fn a_day_in_the_default_configuration_writes_nothing() {
     let line = counted("86400");
     println!("24 h of machine time, default configuration, a script that asks for 60 % in every cut: {line}");

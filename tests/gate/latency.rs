@@ -34,7 +34,7 @@ fn at(values: &[f64], share: f64) -> f64 {
 ///
 /// `cargo test --release --test gate added_latency -- --ignored --nocapture`
 #[test]
-#[ignore = "some minutes in real time; tight limits that a loaded computer does not keep"]
+#[ignore = "4 minutes: time from a reading to the issued write, in real time; a loaded computer does not keep its limits"]
 fn added_latency_from_sample_to_issued_write() {
     let directory = tempfile::tempdir().expect("a directory");
     let config = prepared(directory.path(), "simulated://lathe?dropouts_per_h=0&begun_s=110");

@@ -141,7 +141,7 @@ fn whatever_a_script_gives_the_controller_gets_what_the_band_and_the_pace_allow(
 
 /// `cargo test --release --test gate a_million_outputs -- --ignored --nocapture`
 #[test]
-#[ignore = "a million ticks: about a minute"]
+#[ignore = "1 minute: a million random script outputs stay within band and slew"]
 fn a_million_outputs() {
     check(1_000_000);
 }

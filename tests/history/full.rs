@@ -76,7 +76,7 @@ fn a_full_disk_stops_nothing() {
 }
 
 #[test]
-#[ignore = "runs inside the namespace of the test above"]
+#[ignore = "part of a_full_disk_stops_nothing: runs on a small disk of its own"]
 fn full_disk() {
     let Some(disk) = disk() else { return };
     let (path, machine) = (disk.join("h.db"), Machine::new());
@@ -149,7 +149,7 @@ fn a_read_only_disk_is_said_and_readable() {
 }
 
 #[test]
-#[ignore = "runs inside the namespace of the test above"]
+#[ignore = "part of the tests on a small disk: runs on a small disk of its own"]
 fn fill_a_little() {
     let Some(disk) = disk() else { return };
     let writer = Writer::open(&disk.join("h.db"), options()).expect("opens");
@@ -164,7 +164,7 @@ fn fill_a_little() {
 }
 
 #[test]
-#[ignore = "runs inside the namespace of the test above"]
+#[ignore = "part of the tests on a small disk: runs on a disk of its own that is read-only"]
 fn read_only_disk() {
     let Some(disk) = disk() else { return };
     let path = disk.join("h.db");

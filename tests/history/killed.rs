@@ -25,7 +25,7 @@ fn rows_in(path: &Path) -> i64 {
 
 /// Not a test of its own: the process that is killed. It goes on where the history ends, and says what is acknowledged.
 #[test]
-#[ignore = "the child process of the test below"]
+#[ignore = "part of the tests beside it: the process that is killed"]
 fn child() {
     let Ok(path) = std::env::var(CHILD_PATH) else { return };
     let live = std::env::var(CHILD_LIVE).is_ok();

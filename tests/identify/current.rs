@@ -101,7 +101,7 @@ fn the_coefficients_of_a_cubic_are_inside_their_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of the coefficients of the feed curve, 200 repetitions"]
 fn the_coefficients_of_a_cubic_are_inside_their_intervals_200_times() {
     coefficients(LONG);
 }
@@ -153,7 +153,7 @@ fn a_cut_at_a_feed_left_out_lies_about_the_curve() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: a feed that was left out lies about the feed curve, 200 repetitions"]
 fn a_cut_at_a_feed_left_out_lies_about_the_curve_200_times() {
     left_out(LONG);
 }

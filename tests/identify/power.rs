@@ -88,7 +88,7 @@ fn the_level_of_a_visit_is_inside_its_interval() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of the level of one visit of a speed, 200 repetitions"]
 fn the_level_of_a_visit_is_inside_its_interval_200_times() {
     levels(LONG);
 }
@@ -149,7 +149,7 @@ fn no_load_powers_are_inside_their_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of no-load powers, 200 repetitions"]
 fn no_load_powers_are_inside_their_intervals_200_times() {
     no_load(LONG);
 }
@@ -214,7 +214,7 @@ fn load_loss_is_inside_its_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of load loss, 200 repetitions"]
 fn load_loss_is_inside_its_intervals_200_times() {
     load_loss(LONG);
 }

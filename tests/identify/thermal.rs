@@ -97,7 +97,7 @@ fn coefficients_of_a_late_law_are_inside_their_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of thermal coefficients with and without a lag, 200 repetitions"]
 fn coefficients_are_inside_their_intervals_200_times() {
     without_lag(LONG);
     with_lag(LONG);

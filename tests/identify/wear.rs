@@ -155,7 +155,7 @@ fn the_numbers_of_the_physical_form_are_inside_their_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions"]
+#[ignore = "1 minute: coverage of the wear model, 200 repetitions"]
 fn the_numbers_of_the_physical_form_are_inside_their_intervals_200_times() {
     coverage(LONG);
 }

@@ -213,7 +213,7 @@ fn the_thermal_error_is_compensated_through_both_sinks() {
 
 /// `cargo test --release --test loops a_day_of -- --ignored --nocapture`
 #[test]
-#[ignore = "two days of the machine: half a minute"]
+#[ignore = "30 seconds: thermal offsets over two simulated days, through the gate"]
 fn a_day_of_thermal_error() {
     day(24);
 }

@@ -170,7 +170,7 @@ fn the_alarm_comes_near_the_criterion() {
 
 /// `cargo test --release --test loops fifty_batches -- --ignored --nocapture`
 #[test]
-#[ignore = "50 batches of up to 150 parts: minutes"]
+#[ignore = "5 minutes: when the wear alarm comes in 50 batches of up to 150 parts"]
 fn fifty_batches() {
     seeds(50);
 }

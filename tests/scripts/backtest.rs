@@ -230,7 +230,7 @@ fn alarms_of_another_version_are_not_compared_and_the_report_says_until_when() {
 
 /// A week at 10 Hz: `cargo test --release --test scripts a_stored_week -- --ignored --nocapture`
 #[test]
-#[ignore = "ten minutes"]
+#[ignore = "10 minutes: a backtest over a stored day and week at 10 Hz"]
 fn a_stored_week_at_ten_hertz() {
     let directory = tempfile::tempdir().expect("a directory");
     let began = std::time::Instant::now();
@@ -248,7 +248,7 @@ fn a_stored_week_at_ten_hertz() {
 
 /// A week at 1 Hz: `cargo test --release --test scripts a_coarse_week -- --ignored --nocapture`
 #[test]
-#[ignore = "minutes"]
+#[ignore = "5 minutes: a backtest over a week at a sample per 2 s"]
 fn a_coarse_week_at_one_hertz() {
     let directory = tempfile::tempdir().expect("a directory");
     machine(directory.path(), 604_800, 1.0);

@@ -76,7 +76,7 @@ fn processor_ns() -> Option<u64> {
 /// How long each takes when nobody is in the way, as processor time:
 /// `cargo test --release --test scripts mad_scripts_take -- --ignored --nocapture`
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "10 seconds: processor time of scripts that never end"]
 fn mad_scripts_take_less_than_fifty_milliseconds() {
     let mut worst = 0.0_f64;
     for (what, text) in MAD {

@@ -42,7 +42,7 @@ fn the_time_constant_and_the_coefficients_lie_in_their_intervals() {
 }
 
 #[test]
-#[ignore = "200 repetitions take a while"]
+#[ignore = "1 minute: intervals of the lagged thermal laws cover the truth in 200 repetitions"]
 fn intervals_cover_in_two_hundred_repetitions() {
     check(200);
 }

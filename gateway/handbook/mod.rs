@@ -1,0 +1,68 @@
+//! The handbook: chapters in Markdown that stand beside this file and are part of the program, so that a box without a
+//! network can explain itself.
+//!
+//! A chapter is about one topic. Its topic is the name of its file, its title is its first heading. Every chapter is a row
+//! of the table below; `tests/handbook.rs` fails when a file of the folder has no row.
+
+use adapters::channel::nearest;
+
+/// One chapter of the handbook.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chapter {
+    /// What `cnc-gateway help` calls it; the name of the file without its ending.
+    pub topic: &'static str,
+    /// The chapter, Markdown.
+    pub text: &'static str,
+}
+
+impl Chapter {
+    /// The first heading, without its mark; the topic where there is none.
+    #[must_use]
+    pub fn title(&self) -> &'static str {
+        self.text.lines().find_map(|line| line.strip_prefix("# ")).map_or(self.topic, str::trim)
+    }
+}
+
+macro_rules! chapters {
+    ($($topic:literal),* $(,)?) => {
+        /// Every chapter, in the order in which a reader wants them.
+        pub static CHAPTERS: &[Chapter] =
+            &[$(Chapter { topic: $topic, text: include_str!(concat!($topic, ".md")) }),*];
+    };
+}
+
+chapters! {
+    "start",
+    "configuration",
+    "sources",
+    "rules",
+    "history",
+    "contracts",
+    "mismatch",
+    "measured",
+    "not-proven",
+    "glossary",
+    "inside",
+    "tests",
+    "changelog",
+}
+
+/// The chapter of this topic. Case does not count.
+#[must_use]
+pub fn chapter(topic: &str) -> Option<&'static Chapter> {
+    CHAPTERS.iter().find(|chapter| chapter.topic.eq_ignore_ascii_case(topic))
+}
+
+/// The topic that is written most like this one, if one is near.
+#[must_use]
+pub fn nearest_topic(topic: &str) -> Option<&'static str> {
+    nearest(topic, CHAPTERS.iter().map(|chapter| chapter.topic))
+}
+
+/// One line for each chapter: topic and title.
+#[must_use]
+pub fn contents() -> String {
+    let width = CHAPTERS.iter().map(|chapter| chapter.topic.len()).max().unwrap_or(0);
+    let line = |chapter: &Chapter| format!("  {:width$}  {}\n", chapter.topic, chapter.title());
+    CHAPTERS.iter().map(line).collect()
+}

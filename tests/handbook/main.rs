@@ -1,0 +1,61 @@
+//! README and handbook: what they show is accepted by the program, what they point to is there, and the templates of
+//! chapter `inside` compile and work.
+//!
+//! Code blocks are looked at as they stand: fenced ones, and those that are indented by four spaces.
+
+mod commands;
+mod documents;
+mod driver;
+mod effect;
+mod settings;
+
+use documents::{documents, root};
+use gateway::handbook::{CHAPTERS, chapter, contents, nearest_topic};
+use std::collections::BTreeSet;
+
+#[test]
+fn every_file_of_the_handbook_is_a_chapter() {
+    let folder = root().join("gateway/handbook");
+    let names = std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").file_name());
+    let files: BTreeSet<String> =
+        names.filter_map(|name| name.to_string_lossy().strip_suffix(".md").map(str::to_owned)).collect();
+    let known: BTreeSet<String> = CHAPTERS.iter().map(|chapter| chapter.topic.to_owned()).collect();
+    assert_eq!(files, known, "files of gateway/handbook (left), rows of the table in gateway/handbook/mod.rs (right)");
+    assert_eq!(known.len(), CHAPTERS.len(), "a chapter stands twice in the table");
+    for chapter in CHAPTERS {
+        assert!(chapter.text.starts_with("# "), "{}.md begins with its title: # Title", chapter.topic);
+    }
+}
+
+#[test]
+fn a_chapter_is_found_by_its_topic() {
+    assert_eq!(chapter("Glossary").map(|found| found.title()), Some("Glossary"));
+    assert_eq!(chapter("nothing"), None);
+    assert_eq!(nearest_topic("configuraton"), Some("configuration"));
+    assert!(contents().lines().count() == CHAPTERS.len());
+}
+
+#[test]
+fn links_lead_to_files_that_are_there() {
+    let mut broken = Vec::new();
+    for document in documents() {
+        let folder = document.path.parent().expect("a folder");
+        for target in document.links() {
+            let file = target.split('#').next().unwrap_or_default();
+            let outside = target.contains("://") || file.is_empty();
+            // The pictures are taken of a running box; a release without them shows their captions.
+            let picture = file.ends_with(".png");
+            if !outside && !picture && !folder.join(file).exists() {
+                broken.push(format!("{}: {target}", document.name));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "links to nothing:\n  {}", broken.join("\n  "));
+}
+
+#[test]
+fn the_readme_is_one_page() {
+    let readme = documents().into_iter().find(|document| document.name == "README.md").expect("there is one");
+    let lines = readme.text.lines().count();
+    assert!(lines <= 100, "{lines} lines: what does not help to decide in a minute belongs into the handbook");
+}
