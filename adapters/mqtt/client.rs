@@ -113,18 +113,32 @@ impl Client {
     }
 
     pub(super) fn send(&self, packet: &[u8]) -> Result<(), MqttError> {
-        self.writer.write(packet).map_err(|error| {
-            // Half a packet may be on the line: nothing can follow it.
-            let why = MqttError::Closed(error.to_string());
-            self.inbox.close(why.clone());
-            self.writer.shut();
-            why
-        })
+        self.writer.write(packet).map_err(|error| self.broke(&error))
+    }
+
+    /// Half a packet may be on the line: nothing can follow it.
+    fn broke(&self, error: &std::io::Error) -> MqttError {
+        let why = MqttError::Closed(error.to_string());
+        self.inbox.close(why.clone());
+        self.writer.shut();
+        why
     }
 
     pub(super) fn acknowledged(&self, id: u16, what: &'static str) -> Result<Vec<u8>, MqttError> {
         let found = self.inbox.take_acknowledgement(id, Instant::now() + self.deadline)?;
         found.ok_or(MqttError::Unacknowledged { what, deadline_ms: self.deadline.as_millis() })
+    }
+
+    /// Asks the broker for a sign of life and waits for it.
+    pub(super) fn sign_of_life(&self) -> Result<(), MqttError> {
+        let count = self.writer.ping().map_err(|error| self.broke(&error))?;
+        match self.inbox.await_signs(count, Instant::now() + self.deadline)? {
+            true => Ok(()),
+            false => {
+                let deadline_ms = self.deadline.as_millis();
+                Err(MqttError::Unacknowledged { what: "a request for a sign of life", deadline_ms })
+            }
+        }
     }
 
     /// 1 to 65535, around and around.

@@ -15,6 +15,8 @@ struct Contents {
     dropped: u64,
     /// What the broker said to packets with an identifier: one code per subscription, none for a message.
     acknowledged: BTreeMap<u16, Vec<u8>>,
+    /// Signs of life that the broker has given.
+    signs: u64,
     closed: Option<MqttError>,
 }
 
@@ -45,6 +47,16 @@ impl Inbox {
             contents.acknowledged.pop_first();
         }
         self.changed.notify_all();
+    }
+
+    pub(super) fn sign(&self) {
+        self.locked().signs += 1;
+        self.changed.notify_all();
+    }
+
+    /// Waits until the broker has given so many signs of life; false when it has not until then.
+    pub(super) fn await_signs(&self, count: u64, until: Instant) -> Result<bool, MqttError> {
+        self.wait(until, |contents| (contents.signs >= count).then_some(())).map(|found| found.is_some())
     }
 
     /// The connection is over; the first reason stays.

@@ -30,11 +30,14 @@ impl Client {
     /// See [`MqttError`].
     pub fn publish(&self, topic: &str, payload: &[u8], qos: Qos) -> Result<(), MqttError> {
         let message = Outgoing { topic: topic.to_owned(), payload: payload.to_vec(), retain: false };
-        self.publish_all(std::slice::from_ref(&message), qos).map_err(|(_, error)| error)
+        let id = (qos == Qos::AtLeastOnce).then(|| self.id());
+        self.send_one(&message, id)?;
+        id.map_or(Ok(()), |id| self.arrived(id))
     }
 
-    /// Sends messages in this order; with [`Qos::AtLeastOnce`] several are on their way at once, and it returns when the
-    /// broker has acknowledged all of them.
+    /// Sends messages in this order and returns when the broker has read all of them: with [`Qos::AtLeastOnce`] several
+    /// are on their way at once and each is acknowledged; with [`Qos::AtMostOnce`] the broker is asked for a sign of life
+    /// after the last one, and a broker reads a connection in order.
     ///
     /// # Errors
     /// The index of the first message that is not known to have arrived, and why. After [`MqttError::Refused`] and
@@ -54,6 +57,9 @@ impl Client {
             {
                 self.arrived(id).map_err(|error| (index, error))?;
             }
+        }
+        if qos == Qos::AtMostOnce && !messages.is_empty() {
+            return self.sign_of_life().map_err(|error| (0, error));
         }
         waiting.drain(..).try_for_each(|(index, id)| self.arrived(id).map_err(|error| (index, error)))
     }

@@ -18,18 +18,32 @@ pub(super) const READ_PAUSE: Duration = Duration::from_millis(200);
 pub(super) struct Writer {
     line: Arc<Line>,
     /// When something was sent last. Held while it is sent: one packet at a time.
-    sent: Mutex<Instant>,
+    sent: Mutex<Sent>,
+}
+
+#[derive(Debug)]
+struct Sent {
+    at: Instant,
+    /// Requests for a sign of life so far.
+    pings: u64,
 }
 
 impl Writer {
     pub(super) fn new(line: Arc<Line>) -> Self {
-        Self { line, sent: Mutex::new(Instant::now()) }
+        Self { line, sent: Mutex::new(Sent { at: Instant::now(), pings: 0 }) }
     }
 
     pub(super) fn write(&self, packet: &[u8]) -> std::io::Result<()> {
         let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
-        *sent = Instant::now();
+        sent.at = Instant::now();
         self.line.write_all(packet)
+    }
+
+    /// Asks for a sign of life; how many have been asked for with this one.
+    pub(super) fn ping(&self) -> std::io::Result<u64> {
+        let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
+        (sent.at, sent.pings) = (Instant::now(), sent.pings + 1);
+        self.line.write_all(&PING).map(|()| sent.pings)
     }
 
     /// Ends the connection in both directions; the reading thread ends by it.
@@ -38,7 +52,7 @@ impl Writer {
     }
 
     fn idle(&self, now: Instant) -> Duration {
-        now.saturating_duration_since(*self.sent.lock().unwrap_or_else(PoisonError::into_inner))
+        now.saturating_duration_since(self.sent.lock().unwrap_or_else(PoisonError::into_inner).at)
     }
 }
 
@@ -89,7 +103,8 @@ impl Reader {
                 Incoming::PubAck(id, code) => self.inbox.acknowledge(id, vec![code]),
                 Incoming::SubAck { id, codes } => self.inbox.acknowledge(id, codes),
                 Incoming::Disconnect(code) => return Err(format!("the broker ends it: {}", words::reason(code))),
-                Incoming::PingResp | Incoming::ConnAck { .. } => {}
+                Incoming::PingResp => self.inbox.sign(),
+                Incoming::ConnAck { .. } => {}
             }
         }
         Ok(())
@@ -104,7 +119,7 @@ impl Reader {
             return Err(format!("the broker has been silent for {} s", silent.as_secs()));
         }
         if self.writer.idle(now) >= self.keep_alive / 2 {
-            self.writer.write(&PING).map_err(|error| error.to_string())?;
+            self.writer.ping().map_err(|error| error.to_string())?;
         }
         Ok(())
     }

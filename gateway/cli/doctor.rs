@@ -2,6 +2,7 @@
 
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
 use crate::doctor::{self, Report};
+use crate::sinks::{self, SinkAddress};
 use adapters::driver::FactValue;
 use clap::Args;
 use std::fmt::Write;
@@ -23,6 +24,9 @@ pub(super) struct DoctorArguments {
 /// Prints the report. Exit code 0 reachable without problems, 1 with problems, 2 unusable address.
 pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
     let unusable = |text| CannotRun::new(text, "");
+    if SinkAddress::is_one(&arguments.address) {
+        return sink(arguments);
+    }
     let Some(library) = &arguments.compare else {
         let report = doctor::examine(&arguments.address).map_err(unusable)?;
         if arguments.json {
@@ -40,6 +44,20 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         print(&format!("{}{}comparison\n{lines}\n", text(&comparison.ours), text(&comparison.theirs)));
     }
     Ok(outcome(comparison.is_well()))
+}
+
+/// Tries a receiver.
+fn sink(arguments: &DoctorArguments) -> CommandResult {
+    let address: SinkAddress = arguments.address.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(|error| CannotRun::new(format!("no threads: {error}"), ""))?;
+    let found = runtime.block_on(sinks::doctor::examine(&address));
+    if arguments.json {
+        print_json(&found.json(&address));
+    } else {
+        print(&found.text(&address));
+    }
+    Ok(outcome(found.error.is_none()))
 }
 
 fn outcome(well: bool) -> Outcome {

@@ -6,6 +6,7 @@ mod arm;
 mod audit;
 mod bench;
 mod check;
+mod devices;
 mod diagnose;
 mod doctor;
 mod effects;
@@ -127,6 +128,8 @@ enum Command {
     Rules(rules::RulesArguments),
     /// Try one address: who is there, what it answers, what is wrong and what to do next.
     Doctor(doctor::DoctorArguments),
+    /// Write the devices.xml with which an MTConnect agent reads this machine (sink shdr://).
+    Devices(devices::DevicesArguments),
     /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
     #[command(subcommand)]
     Serve(serve::Served),
@@ -174,6 +177,7 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Identify(identify) => identify::identify(&identify),
         Command::Rules(rules) => rules::run(&rules),
         Command::Doctor(doctor) => doctor::doctor(&doctor),
+        Command::Devices(devices) => devices::run(&devices),
         Command::Serve(served) => serve::run(&served),
         Command::Help(topic) => help::help(&topic),
         Command::VendorChild(child) => vendor_child::run(&child),

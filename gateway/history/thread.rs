@@ -221,6 +221,10 @@ impl Thread {
         if let Some(newest_ns) = self.keeper.newest_ns() {
             let _ = end_state(&mut self.db, newest_ns);
         }
+        if let Some(outbox) = &self.outbox {
+            // Where this fails, the sinks send again what they sent last.
+            let _ = outbox.close(&self.db);
+        }
         // What is committed is in the log already; a failing last checkpoint loses nothing.
         let _ = self.db.close();
     }

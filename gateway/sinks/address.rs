@@ -1,19 +1,31 @@
 //! Addresses of sinks: the notation of sources, with schemes of their own.
 
 use super::mqtt::MqttTarget;
+use super::shdr::ShdrTarget;
+use super::sparkplug::SparkplugTarget;
 use adapters::address::{AddressError, Keys};
 use adapters::channel::nearest;
 use std::fmt;
 use std::str::FromStr;
 
 /// The schemes of the notation, each with how an address of it is written.
-pub const SCHEMES: [(&str, &str); 2] = [("mqtt", "mqtt://BROKER:1883/PREFIX"), ("mqtts", "mqtts://BROKER:8883/PREFIX")];
+pub const SCHEMES: [(&str, &str); 5] = [
+    ("mqtt", "mqtt://BROKER:1883/PREFIX"),
+    ("mqtts", "mqtts://BROKER:8883/PREFIX"),
+    ("sparkplug", "sparkplug://BROKER:1883/GROUP/NODE/DEVICE"),
+    ("shdr", "shdr://0.0.0.0:7878"),
+    ("sparkplugs", "sparkplugs://BROKER:8883/GROUP/NODE/DEVICE"),
+];
 
 /// What an address means. Each variant belongs to one kind of sink.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SinkTarget {
     /// JSON documents on plain topics.
     Mqtt(MqttTarget),
+    /// Lines for MTConnect agents.
+    Shdr(ShdrTarget),
+    /// Sparkplug B.
+    Sparkplug(SparkplugTarget),
 }
 
 /// Where a sink is, and how to talk to it.
@@ -41,6 +53,8 @@ impl SinkAddress {
     pub fn check(&self) -> Vec<(String, String)> {
         match &self.target {
             SinkTarget::Mqtt(target) => target.broker.check(),
+            SinkTarget::Shdr(_) => Vec::new(),
+            SinkTarget::Sparkplug(target) => target.broker.check(),
         }
     }
 
@@ -94,6 +108,10 @@ fn no_scheme() -> String {
 fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String> {
     match scheme {
         "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
+        "shdr" => ShdrTarget::parse(body, keys).map(SinkTarget::Shdr),
+        "sparkplug" | "sparkplugs" => {
+            SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)
+        }
         _ => Err(unknown(scheme)),
     }
 }

@@ -73,6 +73,13 @@ impl BrokerTarget {
 
 const READABLE: &str = "make it readable for the gateway's user, or write another path";
 
+/// The name of a client that is the same at every start: of the box, and of the sink, which may be a long address.
+pub(super) fn client_name(box_id: &str, sink: &str) -> String {
+    // FNV-1a, which tells the few sinks of a box apart.
+    let digits = sink.bytes().fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+    format!("{box_id}-{digits:08x}")
+}
+
 /// What is wrong with the files of TLS and of the password, each with what to do.
 #[must_use]
 pub fn broker_files(tls: Option<&TlsFiles>, login: &Login) -> Vec<(String, String)> {
@@ -105,6 +112,14 @@ impl Link {
         let place = place(broker);
         let connected = blocking(move || Client::connect(&options)).await?;
         self.client = Some(Arc::new(connected.map_err(|error| line(&place, error))?));
+        Ok(())
+    }
+
+    /// Connects and leaves, under a name that no running box has.
+    pub(super) async fn probe(&mut self, broker: &BrokerTarget) -> Result<(), SinkError> {
+        let own = BrokerTarget { client_id: None, ..broker.clone() };
+        self.connect(&own, &format!("doctor-{}", adapters::mqtt::unique()), None).await?;
+        self.leave().await;
         Ok(())
     }
 

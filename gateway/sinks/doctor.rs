@@ -2,6 +2,7 @@
 
 use super::{SinkAddress, SinkError, open};
 use crate::history::{Outbox, OutboxSettings};
+use serde_json::json;
 use std::time::{Duration, Instant};
 
 /// A receiver that takes longer than this does not answer.
@@ -21,14 +22,41 @@ pub async fn examine(address: &SinkAddress) -> Found {
     let outbox = Outbox::new("doctor", OutboxSettings::default(), []);
     let mut sink = open(address, "doctor", &outbox);
     let began = Instant::now();
-    let connected = tokio::time::timeout(DEADLINE, sink.connect()).await;
+    let connected = tokio::time::timeout(DEADLINE, sink.probe()).await;
     let connected_ms = began.elapsed().as_secs_f64() * 1e3;
     let late = || {
         let what = format!("{address} did not become ready within {} s", DEADLINE.as_secs());
         Err(SinkError::line(what, "look whether the receiver is overloaded or a firewall swallows the packets"))
     };
     let error = connected.unwrap_or_else(|_| late()).err();
-    // What was not closed in time is closed with the process.
-    let _late = tokio::time::timeout(Duration::from_secs(2), sink.close()).await;
     Found { connected_ms, error }
+}
+
+impl Found {
+    /// As a document.
+    #[must_use]
+    pub fn json(&self, address: &SinkAddress) -> serde_json::Value {
+        let problem = |error: &SinkError| {
+            let (what, next) = error.parts();
+            json!({"what": what, "next": next})
+        };
+        json!({
+            "address": address.text(),
+            "reachable": self.error.is_none(),
+            "timing": {"connected_ms": (self.connected_ms * 10.0).round() / 10.0},
+            "problems": self.error.iter().map(problem).collect::<Vec<_>>(),
+        })
+    }
+
+    /// In lines.
+    #[must_use]
+    pub fn text(&self, address: &SinkAddress) -> String {
+        match &self.error {
+            None => format!("{address}\n  takes what the box sends; connected in {:.1} ms\n", self.connected_ms),
+            Some(error) => {
+                let (what, next) = error.parts();
+                format!("{address}\n  takes nothing\n  problem: {what}\n    next: {next}\n")
+            }
+        }
+    }
 }

@@ -33,20 +33,27 @@ pub struct Sinks {
 /// opened later. Call it within a runtime.
 #[must_use]
 pub fn start(sinks: &[(String, SinkAddress)], outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
+    let opened = sinks.iter().map(|(name, address)| (name.clone(), open(address, name, outbox)));
+    start_with(opened.collect(), outbox, board, path)
+}
+
+/// The same for sinks that are open already, each with its name.
+#[must_use]
+pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
     let (stop, stopping) = watch::channel(false);
-    let task = |(index, (name, address)): (usize, &(String, SinkAddress))| {
+    let task = |(index, (name, sink)): (usize, (String, Box<dyn Sink>))| {
         let task = Task {
             index,
-            name: name.clone(),
+            name,
             outbox: outbox.clone(),
             board: board.clone(),
             path: path.to_owned(),
             stopping: stopping.clone(),
             feed: None,
         };
-        tokio::spawn(task.run(open(address, name, outbox)))
+        tokio::spawn(task.run(sink))
     };
-    let tasks = sinks.iter().enumerate().map(task).collect();
+    let tasks = sinks.into_iter().enumerate().map(task).collect();
     Sinks { stop, tasks }
 }
 
@@ -169,11 +176,12 @@ impl Task {
         if let Some(gap) = standing.position.oldest_gap() {
             return self.batch(sink, gap, true).await;
         }
-        tokio::select! {
-            changed = head.changed() => changed.map_err(|_| Left::Stop),
-            done = sink.idle() => Ok(done?),
-            _ = self.stopping.wait_for(|stop| *stop) => Err(Left::Stop),
-        }
+        let wanted = tokio::select! {
+            changed = head.changed() => return changed.map_err(|_| Left::Stop),
+            wanted = sink.idle() => wanted,
+            _ = self.stopping.wait_for(|stop| *stop) => return Err(Left::Stop),
+        };
+        attend(sink, wanted).await
     }
 
     async fn batch(&mut self, sink: &mut dyn Sink, (from, to): (u64, u64), historical: bool) -> Result<(), Left> {
@@ -194,7 +202,7 @@ impl Task {
         }
         // What the receiver wants is looked at between two batches as well.
         match timeout(Duration::ZERO, sink.idle()).await {
-            Ok(done) => Ok(done?),
+            Ok(wanted) => attend(sink, wanted).await,
             Err(_nothing) => Ok(()),
         }
     }
@@ -243,6 +251,12 @@ impl Task {
             Notice::new(Severity::Warning, "sink_refused", format!("sink {}: {error}", self.name)).say();
         }
     }
+}
+
+/// The receiver wants something, or the connection is over.
+async fn attend(sink: &mut dyn Sink, wanted: Result<(), SinkError>) -> Result<(), Left> {
+    wanted?;
+    timeout(DEADLINE, sink.attend()).await.unwrap_or_else(|_| Err(too_slow("answering"))).map_err(Left::Failed)
 }
 
 fn now_ns() -> i64 {

@@ -8,8 +8,8 @@
 //!
 //! # What is promised
 //! Every item is sent at least once, unless the bounds of the outbox dropped it (counted) or the receiver will never take
-//! it (counted). Its number makes a second delivery recognisable. A box that is killed repeats at most what it had sent
-//! since the last commit. Live data never waits for old data: after an outage the sink goes on with what is new, and
+//! it (counted). Its number makes a second delivery recognisable. A box that is killed repeats at most what it had
+//! sent in the last five seconds. Live data never waits for old data: after an outage the sink goes on with what is new, and
 //! what is missing follows in pieces of [`Sink::items_max`] between two live ones.
 //!
 //! Sinks run on tokio and read the history on connections of their own. No sink can hold up the tick or the writer.
@@ -21,6 +21,8 @@ pub mod doctor;
 pub mod drive;
 pub mod mqtt;
 pub mod open;
+pub mod shdr;
+pub mod sparkplug;
 pub mod status;
 
 pub use address::{SinkAddress, SinkTarget};
@@ -57,15 +59,25 @@ pub trait Sink: Send {
     /// Sends the items and returns when the receiver has taken all of them.
     fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>>;
 
-    /// Waits until the receiver wants something, does it, and returns; an error when the connection is over. The default
-    /// waits for ever.
+    /// Waits until the receiver wants something, and returns; [`Sink::attend`] comes next. An error when the connection is
+    /// over. The default waits for ever.
     fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(std::future::pending())
+    }
+
+    /// Does what the receiver wants since [`Sink::idle`] returned.
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(std::future::ready(Ok(())))
     }
 
     /// Says goodbye, where the connection still stands. At most two seconds are waited for it.
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(std::future::ready(()))
+    }
+
+    /// For `doctor`: connects and says what is wrong, without telling the receiver anything, and ends the connection.
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        self.connect()
     }
 
     /// Can the receiver take old data after new data? Otherwise what an outage left is not sent, and counted as dropped.
@@ -105,6 +117,14 @@ impl SinkError {
     /// A failed line.
     pub fn line(what: impl Into<String>, next: impl Into<String>) -> Self {
         Self::Line { what: what.into(), next: next.into() }
+    }
+
+    /// What happened, and what to do next.
+    #[must_use]
+    pub fn parts(&self) -> (&str, &str) {
+        match self {
+            Self::Line { what, next } | Self::Item { what, next, .. } => (what, next),
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! Nothing is subscribed: a network cannot ask the box for anything this way.
 
-use super::broker::{BrokerTarget, Link};
+use super::broker::{BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::{Item, Outbox};
 use adapters::address::Keys;
@@ -75,7 +75,7 @@ impl Sink for MqttSink {
         Box::pin(async move {
             let Outgoing { topic, payload, retain } = self.online(false);
             let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain };
-            let name = format!("{}-{}", self.outbox.box_id(), self.name);
+            let name = client_name(&self.outbox.box_id(), &self.name);
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
             let greeted = self.link.publish(vec![self.online(true)], Qos::AtLeastOnce, &self.target.broker).await;
             greeted.map_err(|(_, failure)| failure.of_item(0))
@@ -93,6 +93,10 @@ impl Sink for MqttSink {
     fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
         // Nothing is subscribed: what comes is none of ours.
         Box::pin(async move { self.link.next(&self.target.broker).await.map(drop) })
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.link.probe(&self.target.broker))
     }
 
     fn close(&mut self) -> Pending<'_, ()> {

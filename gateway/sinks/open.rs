@@ -1,6 +1,8 @@
 //! From an address to a sink.
 
 use super::mqtt::MqttSink;
+use super::shdr::ShdrSink;
+use super::sparkplug::SparkplugSink;
 use super::{Sink, SinkAddress, SinkTarget};
 use crate::history::Outbox;
 
@@ -10,5 +12,7 @@ use crate::history::Outbox;
 pub fn open(address: &SinkAddress, name: &str, outbox: &Outbox) -> Box<dyn Sink> {
     match address.target() {
         SinkTarget::Mqtt(target) => Box::new(MqttSink::new(target.clone(), name, outbox)),
+        SinkTarget::Shdr(target) => Box::new(ShdrSink::new(target.clone(), outbox)),
+        SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), name, outbox)),
     }
 }

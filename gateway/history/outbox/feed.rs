@@ -52,47 +52,61 @@ impl Feed {
     pub fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<Stretch, HistoryError> {
         let mut stretch = Stretch { items: Vec::new(), to: from };
         while stretch.to < to && stretch.items.len() < items_max {
-            let Some((first, body)) = self.row_at(stretch.to, to)? else {
-                stretch.to = to;
-                break;
-            };
-            let text = unpacked(&body).unwrap_or_default();
-            let lines: Vec<&str> = text.lines().collect();
-            if lines.iter().any(|line| line::names_unknown(line, &self.known)) {
-                self.learn()?;
-            }
-            let end = first + lines.len().max(1) as u64;
-            stretch.to = stretch.to.max(first);
-            for (sequence, text) in (first..).zip(lines) {
-                if sequence < stretch.to || sequence >= to || stretch.items.len() >= items_max {
-                    continue;
-                }
-                stretch.items.extend(line::item(sequence, text, &self.known));
-                stretch.to = sequence + 1;
-            }
-            if stretch.items.len() < items_max {
-                stretch.to = end.min(to);
+            match self.row_at(stretch.to, to)? {
+                Some(row) => self.take(&mut stretch, &row, to, items_max)?,
+                None => stretch.to = to,
             }
         }
         Ok(stretch)
     }
 
+    fn take(&mut self, stretch: &mut Stretch, row: &Row, to: u64, items_max: usize) -> Result<(), HistoryError> {
+        // A body that cannot be read is passed over: its items are lost, those after it are not.
+        let text = unpacked(&row.body).unwrap_or_default();
+        stretch.to = stretch.to.max(row.first);
+        for (sequence, text) in (row.first..).zip(text.lines()) {
+            if sequence < stretch.to {
+                continue;
+            }
+            if sequence >= to || stretch.items.len() >= items_max {
+                return Ok(());
+            }
+            stretch.to = sequence + 1;
+            let Some(parsed) = line::parse(text) else { continue };
+            if parsed.names_unknown(&self.known) {
+                self.learn()?;
+            }
+            stretch.items.push(parsed.item(sequence, &self.known));
+        }
+        stretch.to = stretch.to.max((row.first + row.items).min(to));
+        Ok(())
+    }
+
     /// The row that holds item `from`, or the next one below `to`.
-    fn row_at(&self, from: u64, to: u64) -> Result<Option<(u64, Vec<u8>)>, HistoryError> {
+    fn row_at(&self, from: u64, to: u64) -> Result<Option<Row>, HistoryError> {
         let [from, to] = [from, to].map(|number| i64::try_from(number).unwrap_or(i64::MAX));
         let mut select = self
             .db
             .prepare_cached(
-                "SELECT first_sequence, body FROM outbox
+                "SELECT first_sequence, items, body FROM outbox
                  WHERE first_sequence >= coalesce((SELECT max(first_sequence) FROM outbox WHERE first_sequence <= ?1), ?1)
                    AND first_sequence + items > ?1 AND first_sequence < ?2
                  ORDER BY first_sequence LIMIT 1",
             )
             .doing("reading the outbox")?;
-        let row = select.query_map([from, to], |row| Ok((row.get::<_, i64>(0)?, row.get(1)?)));
-        let found = row.and_then(|mut rows| rows.next().transpose()).doing("reading the outbox")?;
-        Ok(found.map(|(first, body)| (u64::try_from(first).unwrap_or(0), body)))
+        let unsigned = |number: i64| u64::try_from(number).unwrap_or(0);
+        let row = select.query_map([from, to], |row| {
+            Ok(Row { first: unsigned(row.get(0)?), items: unsigned(row.get(1)?), body: row.get(2)? })
+        });
+        row.and_then(|mut rows| rows.next().transpose()).doing("reading the outbox")
     }
+}
+
+/// A row of the table `outbox`.
+struct Row {
+    first: u64,
+    items: u64,
+    body: Vec<u8>,
 }
 
 fn unpacked(body: &[u8]) -> Option<String> {

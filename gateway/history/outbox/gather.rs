@@ -5,7 +5,7 @@ use super::item::{SeriesInfo, leaves};
 use super::line;
 use super::report::Report;
 use super::shared::{Head, Outbox};
-use super::store::{self, Stored};
+use super::store::{self, Put, Stored};
 use crate::history::HistoryError;
 use crate::history::mailbox::Posted;
 use crate::history::reason::Reasons;
@@ -15,10 +15,15 @@ use adapters::clock::TimeNs;
 use rusqlite::Connection;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Lines that may wait for a disk that takes nothing; beyond that the oldest is dropped and counted. At 10 ticks a second
 /// with 20 changing values about four hours.
 const WAITING_BYTES_MAX: usize = 16_000_000;
+
+/// What the sinks have delivered is noted, and removed, this often: each time costs two pages of the disk (flash wears), and
+/// what is not noted is sent again after a kill.
+const TIDY_EVERY: Duration = Duration::from_secs(5);
 
 /// The line of one tick.
 #[derive(Debug)]
@@ -39,13 +44,14 @@ pub(crate) struct Gatherer {
     /// Lines dropped because the disk took nothing for too long; they never got a number.
     lost: u64,
     stored: Stored,
+    tidied: Instant,
 }
 
 /// What a transaction has taken, to be forgotten when it is durable.
 pub(crate) struct Taken {
     ticks: usize,
-    stored: Stored,
-    items: Vec<(u64, u64)>,
+    put: Put,
+    tidy: bool,
 }
 
 impl Gatherer {
@@ -59,6 +65,7 @@ impl Gatherer {
             bytes: 0,
             lost: 0,
             stored,
+            tidied: Instant::now(),
             outbox,
         };
         gatherer.tell(&Reasons::default());
@@ -81,12 +88,17 @@ impl Gatherer {
 
     /// Would a commit change anything here?
     pub(crate) fn is_dirty(&self) -> bool {
-        self.outbox.has_news()
+        self.outbox.has_news() && self.tidied.elapsed() >= TIDY_EVERY
+    }
+
+    /// At the end: notes what the sinks have delivered.
+    pub(crate) fn close(&self, db: &Connection) -> Result<(), HistoryError> {
+        store::note(db, &self.outbox, &[])
     }
 
     /// Puts into the running transaction the items of the ticks before row `end_row` and of these records, which belong
-    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow, and notes what the
-    /// sinks have delivered.
+    /// after as many rows from `opened_row` on as they say; then drops what the bounds do not allow, and now and then notes
+    /// what the sinks have delivered.
     pub(crate) fn put<'a>(
         &self,
         db: &Connection,
@@ -105,8 +117,9 @@ impl Gatherer {
         }
         lines.extend(ticks.map(|tick| (tick.at_ns, tick.text.as_str().into())));
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
-        let (stored, items) = store::put(db, &self.outbox, &self.stored, &lines)?;
-        Ok(Taken { ticks, stored, items })
+        let tidy = self.tidied.elapsed() >= TIDY_EVERY;
+        let put = store::put(db, &self.outbox, &self.stored, &lines, tidy)?;
+        Ok(Taken { ticks, put, tidy })
     }
 
     /// What was put is durable.
@@ -114,8 +127,11 @@ impl Gatherer {
         for line in self.waiting.drain(..taken.ticks) {
             self.bytes -= line.text.len();
         }
-        self.stored = taken.stored;
-        self.outbox.noted(&taken.items);
+        self.stored = taken.put.stored;
+        self.outbox.noted(&taken.put.dropped);
+        if taken.tidy {
+            self.tidied = Instant::now();
+        }
         self.tell(reasons);
     }
 

@@ -38,22 +38,33 @@ pub(super) fn of_record(record: &Record) -> String {
 /// Series by their numbers.
 pub(super) type Known = HashMap<i64, Arc<SeriesInfo>>;
 
-/// The item of a line; `None` for one that this version cannot read. Values of unknown series are left out.
-pub(super) fn item(sequence: u64, text: &str, known: &Known) -> Option<Item> {
-    let Line { t, s, r } = serde_json::from_str(text).ok()?;
-    let content = match (s, r) {
-        (Some(cells), _) => Content::Sample(cells.iter().filter_map(|(id, cell)| reading(id, cell, known)).collect()),
-        (None, Some(record)) => Content::Record(Box::new(record)),
-        (None, None) => return None,
-    };
-    Some(Item { sequence, at_ns: t, content })
+/// A line, parsed.
+#[derive(Debug)]
+pub(super) struct Parsed(Line);
+
+/// Reads a line; `None` for one that this version cannot read.
+pub(super) fn parse(text: &str) -> Option<Parsed> {
+    serde_json::from_str(text).ok().filter(|line: &Line| line.s.is_some() || line.r.is_some()).map(Parsed)
 }
 
-/// Does the line name a series that is not among these?
-pub(super) fn names_unknown(text: &str, known: &Known) -> bool {
-    let line: Option<Line> = serde_json::from_str(text).ok();
-    let cells = line.and_then(|line| line.s).unwrap_or_default();
-    cells.keys().any(|id| id.parse().map_or(true, |id: i64| !known.contains_key(&id)))
+impl Parsed {
+    /// Does it name a series that is not among these?
+    pub(super) fn names_unknown(&self, known: &Known) -> bool {
+        let is_unknown = |id: &String| id.parse().map_or(true, |id: i64| !known.contains_key(&id));
+        self.0.s.as_ref().is_some_and(|cells| cells.keys().any(is_unknown))
+    }
+
+    /// The item; values of unknown series are left out.
+    pub(super) fn item(self, sequence: u64, known: &Known) -> Item {
+        let Line { t, s, r } = self.0;
+        let readings =
+            |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| reading(id, cell, known)).collect();
+        let content = match r {
+            Some(record) => Content::Record(Box::new(record)),
+            None => Content::Sample(s.map(readings).unwrap_or_default()),
+        };
+        Item { sequence, at_ns: t, content }
+    }
 }
 
 fn reading(id: &str, cell: &Json, known: &Known) -> Option<Reading> {

@@ -143,30 +143,43 @@ fn save(db: &Connection, name: &str, standing: &Standing) -> Result<(), HistoryE
         .doing("noting what a sink has delivered")
 }
 
-/// Adds these lines, removes what is delivered or beyond the bounds, notes what the sinks have delivered. Gives what lies
-/// in the table afterwards, and the stretches of numbers that were dropped undelivered.
+/// What a transaction did to the outbox.
+pub(super) struct Put {
+    pub(super) stored: Stored,
+    /// Stretches of numbers that were dropped before they were delivered everywhere.
+    pub(super) dropped: Vec<(u64, u64)>,
+}
+
+/// Adds these lines and removes what is beyond the bounds; `tidy`, it removes what is delivered too, and notes what each
+/// sink has delivered.
 pub(super) fn put(
     db: &Connection,
     outbox: &Outbox,
     before: &Stored,
     lines: &[(TimeNs, Cow<'_, str>)],
-) -> Result<(Stored, Vec<(u64, u64)>), HistoryError> {
+    tidy: bool,
+) -> Result<Put, HistoryError> {
     let mut stored = *before;
     if !lines.is_empty() {
         add(db, &mut stored, lines)?;
     }
-    let removed = remove(db, outbox, &mut stored)?;
+    let dropped = remove(db, outbox, &mut stored, tidy)?;
+    if tidy || !dropped.is_empty() {
+        note(db, outbox, &dropped)?;
+    }
+    Ok(Put { stored, dropped })
+}
+
+/// Notes what each sink has delivered, as if these stretches had been dropped already.
+pub(super) fn note(db: &Connection, outbox: &Outbox, dropped: &[(u64, u64)]) -> Result<(), HistoryError> {
     outbox.for_each_sink(|name, standing| {
         let mut after = standing.clone();
-        let dropped = removed.iter().map(|(from, to)| {
-            let count = after.position.within(*from, *to);
+        for (from, to) in dropped {
+            after.dropped += after.position.within(*from, *to);
             after.position.done(*from, *to);
-            count
-        });
-        after.dropped += dropped.sum::<u64>();
+        }
         save(db, name, &after)
-    })?;
-    Ok((stored, removed))
+    })
 }
 
 fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -> Result<(), HistoryError> {
@@ -193,9 +206,9 @@ fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -
     Ok(())
 }
 
-/// Removes the oldest rows as long as they are delivered, too old, or too much. Gives the stretches that were not delivered
-/// everywhere.
-fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored) -> Result<Vec<(u64, u64)>, HistoryError> {
+/// Removes the oldest rows as long as they are too old, too much or, if `tidy`, delivered. Gives the stretches that were not
+/// delivered everywhere.
+fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
     let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
     let horizon_ns = stored.newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
@@ -207,7 +220,7 @@ fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored) -> Result<Vec<(
         };
         let end = first + items;
         let delivered = end <= lowest;
-        let due = delivered || end_ns < horizon_ns || stored.bytes > settings.max_bytes;
+        let due = (delivered && tidy) || end_ns < horizon_ns || stored.bytes > settings.max_bytes;
         if !due || end == stored.next_sequence {
             stored.oldest_ns = Some(end_ns);
             break;

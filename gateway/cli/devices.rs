@@ -1,0 +1,57 @@
+//! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
+
+use super::{CannotRun, CommandResult, Outcome, print};
+use crate::config;
+use crate::history::{Query, Reader};
+use crate::moment;
+use crate::sinks::shdr::devices_xml;
+use adapters::clock::{Clock, SystemClock};
+use clap::Args;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `devices`.
+#[derive(Debug, Args)]
+pub(super) struct DevicesArguments {
+    /// Configuration file; without one the built-in configuration.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Write it there instead of printing it.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Prints or writes the document. Where the machine has been read already, it holds what the machine delivers; before that,
+/// everything that the gateway knows.
+pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let config = config::load(arguments.config.as_deref(), environment).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })?;
+    let delivered = delivered(&config.history.path);
+    let created = moment::utc(SystemClock::new().now_ns());
+    let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
+    let text = devices_xml(&config.gateway.name, &created, known);
+    match &arguments.out {
+        None => print(&text),
+        Some(file) => std::fs::write(file, text).map_err(|error| {
+            CannotRun::new(format!("{} cannot be written: {error}", file.display()), "choose another place")
+        })?,
+    }
+    Ok(Outcome::Fine)
+}
+
+/// The channels of which the history holds something; `None` before there is one.
+fn delivered(path: &Path) -> Option<BTreeSet<String>> {
+    let reader = Reader::open(path).ok()?;
+    let (_, newest_ns) = reader.span().ok()??;
+    let query = Query { from_ns: Some(newest_ns - 3_600_000_000_000), ..Query::default() };
+    let mut names = BTreeSet::new();
+    let read = reader.samples(&query, |chunk| {
+        names.extend(chunk.series.iter().map(|series| series.name.to_string()));
+        std::ops::ControlFlow::Continue(())
+    });
+    read.ok().filter(|_| !names.is_empty()).map(|_| names)
+}

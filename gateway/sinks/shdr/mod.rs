@@ -1,0 +1,189 @@
+//! `shdr://HOST:7878`: an adapter of MTConnect. The box listens, agents connect and read lines (SHDR).
+//!
+//! An agent that connects is told everything first, then what changes. Missing values are `UNAVAILABLE`; alarms are the
+//! condition `alarms`; each tool that comes into use is an asset. `* PING` is answered, so that both sides find a broken
+//! line. `cnc-gateway devices` writes the `devices.xml` that belongs to these lines.
+//!
+//! The protocol has no way to say that something is old: what happened while no agent was connected is not sent later
+//! (it is in the history). An agent that reads too slowly is disconnected and begins anew.
+
+mod devices;
+mod lines;
+mod model;
+
+pub use devices::devices_xml;
+
+use super::{Batch, Pending, Sink, SinkError};
+use crate::history::Outbox;
+use adapters::address::{Endpoint, Keys, endpoint};
+use lines::Machine;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::broadcast::{self, error::RecvError};
+use tokio::task::{AbortHandle, JoinSet};
+use tokio::time::timeout;
+
+/// Port that agents expect.
+const PORT: u16 = 7878;
+/// Agents at the same time.
+const AGENTS_MAX: usize = 16;
+/// Lines that may wait for an agent, in batches.
+const WAITING_MAX: usize = 256;
+/// An agent that takes nothing for so long is gone.
+const WRITE_WITHIN: Duration = Duration::from_secs(10);
+/// Longest line that an agent may send.
+const LINE_MAX: u64 = 1024;
+
+/// Where the box listens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShdrTarget {
+    /// The address of the box on the agents' network, and the port.
+    pub at: Endpoint,
+    /// Time between two signs of life that agents are told to ask for.
+    pub heartbeat: Duration,
+}
+
+impl ShdrTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+        let heartbeat = Duration::from_secs(keys.number("heartbeat_s", 10, 1, 600));
+        Ok(Self { at: endpoint(body, Some(PORT))?, heartbeat })
+    }
+}
+
+/// What all agents share.
+#[derive(Debug)]
+struct Shared {
+    machine: Mutex<Machine>,
+    lines: broadcast::Sender<Arc<str>>,
+    heartbeat_ms: u128,
+}
+
+/// See the [module](self).
+pub(super) struct ShdrSink {
+    target: ShdrTarget,
+    outbox: Outbox,
+    shared: Option<Arc<Shared>>,
+    listening: Option<AbortHandle>,
+}
+
+impl ShdrSink {
+    pub(super) fn new(target: ShdrTarget, outbox: &Outbox) -> Self {
+        Self { target, outbox: outbox.clone(), shared: None, listening: None }
+    }
+
+    fn stop(&mut self) {
+        if let Some(listening) = self.listening.take() {
+            listening.abort();
+        }
+        self.shared = None;
+    }
+
+    async fn bind(&self) -> Result<TcpListener, SinkError> {
+        let Endpoint { host, port } = &self.target.at;
+        TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
+            let next =
+                "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
+            SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
+        })
+    }
+
+    async fn begin(&mut self) -> Result<(), SinkError> {
+        self.stop();
+        let listener = self.bind().await?;
+        let at_ns = self.outbox.head().borrow().newest_ns.unwrap_or(0);
+        let machine = Machine::new(self.outbox.machine(), &self.outbox.latest(), at_ns);
+        let shared = Arc::new(Shared {
+            machine: Mutex::new(machine),
+            lines: broadcast::Sender::new(WAITING_MAX),
+            heartbeat_ms: self.target.heartbeat.as_millis(),
+        });
+        self.listening = Some(tokio::spawn(listen(listener, shared.clone())).abort_handle());
+        self.shared = Some(shared);
+        Ok(())
+    }
+}
+
+/// Takes agents on; they end with it.
+async fn listen(listener: TcpListener, shared: Arc<Shared>) {
+    let mut agents = JoinSet::new();
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            continue;
+        };
+        while agents.try_join_next().is_some() {}
+        if agents.len() < AGENTS_MAX {
+            agents.spawn(serve(stream, shared.clone()));
+        }
+    }
+}
+
+/// One agent, until it goes or is too slow. What is wrong with it concerns nobody else.
+async fn serve(stream: TcpStream, shared: Arc<Shared>) -> std::io::Result<()> {
+    stream.set_nodelay(true)?;
+    let (reading, mut writing) = stream.into_split();
+    let (greeting, mut lines) = {
+        let machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
+        (machine.greeting(), shared.lines.subscribe())
+    };
+    put(&mut writing, &greeting).await?;
+    let mut asked = BufReader::new(tokio::io::AsyncReadExt::take(reading, LINE_MAX));
+    let mut question = String::new();
+    loop {
+        tokio::select! {
+            read = asked.read_line(&mut question) => {
+                if read? == 0 {
+                    return Ok(());
+                }
+                asked.get_mut().set_limit(LINE_MAX);
+                if question.trim() == "* PING" {
+                    put(&mut writing, &format!("* PONG {}\n", shared.heartbeat_ms)).await?;
+                }
+                question.clear();
+            }
+            line = lines.recv() => match line {
+                Ok(line) => put(&mut writing, &line).await?,
+                Err(RecvError::Lagged(_) | RecvError::Closed) => return Ok(()),
+            },
+        }
+    }
+}
+
+async fn put(writing: &mut (impl AsyncWriteExt + Unpin), text: &str) -> std::io::Result<()> {
+    timeout(WRITE_WITHIN, writing.write_all(text.as_bytes())).await.map_err(std::io::Error::from)?
+}
+
+impl Sink for ShdrSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.begin())
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        let Some(shared) = &self.shared else {
+            return Box::pin(std::future::ready(Err(SinkError::line("the box does not listen", ""))));
+        };
+        // An agent that connects meanwhile gets each line once: in its greeting or after it.
+        let mut machine = shared.machine.lock().unwrap_or_else(PoisonError::into_inner);
+        let text: String = batch.items.iter().map(|item| machine.lines(item)).collect();
+        if !text.is_empty() {
+            // Without an agent nobody hears it.
+            let _agents = shared.lines.send(text.into());
+        }
+        Box::pin(std::future::ready(Ok(())))
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move { self.bind().await.map(drop) })
+    }
+
+    fn close(&mut self) -> Pending<'_, ()> {
+        self.stop();
+        Box::pin(std::future::ready(()))
+    }
+
+    fn takes_history(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,144 @@
+//! Which channel is which data item of MTConnect: the one table that the lines and `devices.xml` are made of.
+//!
+//! The data item has the name of the channel. Values are sent as the channel has them; where the standard wants another
+//! unit, `devices.xml` names the native one and the agent converts.
+//!
+//! Source: MTConnect Standard 1.7, Part 2 (devices), tables of data items and units.
+
+/// A data item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct DataItem {
+    /// Channel, and identifier of the data item.
+    pub(super) channel: &'static str,
+    pub(super) category: Category,
+    /// Type, for example `PATH_FEEDRATE`.
+    pub(super) kind: &'static str,
+    pub(super) sub_type: Option<&'static str>,
+    /// Unit of the standard; samples only.
+    pub(super) units: Option<&'static str>,
+    /// Unit of the channel, where it is another one.
+    pub(super) native_units: Option<&'static str>,
+    pub(super) component: Component,
+}
+
+/// What a data item is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Category {
+    Sample,
+    Event,
+}
+
+/// Where a data item stands in the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Component {
+    Spindle,
+    X,
+    Y,
+    Z,
+    Controller,
+    Path,
+    Electric,
+    Coolant,
+    Environment,
+}
+
+const fn sample(
+    channel: &'static str,
+    component: Component,
+    kind: &'static str,
+    sub_type: Option<&'static str>,
+    units: &'static str,
+) -> DataItem {
+    let category = Category::Sample;
+    DataItem { channel, category, kind, sub_type, units: Some(units), native_units: None, component }
+}
+
+const fn native(item: DataItem, unit: &'static str) -> DataItem {
+    DataItem { native_units: Some(unit), ..item }
+}
+
+const fn event(
+    channel: &'static str,
+    component: Component,
+    kind: &'static str,
+    sub_type: Option<&'static str>,
+) -> DataItem {
+    let category = Category::Event;
+    DataItem { channel, category, kind, sub_type, units: None, native_units: None, component }
+}
+
+use Component::{Controller, Coolant, Electric, Environment, Path, Spindle, X, Y, Z};
+
+const RPM: &str = "REVOLUTION/MINUTE";
+const MM_PER_S: &str = "MILLIMETER/SECOND";
+const MM_PER_MIN: &str = "MILLIMETER/MINUTE";
+const ACTUAL: Option<&str> = Some("ACTUAL");
+const PROGRAMMED: Option<&str> = Some("PROGRAMMED");
+
+/// Every data item. Channels that are not here have no counterpart in the standard and are not sent.
+pub(super) const ITEMS: &[DataItem] = &[
+    sample("spindle_speed_rpm", Spindle, "ROTARY_VELOCITY", ACTUAL, RPM),
+    sample("spindle_programmed_rpm", Spindle, "ROTARY_VELOCITY", PROGRAMMED, RPM),
+    event("spindle_override_pct", Spindle, "ROTARY_VELOCITY_OVERRIDE", None),
+    sample("spindle_load_pct", Spindle, "LOAD", None, "PERCENT"),
+    sample("spindle_power_w", Spindle, "WATTAGE", ACTUAL, "WATT"),
+    sample("spindle_current_a", Spindle, "AMPERAGE", None, "AMPERE"),
+    sample("bearing_temperature_c", Spindle, "TEMPERATURE", None, "CELSIUS"),
+    sample("x_axis_position_mm", X, "POSITION", ACTUAL, "MILLIMETER"),
+    native(sample("x_axis_velocity_mm_min", X, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    sample("x_axis_load_pct", X, "LOAD", None, "PERCENT"),
+    sample("x_axis_current_a", X, "AMPERAGE", None, "AMPERE"),
+    sample("y_axis_position_mm", Y, "POSITION", ACTUAL, "MILLIMETER"),
+    native(sample("y_axis_velocity_mm_min", Y, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    sample("y_axis_load_pct", Y, "LOAD", None, "PERCENT"),
+    sample("y_axis_current_a", Y, "AMPERAGE", None, "AMPERE"),
+    sample("z_axis_position_mm", Z, "POSITION", ACTUAL, "MILLIMETER"),
+    native(sample("z_axis_velocity_mm_min", Z, "VELOCITY", None, MM_PER_S), MM_PER_MIN),
+    sample("z_axis_load_pct", Z, "LOAD", None, "PERCENT"),
+    sample("z_axis_current_a", Z, "AMPERAGE", None, "AMPERE"),
+    event("mode", Controller, "CONTROLLER_MODE", None),
+    event("execution", Path, "EXECUTION", None),
+    event("program", Path, "PROGRAM", None),
+    event("block", Path, "BLOCK", None),
+    event("tool", Path, "TOOL_NUMBER", None),
+    event("part", Path, "PART_ID", None),
+    event("part_count", Path, "PART_COUNT", None),
+    native(sample("feed_mm_min", Path, "PATH_FEEDRATE", ACTUAL, MM_PER_S), MM_PER_MIN),
+    native(sample("feed_programmed_mm_min", Path, "PATH_FEEDRATE", PROGRAMMED, MM_PER_S), MM_PER_MIN),
+    event("feed_override_pct", Path, "PATH_FEEDRATE_OVERRIDE", PROGRAMMED),
+    sample("total_power_w", Electric, "WATTAGE", ACTUAL, "WATT"),
+    sample("supply_voltage_v", Electric, "VOLTAGE", None, "VOLT"),
+    sample("coolant_temperature_c", Coolant, "TEMPERATURE", None, "CELSIUS"),
+    sample("ambient_temperature_c", Environment, "TEMPERATURE", None, "CELSIUS"),
+];
+
+/// The condition that tells of alarms.
+pub(super) const ALARMS: &str = "alarms";
+/// The event that tells whether the box is there.
+pub(super) const AVAILABILITY: &str = "avail";
+/// What stands where there is no value.
+pub(super) const UNAVAILABLE: &str = "UNAVAILABLE";
+
+/// The data item of a channel.
+pub(super) fn of_channel(channel: &str) -> Option<&'static DataItem> {
+    ITEMS.iter().find(|item| item.channel == channel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use adapters::ChannelId;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_data_item_is_a_channel_and_stands_once() {
+        assert!(ITEMS.iter().all(|item| ChannelId::of(item.channel).is_some()));
+        let names: BTreeSet<&str> = ITEMS.iter().map(|item| item.channel).collect();
+        assert_eq!(names.len(), ITEMS.len());
+        let same =
+            |a: &DataItem, b: &DataItem| (a.kind, a.sub_type) == (b.kind, b.sub_type) && a.component == b.component;
+        for (index, item) in ITEMS.iter().enumerate() {
+            assert!(!ITEMS[..index].iter().any(|before| same(before, item)), "{item:?} cannot be told apart");
+        }
+    }
+}

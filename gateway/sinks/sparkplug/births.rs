@@ -1,0 +1,173 @@
+//! The payloads of a node: birth, data, death. Pure.
+//!
+//! A metric is a series under its own name, with the alias that stands for it in data; properties say unit (`engUnit`),
+//! range (`engLow`, `engHigh`), descriptions and whether it is inferred. A value that is missing is null, with the property
+//! `Quality` (0 bad, 500 stale) and the reason as one word in `missing`. Records are metrics of type String that hold JSON.
+
+use super::payload::{Metric, Payload, Property, PropertySet, Value, datatype};
+use crate::history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
+use adapters::clock::TimeNs;
+use std::collections::BTreeSet;
+
+/// Where metrics of the protocol itself stand (specification, 6.4.8).
+pub(super) const REBIRTH: &str = "Node Control/Rebirth";
+const BIRTH_DEATH: &str = "bdSeq";
+
+/// The number of each item, so that a receiver knows one that comes twice.
+const SEQUENCE: (&str, u64) = ("item/sequence", 1);
+/// One metric for each kind of record, with its alias.
+const RECORDS: [(&str, u64); 7] = [
+    ("record/state", 2),
+    ("record/part", 3),
+    ("record/alarm", 4),
+    ("record/alarm_clear", 5),
+    ("record/decision", 6),
+    ("record/diagnosis", 7),
+    ("record/event", 8),
+];
+/// The alias of a series is its number in the history and this.
+const SERIES_FROM: u64 = 100;
+
+/// Qualities as Sparkplug hosts use them.
+const BAD: u32 = 0;
+const STALE: u32 = 500;
+
+/// Milliseconds since 1970, as payloads have them.
+pub(super) fn milliseconds(at_ns: TimeNs) -> u64 {
+    u64::try_from(at_ns.div_euclid(1_000_000)).unwrap_or(0)
+}
+
+/// What stands behind the will: a death is matched to its birth by this number.
+pub(super) fn birth_death(number: u8, at_ms: u64) -> Metric {
+    Metric::named(BIRTH_DEATH, datatype::UINT64, at_ms, Value::Long(number.into()))
+}
+
+/// Death of the node: no sequence number, the number of its birth.
+pub(super) fn death(number: u8, at_ms: u64) -> Payload {
+    Payload { timestamp: Some(at_ms), metrics: vec![birth_death(number, at_ms)], seq: None }
+}
+
+/// What is only of the node: the number of its birth and the way to ask for another one.
+pub(super) fn node(number: u8, at_ms: u64) -> Vec<Metric> {
+    vec![birth_death(number, at_ms), Metric::named(REBIRTH, datatype::BOOLEAN, at_ms, Value::Boolean(false))]
+}
+
+/// Every metric of the machine with its last value; `known` is filled with the series that have one.
+pub(super) fn machine(latest: &[Reading], known: &mut BTreeSet<i64>, at_ms: u64) -> Vec<Metric> {
+    let of_item = Metric {
+        alias: Some(SEQUENCE.1),
+        value: None,
+        is_null: Some(true),
+        ..Metric::named(SEQUENCE.0, datatype::UINT64, at_ms, Value::Long(0))
+    };
+    let of_record = |(name, alias): &(&str, u64)| Metric {
+        alias: Some(*alias),
+        value: None,
+        is_null: Some(true),
+        ..Metric::named(name, datatype::STRING, at_ms, Value::Text(String::new()))
+    };
+    let provided = |reading: &&Reading| known.contains(&reading.series.id) || !is_unprovided(&reading.value);
+    let readings: Vec<&Reading> = latest.iter().filter(provided).collect();
+    known.extend(readings.iter().map(|reading| reading.series.id));
+    let of_series = readings.into_iter().map(|reading| described(reading, at_ms));
+    std::iter::once(of_item).chain(RECORDS.iter().map(of_record)).chain(of_series).collect()
+}
+
+fn is_unprovided(value: &Cell) -> bool {
+    matches!(value, Cell::Missing(reason) if **reason == *"not_provided")
+}
+
+/// A metric as a birth has it: name, alias, type, what it is, and the value.
+fn described(reading: &Reading, at_ms: u64) -> Metric {
+    let SeriesInfo { name, unit, range, en, zh, estimated, .. } = &*reading.series;
+    let mut metric = valued(reading, at_ms);
+    metric.name = Some(name.to_string());
+    metric.datatype = Some(kind(&reading.series));
+    let mut properties = PropertySet::default();
+    if reading.series.kind == SeriesKind::Number {
+        properties.put("engUnit", Property::Text(unit.to_string()));
+    }
+    if let Some((least, greatest)) = range {
+        properties.put("engLow", Property::Double(*least));
+        properties.put("engHigh", Property::Double(*greatest));
+    }
+    properties.put("description", Property::Text(en.to_string()));
+    properties.put("description_zh", Property::Text(zh.to_string()));
+    properties.put("estimated", Property::Boolean(*estimated));
+    let quality = metric.properties.take().unwrap_or_default();
+    properties.keys.extend(quality.keys);
+    properties.values.extend(quality.values);
+    metric.properties = Some(properties);
+    metric
+}
+
+fn kind(series: &SeriesInfo) -> u32 {
+    if series.kind == SeriesKind::Number { datatype::DOUBLE } else { datatype::STRING }
+}
+
+/// A metric as data has it: alias and value.
+fn valued(reading: &Reading, at_ms: u64) -> Metric {
+    let mut metric = Metric { alias: Some(alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
+    metric.datatype = Some(kind(&reading.series));
+    match &reading.value {
+        Cell::Number(number) => metric.value = Some(Value::Double(*number)),
+        Cell::Text(text) => metric.value = Some(Value::Text(text.to_string())),
+        Cell::Missing(reason) => {
+            let mut quality = PropertySet::default();
+            quality.put("Quality", Property::Int(if **reason == *"stale" { STALE } else { BAD }));
+            quality.put("missing", Property::Text(reason.to_string()));
+            (metric.is_null, metric.properties) = (Some(true), Some(quality));
+        }
+    }
+    metric
+}
+
+fn alias(series: &SeriesInfo) -> u64 {
+    SERIES_FROM + u64::try_from(series.id).unwrap_or(0)
+}
+
+/// The metrics of an item.
+pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
+    let at_ms = milliseconds(item.at_ns);
+    let sequence = Metric {
+        alias: Some(SEQUENCE.1),
+        timestamp: Some(at_ms),
+        datatype: Some(datatype::UINT64),
+        value: Some(Value::Long(item.sequence)),
+        ..Metric::default()
+    };
+    let mut metrics = vec![sequence];
+    match &item.content {
+        Content::Sample(readings) => metrics.extend(readings.iter().map(|reading| valued(reading, at_ms))),
+        Content::Record(_) => metrics.extend(record(item, at_ms)),
+    }
+    if historical {
+        metrics.iter_mut().for_each(|metric| metric.is_historical = Some(true));
+    }
+    metrics
+}
+
+fn record(item: &Item, at_ms: u64) -> Option<Metric> {
+    let (_, alias) = RECORDS.iter().find(|(name, _)| name.strip_prefix("record/") == Some(item.kind()))?;
+    Some(Metric {
+        alias: Some(*alias),
+        timestamp: Some(at_ms),
+        datatype: Some(datatype::STRING),
+        value: Some(Value::Text(item.json()["record"].to_string())),
+        ..Metric::default()
+    })
+}
+
+/// Does the item tell of a series that no birth has named?
+pub(super) fn is_unknown(item: &Item, known: &BTreeSet<i64>) -> bool {
+    match &item.content {
+        Content::Sample(readings) => readings.iter().any(|reading| !known.contains(&reading.series.id)),
+        Content::Record(_) => false,
+    }
+}
+
+/// Does a command of the network ask for another birth?
+pub(super) fn asks_rebirth(payload: &Payload) -> bool {
+    let asks = |metric: &Metric| metric.name.as_deref() == Some(REBIRTH) && metric.value == Some(Value::Boolean(true));
+    payload.metrics.iter().any(asks)
+}

@@ -1,0 +1,274 @@
+//! `sparkplug://BROKER:1883/GROUP/NODE/DEVICE` and `sparkplugs://`: Sparkplug B, as an edge node with one device.
+//!
+//! - Birth: every series with name, alias, type, unit, physical range and last value; again whenever a series gets its
+//!   first value, and when a host asks for it with `Node Control/Rebirth`.
+//! - Data: one message per item, values by alias, with the time of the tick. What an outage left follows after the
+//!   birth, flagged `is_historical`.
+//! - Death: the will of the connection; its `bdSeq` is that of the birth.
+//! - The specification wants data at quality of service 0, which nobody acknowledges. After each batch the broker is asked
+//!   for a sign of life on the same connection: its answer says that it has read everything before. Only then is the
+//!   batch delivered.
+//! - Primary host: with `host=ID` nothing is sent before that host says `online` on `spBv1.0/STATE/ID`, and when it says
+//!   that it goes the connection ends; meanwhile everything waits in the outbox. Without it, data that the broker has
+//!   read while nobody listened is gone: at quality of service 0 a broker keeps nothing.
+//! - Commands: `Node Control/Rebirth` alone is obeyed. Nothing else that comes from the network reaches anything.
+//!
+//! Without a DEVICE the metrics are those of the node itself.
+//!
+//! Source: Eclipse Sparkplug Specification 3.0.0; operational behaviour in chapter 5, topics in chapter 4.
+
+mod births;
+mod payload;
+
+use super::broker::{BrokerTarget, Failure, Link, client_name};
+use super::{Batch, Pending, Sink, SinkError};
+use crate::history::{Cell, Outbox};
+use adapters::address::Keys;
+use adapters::clock::{Clock, SystemClock};
+use adapters::mqtt::{Outgoing, Qos, Will};
+use payload::Payload;
+use prost::Message;
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// A birth waits at most this long for the first values.
+const FIRST_VALUES: Duration = Duration::from_secs(3);
+
+/// A primary host that is not there within this is waited for with the usual pauses between two connections.
+const HOST_WITHIN: Duration = Duration::from_secs(10);
+
+/// Where to, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparkplugTarget {
+    /// The broker.
+    pub broker: BrokerTarget,
+    /// Group of nodes, for example the plant.
+    pub group: String,
+    /// The edge node.
+    pub node: String,
+    /// The machine; `None`: the metrics are those of the node.
+    pub device: Option<String>,
+    /// The host that must be there before anything is sent.
+    pub host: Option<String>,
+}
+
+impl SparkplugTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+        let host = keys.text("host").filter(|host| !host.contains(['+', '#', '/']));
+        let (broker, rest) = BrokerTarget::parse(body, keys, secured)?;
+        let parts: Vec<&str> = rest.split('/').collect();
+        let (group, node, device) = match parts[..] {
+            [group, node] => (group, node, None),
+            [group, node, device] => (group, node, Some(device)),
+            _ => return Err("no group and node; write sparkplug://BROKER:1883/GROUP/NODE/DEVICE".to_owned()),
+        };
+        if let Some(part) = parts.iter().find(|part| part.is_empty() || part.contains(['+', '#'])) {
+            return Err(format!("{part:?} is no name of a group, node or device: leave out + and #"));
+        }
+        let device = device.map(str::to_owned);
+        Ok(Self { broker, group: group.to_owned(), node: node.to_owned(), device, host })
+    }
+
+    fn topic(&self, kind: &str) -> String {
+        let Self { group, node, .. } = self;
+        match self.device.as_ref().filter(|_| kind.starts_with('D')) {
+            Some(device) => format!("spBv1.0/{group}/{kind}/{node}/{device}"),
+            None => format!("spBv1.0/{group}/{kind}/{node}"),
+        }
+    }
+}
+
+/// See the [module](self).
+pub(super) struct SparkplugSink {
+    target: SparkplugTarget,
+    name: String,
+    outbox: Outbox,
+    link: Link,
+    /// Number of this connection, 0 to 255; in birth and death.
+    number: u8,
+    /// Number of the next message, 0 to 255.
+    next: u8,
+    /// Series that a birth has named.
+    known: BTreeSet<i64>,
+    rebirth: bool,
+}
+
+impl SparkplugSink {
+    pub(super) fn new(target: SparkplugTarget, name: &str, outbox: &Outbox) -> Self {
+        // A box that starts again quickly must not have the number of its last connection, whose death may still come.
+        let number = u8::try_from(now_ms() / 1000 % 256).unwrap_or(0);
+        Self {
+            target,
+            name: name.to_owned(),
+            outbox: outbox.clone(),
+            link: Link::default(),
+            number,
+            next: 0,
+            known: BTreeSet::new(),
+            rebirth: false,
+        }
+    }
+
+    /// The next message of the node, with its number.
+    fn message(&mut self, kind: &str, metrics: Vec<payload::Metric>, at_ms: u64) -> Outgoing {
+        let payload = Payload { timestamp: Some(at_ms), metrics, seq: Some(self.next.into()) };
+        self.next = self.next.wrapping_add(1);
+        Outgoing { topic: self.target.topic(kind), payload: payload.encode_to_vec(), retain: false }
+    }
+
+    async fn birth(&mut self) -> Result<(), SinkError> {
+        (self.next, self.rebirth) = (0, false);
+        let at_ms = now_ms();
+        let latest = self.outbox.latest();
+        let machine = births::machine(&latest, &mut self.known, at_ms);
+        let node = births::node(self.number, at_ms);
+        let messages = if self.target.device.is_some() {
+            vec![self.message("NBIRTH", node, at_ms), self.message("DBIRTH", machine, at_ms)]
+        } else {
+            vec![self.message("NBIRTH", [node, machine].concat(), at_ms)]
+        };
+        self.publish(messages).await.map_err(|(_, failure)| failure.of_item(0))
+    }
+
+    async fn publish(&self, messages: Vec<Outgoing>) -> Result<(), (usize, Failure)> {
+        self.link.publish(messages, Qos::AtMostOnce, &self.target.broker).await
+    }
+
+    async fn first_values(&self) {
+        let has_some = || self.outbox.latest().iter().any(|reading| !matches!(reading.value, Cell::Missing(_)));
+        let mut head = self.outbox.head();
+        let waiting = async { while !has_some() && head.changed().await.is_ok() {} };
+        // A machine that is off gets a birth of missing values.
+        let _late = tokio::time::timeout(FIRST_VALUES, waiting).await;
+    }
+
+    fn state_topic(&self) -> Option<String> {
+        self.target.host.as_ref().map(|host| format!("spBv1.0/STATE/{host}"))
+    }
+
+    /// Waits until the primary host is there.
+    async fn host(&self) -> Result<(), SinkError> {
+        let Some(topic) = self.state_topic() else { return Ok(()) };
+        let waiting = async {
+            loop {
+                let message = self.link.next(&self.target.broker).await?;
+                if message.topic == topic && is_online(&message.payload) {
+                    return Ok(());
+                }
+            }
+        };
+        tokio::time::timeout(HOST_WITHIN, waiting).await.unwrap_or_else(|_| Err(self.no_host()))
+    }
+
+    fn no_host(&self) -> SinkError {
+        let host = self.target.host.as_deref().unwrap_or_default();
+        let next = "start it, or leave host= out of the address; everything is kept meanwhile";
+        SinkError::line(format!("the primary host {host} is not online"), next)
+    }
+
+    async fn begin(&mut self) -> Result<(), SinkError> {
+        self.first_values().await;
+        self.number = self.number.wrapping_add(1);
+        let payload = births::death(self.number, now_ms()).encode_to_vec();
+        let will = Will { topic: self.target.topic("NDEATH"), payload, qos: Qos::AtLeastOnce, retain: false };
+        let name = client_name(&self.outbox.box_id(), &self.name);
+        self.link.connect(&self.target.broker, &name, Some(will)).await?;
+        let mut commands = vec![self.target.topic("NCMD")];
+        commands.extend(self.target.device.as_ref().map(|_| self.target.topic("DCMD")));
+        commands.extend(self.state_topic());
+        self.link.subscribe(commands, Qos::AtLeastOnce, &self.target.broker).await?;
+        self.host().await?;
+        self.birth().await
+    }
+
+    async fn deliver(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
+        if self.rebirth || batch.items.iter().any(|item| births::is_unknown(item, &self.known)) {
+            let told = |item| births::is_unknown(item, &self.known);
+            let unknown: Vec<_> = batch.items.iter().filter(|item| told(item)).flat_map(series_of).collect();
+            self.known.extend(unknown);
+            self.birth().await?;
+        }
+        let first = self.next;
+        let kind = if self.target.device.is_some() { "DDATA" } else { "NDATA" };
+        let now = now_ms();
+        let messages: Vec<Outgoing> =
+            batch.items.iter().map(|item| self.message(kind, births::data(item, batch.historical), now)).collect();
+        let sent = self.publish(messages).await;
+        sent.map_err(|(index, failure)| {
+            // Those after it did not go out; their numbers are used again.
+            self.next = first.wrapping_add(u8::try_from(index % 256).unwrap_or(0));
+            failure.of_item(batch.items.get(index).map_or(0, |item| item.sequence))
+        })
+    }
+}
+
+fn series_of(item: &crate::history::Item) -> Vec<i64> {
+    match &item.content {
+        crate::history::Content::Sample(readings) => readings.iter().map(|reading| reading.series.id).collect(),
+        crate::history::Content::Record(_) => Vec::new(),
+    }
+}
+
+/// `{"online":true,"timestamp":...}`, retained by the broker (specification, 6.3).
+fn is_online(payload: &[u8]) -> bool {
+    serde_json::from_slice(payload).is_ok_and(|state: serde_json::Value| state["online"] == true)
+}
+
+fn now_ms() -> u64 {
+    births::milliseconds(SystemClock::new().now_ns())
+}
+
+impl Sink for SparkplugSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.begin())
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        Box::pin(self.deliver(batch))
+    }
+
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move {
+            loop {
+                let message = self.link.next(&self.target.broker).await?;
+                let asks = |payload: Payload| births::asks_rebirth(&payload);
+                if message.topic == self.target.topic("NCMD") && Payload::decode(&message.payload[..]).is_ok_and(asks) {
+                    self.rebirth = true;
+                    return Ok(());
+                }
+                if self.state_topic().is_some_and(|topic| topic == message.topic) && !is_online(&message.payload) {
+                    return Err(self.no_host());
+                }
+                // Everything else that the network says is heard by nobody.
+            }
+        })
+    }
+
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move { if self.rebirth { self.birth().await } else { Ok(()) } })
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.link.probe(&self.target.broker))
+    }
+
+    fn close(&mut self) -> Pending<'_, ()> {
+        Box::pin(async move {
+            let at_ms = now_ms();
+            if self.target.device.is_some() {
+                let death = self.message("DDEATH", Vec::new(), at_ms);
+                let _gone = self.publish(vec![death]).await;
+            }
+            let payload = births::death(self.number, at_ms).encode_to_vec();
+            let death = Outgoing { topic: self.target.topic("NDEATH"), payload, retain: false };
+            // Where this does not go through, the will says the same.
+            let _gone = self.link.publish(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
+            self.link.leave().await;
+        })
+    }
+
+    /// With fewer than 256 messages between two signs of life no number is on its way twice.
+    fn items_max(&self) -> usize {
+        200
+    }
+}

@@ -1,0 +1,69 @@
+"""An MTConnect agent that is not ours (PyPI mtconnect): reads devices.xml, takes the lines of an adapter, prints what it knows.
+
+Arguments: DEVICES_XML PORT SECONDS. Prints one JSON document: the values of the agent by data item, everything that was
+pushed with its time, unknown names, the answer to a ping, and assets.
+"""
+
+import json
+import socket
+import sys
+import time
+from xml.etree import ElementTree
+
+from mtconnect.agent import MTConnect
+
+
+def main():
+    devices, port, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+    agent = MTConnect(loc=devices, hostname="http://127.0.0.1:5000")
+    known = set(agent.item_dict)
+    line = socket.create_connection(("127.0.0.1", port), timeout=10)
+    line.sendall(b"* PING\r\n")
+    pushed, unknown, conditions, assets, pong, rest = [], [], [], [], None, b""
+    until = time.monotonic() + seconds
+    line.settimeout(0.2)
+    while time.monotonic() < until:
+        try:
+            part = line.recv(65536)
+        except TimeoutError:
+            continue
+        if not part:
+            break
+        *lines, rest = (rest + part).split(b"\n")
+        for text in (text.decode() for text in lines):
+            if text.startswith("* PONG"):
+                pong = text
+            if text.startswith("*") or not text:
+                continue
+            at, *cells = text.split("|")
+            if cells[0] == "@ASSET@":
+                assets.append({"id": cells[1], "type": cells[2], "root": ElementTree.fromstring(cells[3]).tag})
+                continue
+            if cells[0] == "alarms":
+                conditions.append({"at": at, "level": cells[1], "code": cells[2], "text": cells[-1]})
+                agent.push_data("alarms", cells[1])
+                continue
+            for name, value in zip(cells[::2], cells[1::2]):
+                if name not in known:
+                    unknown.append(name)
+                    continue
+                agent.push_data(name, value)
+                pushed.append([name, at, value])
+    current = ElementTree.fromstring(agent.current().get_xml())
+    values = {entry.get("dataItemId"): entry.text for entry in current.iter() if entry.get("dataItemId")}
+    print(
+        json.dumps(
+            {
+                "known": sorted(known),
+                "values": values,
+                "pushed": pushed,
+                "unknown": unknown,
+                "conditions": conditions,
+                "assets": assets,
+                "pong": pong,
+            }
+        )
+    )
+
+
+main()

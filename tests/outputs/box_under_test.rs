@@ -1,0 +1,88 @@
+//! A gateway on a simulated lathe with one sink, as an integrator starts it.
+
+use crate::process::{Gateway, get, program, run, stderr, stdout, text, wait_for};
+use serde_json::Value as Json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A gateway that sends.
+pub(crate) struct Sending {
+    directory: tempfile::TempDir,
+    pub(crate) gateway: Option<Gateway>,
+    page: String,
+}
+
+impl Sending {
+    /// Starts it with one sink named `plant`, and further lines of configuration.
+    pub(crate) fn to(address: &str, more: &str) -> Self {
+        let directory = tempfile::tempdir().expect("a directory");
+        let config = format!(
+            "[gateway]\nname = \"Lathe 7\"\n[[source]]\naddress = \"simulated://lathe?seed=3\"\n\
+             [[sink]]\nname = \"plant\"\naddress = \"{address}\"\n{more}"
+        );
+        std::fs::write(directory.path().join("gateway.toml"), config).expect("writable");
+        let mut sending = Self { directory, gateway: None, page: String::new() };
+        sending.start();
+        sending
+    }
+
+    pub(crate) fn start(&mut self) {
+        let config = self.directory.path().join("gateway.toml");
+        let mut gateway = Gateway::start(&self.directory.path().join("data"), &["--config", text(&config)]);
+        self.page = gateway.address();
+        self.gateway = Some(gateway);
+    }
+
+    pub(crate) fn database(&self) -> PathBuf {
+        self.directory.path().join("data/history.db")
+    }
+
+    pub(crate) fn status(&self) -> Json {
+        get(&self.page, "/api/v1/status").json()
+    }
+
+    pub(crate) fn sink(&self) -> Json {
+        self.status()["sinks"][0].clone()
+    }
+
+    /// Waits until the sink says so of itself.
+    pub(crate) fn wait_sink(&self, what: &str, ready: impl Fn(&Json) -> bool) -> Json {
+        wait_for(what, Duration::from_secs(60), || Some(self.sink()).filter(&ready))
+    }
+
+    /// Ends it cleanly and gives what it said.
+    pub(crate) fn stop(&mut self) -> String {
+        self.gateway.take().expect("it runs").stop()
+    }
+
+    pub(crate) fn kill(&mut self) {
+        self.gateway.take().expect("it runs").kill();
+    }
+
+    /// The `devices.xml` that the box writes.
+    pub(crate) fn devices(&self) -> PathBuf {
+        let (config, file) = (self.directory.path().join("gateway.toml"), self.directory.path().join("devices.xml"));
+        // The data directory of the running box goes before that of the file.
+        let mut command = program();
+        command.env("CNC_GATEWAY__GATEWAY__DATA_DIR", self.directory.path().join("data"));
+        command.args(["devices", "--config", text(&config), "--out", text(&file)]);
+        let output = command.output().expect("it runs");
+        assert!(output.status.success(), "{}", stderr(&output));
+        file
+    }
+
+    /// What `history query` says: for each channel, the values by time in milliseconds; missing ones are left out.
+    pub(crate) fn queried(&self, channels: &str) -> BTreeMap<String, BTreeMap<i64, Json>> {
+        let database = self.database();
+        let arguments = ["history", "query", "--history", text(&database), "--channels", channels, "--json"];
+        let answer: Json = serde_json::from_str(&stdout(&run(&arguments))).expect("JSON");
+        let series = answer["series"].as_array().expect("series").iter().map(|series| {
+            let points = series["points"].as_array().expect("points").iter();
+            let point =
+                |point: &Json| Some((point[0].as_i64()?, point[1].clone())).filter(|(_, value)| !value.is_null());
+            (series["channel"].as_str().expect("named").to_owned(), points.filter_map(point).collect())
+        });
+        series.collect()
+    }
+}

@@ -1,0 +1,258 @@
+//! The outbox without a network: nothing lost, nothing twice, bounded, live before old.
+
+use crate::fake_sink::{FakeSink, Seen};
+use adapters::{ChannelId, Sample, Slot, Value};
+use gateway::history::{Event, ExtraSeries, ExtraValue, Feed, Item, Options, Outbox, OutboxSettings, Writer};
+use gateway::sinks::{Board, Sinks, drive};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+const TICK_NS: i64 = 100_000_000;
+const BEGIN_NS: i64 = 1_700_000_000_000_000_000;
+
+/// A history that is written, with an outbox for one sink named `plant`.
+struct Stand {
+    directory: tempfile::TempDir,
+    writer: Option<Writer>,
+    outbox: Outbox,
+    ticks: i64,
+}
+
+fn settings() -> OutboxSettings {
+    OutboxSettings { refresh: Duration::from_secs(3600), ..OutboxSettings::default() }
+}
+
+impl Stand {
+    fn new(settings: OutboxSettings) -> Self {
+        let outbox = Outbox::new("lathe 1", settings, ["plant".to_owned()]);
+        let mut stand = Self { directory: tempfile::tempdir().expect("a directory"), writer: None, outbox, ticks: 0 };
+        stand.open();
+        stand
+    }
+
+    fn path(&self) -> PathBuf {
+        self.directory.path().join("history.db")
+    }
+
+    fn open(&mut self) {
+        let extras = vec![ExtraSeries::text("machine_state", "state", "状态")];
+        let group_commit = Duration::from_millis(50);
+        let outbox = Some(self.outbox.clone());
+        let options = Options { extras, group_commit, outbox, ..Options::default() };
+        self.writer = Some(Writer::open(&self.path(), options).expect("opens"));
+    }
+
+    /// Every tick has another power; every tenth is followed by an event.
+    fn write(&mut self, ticks: i64) {
+        let writer = self.writer.as_ref().expect("open");
+        let power = ChannelId::of("spindle_power_w").expect("in the table");
+        for tick in self.ticks..self.ticks + ticks {
+            let at_ns = BEGIN_NS + tick * TICK_NS;
+            let mut sample = Sample::empty(at_ns);
+            sample.set(power, Slot { value: Ok(Value::Number(tick as f64)), age_ns: 0 });
+            writer.sample(&sample, &[ExtraValue::Text("cutting")]);
+            if tick % 10 == 9 {
+                writer.record(Event { at_ns, kind: "test".to_owned(), ..Event::default() });
+            }
+        }
+        self.ticks += ticks;
+        writer.flush().expect("durable");
+    }
+
+    fn close(&mut self) {
+        if let Some(writer) = self.writer.take() {
+            let status = writer.close();
+            assert_eq!(status.degraded, None);
+        }
+    }
+
+    /// The same file, opened by another process later.
+    fn reopen(&mut self, settings: OutboxSettings) {
+        self.close();
+        self.outbox = Outbox::new("lathe 1", settings, ["plant".to_owned()]);
+        self.open();
+    }
+
+    /// How many items there should be by now.
+    fn items(&self) -> u64 {
+        u64::try_from(self.ticks + self.ticks / 10).expect("positive")
+    }
+
+    fn start(&self, sink: FakeSink) -> (Sinks, Board) {
+        let board = Board::new(self.outbox.clone(), [("plant".to_owned(), "fake".to_owned())]);
+        let path = self.path();
+        let sinks = drive::start_with(vec![("plant".to_owned(), Box::new(sink))], &self.outbox, &board, &path);
+        (sinks, board)
+    }
+}
+
+fn fake(seen: &Arc<Mutex<Seen>>) -> FakeSink {
+    FakeSink { seen: seen.clone(), batch: 7, takes_history: true }
+}
+
+fn runtime() -> tokio::runtime::Runtime {
+    tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads")
+}
+
+fn until(what: &str, mut done: impl FnMut() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(20);
+    while !done() {
+        assert!(Instant::now() < limit, "not within 20 s: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn numbers(seen: &Mutex<Seen>) -> Vec<u64> {
+    let mut numbers: Vec<u64> = seen.lock().expect("whole").items.iter().map(|(sequence, _)| *sequence).collect();
+    numbers.sort_unstable();
+    numbers
+}
+
+fn read(path: &Path, from: u64, to: u64) -> Vec<Item> {
+    Feed::open(path).expect("a history").read(from, to, usize::MAX).expect("readable").items
+}
+
+#[test]
+fn items_are_numbered_without_holes_in_the_order_of_time_and_over_restarts() {
+    let mut stand = Stand::new(settings());
+    stand.write(25);
+    let box_id = stand.outbox.box_id();
+    assert!(box_id.starts_with("lathe-1-") && box_id.len() == "lathe-1-".len() + 6, "{box_id}");
+    stand.reopen(settings());
+    assert_eq!(stand.outbox.box_id(), box_id, "the same file is the same box");
+    stand.write(25);
+    let items = read(&stand.path(), 0, u64::MAX);
+    let sequences: Vec<u64> = items.iter().map(|item| item.sequence).collect();
+    assert_eq!(sequences, (1..=stand.items()).collect::<Vec<u64>>());
+    assert!(items.is_sorted_by_key(|item| item.at_ns), "an event follows the tick it belongs to");
+    assert_eq!(items.iter().filter(|item| item.kind() == "event").count(), 5);
+}
+
+#[test]
+fn every_item_arrives_once_however_the_receiver_comes_and_goes() {
+    let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
+    let runtime = runtime();
+    let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });
+    for round in 0..6 {
+        stand.write(40);
+        until("all delivered", || numbers(&seen).len() as u64 == stand.items());
+        seen.lock().expect("whole").down = true;
+        stand.write(30);
+        until("the failure is told", || board.status()[0].failing);
+        assert!(board.status()[0].error.as_ref().is_some_and(|error| error.contains("down")), "round {round}");
+        seen.lock().expect("whole").down = false;
+    }
+    until("all delivered", || numbers(&seen).len() as u64 == stand.items());
+    runtime.block_on(sinks.stop());
+    assert_eq!(numbers(&seen), (1..=stand.items()).collect::<Vec<u64>>(), "0 lost, 0 twice");
+    let status = &board.status()[0];
+    assert_eq!((status.behind_items, status.dropped, status.refused), (0, 0, 0), "{status:?}");
+    // What is delivered is not kept: one row is left to number on from.
+    std::thread::sleep(Duration::from_secs(5));
+    stand.write(1);
+    assert!(stand.outbox.figures().bytes < 2_000, "{:?}", stand.outbox.figures());
+}
+
+#[test]
+fn after_an_outage_live_data_comes_first_and_the_gap_is_history() {
+    let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
+    seen.lock().expect("whole").down = true;
+    let runtime = runtime();
+    let (sinks, _) = runtime.block_on(async { stand.start(fake(&seen)) });
+    stand.write(300);
+    let outage = stand.items();
+    seen.lock().expect("whole").down = false;
+    until("history flows", || seen.lock().expect("whole").items.len() > 20);
+    stand.write(10);
+    until("all delivered", || numbers(&seen).len() as u64 == stand.items());
+    runtime.block_on(sinks.stop());
+    let items = seen.lock().expect("whole").items.clone();
+    assert!(items.iter().all(|(sequence, historical)| (*sequence <= outage) == *historical), "{items:?}");
+    let at = |number: u64| items.iter().position(|(sequence, _)| *sequence == number).expect("delivered");
+    // The writer commits every 50 ms and a batch is 7 items: the live data overtakes what is left of the gap.
+    println!("live item {} came as number {} of {}", outage + 1, at(outage + 1), items.len());
+    assert!(numbers(&seen).windows(2).all(|pair| pair[1] == pair[0] + 1), "0 lost, 0 twice");
+}
+
+#[test]
+fn what_was_delivered_is_remembered_over_a_restart() {
+    let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
+    let runtime = runtime();
+    for _ in 0..3 {
+        let (sinks, _) = runtime.block_on(async { stand.start(fake(&seen)) });
+        stand.write(50);
+        until("all delivered", || numbers(&seen).len() as u64 == stand.items());
+        runtime.block_on(sinks.stop());
+        stand.write(20);
+        stand.reopen(settings());
+    }
+    let (sinks, _) = runtime.block_on(async { stand.start(fake(&seen)) });
+    until("all delivered", || numbers(&seen).len() as u64 == stand.items());
+    runtime.block_on(sinks.stop());
+    assert_eq!(numbers(&seen), (1..=stand.items()).collect::<Vec<u64>>(), "0 lost, 0 twice");
+}
+
+#[test]
+fn an_item_that_nobody_takes_is_left_out_and_counted() {
+    let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
+    seen.lock().expect("whole").poison = vec![5, 17];
+    let runtime = runtime();
+    let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });
+    stand.write(40);
+    until("the rest is delivered", || numbers(&seen).len() as u64 == stand.items() - 2);
+    until("both are counted", || board.status()[0].refused == 2);
+    runtime.block_on(sinks.stop());
+    let expected: Vec<u64> = (1..=stand.items()).filter(|number| ![5, 17].contains(number)).collect();
+    assert_eq!(numbers(&seen), expected);
+    assert!(board.status()[0].error.as_ref().is_some_and(|error| error.contains("too large")));
+}
+
+#[test]
+fn a_receiver_that_wants_no_history_gets_none() {
+    let (mut stand, seen) = (Stand::new(settings()), Arc::new(Mutex::new(Seen::default())));
+    stand.write(100);
+    let before = stand.items();
+    let runtime = runtime();
+    let (sinks, board) = runtime.block_on(async { stand.start(FakeSink { takes_history: false, ..fake(&seen) }) });
+    until("connected", || board.status()[0].state == "connected");
+    until("the gap is given up", || board.status()[0].dropped == before);
+    stand.write(10);
+    until("the new ones", || numbers(&seen).len() as u64 == stand.items() - before);
+    runtime.block_on(sinks.stop());
+    assert_eq!(numbers(&seen).first(), Some(&(before + 1)));
+}
+
+#[test]
+fn the_outbox_stays_within_its_bounds_and_tells_what_it_dropped() {
+    let bounded = OutboxSettings { max_bytes: 20_000, ..settings() };
+    let (mut stand, seen) = (Stand::new(bounded.clone()), Arc::new(Mutex::new(Seen::default())));
+    for _ in 0..150 {
+        stand.write(20);
+    }
+    stand.write(1);
+    let figures = stand.outbox.figures();
+    assert!(figures.bytes <= bounded.max_bytes, "{figures:?}");
+    let dropped = stand.outbox.standing("plant").expect("configured").dropped;
+    assert!(dropped > 0 && figures.outage_fits_h(&bounded).is_some(), "{dropped} {figures:?}");
+    // It is remembered, and what is left arrives.
+    stand.reopen(bounded);
+    let left = stand.outbox.standing("plant").expect("configured").position.waiting(stand.items() + 1);
+    assert_eq!(dropped + left, stand.items());
+    let runtime = runtime();
+    let (sinks, board) = runtime.block_on(async { stand.start(fake(&seen)) });
+    until("what is left", || numbers(&seen).len() as u64 == left);
+    runtime.block_on(sinks.stop());
+    assert_eq!(board.status()[0].dropped, dropped);
+    println!("{dropped} of {} items dropped at 20 kB", stand.items());
+}
+
+#[test]
+fn what_is_too_old_is_dropped() {
+    let aged = OutboxSettings { max_age: Duration::from_secs(10), ..settings() };
+    let mut stand = Stand::new(aged);
+    (0..20).for_each(|_| stand.write(20));
+    let dropped = stand.outbox.standing("plant").expect("configured").dropped;
+    let (kept, all) = (stand.items() - dropped, stand.items());
+    assert!((110..=160).contains(&kept), "ten seconds are 110 items and what a commit holds: {kept} of {all}");
+}

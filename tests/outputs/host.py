@@ -1,0 +1,94 @@
+"""A Sparkplug host that is not ours: decodes with pysparkplug what comes over a broker, one JSON line per message.
+
+Arguments: PORT. Standard input: a line "rebirth GROUP NODE" asks that node for its birth.
+"""
+
+import json
+import sys
+import threading
+import time
+
+import paho.mqtt.client as mqtt
+import pysparkplug
+from pysparkplug import _protobuf
+
+PROPERTY_FIELDS = {3: "int_value", 10: "double_value", 11: "boolean_value", 12: "string_value"}
+
+
+def properties(metric):
+    names = metric.properties.keys
+    return {name: getattr(value, PROPERTY_FIELDS[value.type]) for name, value in zip(names, metric.properties.values)}
+
+
+def show(topic, payload):
+    kind = topic.split("/")[2]
+    decoded = _protobuf.Payload.FromString(payload)
+    metrics = []
+    for raw in decoded.metrics:
+        metric = pysparkplug.Metric.from_pb(raw)
+        metrics.append(
+            {
+                "name": metric.name,
+                "alias": metric.alias,
+                "datatype": metric.datatype.name,
+                "value": metric.value,
+                "null": metric.is_null,
+                "historical": metric.is_historical,
+                "timestamp": metric.timestamp,
+                "properties": properties(raw),
+            }
+        )
+    seq = decoded.seq if decoded.HasField("seq") else None
+    print(json.dumps({"topic": topic, "kind": kind, "seq": seq, "metrics": metrics}), flush=True)
+
+
+def rebirth(client, group, node):
+    command = pysparkplug.NCmd(
+        timestamp=pysparkplug.get_current_timestamp(),
+        metrics=(
+            pysparkplug.Metric(
+                timestamp=pysparkplug.get_current_timestamp(),
+                name="Node Control/Rebirth",
+                datatype=pysparkplug.DataType.BOOLEAN,
+                value=True,
+            ),
+        ),
+    )
+    client.publish(f"spBv1.0/{group}/NCMD/{node}", command.encode(include_dtypes=True), qos=1)
+
+
+def main():
+    client = mqtt.Client(client_id="host", clean_session=False)
+    state = "spBv1.0/STATE/host"
+    client.will_set(state, json.dumps({"online": False, "timestamp": 1}), qos=1, retain=True)
+    client.on_connect = lambda client, *_: client.subscribe("spBv1.0/+/#", qos=1)
+    client.on_subscribe = lambda client, *_: (
+        client.publish(state, json.dumps({"online": True, "timestamp": 1}), qos=1, retain=True),
+        print(json.dumps({"kind": "connected"}), flush=True),
+    )
+    client.on_message = lambda client, _, message: (
+        None if "/STATE/" in message.topic else show(message.topic, message.payload)
+    )
+    client.reconnect_delay_set(min_delay=1, max_delay=1)
+    while True:
+        try:
+            client.connect("127.0.0.1", int(sys.argv[1]), keepalive=30)
+            break
+        except OSError:
+            time.sleep(0.05)
+
+    def listen():
+        for line in sys.stdin:
+            rebirth(client, *line.split()[1:])
+
+    threading.Thread(target=listen, daemon=True).start()
+    while True:
+        client.loop(timeout=0.1)
+        if not client.is_connected():
+            try:
+                client.reconnect()
+            except OSError:
+                time.sleep(0.02)
+
+
+main()

@@ -1,0 +1,68 @@
+//! The Sparkplug host of `host.py`, as a child process.
+
+use serde_json::Value as Json;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// A host that decodes everything it hears.
+pub(crate) struct Host {
+    child: Child,
+    heard: Arc<Mutex<Vec<Json>>>,
+}
+
+impl Host {
+    /// A host at the broker on this port; `None` where pysparkplug is not installed.
+    pub(crate) fn at(port: u16) -> Option<Self> {
+        let has = Command::new("python3").args(["-c", "import pysparkplug"]).stderr(Stdio::null()).status();
+        if !has.is_ok_and(|status| status.success()) {
+            assert!(std::env::var_os("CNC_GATEWAY_CI").is_none(), "pysparkplug is not installed");
+            eprintln!("SKIPPED: pysparkplug is not installed (pip install pysparkplug==0.6.1)");
+            return None;
+        }
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outputs/host.py");
+        let mut command = Command::new("python3");
+        command.arg(script).arg(port.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.spawn().expect("python3 runs");
+        let (heard, output) = (Arc::new(Mutex::new(Vec::new())), child.stdout.take().expect("piped"));
+        let shared = heard.clone();
+        std::thread::spawn(move || {
+            for line in BufReader::new(output).lines().map_while(Result::ok) {
+                shared.lock().expect("whole").push(serde_json::from_str(&line).expect("JSON"));
+            }
+        });
+        let host = Self { child, heard };
+        host.wait("the host to connect", |heard| heard.iter().any(|message| message["kind"] == "connected"));
+        Some(host)
+    }
+
+    pub(crate) fn heard(&self) -> Vec<Json> {
+        self.heard.lock().expect("whole").clone()
+    }
+
+    pub(crate) fn wait(&self, what: &str, mut ready: impl FnMut(&[Json]) -> bool) {
+        let until = Instant::now() + Duration::from_secs(40);
+        while !ready(&self.heard.lock().expect("whole")) {
+            let kinds = || self.heard().iter().map(|message| message["kind"].to_string()).collect::<Vec<_>>().join(" ");
+            assert!(Instant::now() < until, "waited 40 s in vain: {what}; heard {}", kinds());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    pub(crate) fn count(&self, kind: &str) -> usize {
+        self.heard().iter().filter(|message| message["kind"] == kind).count()
+    }
+
+    pub(crate) fn ask_rebirth(&mut self, group: &str, node: &str) {
+        writeln!(self.child.stdin.as_mut().expect("piped"), "rebirth {group} {node}").expect("it listens");
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        let _ended = self.child.kill();
+        let _status = self.child.wait();
+    }
+}

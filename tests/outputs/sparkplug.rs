@@ -1,0 +1,185 @@
+//! Sparkplug B as a host that is not ours decodes it.
+
+use crate::box_under_test::Sending;
+use crate::broker::Broker;
+use crate::host::Host;
+use adapters::channel::CHANNELS;
+use serde_json::Value as Json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+fn metrics(message: &Json) -> &[Json] {
+    message["metrics"].as_array().map_or(&[], Vec::as_slice)
+}
+
+fn named<'a>(message: &'a Json, name: &str) -> &'a Json {
+    metrics(message).iter().find(|metric| metric["name"] == name).unwrap_or(&Json::Null)
+}
+
+/// What a host knows after everything it has heard: values by name and time, numbers of items.
+#[derive(Default)]
+struct Known {
+    names: BTreeMap<u64, String>,
+    values: BTreeMap<String, BTreeMap<i64, Json>>,
+    items: Vec<(u64, bool)>,
+}
+
+impl Known {
+    fn of(heard: &[Json]) -> Self {
+        let mut known = Self::default();
+        for message in heard {
+            for metric in metrics(message) {
+                known.take(message["kind"] == "DDATA", metric);
+            }
+        }
+        known
+    }
+
+    fn take(&mut self, is_data: bool, metric: &Json) {
+        let alias = metric["alias"].as_u64().unwrap_or(0);
+        if let Some(name) = metric["name"].as_str().filter(|_| alias > 0) {
+            let before = self.names.insert(alias, name.to_owned());
+            assert!(before.is_none_or(|before| before == name), "alias {alias} changed its name");
+        }
+        let Some(name) = self.names.get(&alias).filter(|_| is_data) else { return };
+        if name == "item/sequence" {
+            let number = metric["value"].as_u64().expect("a number");
+            self.items.push((number, metric["historical"] == true));
+        } else if metric["null"] == false {
+            let at_ms = metric["timestamp"].as_i64().expect("a time");
+            self.values.entry(name.clone()).or_default().insert(at_ms, metric["value"].clone());
+        }
+    }
+}
+
+/// Births begin at 0, every message counts on by one modulo 256, deaths carry the number of the birth before.
+/// Gives the number of births.
+fn assert_legal(heard: &[Json]) -> usize {
+    let (mut next, mut birth_number, mut births) = (None, None, 0);
+    for message in heard {
+        let kind = message["kind"].as_str().unwrap_or_default();
+        match kind {
+            "NBIRTH" => {
+                assert_eq!(message["seq"], 0, "{message}");
+                birth_number = named(message, "bdSeq")["value"].as_u64();
+                assert!(birth_number.is_some(), "{message}");
+                (next, births) = (Some(1), births + 1);
+            }
+            "DBIRTH" | "DDATA" | "DDEATH" => {
+                // Before its first birth a host that came late hears data; it would ask for a birth.
+                if let Some(expected) = next {
+                    assert_eq!(message["seq"].as_u64(), Some(expected), "{kind}: {message}");
+                    next = Some((expected + 1) % 256);
+                }
+            }
+            "NDEATH" => {
+                assert_eq!(message["seq"], Json::Null, "a death has no number");
+                let number = named(message, "bdSeq")["value"].as_u64();
+                assert!(birth_number.is_none() || number == birth_number, "{number:?} is not {birth_number:?}");
+                next = None;
+            }
+            _ => {}
+        }
+    }
+    births
+}
+
+#[test]
+fn another_implementation_decodes_births_and_data_as_history_query_shows_them() {
+    let Some(broker) = Broker::start() else { return };
+    let Some(mut host) = Host::at(broker.port) else { return };
+    let address = format!("sparkplug://127.0.0.1:{}/plant/line-1/lathe-7", broker.port);
+    let mut sending = Sending::to(&address, "");
+    host.wait("data", |heard| heard.iter().filter(|message| message["kind"] == "DDATA").count() > 40);
+    host.ask_rebirth("plant", "line-1");
+    let before = host.count("NBIRTH");
+    host.wait("the birth that was asked for", |heard| {
+        heard.iter().filter(|message| message["kind"] == "NBIRTH").count() > before
+    });
+    let after = host.count("DDATA");
+    host.wait("more data", |heard| heard.iter().filter(|message| message["kind"] == "DDATA").count() > after + 20);
+    sending.stop();
+    host.wait("the death", |heard| heard.last().is_some_and(|message| message["kind"] == "NDEATH"));
+    let heard = host.heard();
+    assert_legal(&heard);
+    births_say_units_and_ranges(&heard);
+    let known = Known::of(&heard);
+    let names = "spindle_power_w,spindle_speed_rpm,feed_mm_min,machine_state,cutting_power_w";
+    let (mut compared, stored) = (0, sending.queried(names));
+    for (name, points) in &stored {
+        for (at_ms, value) in known.values.get(name).into_iter().flatten() {
+            assert_eq!(points.get(at_ms), Some(value), "{name} at {at_ms}");
+            compared += 1;
+        }
+    }
+    println!("{compared} values of {} series equal to `history query`", stored.len());
+    assert!(compared > 100, "{compared}");
+    let numbers: BTreeSet<u64> = known.items.iter().map(|(number, _)| *number).collect();
+    assert_eq!(numbers.len(), known.items.len(), "no item comes twice");
+}
+
+fn births_say_units_and_ranges(heard: &[Json]) {
+    let birth = heard.iter().rfind(|message| message["kind"] == "DBIRTH").expect("born");
+    let mut checked = 0;
+    for channel in CHANNELS {
+        let metric = named(birth, channel.name);
+        if metric.is_null() || channel.unit.is_empty() {
+            continue;
+        }
+        let properties = &metric["properties"];
+        assert_eq!(metric["datatype"], "DOUBLE");
+        assert_eq!(properties["engUnit"], channel.unit, "{metric}");
+        assert_eq!(
+            (properties["engLow"].as_f64(), properties["engHigh"].as_f64()),
+            (Some(channel.range.0), Some(channel.range.1))
+        );
+        assert_eq!(properties["description"], channel.en);
+        checked += 1;
+    }
+    println!("{checked} channels with unit and range of {} metrics", metrics(birth).len());
+    assert!(checked > 5, "{checked}");
+}
+
+/// How often the broker dies: 200 times by hand, fewer in every run.
+fn restarts() -> u32 {
+    std::env::var("BROKER_RESTARTS").ok().and_then(|count| count.parse().ok()).unwrap_or(5)
+}
+
+#[test]
+fn every_restart_of_the_broker_begins_a_legal_sequence_and_nothing_is_lost() {
+    let Some(mut broker) = Broker::start() else { return };
+    let Some(host) = Host::at(broker.port) else { return };
+    let address = format!("sparkplug://127.0.0.1:{}/plant/line-1/lathe-7?host=host", broker.port);
+    let mut sending = Sending::to(&address, "");
+    host.wait("data", |heard| heard.iter().any(|message| message["kind"] == "DDATA"));
+    for restart in 0..restarts() {
+        let connections = host.count("connected");
+        let births = host.count("DBIRTH");
+        broker.kill();
+        broker.run();
+        host.wait("the host is back", |heard| {
+            heard.iter().filter(|message| message["kind"] == "connected").count() > connections
+        });
+        host.wait(&format!("birth after restart {restart}"), |heard| {
+            heard.iter().filter(|message| message["kind"] == "DBIRTH").count() > births
+        });
+    }
+    sending.wait_sink("nothing waits", |sink| sink["behind_items"].as_u64().is_some_and(|behind| behind < 20));
+    std::thread::sleep(Duration::from_millis(500));
+    let status = sending.sink();
+    sending.stop();
+    let heard = host.heard();
+    let births = assert_legal(&heard);
+    let known = Known::of(&heard);
+    let numbers: BTreeSet<u64> = known.items.iter().map(|(number, _)| *number).collect();
+    let (first, last) = (numbers.first().copied().unwrap_or(0), numbers.last().copied().unwrap_or(0));
+    let lost = (last - first + 1) - numbers.len() as u64;
+    let twice = known.items.len() - numbers.len();
+    let old = known.items.iter().filter(|(_, historical)| *historical).count();
+    println!(
+        "{} restarts, {births} births, {} items, {old} of them flagged as history, {lost} lost, {twice} sent twice, status {status}",
+        restarts(),
+        numbers.len()
+    );
+    assert_eq!(lost, 0, "nothing may be lost");
+}
