@@ -107,7 +107,7 @@ table! {
     SYSTEM = 1 0x18 All "-" "18 bytes of ODBSYS" "cnc_sysinfo" Captured;
     STATUS = 1 0x19 All "-" "7 i16: mode, run, motion, auxiliary, emergency, alarm, edit" "cnc_statinfo" Captured;
     ALARM_BITS = 1 0x1A All "-" "i32" "cnc_alarm2" Captured;
-    FIGURES = 1 0x1B All "what (0 axes)" "count i32, then places in and out i16 each" "cnc_getfigure" Client;
+    FIGURES = 1 0x1B All "what (0 axes)" "count i32, then places in and out i16 each" "cnc_getfigure" Library;
     PROGRAM = 1 0x1C All "-" "running i32, main i32" "cnc_rdprgnum" Captured;
     SEQUENCE = 1 0x1D All "-" "i32" "cnc_rdseqnum" Captured;
     EXECUTED_TEXT = 1 0x20 All "most bytes" "block i32, text" "cnc_rdexecprog" Captured;

@@ -26,8 +26,10 @@ pub enum ItemError {
     Refused(i32),
     /// The library has not the function.
     NotOffered,
-    /// An overrun, a number that is none, or the child died of it.
+    /// An overrun, or a number that is none.
     Malformed(String),
+    /// The child ended or hung in this question.
+    Failed(String),
 }
 
 impl ItemError {
@@ -39,6 +41,7 @@ impl ItemError {
             Self::Refused(-2) | Self::NotOffered => Absence::NotSupported,
             Self::Refused(_) => Absence::Refused,
             Self::Malformed(_) => Absence::OutOfRange,
+            Self::Failed(_) => Absence::Disconnected,
         }
     }
 }

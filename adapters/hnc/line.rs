@@ -217,7 +217,7 @@ impl Inner {
             return Err(self.dead_link(took));
         }
         if let Err((_, error)) = outcome {
-            results.push(Err(ItemError::Malformed(error.to_string())));
+            results.push(Err(ItemError::Failed(error.to_string())));
         }
         Ok(())
     }

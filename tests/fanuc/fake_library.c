@@ -195,6 +195,14 @@ int16_t cnc_rddynamic2(uint16_t h, int16_t axis, int16_t length, int32_t *out) {
     return 0;
 }
 
+int16_t cnc_getfigure(uint16_t h, int16_t kind, int16_t *count, int16_t *in, int16_t *out) {
+    (void)h, (void)kind;
+    CHECKED(out, 64);
+    *count = 2;
+    in[0] = in[1] = out[0] = out[1] = 3;
+    return 0;
+}
+
 int16_t cnc_modal(uint16_t h, int16_t kind, int16_t block, int32_t *out) {
     (void)h, (void)block;
     CHECKED(out, 260);

@@ -141,10 +141,10 @@ fn motion(controller: &Controller, request: &Request) -> Data8 {
     }
 }
 
-/// Places after the point of positions: three, in and out, of every axis.
+/// Places after the point of the positions of every axis, in and out.
 fn figures(controller: &Controller) -> Vec<u8> {
-    let axes = controller.axes.len();
-    [longs(&[long(axes)]), shorts(&[3, 3].repeat(axes))].concat()
+    let places: Vec<i16> = controller.axes.iter().flat_map(|axis| [axis.positions[1].exponent; 2]).collect();
+    [longs(&[long(controller.axes.len())]), shorts(&places)].concat()
 }
 
 /// Variables as doubles; a vacant one is no number.

@@ -41,23 +41,7 @@ impl Session {
             Item::Servos(Servo::Load) => self.servo_meter().map(|(_, loads)| Answer::Numbers(loads)),
             Item::AxisNames => self.servo_meter().map(|(names, _)| Answer::Names(names)),
             Item::Servos(Servo::Current) => self.servo_current(),
-            Item::Program => {
-                let bytes = filled(size_of::<OdbPro>(), |out| f.cnc_rdprgnum(h, out))?;
-                let number = |at| i32::from(bytes.i16(at));
-                Ok(Answer::Program {
-                    running: number(offset_of!(OdbPro, data)),
-                    main: number(offset_of!(OdbPro, mdata)),
-                })
-            }
-            Item::ProgramName => {
-                let bytes = filled(size_of::<OdbExePrg>(), |out| f.cnc_exeprgname(h, out))?;
-                let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text(0, 36));
-                Ok(Answer::Named { number, name })
-            }
-            Item::Sequence => {
-                let bytes = filled(size_of::<OdbSeq>(), |out| f.cnc_rdseqnum(h, out))?;
-                Ok(Answer::Whole(bytes.i32(offset_of!(OdbSeq, data))))
-            }
+            Item::Program | Item::ProgramName | Item::Sequence => self.program(item),
             Item::AlarmBits => {
                 let mut bits = 0;
                 checked(f.cnc_alarm2(h, &mut bits)).map(|()| Answer::Whole(bits))
@@ -96,6 +80,30 @@ impl Session {
                 let number = i16::try_from(number).unwrap_or(i16::MAX);
                 let bytes = filled(ZOFS_LEN, |out| f.cnc_rdzofs(h, number, axis, 8, out))?;
                 Ok(Answer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
+            }
+            _ => Err(ItemError::NotOffered),
+        }
+    }
+
+    fn program(&self, item: Item) -> ItemResult {
+        let (f, h) = (&self.functions, self.handle);
+        match item {
+            Item::Program => {
+                let bytes = filled(size_of::<OdbPro>(), |out| f.cnc_rdprgnum(h, out))?;
+                let number = |at| i32::from(bytes.i16(at));
+                Ok(Answer::Program {
+                    running: number(offset_of!(OdbPro, data)),
+                    main: number(offset_of!(OdbPro, mdata)),
+                })
+            }
+            Item::ProgramName => {
+                let bytes = filled(size_of::<OdbExePrg>(), |out| f.cnc_exeprgname(h, out))?;
+                let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text(0, 36));
+                Ok(Answer::Named { number, name })
+            }
+            Item::Sequence => {
+                let bytes = filled(size_of::<OdbSeq>(), |out| f.cnc_rdseqnum(h, out))?;
+                Ok(Answer::Whole(bytes.i32(offset_of!(OdbSeq, data))))
             }
             _ => Err(ItemError::NotOffered),
         }
@@ -199,6 +207,14 @@ impl Session {
     pub(super) fn every_axis(&self) -> Result<Bytes, ItemError> {
         let length = i16::try_from(ODBDY2_ALL_LEN).unwrap_or(540);
         filled(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))
+    }
+
+    /// Places after the point of the positions of every axis: three in millimetres, four in inches on most machines.
+    pub(super) fn figures(&self) -> Result<Vec<i16>, ItemError> {
+        let (mut found, mut entered) = (i16::try_from(MAX_AXIS).unwrap_or(32), Guarded::new(2 * MAX_AXIS));
+        let call = |out: &mut Guarded| self.functions.cnc_getfigure(self.handle, 0, &mut found, &mut entered, out);
+        let bytes = filled(2 * MAX_AXIS, call)?;
+        Ok((0..count(found, MAX_AXIS)).map(|axis| bytes.i16(2 * axis)).collect())
     }
 
     fn variable(&self, number: u16) -> ItemResult {

@@ -66,6 +66,8 @@ pub(super) struct Session {
     pub(super) speed: Option<(Option<f64>, SpeedUnit)>,
     /// Bytes of a value of the parameters and diagnosis numbers that have been read.
     pub(super) sizes: HashMap<Item, usize>,
+    /// Places after the point of the axes of each path: the calls for positions give whole numbers.
+    places: HashMap<u8, Vec<i16>>,
 }
 
 impl Drop for Session {
@@ -99,6 +101,7 @@ impl Session {
             dynamic: None,
             speed: None,
             sizes: HashMap::new(),
+            places: HashMap::new(),
         };
         match session.turn_to(path) {
             Ok(0) => {}
@@ -158,6 +161,10 @@ impl Session {
         if matches!(question.item, Item::Position(_, -1)) && self.dynamic.is_none() {
             self.dynamic = Some(self.every_axis()?);
         }
+        if matches!(question.item, Item::Position(_, -1)) && !self.places.contains_key(&self.path) {
+            let places = self.figures()?;
+            self.places.insert(self.path, places);
+        }
         if matches!(question.item, Item::Feed | Item::FeedUnit) {
             match self.feed_with_unit() {
                 Ok((_, unit)) if question.item == Item::FeedUnit => return Ok(Answer::Unit(unit)),
@@ -167,7 +174,9 @@ impl Session {
                 Err(error) => return Err(error),
             }
         }
-        let known = self.dynamic.as_ref().and_then(|dynamic| dynamic::of(question.item, dynamic, self.axes_max));
+        let places = self.places.get(&self.path).map_or(&[][..], Vec::as_slice);
+        let known =
+            self.dynamic.as_ref().and_then(|dynamic| dynamic::of(question.item, dynamic, self.axes_max, places));
         known.map_or_else(|| self.read(question.item), Ok)
     }
 

@@ -1,13 +1,14 @@
 //! The call for the positions of every axis, and what it says besides.
 
 use super::layout::OdbDy2;
-use super::structure::{Bytes, POSITION_PLACES, decimal};
+use super::structure::{Bytes, decimal};
 use crate::fanuc::answer::Answer;
 use crate::fanuc::item::{Item, Position};
 use std::mem::{offset_of, size_of};
 
-/// What the call for the positions of every axis says besides: it asks for all of this in one frame.
-pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize) -> Option<Answer> {
+/// What the call for the positions of every axis says besides: it asks for all of this in one frame. `places` are the places
+/// after the point of every axis.
+pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize, places: &[i16]) -> Option<Answer> {
     let whole = |at| dynamic.i32(at);
     let number = |at| Answer::Number(Some(f64::from(whole(at))));
     Some(match item {
@@ -27,7 +28,9 @@ pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize) -> Option<Answer>
                 Position::ToGo => 3,
             };
             let at = |axis: usize| size_of::<OdbDy2>() + 4 * (place * axes_max + axis);
-            Answer::Numbers((0..axes_max).map(|axis| decimal(whole(at(axis)), POSITION_PLACES)).collect())
+            Answer::Numbers(
+                (0..axes_max).map(|axis| decimal(whole(at(axis)), places.get(axis).copied().unwrap_or(0))).collect(),
+            )
         }
         _ => return None,
     })

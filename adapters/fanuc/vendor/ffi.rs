@@ -20,6 +20,8 @@ functions! {
     cnc_acts2(handle: u16 => u16, spindle: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_diagnoss(handle: u16 => u16, number: i16 => i16, axis: i16 => i16, length: i16 => i16,
         out: &mut Guarded => *mut c_void) -> i16;
+    cnc_getfigure(handle: u16 => u16, kind: i16 => i16, count: &mut i16 => *mut i16,
+        entered: &mut Guarded => *mut c_void, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdspdlname(handle: u16 => u16, count: &mut i16 => *mut i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdtimer(handle: u16 => u16, kind: i16 => i16, out: &mut Guarded => *mut c_void) -> i16;
     cnc_rdtofs(handle: u16 => u16, number: i16 => i16, kind: i16 => i16, length: i16 => i16,

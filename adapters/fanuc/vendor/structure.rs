@@ -6,7 +6,7 @@ use crate::fanuc::answer::{ItemError, Refusal};
 use crate::fanuc::code::ReturnCode;
 use std::mem::offset_of;
 
-/// Decimals of positions that the library gives without them (increment system IS-B, millimetres).
+/// Decimals of offsets that the library gives without them (increment system IS-B, millimetres).
 pub(super) const POSITION_PLACES: i16 = 3;
 
 /// Why a call has no structure.
