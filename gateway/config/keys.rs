@@ -407,7 +407,7 @@ const CORE: &[Key] = &[
     ),
     key(
         ("http", "session_s"),
-        Number(60.0, 604_800.0),
+        Number(10.0, 604_800.0),
         Default("28800.0"),
         "Whoever has signed in is signed out after this time",
         "登录有效时间（秒）",
