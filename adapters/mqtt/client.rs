@@ -170,7 +170,7 @@ fn greeted(line: &Line, options: &Options, until: Instant) -> Result<(Frames, Al
             Err(error) if stream::is_silence(&error) => continue,
             Err(error) => {
                 let within = TlsError::within(&error, &options.host);
-                return Err(within.map_or_else(|| MqttError::Closed(error.to_string()), MqttError::Tls));
+                return Err(within.map_or_else(|| hung_up(line), MqttError::Tls));
             }
         }
         match frames.next().map_err(MqttError::Closed)? {

@@ -224,7 +224,8 @@ impl Task {
         self.outbox.delivered(&self.name, from, stretch.to);
         let reached_ns = stretch.items.last().map(|item| item.at_ns);
         let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());
-        let delay_s = reached_ns.map(|at_ns| seconds(now_ns() - at_ns));
+        // A record may have no time; an accelerated machine is ahead of the clock.
+        let delay_s = reached_ns.filter(|at_ns| *at_ns > 0).map(|at_ns| seconds(now_ns() - at_ns).max(0.0));
         self.board.change(self.index, |progress| {
             progress.delivered += stretch.items.len() as u64;
             if historical || !gap {

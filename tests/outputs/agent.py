@@ -8,13 +8,27 @@ import json
 import socket
 import sys
 import time
-from xml.etree import ElementTree
 
-from mtconnect.agent import MTConnect
+# The agent was written for a Python whose elements had `getchildren`; the class in Python can be given it back.
+sys.modules["_elementtree"] = None
+from xml.etree import ElementTree  # noqa: E402
+
+ElementTree.Element.getchildren = lambda element: list(element)
+
+from mtconnect.agent import MTConnect  # noqa: E402
+
+
+def plain(devices):
+    """This agent reads the devices alone, without namespaces."""
+    root = ElementTree.parse(devices).getroot()
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    ElementTree.ElementTree(root.find("Devices")).write(devices + ".plain")
+    return devices + ".plain"
 
 
 def main():
-    devices, port, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+    devices, port, seconds = plain(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     agent = MTConnect(loc=devices, hostname="http://127.0.0.1:5000")
     known = set(agent.item_dict)
     line = socket.create_connection(("127.0.0.1", port), timeout=10)

@@ -11,25 +11,36 @@ pub(crate) struct Sending {
     directory: tempfile::TempDir,
     pub(crate) gateway: Option<Gateway>,
     page: String,
+    speed: &'static str,
 }
 
 impl Sending {
     /// Starts it with one sink named `plant`, and further lines of configuration.
     pub(crate) fn to(address: &str, more: &str) -> Self {
+        Self::at_speed("1", address, more)
+    }
+
+    /// The same twenty times as fast: the machine is switched on soon, and there is much to send.
+    pub(crate) fn fast(address: &str) -> Self {
+        Self::at_speed("20", address, "")
+    }
+
+    fn at_speed(speed: &'static str, address: &str, more: &str) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let config = format!(
             "[gateway]\nname = \"Lathe 7\"\n[[source]]\naddress = \"simulated://lathe?seed=3\"\n\
              [[sink]]\nname = \"plant\"\naddress = \"{address}\"\n{more}"
         );
         std::fs::write(directory.path().join("gateway.toml"), config).expect("writable");
-        let mut sending = Self { directory, gateway: None, page: String::new() };
+        let mut sending = Self { directory, gateway: None, page: String::new(), speed };
         sending.start();
         sending
     }
 
     pub(crate) fn start(&mut self) {
         let config = self.directory.path().join("gateway.toml");
-        let mut gateway = Gateway::start(&self.directory.path().join("data"), &["--config", text(&config)]);
+        let mut gateway =
+            Gateway::start(&self.directory.path().join("data"), &["--config", text(&config), "--speed", self.speed]);
         self.page = gateway.address();
         self.gateway = Some(gateway);
     }

@@ -83,12 +83,14 @@ def main():
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
-        client.loop(timeout=0.1)
-        if not client.is_connected():
-            try:
-                client.reconnect()
-            except OSError:
-                time.sleep(0.02)
+        greeted = time.monotonic() + 5
+        while client.is_connected() or time.monotonic() < greeted:
+            if client.loop(timeout=0.1) != mqtt.MQTT_ERR_SUCCESS:
+                break
+        try:
+            client.reconnect()
+        except OSError:
+            time.sleep(0.02)
 
 
 main()

@@ -9,38 +9,47 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// `mosquitto_sub` with a client certificate; its lines are `TOPIC PAYLOAD`.
+/// `mosquitto_sub`, started again when its broker dies; its lines are `TOPIC PAYLOAD`.
 struct Listener {
-    child: Child,
+    child: Arc<Mutex<Option<Child>>>,
     lines: Arc<Mutex<Vec<String>>>,
 }
 
 impl Listener {
     fn plain(port: u16) -> Option<Self> {
-        Self::start(port, |_| {})
+        Self::start(port, &[])
     }
 
     fn secured(port: u16, certificates: &Certificates) -> Option<Self> {
-        Self::start(port, |command| {
-            for (option, file) in [("--cafile", "ca.pem"), ("--cert", "box.pem"), ("--key", "box.key")] {
-                command.arg(option).arg(certificates.path(file));
-            }
-        })
+        let files = [("--cafile", "ca.pem"), ("--cert", "box.pem"), ("--key", "box.key")];
+        Self::start(port, &files.map(|(option, file)| [option.to_owned(), certificates.text(file)]).concat())
     }
 
-    fn start(port: u16, more: impl FnOnce(&mut Command)) -> Option<Self> {
-        let mut command = Command::new(program("mosquitto_sub")?);
-        command.args(["-h", "localhost", "-p", &port.to_string(), "-t", "works/#", "-v", "-q", "1"]);
-        more(&mut command);
-        let mut child = command.stdout(Stdio::piped()).spawn().expect("mosquitto_sub runs");
-        let lines = Arc::new(Mutex::new(Vec::new()));
-        let (shared, output) = (lines.clone(), child.stdout.take().expect("piped"));
+    fn start(port: u16, more: &[String]) -> Option<Self> {
+        let client = program("mosquitto_sub")?;
+        let (port, more) = (port.to_string(), more.to_vec());
+        let spawn = move || {
+            let mut command = Command::new(&client);
+            command.args(["-h", "localhost", "-p", &port, "-t", "works/#", "-v", "-q", "1"]).args(&more);
+            command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("mosquitto_sub runs")
+        };
+        let listener = Self { child: Arc::new(Mutex::new(Some(spawn()))), lines: Arc::default() };
+        let (child, lines) = (listener.child.clone(), listener.lines.clone());
         std::thread::spawn(move || {
-            for line in BufReader::new(output).lines().map_while(Result::ok) {
-                shared.lock().expect("whole").push(line);
+            loop {
+                let output = child.lock().expect("whole").as_mut().and_then(|child| child.stdout.take());
+                let Some(output) = output else { return };
+                for line in BufReader::new(output).lines().map_while(Result::ok) {
+                    lines.lock().expect("whole").push(line);
+                }
+                std::thread::sleep(Duration::from_millis(20));
+                let mut held = child.lock().expect("whole");
+                let Some(ended) = held.as_mut() else { return };
+                let _status = ended.wait();
+                *held = Some(spawn());
             }
         });
-        Some(Self { child, lines })
+        Some(listener)
     }
 
     /// Every document on any topic.
@@ -58,8 +67,10 @@ impl Listener {
 
 impl Drop for Listener {
     fn drop(&mut self) {
-        let _ended = self.child.kill();
-        let _status = self.child.wait();
+        if let Some(mut child) = self.child.lock().expect("whole").take() {
+            let _ended = child.kill();
+            let _status = child.wait();
+        }
     }
 }
 
@@ -107,14 +118,14 @@ fn a_killed_box_loses_nothing_that_it_remembers() {
     let Some(broker) = Broker::start() else { return };
     let Some(listener) = Listener::plain(broker.port) else { return };
     let address = format!("mqtt://127.0.0.1:{}/works/lathe", broker.port);
-    let mut sending = Sending::to(&address, "");
+    let mut sending = Sending::fast(&address);
     for _ in 0..2 {
-        sending.wait_sink("some are delivered", |sink| sink["delivered"].as_u64() > Some(12));
+        sending.wait_sink("some are delivered", |sink| sink["delivered"].as_u64() > Some(100));
         sending.kill();
         sending.start();
     }
-    sending.wait_sink("some are delivered", |sink| sink["delivered"].as_u64() > Some(12));
-    sending.wait_sink("nothing waits", |sink| sink["behind_items"].as_u64() < Some(10));
+    sending.wait_sink("some are delivered", |sink| sink["delivered"].as_u64() > Some(100));
+    sending.wait_sink("nothing waits", |sink| sink["behind_items"].as_u64() < Some(200));
     sending.stop();
     let mut numbers: Vec<u64> = listener.all().iter().filter_map(|item| item["sequence"].as_u64()).collect();
     let arrived = numbers.len();
@@ -122,7 +133,7 @@ fn a_killed_box_loses_nothing_that_it_remembers() {
     numbers.dedup();
     println!("{} items after two kills, {} came twice", numbers.len(), arrived - numbers.len());
     assert_eq!(numbers, (1..=numbers.len() as u64).collect::<Vec<u64>>(), "no hole");
-    assert!(arrived - numbers.len() < 150, "at most what was sent since the last commit comes twice");
+    assert!(arrived - numbers.len() < 2500, "at most what was sent since the last commit comes twice");
 }
 
 /// A listener with this certificate that asks for one.

@@ -95,7 +95,7 @@ fn what_the_broker_will_never_take_is_left_out_and_the_machine_is_read_on() {
     assert!(status["error"].as_str().is_some_and(|error| error.contains("600")), "{status}");
     assert_eq!(status["state"], "connected");
     let (before, source) = (sending.status()["tick"]["count"].as_u64(), sending.status()["sources"][0].clone());
-    assert_eq!(source["state"], "reading");
+    assert_ne!(source["state"], "failing", "{source}");
     std::thread::sleep(std::time::Duration::from_millis(600));
     assert!(sending.status()["tick"]["count"].as_u64() > before, "the tick goes on");
     sending.stop();
@@ -108,7 +108,7 @@ fn a_box_without_its_broker_polls_decides_and_says_what_to_do() {
         sending.wait_sink("the failure", |sink| sink["failing"] == true && sink["behind_items"].as_u64() > Some(5));
     assert!(status["error"].as_str().is_some_and(|error| error.contains("refused")), "{status}");
     let whole = sending.status();
-    assert_eq!(whole["sources"][0]["state"], "reading", "{}", whole["sources"][0]);
+    assert_ne!(whole["sources"][0]["state"], "failing", "{}", whole["sources"][0]);
     let problems = whole["problems"].as_array().expect("a list");
     assert!(problems.iter().any(|problem| problem["what"].as_str().is_some_and(|what| what.contains("sink plant"))));
     assert_eq!(whole["tick"]["skipped"], 0, "{}", whole["tick"]);

@@ -30,7 +30,7 @@ fn agent(devices: &Path, port: u16, seconds: f64) -> Option<Json> {
 #[test]
 fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
     let port = free_port();
-    let mut sending = Sending::to(&format!("shdr://127.0.0.1:{port}"), "");
+    let mut sending = Sending::fast(&format!("shdr://127.0.0.1:{port}"));
     sending.wait_sink("listening", |sink| sink["state"] == "connected" && sink["delivered"].as_u64() > Some(10));
     let devices = sending.devices();
     let Some(agent) = agent(&devices, port, 4.0) else { return };
@@ -62,7 +62,7 @@ fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
 #[test]
 fn an_agent_that_sends_nonsense_or_reads_nothing_harms_nobody() {
     let port = free_port();
-    let mut sending = Sending::to(&format!("shdr://127.0.0.1:{port}"), "");
+    let mut sending = Sending::fast(&format!("shdr://127.0.0.1:{port}"));
     sending.wait_sink("listening", |sink| sink["state"] == "connected");
     let mut noisy = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
     noisy.write_all(&[b'x'; 5000]).expect("taken");
