@@ -83,7 +83,22 @@ pub(crate) fn torque_at_1000_rpm(scene: &Scene) -> Option<Vec<f64>> {
     Some(scene.load()?.iter().zip(&krpm).map(|(load, n)| load / n.max(CREEP_KRPM)).collect())
 }
 
-/// How the drive of the output moves: axis velocity in m/s, or spindle speed in rad/s, with its sign.
+/// Correlation of a force with the velocity below which it is the force of the body on what moves it: whatever the laws,
+/// what drives a body against friction puts energy into it on the whole. Springs and masses alone come near zero.
+const OPPOSES: f64 = -0.3;
+
+/// Is a force recorded as the one that opposes the motion, instead of the one that drives it?
+fn opposes(scene: &Scene, velocity: &[f64]) -> bool {
+    let rows = || (0..velocity.len()).filter(|row| scene.usable()[*row] && velocity[*row].is_finite());
+    let force = scene.recorded();
+    let sum = |of: &dyn Fn(usize) -> f64| rows().map(of).sum::<f64>();
+    let (along, force_2, speed_2) =
+        (sum(&|row| force[row] * velocity[row]), sum(&|row| force[row].powi(2)), sum(&|row| velocity[row].powi(2)));
+    along < OPPOSES * (force_2 * speed_2).sqrt()
+}
+
+/// How the drive of the output moves: axis velocity in m/s, or spindle speed in rad/s, with its sign; against it where the
+/// force is recorded as the one that opposes the motion, so that friction is positive in either convention.
 pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
     if is_displacement(scene) {
         return None;
@@ -91,7 +106,11 @@ pub(crate) fn motion(scene: &Scene) -> Option<Vec<f64>> {
     let role = if turns(scene) { Role::Speed } else { Role::Velocity };
     let motion = in_si(scene, scene.role_name(role)?)?;
     let unsigned = scene.output_kind() == OutputKind::Force && !is_signed(scene);
-    Some(if unsigned { motion.iter().map(|v| v.abs()).collect() } else { motion })
+    if unsigned {
+        return Some(motion.iter().map(|v| v.abs()).collect());
+    }
+    let opposes = scene.output_kind() == OutputKind::Force && opposes(scene, &motion);
+    Some(if opposes { motion.iter().map(|v| -v).collect() } else { motion })
 }
 
 /// Does the drive of the output turn (rad/s) rather than slide (m/s)?

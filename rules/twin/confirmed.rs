@@ -156,7 +156,7 @@ mod tests {
     fn what_rows_held_out_hardly_confirm_may_be_something_else() {
         let found = found([30.0; 6], 17.0);
         let fit = found.fit.as_ref().expect("fitted");
-        assert!(!fit.rises() && !fit.carries_little(), "{}", found.debug);
+        assert!(!fit.carries_little(), "{}", found.debug);
         assert_eq!(told(&found), (vec!["viscous_friction"], vec!["unknown"]), "{}", found.debug);
     }
 }

@@ -13,7 +13,6 @@ use super::outcome::{Answer, Outcome};
 use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
-use super::unknown::Doubt;
 use super::veil::SeenForm;
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
@@ -154,12 +153,7 @@ impl<'a> Case<'a> {
         let base = self.unveil(base);
         let answer = self.answer(&base, seed);
         self.show_hidden(&base);
-        let mut outcome = Outcome::new(self, answer);
-        if outcome.is_weak_alarm_without_a_name() && outcome.fits.rises() {
-            // On rows that took no part it explains nothing.
-            let Outcome { base, found, designs, slight_entry, .. } = outcome;
-            outcome = Outcome::new(self, Answer { base, found, designs, doubt: Doubt::NONE, slight_entry });
-        }
+        let outcome = Outcome::new(self, answer).confirmed(self);
         verdicts::judge(self, outcome)
     }
 

@@ -129,12 +129,6 @@ const CARRIED_SHARE: f64 = 0.7;
 const LEFT_RATIO: f64 = 1.5;
 
 impl Fits {
-    /// Is the error on rows that took no part greater than before? Then something else is there than what is named.
-    #[must_use]
-    pub fn rises(&self) -> bool {
-        self.held_out_share().is_some_and(|share| share > 1.0)
-    }
-
     /// Does the error fall to half on the fitted rows, and hardly on those that took no part, of which much more is left?
     /// Then what is named may be there, and something else with it.
     #[must_use]
@@ -229,6 +223,5 @@ mod tests {
         assert!(!fits((50.0, 24.0), (30.0, 25.0)).carries_little());
         // Little is claimed of the fitted rows either, as by a warm-up that only the first run shows.
         assert!(!fits((50.0, 31.0), (42.0, 41.0)).carries_little());
-        assert!(fits((50.0, 24.0), (42.0, 43.0)).rises());
     }
 }

@@ -71,7 +71,12 @@ pub fn fit(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
 /// Fits `parts` to the levels alone: as if the noise had no memory.
 #[must_use]
 pub(super) fn fit_levels(data: &mut Data<'_>, parts: &[Part]) -> Option<Fit> {
-    let noise = Arma::WHITE;
+    fit_at(data, parts, Arma::WHITE)
+}
+
+/// Fits `parts` in noise that is known.
+#[must_use]
+pub(super) fn fit_at(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
     let mut state = State::new(data, parts.to_vec())?;
     state.descend(data, parts, noise)?;
     let log_likelihood = data.frame.log_likelihood(state.cost(data, noise), noise);

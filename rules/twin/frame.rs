@@ -250,6 +250,34 @@ impl Frame {
         self.stretches.push(first..self.groups.len());
     }
 
+    /// The groups of the units that `takes` accepts, as they weigh here; levels of their own are left out.
+    #[must_use]
+    pub(super) fn only(&self, takes: impl Fn(usize) -> bool) -> Self {
+        let mut some = Self {
+            groups: Vec::new(),
+            stretches: Vec::new(),
+            unit: Vec::new(),
+            weights: Vec::new(),
+            quiet: Vec::new(),
+            levels: None,
+        };
+        for stretch in self.stretches.iter().filter(|stretch| takes(self.unit[stretch.start])) {
+            let first = some.groups.len();
+            some.groups.extend(self.groups[stretch.clone()].iter().cloned());
+            some.unit.extend(&self.unit[stretch.clone()]);
+            some.weights.extend(self.weights.get(stretch.clone()).unwrap_or_default());
+            some.quiet.extend(self.quiet.get(stretch.clone()).unwrap_or_default());
+            some.stretches.push(first..some.groups.len());
+        }
+        some
+    }
+
+    /// What the innovation of this group is multiplied by because it is outlandish.
+    #[must_use]
+    pub(super) fn outlier_weight(&self, group: usize) -> f64 {
+        self.weights.get(group).copied().unwrap_or(1.0)
+    }
+
     /// How many groups.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -4,9 +4,9 @@
 use super::frame::{Frame, Unit};
 use super::model::{Body, Part, simulate};
 use super::noise::Arma;
-use crate::physics::Scene;
+use crate::physics::{Form, Scene};
 use crate::statistics::count;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a set of parts says about every row, and what each of its effects adds.
 #[derive(Debug, Clone)]
@@ -32,6 +32,9 @@ pub fn predict(
     for index in first..parts.len() {
         if follows_state(&parts[index]) {
             follow(scene, parts, index, units, held, noise, &mut prediction);
+        } else if is_of_recorded_lots(&parts[index]) {
+            // Rows of a lot that no fitted run has.
+            let _ = follow_new_lots(scene, &parts[index], index, units, held, noise, &mut prediction);
         }
     }
     Some(prediction)
@@ -89,6 +92,54 @@ fn unit_contribution(scene: &Scene, part: &Part) -> Option<Vec<f64>> {
         form.place = Some(("run".to_owned(), first));
     }
     always.contribution(scene)
+}
+
+/// Is it another hardness in lots that are written down?
+fn is_of_recorded_lots(part: &Part) -> bool {
+    match &part.body {
+        Body::Effect(effect, form) => effect.doc().kind == "hardness_batch" && ["lot", "lots"].contains(&form.name),
+        _ => false,
+    }
+}
+
+/// The gain of a lot that no fitted run has, in each held-out run from its earlier rows: normal before any row is seen,
+/// with the mean and the spread of the gains of the known lots.
+fn follow_new_lots(
+    scene: &Scene,
+    part: &Part,
+    index: usize,
+    units: &[Unit],
+    held: &BTreeSet<usize>,
+    noise: Noise,
+    prediction: &mut Prediction,
+) -> Option<()> {
+    let lots = scene.words("lot")?;
+    let fitted = (0..units.len()).filter(|unit| !held.contains(unit)).flat_map(|unit| units[unit].rows.clone());
+    let known: BTreeSet<&str> = fitted.filter_map(|row| lots.get(row)).collect();
+    let first = scene.run_names().first()?.clone();
+    let always = Form { name: "step", place: Some(("run".to_owned(), first)), ..Form::default() };
+    let (_, cut) = part.effect_and_form()?.0.columns(scene, &always)?.pop()?;
+    let gains: Vec<f64> = part.parameters.iter().map(|gain| gain.value).collect();
+    let lots_known = count(known.len().max(2));
+    let mean = gains.iter().sum::<f64>() / lots_known;
+    let spread = (gains.iter().map(|gain| gain * gain).sum::<f64>() / lots_known - mean * mean).max(f64::MIN_POSITIVE);
+    let weight = noise.deviation * noise.deviation * noise.arma.inflation() / spread;
+    for unit in held {
+        let mut seen: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+        for row in units[*unit].rows.clone() {
+            let Some(lot) = lots.get(row).filter(|lot| !known.contains(lot)) else { continue };
+            let (xy, xx) = seen.entry(lot).or_insert((mean * weight, weight));
+            let without = prediction.total[row] - prediction.contributions[index][row];
+            let expected = *xy / xx.max(f64::MIN_POSITIVE) * cut[row];
+            prediction.contributions[index][row] = expected;
+            prediction.total[row] = without + expected;
+            if scene.usable()[row] {
+                *xy += cut[row] * (scene.recorded()[row] - without);
+                *xx += cut[row] * cut[row];
+            }
+        }
+    }
+    Some(())
 }
 
 /// Forward filter over two states, absent or present, with even odds at the start of the run.

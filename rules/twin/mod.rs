@@ -9,7 +9,10 @@
 //! 4. Singles, then pairs and triples on top of the leaders; signs and ranges are physics.
 //! 5. Whoever cannot be told from the best within 6 units of information is named beside it, with the experiment that
 //!    separates them. What no candidate explains is `unknown`, located, with an empirical form.
-//! 6. Every fit is shown on runs that took no part in fitting, choosing or stopping.
+//! 6. Every name must predict fitted runs from the other fitted runs (the inner split, `inner_split.rs`); the same split
+//!    says whether a fit is reported by generalised least squares or by its levels alone.
+//! 7. Every fit is shown on runs that took no part in fitting, choosing or stopping. They may only withdraw: where the
+//!    error there does not fall, nothing is told but that, with the place and the next experiment.
 
 mod agreement;
 pub mod bind;
@@ -37,6 +40,7 @@ pub mod hidden;
 mod hidden_lots;
 mod hidden_tone;
 pub mod holdout;
+mod inner_split;
 pub mod inputs;
 pub mod latent;
 mod levels;
@@ -47,6 +51,7 @@ pub mod locate;
 mod misnamed;
 pub mod model;
 pub mod model_file;
+mod next_step;
 pub mod noise;
 mod offered;
 mod outcome;

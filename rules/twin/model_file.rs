@@ -508,7 +508,7 @@ mod tests {
         let text = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"meter_window\"\nform = \"ramp\"\n";
         let problems = parse_model(text).expect_err("no such form");
         assert!(
-            problems[0].to_string().contains("meter_window has no form ramp; its forms: lag, mean"),
+            problems[0].to_string().contains("meter_window has no form ramp; its forms: lag, mean, late"),
             "{}",
             problems[0]
         );

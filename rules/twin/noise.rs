@@ -21,6 +21,14 @@ impl Arma {
     /// White noise.
     pub const WHITE: Self = Self { phi: 0.0, theta: 0.0 };
 
+    /// The nearest noise that is a slow process with white noise on top. What is smoother than a slow process is no noise
+    /// but what a model lacks, and in such noise a fit would forget every level.
+    #[must_use]
+    pub fn lawful(phi: f64, theta: f64) -> Self {
+        let phi = phi.clamp(0.0, PHI_MAX);
+        Self { phi, theta: theta.clamp(-phi, 0.0) }
+    }
+
     /// Standard deviation of an innovation over that of the process: the weight of a first row.
     #[must_use]
     pub fn first_weight(self) -> f64 {
@@ -138,6 +146,7 @@ pub fn fit_near(residual: &[f64], frame: &Frame, start: Arma) -> (f64, Arma) {
         let e = frame.whiten(residual, noise);
         frame.log_likelihood(dot(&e, &e), noise)
     };
+    let start = Arma::lawful(start.phi, start.theta);
     let mut best = (score(start), start);
     for noise in GRID.iter().step_by(3) {
         let score = score(*noise);
@@ -158,7 +167,7 @@ pub fn refine(mut best: (f64, Arma), score: impl Fn(Arma) -> f64) -> (f64, Arma)
         let tries = [(phi + d_phi, theta), (phi - d_phi, theta), (phi, theta + step), (phi, theta - step)];
         let mut moved = false;
         for (phi, theta) in tries {
-            let noise = Arma { phi: phi.clamp(-0.5, PHI_MAX), theta: theta.clamp(-0.98, 0.9) };
+            let noise = Arma::lawful(phi, theta);
             let got = score(noise);
             if got > best.0 + 1e-9 {
                 best = (got, noise);

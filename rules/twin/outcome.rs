@@ -6,8 +6,9 @@ use super::diagnose::{Case, ordinary_noise};
 use super::diagnosis::{Fits, Rows, Verdict};
 use super::fit::Fit;
 use super::holdout::Prediction;
-use super::search::Found;
-use super::size::BEYOND_DOUBT_INFORMATION;
+use super::inner_split::Left;
+use super::scan::price;
+use super::search::{Found, Hypothesis};
 use super::unknown::{Doubt, Nameless, Unknown};
 
 /// What was found, before it is told.
@@ -27,10 +28,33 @@ impl Answer {
     }
 }
 
+/// What does not hold in runs that took no part in fitting it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Withdrawn {
+    /// The kinds that had been named; empty where there was no name.
+    pub kinds: Vec<String>,
+    /// Were they fitted runs (the inner split), or those held out?
+    pub among_fitted: bool,
+    /// Root mean square errors there, without it and with it.
+    pub errors: (f64, f64),
+    /// What it explained, in units of information.
+    pub information: f64,
+    /// What it would have added to every row, by label.
+    pub added: Vec<(String, Vec<f64>)>,
+}
+
 /// Everything the verdict is made from.
 pub struct Outcome {
-    /// The baseline fitted alone.
+    /// The baseline fitted alone, as the search compares with it.
     pub base: Fit,
+    /// The baseline as it is reported.
+    pub reported_base: Fit,
+    /// What was found, with the baseline, as it is reported.
+    pub reported: Fit,
+    /// What the inner split leaves before and after.
+    pub(super) inner: Option<(Left, Left)>,
+    /// What had been found and does not hold in runs that took no part in fitting it.
+    pub withdrawn: Option<Withdrawn>,
     /// What the search found.
     pub found: Found,
     /// Every hypothesis of the search.
@@ -58,8 +82,11 @@ impl Outcome {
         let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
         let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
         let none = empty();
-        let before = case.predict(&base).unwrap_or_else(|| none.clone());
-        let after = case.predict(&last).unwrap_or(none);
+        let (checked_base, checked) = (case.checked(&base, last.noise), case.checked(&last, last.noise));
+        let inner = checked_base.left.zip(checked.left);
+        let (reported_base, reported) = (checked_base.fit, checked.fit);
+        let before = case.predict(&reported_base).unwrap_or_else(|| none.clone());
+        let after = case.predict(&reported).unwrap_or(none);
         let totals = Totals { before: &before.total, after: &after.total };
         let shown = case.shown(&last, &totals);
         let doubted = if unknown.is_none() { case.doubted(&found.best, shown) } else { None };
@@ -70,7 +97,7 @@ impl Outcome {
             rows: case.told().frame.len() + case.told().held_frame.len(),
             runs: case.units.len(),
             held_out_runs: case.held.iter().map(|unit| case.units[*unit].name.clone()).collect(),
-            noise_floor: ordinary_noise(&last),
+            noise_floor: ordinary_noise(&reported),
             before: case.quality(&before),
             after: case.quality(&after),
         };
@@ -82,20 +109,90 @@ impl Outcome {
             compared: case.told().scene.usable().to_vec(),
             effects: added.clone(),
         };
-        Self { base, found, designs, unknown, nameless, slight_entry, doubted, fits, rows, added }
+        Self {
+            base,
+            reported_base,
+            reported,
+            inner,
+            withdrawn: None,
+            found,
+            designs,
+            unknown,
+            nameless,
+            slight_entry,
+            doubted,
+            fits,
+            rows,
+            added,
+        }
     }
 
-    /// Is something said to remain where nothing is named, and not beyond doubt?
-    #[must_use]
-    pub(super) fn is_weak_alarm_without_a_name(&self) -> bool {
-        let weak = self.unknown.as_ref().is_some_and(|unknown| unknown.information < BEYOND_DOUBT_INFORMATION);
-        weak && self.found.best.members.is_empty()
+    /// What was found, if runs that took no part in fitting it are predicted no better with it than without: the inner
+    /// split decides, and the runs held out may only withdraw.
+    fn refuted(&self) -> Option<Withdrawn> {
+        let best = &self.found.best;
+        if best.members.is_empty() && self.unknown.is_none() {
+            return None;
+        }
+        let kinds = best.members.iter().map(|member| self.designs[*member].kind.clone()).collect();
+        let held_out = self.fits.before.held_out_rmse.zip(self.fits.after.held_out_rmse);
+        let inner = self.inner.filter(|(before, after)| after.exceeds(*before));
+        let inner = inner.map(|(before, after)| (true, (before.error(), after.error())));
+        let held_out = held_out.filter(|(before, after)| after >= before).map(|errors| (false, errors));
+        let (among_fitted, errors) = inner.or(held_out)?;
+        Some(Withdrawn { kinds, among_fitted, errors, information: self.information(), added: self.added.clone() })
+    }
+
+    /// Units of information of what is told or was withdrawn.
+    pub(super) fn information(&self) -> f64 {
+        let told = self.unknown.as_ref().map_or(self.found.best.information, |unknown| unknown.information);
+        self.withdrawn.as_ref().map_or(told, |withdrawn| withdrawn.information)
+    }
+
+    /// The same with nothing told that is refuted: of several names, the one whose absence leaves least goes first.
+    pub(super) fn confirmed(self, case: &mut Case<'_>) -> Self {
+        let Some(withdrawn) = self.refuted() else { return self };
+        let fewer = if self.unknown.is_none() { self.without_one(case, withdrawn.among_fitted) } else { None };
+        let Self { base, mut found, designs, nameless, slight_entry, .. } = self;
+        if let Some((position, less)) = fewer {
+            found.best = less;
+            found.p_values.remove(position.min(found.p_values.len() - 1));
+            let doubt = Doubt { unknown: None, nameless };
+            return Self::new(case, Answer { base, found, designs, doubt, slight_entry }).confirmed(case);
+        }
+        found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
+        let nothing = Answer { base, found, designs, doubt: Doubt::NONE, slight_entry: false };
+        Self { withdrawn: Some(withdrawn), ..Self::new(case, nothing) }
+    }
+
+    /// The names without the one in whose absence the rows that refuted them are predicted best, and its position; `None`
+    /// for a name that stands alone.
+    fn without_one(&self, case: &mut Case<'_>, among_fitted: bool) -> Option<(usize, Hypothesis)> {
+        let best = &self.found.best;
+        if best.members.len() < 2 {
+            return None;
+        }
+        let mut least: Option<(f64, usize, Hypothesis)> = None;
+        for position in 0..best.members.len() {
+            let Some(mut less) = case.without(best, position) else { continue };
+            less.information += price(&self.designs[best.members[position]], case.ln_rows(&self.base));
+            let error = if among_fitted {
+                case.left_of_inner(&less.fit, less.fit.noise, best.fit.noise).map(Left::error)
+            } else {
+                case.predict(&less.fit).and_then(|prediction| case.quality(&prediction).held_out_rmse)
+            };
+            let Some(error) = error else { continue };
+            if least.as_ref().is_none_or(|(least, ..)| error < *least) {
+                least = Some((error, position, less));
+            }
+        }
+        least.map(|(_, position, less)| (position, less))
     }
 
     /// The fit that is reported.
     #[must_use]
     pub fn last(&self) -> &Fit {
-        self.unknown.as_ref().map_or(&self.found.best.fit, |unknown| &unknown.fit)
+        &self.reported
     }
 
     /// Is nothing missing?
@@ -103,6 +200,7 @@ impl Outcome {
     pub fn verdict(&self, ambiguous: bool) -> Verdict {
         match (&self.unknown, self.found.best.members.is_empty()) {
             (Some(_), _) => Verdict::Unexplained,
+            (None, true) if self.withdrawn.is_some() => Verdict::CannotTell,
             (None, true) => Verdict::NoMismatch,
             (None, false) if ambiguous => Verdict::Ambiguous,
             (None, false) => Verdict::Explained,

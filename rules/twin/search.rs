@@ -6,9 +6,10 @@ use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
 use super::scan::{Bank, best_of_each_law, likeliest, price_of};
-use crate::physics::OutputKind;
 use crate::physics::catalogue::dry_friction::slips;
-use crate::physics::drive::is_axis_output;
+use crate::physics::catalogue::meter_window::LATE;
+use crate::physics::drive::{is_axis_output, is_power, motion, turns};
+use crate::physics::{OutputKind, Role, Scene};
 use crate::statistics::count;
 
 /// Effects that may be found at once.
@@ -337,10 +338,18 @@ fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
     let acts = value("share").is_none_or(|share| share.abs() >= 0.2);
     match part.kind.as_str() {
         "clock_lag" | "engagement_timing" | "override_delay" => resolved("delay_s") && acts,
+        "meter_window" if part.has_form(LATE) => {
+            resolved("window_s") && value("share").is_some_and(|share| share >= LATE_SHARE_MIN)
+        }
         "meter_window" => resolved("window_s") && acts,
+        "copper_loss" => value("base_speed_rpm").is_none_or(|base_rpm| is_often_below(scene, base_rpm)),
         "saturation" => acts,
         "zero_drift" => stands_out(part, fit, data),
         "dry_friction" => value("presliding_way").is_none_or(|way| slips(scene, way)),
+        "stribeck" if turns(scene) && is_power(scene) => {
+            let top = motion(scene).map_or(0.0, |velocity| velocity.iter().fold(0.0_f64, |top, v| top.max(v.abs())));
+            value("stribeck_speed").is_none_or(|speed| speed <= CREEP_SHARE * top)
+        }
         "stribeck" if scene.output_kind() == OutputKind::Force || is_axis_output(scene) => {
             value("level").is_some_and(|level| level.abs() <= most_excess(&fit.parts))
         }
@@ -348,6 +357,23 @@ fn plausible(part: &Part, fit: &Fit, data: &Data<'_>) -> bool {
     }
 }
 
+/// Share of the output that a late echo has at least: less is within what a law in the edges may be wrong.
+const LATE_SHARE_MIN: f64 = 0.02;
+/// Share of the cutting rows that must lie below the speed from which the field is weakened: above it copper loss follows
+/// the power, and is a load loss.
+const BELOW_BASE_MIN: f64 = 0.25;
+
+/// Does the spindle often cut below this speed?
+fn is_often_below(scene: &Scene, base_rpm: f64) -> bool {
+    let (Some(speed), Some(load)) = (scene.role(Role::Speed), scene.load()) else { return true };
+    let cutting: Vec<f64> = speed.iter().zip(load).filter(|(_, load)| **load > 0.0).map(|(n, _)| n.abs()).collect();
+    let below = cutting.iter().filter(|n| **n < base_rpm).count();
+    count(below) >= BELOW_BASE_MIN * count(cutting.len())
+}
+
+/// Share of the greatest speed up to which a spindle creeps: an excess of friction that reaches further is any bend of the
+/// no-load power, such as a windage of another sign. The search begins at a fifth at most.
+const CREEP_SHARE: f64 = 0.35;
 /// Times the dry friction beside it that friction at creep speed may exceed it by: bodies that start to move meet up to two
 /// or three times the friction of bodies that do.
 const EXCESS_MAX: f64 = 3.0;

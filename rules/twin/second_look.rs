@@ -16,7 +16,7 @@ impl Case<'_> {
     pub(super) fn with_the_strange_fitted(&self, first: &Diagnosis) -> Option<Self> {
         let quality = first.fit.as_ref()?.before;
         let strange = quality.held_out_rmse? > STRANGE * quality.rmse;
-        if first.verdict != Verdict::NoMismatch || !strange {
+        if !matches!(first.verdict, Verdict::NoMismatch | Verdict::CannotTell) || !strange {
             return None;
         }
         let left =

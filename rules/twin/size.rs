@@ -4,7 +4,6 @@ use super::agreement::differs_by_run;
 use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::{Fit, fit};
-use super::holdout::rmse;
 use super::scan::{price, price_of};
 use super::search::{FIRST_INFORMATION, Found, Hypothesis};
 use super::verdicts::CLASS_INFORMATION;
@@ -19,8 +18,6 @@ const SIZE_SHARE: f64 = 0.005;
 pub(super) const BEYOND_DOUBT_INFORMATION: f64 = 60.0;
 /// The same beside an effect that explains more.
 const BEYOND_DOUBT_BESIDE: f64 = 100.0;
-/// Information from which a member stands whatever it leaves of the rows held out: their lots and tools may be others.
-const MISLEADING_MAX: f64 = 200.0;
 /// Share of what is explained up to which a member on which the runs disagree is dropped: most of it is no imitation.
 const MINOR_SHARE: f64 = 0.5;
 /// Share of the mean output below which an output counts as that share.
@@ -84,27 +81,18 @@ impl Case<'_> {
             let drops = several && gained < paid
                 || minor && differs_by_run(&best.fit, &self.frame, first + position)
                 || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt)
-                || several && self.misleads(&without, &best.fit, gained - paid);
+                || several && !self.predicts_more(&without, &best.fit);
             drops.then_some((position, gained))
         };
         let all = (0..best.members.len()).filter_map(unclaimable);
         all.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(position, _)| position)
     }
 
-    /// Does a member that explains so much of the fitted rows leave more than that of those held out, with it than without?
-    fn misleads(&mut self, without: &Fit, with: &Fit, information: f64) -> bool {
-        if information > MISLEADING_MAX {
-            return false;
-        }
-        let rows = count(self.held_frame.len()) / with.noise.inflation();
-        let errors = self.held_out_rmse(without).zip(self.held_out_rmse(with));
-        errors.is_some_and(|(without, with)| costs_more(information, rows, without, with))
-    }
-
-    /// Error of a fit on the held-out rows of what is fitted here; `None` where none are.
-    fn held_out_rmse(&mut self, fit: &Fit) -> Option<f64> {
-        let prediction = self.predict_here(fit)?;
-        rmse(&self.scene, &self.held_frame, &prediction.total)
+    /// Is less left of fitted runs that are predicted from the others with a member than without it?
+    fn predicts_more(&mut self, without: &Fit, with: &Fit) -> bool {
+        let of = |case: &mut Self, fit: &Fit| case.left_of_inner(fit, fit.noise, with.noise);
+        let left = of(self, without).zip(of(self, with));
+        left.is_none_or(|(without, with)| !with.exceeds(without))
     }
 
     /// Is the difference of two residuals too small to claim: everywhere a share of the output by which a model or a
@@ -120,25 +108,5 @@ impl Case<'_> {
         let sizes = [(1, 1.0), (5, 1.6), (20, 2.2)];
         let small = sizes.iter().all(|(part, times)| size((shares.len() / part).max(1)) < times * SIZE_SHARE);
         small && !beyond_doubt || distance(one, other) < (SIZE_DEVIATIONS * deviation).min(SIZE_SHARE * mean)
-    }
-}
-
-/// Is an error on so many independent held-out rows that rises from `without` to `with` worth more than the information
-/// gained on the fitted ones? Both in units of information, so that the one can be held against the other.
-fn costs_more(information: f64, rows: f64, without: f64, with: f64) -> bool {
-    let rises = without > 0.0 && with > without;
-    rises && 2.0 * rows * (with / without).ln() > information
-}
-
-#[cfg(test)]
-mod tests {
-    use super::costs_more;
-
-    #[test]
-    fn what_is_paid_for_on_held_out_rows_is_not_gained() {
-        // A drift that bends away behind the last fitted run, and one that is a little off there.
-        assert!(costs_more(22.0, 180.0, 0.2, 6.3));
-        assert!(!costs_more(22.0, 180.0, 0.20, 0.21));
-        assert!(!costs_more(22.0, 180.0, 0.3, 0.2) && !costs_more(22.0, 180.0, 0.0, 0.2));
     }
 }

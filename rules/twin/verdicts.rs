@@ -15,6 +15,8 @@ use crate::physics::state::BETWEEN_SAMPLES;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
+/// Classes within which a name that is in doubt is compared with the next: beyond, no other name is an explanation.
+const FURTHER: f64 = 5.0;
 /// The kind whose mean delay may be too short to be told from a lag.
 const WINDOW: &str = "meter_window";
 
@@ -53,7 +55,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
     }
-    let doubtful = outcome.fits.rises() || outcome.fits.carries_little() || outcome.found.leaves_much_unnamed();
+    let doubtful = outcome.fits.carries_little() || outcome.found.leaves_much_unnamed();
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
     }
@@ -69,6 +71,13 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         alternatives.retain(|other| other.effect != lag);
         alternatives.push(alternative(lag, WINDOW, 0.0));
     }
+    if !alternatives.is_empty() && outcome.unknown.is_none() && alternatives.iter().all(is_nameless) {
+        // Doubt about a name is told by the name that comes next, or there is none.
+        match alternatives_within(case, &outcome, FURTHER * CLASS_INFORMATION).into_iter().next() {
+            Some(nearest) => alternatives.insert(0, nearest),
+            None => alternatives.clear(),
+        }
+    }
     let verdict = outcome.verdict(!alternatives.is_empty());
     let mismatch = regions(case, &outcome);
     let unit = unit_of(&case.model.output).to_owned();
@@ -80,15 +89,18 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         mismatch,
         baseline_shift: if missing.is_empty() { Vec::new() } else { shifts(case, &outcome) },
         missing,
-        next_experiment: experiment(&outcome, &alternatives),
+        next_experiment: super::next_step::next_step(&outcome, verdict, &alternatives),
         alternatives,
         data_quality: case.faults.clone(),
         model: extended(case, outcome.last()),
         debug: debug(case, &outcome),
-        rows: outcome.rows,
+        rows: outcome.rows.clone(),
         unit,
     };
-    diagnosis.summary = super::words::summary(&diagnosis);
+    diagnosis.summary = match &outcome.withdrawn {
+        Some(withdrawn) => super::words::withdrawn(withdrawn, &diagnosis.unit),
+        None => super::words::summary(&diagnosis),
+    };
     diagnosis
 }
 
@@ -134,10 +146,11 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
     // Parts that act on load or output find both as the reported fit simulates them.
     let _ = simulate(&outcome.last().parts, &mut case.scene);
     if let Some(unknown) = &outcome.unknown {
-        let part = &unknown.fit.parts[case.parts.len()];
-        let mut found = vec![described(case, outcome, &unknown.fit, part, case.parts.len())];
-        for (number, part) in unknown.fit.parts.iter().enumerate().skip(case.parts.len() + 1) {
-            let more = described(case, outcome, &unknown.fit, part, number);
+        let fit = outcome.last();
+        let part = &fit.parts[case.parts.len()];
+        let mut found = vec![described(case, outcome, fit, part, case.parts.len())];
+        for (number, part) in fit.parts.iter().enumerate().skip(case.parts.len() + 1) {
+            let more = described(case, outcome, fit, part, number);
             found[0].equation = format!("{}; {}", found[0].equation, more.equation);
             let named = |e: Estimate| Estimate { name: format!("{}.{}", part.label(), e.name), ..e };
             found[0].parameters.extend(more.parameters.into_iter().map(named));
@@ -157,14 +170,18 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
     let first = case.parts.len();
     let mut found: Vec<(f64, Missing)> = Vec::new();
     for position in 0..best.members.len() {
-        let mut missing = described(case, outcome, &best.fit, &best.fit.parts[first + position], first + position);
+        let told = outcome.last();
+        let mut missing = described(case, outcome, told, &told.parts[first + position], first + position);
         missing.p_value = outcome.found.p_values.get(position).copied().unwrap_or(super::search::P_MAX);
         let without = if best.members.len() == 1 { None } else { case.without(&best, position) };
         let fit = without.map_or_else(|| outcome.base.clone(), |without| without.fit);
         missing.delta_ic = 2.0 * (best.fit.log_likelihood - fit.log_likelihood)
             - super::scan::price(&outcome.designs[best.members[position]], case.ln_rows(&outcome.base));
-        missing.held_out_rmse_before =
-            case.predict(&fit).and_then(|prediction| case.quality(&prediction).held_out_rmse);
+        missing.held_out_rmse_before = if best.members.len() == 1 {
+            outcome.fits.before.held_out_rmse
+        } else {
+            case.predict(&fit).and_then(|prediction| case.quality(&prediction).held_out_rmse)
+        };
         missing.held_out_rmse_after = outcome.fits.after.held_out_rmse;
         found.push((fit.left_in(&case.frame, best.fit.noise), missing));
     }
@@ -208,12 +225,17 @@ fn absorbed(case: &Case<'_>, outcome: &Outcome, part: &Part) -> f64 {
     let Some(contribution) = part.contribution(&case.scene) else { return 0.0 };
     let reduced = case.frame.reduce(&contribution);
     let whole = super::linear::dot(&reduced, &reduced);
-    let left = super::linear::least_squares(&outcome.base.tangent, &reduced).rss;
+    let left = super::linear::least_squares(&outcome.reported_base.tangent, &reduced).rss;
     if whole > 0.0 { (1.0 - left / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Explanations within the class of the best: one member replaced by another kind.
 fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
+    alternatives_within(case, outcome, CLASS_INFORMATION)
+}
+
+/// The same within so many units of information, the nearest first.
+fn alternatives_within(case: &Case<'_>, outcome: &Outcome, class: f64) -> Vec<Alternative> {
     let best = &outcome.found.best;
     let kind = |member: &usize| outcome.designs[*member].kind.as_str();
     let kinds: Vec<&str> = best.members.iter().map(kind).collect();
@@ -221,7 +243,7 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
         return kinds.iter().map(|name| alternative(name, "unknown", 0.0)).collect();
     }
     // Where a fit leaves more than noise, likelihoods mean that much less.
-    let within = CLASS_INFORMATION * best.fit.dispersion(&case.frame);
+    let within = class * best.fit.dispersion(&case.frame);
     let between_samples = acts_between_samples(outcome, best);
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
@@ -240,6 +262,7 @@ fn alternatives(case: &Case<'_>, outcome: &Outcome) -> Vec<Alternative> {
             all.push(alternative(new, gone, delta.max(0.0)));
         }
     }
+    all.sort_by(|a, b| a.delta_ic.total_cmp(&b.delta_ic));
     all
 }
 
@@ -267,22 +290,12 @@ fn alternative(other: &str, instead_of: &str, delta_ic: f64) -> Alternative {
     }
 }
 
-fn experiment(outcome: &Outcome, alternatives: &[Alternative]) -> Option<Experiment> {
-    let closest = alternatives.first()?;
-    let doc = effect(&closest.effect).or_else(|| effect(&closest.instead_of))?.doc();
-    Some(Experiment {
-        statement: doc.en.experiment.to_owned(),
-        minutes: doc.experiment_minutes,
-        expected_delta_ic: outcome.found.best.information.clamp(10.0, 100.0),
-        effect: doc.kind.to_owned(),
-    })
-}
-
 /// One region per added effect, the largest share first.
 fn regions(case: &Case<'_>, outcome: &Outcome) -> Vec<Region> {
-    let squares: f64 = outcome.added.iter().flat_map(|(_, values)| values).map(|x| x * x).sum();
+    let added = outcome.withdrawn.as_ref().map_or(&outcome.added, |withdrawn| &withdrawn.added);
+    let squares: f64 = added.iter().flat_map(|(_, values)| values).map(|x| x * x).sum();
     let mut regions: Vec<Region> =
-        outcome.added.iter().map(|(effect, values)| region(&case.told().scene, effect, values, squares)).collect();
+        added.iter().map(|(effect, values)| region(&case.told().scene, effect, values, squares)).collect();
     regions.retain(|region| !region.spans.is_empty());
     regions.sort_by(|a, b| b.share.total_cmp(&a.share));
     regions
@@ -290,7 +303,7 @@ fn regions(case: &Case<'_>, outcome: &Outcome) -> Vec<Region> {
 
 fn shifts(case: &Case<'_>, outcome: &Outcome) -> Vec<Shift> {
     let after = outcome.last();
-    let pairs = outcome.base.parts.iter().zip(&after.parts).take(case.parts.len());
+    let pairs = outcome.reported_base.parts.iter().zip(&after.parts).take(case.parts.len());
     pairs
         .flat_map(|(before, after)| {
             before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed).map(|(b, a)| Shift {
@@ -320,8 +333,11 @@ fn debug(case: &Case<'_>, outcome: &Outcome) -> String {
     let refused = outcome.found.refused_p;
     let c = outcome.last().dispersion(&case.frame);
     let held_out = outcome.fits.held_out_share();
+    let inner = outcome.inner.map(|(before, after)| after.error() / before.error());
+    let withdrawn =
+        outcome.withdrawn.as_ref().map(|withdrawn| (&withdrawn.kinds, withdrawn.among_fitted, withdrawn.errors));
     format!(
-        "dispersion {c:.2} held-out {held_out:.3?} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
+        "dispersion {c:.2} held-out {held_out:.3?} inner {inner:.3?} withdrawn {withdrawn:?} {} {:.1} p {:?} refused {refused:?} noise {:.2}/{:.2} -> {:.2}/{:.2}{unknown} | {}",
         name(&best.members),
         best.information,
         outcome.found.p_values,

@@ -2,6 +2,7 @@
 
 use super::diagnosis::{Diagnosis, Verdict};
 use super::locate::Condition;
+use super::outcome::Withdrawn;
 
 /// One or two sentences for the machinist.
 #[must_use]
@@ -30,6 +31,22 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
     }
 }
 
+/// Why nothing is told although something was found in the fitted runs.
+#[must_use]
+pub(super) fn withdrawn(withdrawn: &Withdrawn, unit: &str) -> String {
+    let names: Vec<String> = withdrawn.kinds.iter().map(|kind| kind.replace('_', " ")).collect();
+    let what = if names.is_empty() { "something without a name".to_owned() } else { names.join(" and ") };
+    let runs = if withdrawn.among_fitted {
+        "fitted runs that are predicted from the others"
+    } else {
+        "runs that took no part in fitting"
+    };
+    let (before, after) = withdrawn.errors;
+    format!(
+        "Cannot tell: {what} fits the runs it was fitted to, but the error on {runs} does not fall ({before:.3} {unit} without it, {after:.3} {unit} with it)."
+    )
+}
+
 /// A rival in words; one without a name too.
 fn rival(effect: &str) -> String {
     if effect == "unknown" { "a cause that is not in the catalogue".to_owned() } else { effect.replace('_', " ") }
@@ -40,9 +57,8 @@ fn improvement(diagnosis: &Diagnosis) -> String {
     let unit = &diagnosis.unit;
     match (fit.before.held_out_rmse, fit.after.held_out_rmse) {
         (Some(before), Some(after)) => {
-            let goes = if fit.rises() { "rises" } else { "falls" };
             format!(
-                "On runs that took no part in fitting the error {goes} from {before:.3} to {after:.3} {unit}; the noise is {:.3} {unit}.",
+                "On runs that took no part in fitting the error falls from {before:.3} to {after:.3} {unit}; the noise is {:.3} {unit}.",
                 fit.noise_floor
             )
         }

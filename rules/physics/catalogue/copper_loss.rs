@@ -11,15 +11,25 @@ pub struct CopperLoss;
 static DOC: EffectDoc = EffectDoc {
     kind: "copper_loss",
     family: "drive",
-    law: "P = per_load2 * (L / (n / 1000 rpm))^2; L load, n at least 50 rpm",
-    parameters: &[ParameterDoc {
-        name: "per_load2",
-        unit: "1/output",
-        entry: Entry::Linear,
-        range: (0.0, 1.0),
-        en: "loss per squared load at 1000 rpm",
-        zh: "1000 rpm下单位负载平方的损耗",
-    }],
+    law: "P = per_load2 * (L / (n / 1000 rpm))^2; L load, n at least 50 rpm; weakened: times (n / base_speed_rpm)^2 above that speed",
+    parameters: &[
+        ParameterDoc {
+            name: "per_load2",
+            unit: "1/output",
+            entry: Entry::Linear,
+            range: (0.0, 1.0),
+            en: "loss per squared load at 1000 rpm",
+            zh: "1000 rpm下单位负载平方的损耗",
+        },
+        ParameterDoc {
+            name: "base_speed_rpm",
+            unit: "rpm",
+            entry: Entry::Shape,
+            range: (10.0, 100_000.0),
+            en: "speed above which the field is weakened, so that a torque takes more current",
+            zh: "弱磁起始转速，超过后同样转矩需要更大电流",
+        },
+    ],
     needs: &["load", "speed"],
     source: "3 R I^2 with I = T / kt; R 0.05-1 ohm, kt 0.5-3 N m/A",
     experiment_minutes: 8.0,
@@ -45,14 +55,33 @@ impl Effect for CopperLoss {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
-        let columns = turns.then(|| self.columns(scene, &Form::plain())).flatten();
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+    fn form_names(&self) -> &'static [&'static str] {
+        &[WEAKENED]
     }
 
-    fn columns(&self, scene: &Scene, _form: &Form) -> Option<Columns> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let turns = krpm(scene).filter(|krpm| varies(krpm));
+        let columns = turns.as_ref().and_then(|_| self.columns(scene, &Form::plain()));
+        let (Some(krpm), Some(_)) = (turns, columns.filter(|columns| varies(&columns[0].1))) else { return Vec::new() };
+        let top_rpm = 1000.0 * krpm.iter().copied().fold(0.0, f64::max);
+        let weakened = BASE_SHARES
+            .map(|share| Form { name: WEAKENED, ..Form::of(&[("base_speed_rpm", share * top_rpm)]) });
+        std::iter::once(Form::plain()).chain(weakened).collect()
+    }
+
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let torque = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
-        Some(vec![("per_load2", torque.iter().map(|torque| torque * torque).collect())])
+        let krpm = krpm(scene)?;
+        let base_krpm = match form.name {
+            WEAKENED => form.value("base_speed_rpm").unwrap_or(1000.0).max(1.0) / 1000.0,
+            _ => f64::INFINITY,
+        };
+        let squared = |(torque, n): (&f64, &f64)| (torque * (n / base_krpm).max(1.0)).powi(2);
+        Some(vec![("per_load2", torque.iter().zip(&krpm).map(squared).collect())])
     }
 }
+
+/// With the field weakened above a base speed: the torque of a current falls there in proportion to the speed.
+const WEAKENED: &str = "weakened";
+/// Base speeds that are tried, as shares of the greatest speed; the fit moves them.
+const BASE_SHARES: [f64; 3] = [0.25, 0.45, 0.7];

@@ -70,7 +70,10 @@ impl Effect for CuttingPower {
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
         let process = if form.name.is_empty() { "turning" } else { form.name };
         let section = section(scene, process, form.value("mc").unwrap_or(0.23))?;
-        let engaged = engaged(scene);
+        let mut engaged = engaged(scene);
+        if process == "milling" && rate_is_of_the_moment(scene, &engaged) {
+            engaged.iter_mut().for_each(|engaged| *engaged = f64::from(u8::from(*engaged > 0.0)));
+        }
         Some(vec![("kc11_n_per_mm2", section.iter().zip(&engaged).map(|(power, engaged)| power * engaged).collect())])
     }
 
@@ -108,6 +111,29 @@ fn milling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {
     };
     let mut thinned = held(|thickness_mm| thinned(thickness_mm, mc));
     Some((0..scene.rows()).map(|row| thinned(tooth[row] * share(row)) * rate[row] / 60.0).collect())
+}
+
+/// Engagements between which a row tells whether a removal rate has the engagement in it already.
+const PARTLY: std::ops::Range<f64> = 0.05..0.95;
+/// Rows that must tell it.
+const TELLING_ROWS_MIN: usize = 5;
+
+/// Is the recorded removal rate that of the moment, as a CAM system works it out, which is less while the tool enters? Then
+/// the engagement is in it already. Told by the rows in which the tool is partly in the work.
+fn rate_is_of_the_moment(scene: &Scene, engaged: &[f64]) -> bool {
+    let columns = ["removal_rate_cm3_min", "depth_of_cut_mm", "width_of_cut_mm", "feed_mm_min"];
+    let [Some(rate), Some(depth), Some(width), Some(feed)] = columns.map(|name| scene.column(name)) else {
+        return false;
+    };
+    let (mut telling, mut of_the_moment) = (0, 0);
+    for row in (0..scene.rows()).filter(|row| PARTLY.contains(&engaged[*row])) {
+        let full = depth[row] * width[row] * feed[row] / 1000.0;
+        if full > 0.0 {
+            telling += 1;
+            of_the_moment += usize::from((rate[row] - full * engaged[row]).abs() < (rate[row] - full).abs());
+        }
+    }
+    telling >= TELLING_ROWS_MIN && 2 * of_the_moment > telling
 }
 
 fn drilling(scene: &Scene, mc: f64) -> Option<Vec<f64>> {

@@ -12,7 +12,7 @@ pub struct GearStage;
 static DOC: EffectDoc = EffectDoc {
     kind: "gear_stage",
     family: "drive",
-    law: "y = step + share * L in one stage while it turns; without the channel gear_stage: below a switching speed",
+    law: "y = step + share * L in one stage while it turns; without the channel gear_stage: below a switching speed; sloped: and slope * n / (1000 rpm)",
     parameters: &[
         ParameterDoc {
             name: "step",
@@ -29,6 +29,14 @@ static DOC: EffectDoc = EffectDoc {
             range: (-0.4, 0.4),
             en: "share of the load lost in this stage beyond the others",
             zh: "该档相对其他档多损失的负载比例",
+        },
+        ParameterDoc {
+            name: "slope",
+            unit: "output",
+            entry: Entry::Linear,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
+            en: "change of no-load output in this stage that grows with the speed, at 1000 rpm",
+            zh: "该档空载输出随转速增长的变化（1000 rpm下）",
         },
         ParameterDoc {
             name: "switch_rpm",
@@ -70,7 +78,7 @@ impl Effect for GearStage {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["stage", "speed"]
+        &["stage", "speed", SLOPED]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -81,13 +89,14 @@ impl Effect for GearStage {
         let ln_choices = ln_count(stages.len());
         if stages.len() > 1 {
             let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
-            let form = |stage: &i64| Form { name: "stage", place: place(stage), ln_choices, ..Form::default() };
-            return stages.iter().map(form).collect();
+            let form = |name| move |stage: &i64| Form { name, place: place(stage), ln_choices, ..Form::default() };
+            return stages.iter().map(form("stage")).chain(stages.iter().map(form(SLOPED))).collect();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
-        let form = |speed: &f64| Form { name: "speed", ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
-        speeds.iter().map(form).collect()
+        let form =
+            |name| move |speed: &f64| Form { name, ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
+        speeds.iter().map(form("speed")).chain(speeds.iter().map(form(SLOPED))).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -109,6 +118,10 @@ impl Effect for GearStage {
             let law = |(here, load): (&bool, &f64)| if *here { *load } else { 0.0 };
             columns.push(("share", here.iter().zip(load).map(law).collect()));
         }
+        if form.name == SLOPED {
+            let law = |(here, n): (&bool, &f64)| if *here { *n } else { 0.0 };
+            columns.push(("slope", here.iter().zip(&krpm).map(law).collect()));
+        }
         Some(columns)
     }
 
@@ -121,6 +134,9 @@ impl Effect for GearStage {
         self.forms(scene).into_iter().next().unwrap_or(speed)
     }
 }
+
+/// The stage that also takes more or less the faster it turns.
+const SLOPED: &str = "sloped";
 
 /// The stages in use, in rising order; at most eight.
 fn stages(scene: &Scene) -> Vec<i64> {

@@ -374,3 +374,27 @@ fn the_friction_of_a_feed_drive_falls_as_it_warms() {
     let size = |rows: std::ops::Range<usize>| fall[rows].iter().map(|x| x.abs()).fold(0.0, f64::max);
     assert!(size(1000..1200) > 5.0 * size(0..20));
 }
+
+#[test]
+fn a_removal_rate_of_the_moment_has_the_engagement_in_it_already() {
+    let engaged = |row: usize| [0.0, 0.5, 1.0, 0.5][row % 4];
+    let full = 3.0 * 10.0 * 400.0 / 1000.0;
+    let section = |rate: &dyn Fn(usize) -> f64| {
+        let one = |value: f64| move |_: usize| value;
+        let (depth, width, feed, tooth, diameter) = (one(3.0), one(10.0), one(400.0), one(0.1), one(40.0));
+        let inputs: [(&str, &dyn Fn(usize) -> f64); 7] = [
+            ("engaged", &engaged),
+            ("depth_of_cut_mm", &depth),
+            ("width_of_cut_mm", &width),
+            ("feed_mm_min", &feed),
+            ("feed_per_tooth_mm", &tooth),
+            ("diameter_mm", &diameter),
+            ("removal_rate_cm3_min", rate),
+        ];
+        let scene = with_inputs(80, 1.0, "spindle_power_w", &inputs);
+        let form = Form { name: "milling", ..Form::of(&[("mc", 0.25)]) };
+        column("cutting_power", &scene, &form)
+    };
+    let (moment, nominal) = (section(&|row| full * engaged(row)), section(&|_| full));
+    assert!(moment.iter().zip(&nominal).all(|(a, b)| (a - b).abs() < 1e-9), "{:?} {:?}", &moment[..4], &nominal[..4]);
+}

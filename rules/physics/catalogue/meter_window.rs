@@ -1,6 +1,7 @@
 //! The meter averages over a window: edges are smeared.
 
 use crate::physics::excitation::{delays, varies};
+use crate::physics::state::delayed;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Averaging in the meter.
@@ -10,7 +11,7 @@ pub struct MeterWindow;
 static DOC: EffectDoc = EffectDoc {
     kind: "meter_window",
     family: "measurement",
-    law: "y = share * (A(S) - S), S the simulated output; lag: A first order with time constant window_s; mean: A mean over the last window_s",
+    law: "y = share * (A(S) - S), S the simulated output; lag: A first order with time constant window_s; mean: A mean over the last window_s; late: lag, delay_s later",
     parameters: &[
         ParameterDoc {
             name: "share",
@@ -27,6 +28,14 @@ static DOC: EffectDoc = EffectDoc {
             range: (0.01, 30.0),
             en: "time constant, or length of the window",
             zh: "时间常数或窗口长度",
+        },
+        ParameterDoc {
+            name: "delay_s",
+            unit: "s",
+            entry: Entry::Shape,
+            range: (0.0, 30.0),
+            en: "time by which what was averaged is reported late",
+            zh: "平均之后报告的延迟",
         },
     ],
     needs: &["the simulated output"],
@@ -55,7 +64,7 @@ impl Effect for MeterWindow {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["lag", "mean"]
+        &["lag", "mean", LATE]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -64,7 +73,13 @@ impl Effect for MeterWindow {
         }
         let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);
         let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) }.whole();
-        windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).collect()
+        let late_windows = delays(scene, &LATE_WINDOWS_S);
+        let late = late_windows.iter().flat_map(|window_s| LATE_SHARES.map(|share| (*window_s, share * window_s)));
+        let late = late.map(|(window_s, delay_s)| {
+            let shape = [("window_s", window_s), ("delay_s", delay_s)];
+            Form { name: LATE, ..Form::of(&shape) }
+        });
+        windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).chain(late).collect()
     }
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
@@ -77,6 +92,9 @@ impl Effect for MeterWindow {
             let average = if form.name == "mean" { running_mean } else { first_order_lag };
             smeared[run.clone()].copy_from_slice(&average(time_s, inside, window_s));
         }
+        if form.name == LATE {
+            smeared = delayed(scene, &smeared, form.value("delay_s").unwrap_or(0.0));
+        }
         Some(vec![("share", smeared.iter().zip(simulated).map(|(smeared, now)| smeared - now).collect())])
     }
 
@@ -84,6 +102,12 @@ impl Effect for MeterWindow {
         Form { name: "lag", ..Form::of(&[("window_s", 1.0)]) }
     }
 }
+
+/// Averaged and reported late, in whole or in part: what meters on a bus do, and filters with an echo.
+pub(crate) const LATE: &str = "late";
+/// Time constants that are tried, s, and delays as shares of them; the fit moves both.
+const LATE_WINDOWS_S: [f64; 3] = [0.5, 1.5, 4.0];
+const LATE_SHARES: [f64; 2] = [0.5, 1.5];
 
 /// First-order lag, settled at the start, exact for an input that is linear between rows.
 fn first_order_lag(time_s: &[f64], input: &[f64], tau_s: f64) -> Vec<f64> {
