@@ -28,12 +28,14 @@ pub(super) struct Family {
     pub(super) at_edges: bool,
     /// Is it a part of many laws, so that it claims no curve by itself?
     pub(super) is_contained: bool,
+    /// Do its variants contain the forms of the catalogue, so that these need not stand beside them?
+    pub(super) covers: bool,
 }
 
 impl Family {
     /// A family of this kind of either sign.
     pub(super) const fn of(kind: &'static str) -> Self {
-        Self { kind: Cow::Borrowed(kind), sign: 0.0, channels: &[], widens: true, ln_rarity: 0.0, at_edges: false, is_contained: false }
+        Self { kind: Cow::Borrowed(kind), sign: 0.0, channels: &[], widens: true, ln_rarity: 0.0, at_edges: false, is_contained: false, covers: true }
     }
 
     /// Its contribution has this sign.
@@ -51,6 +53,12 @@ impl Family {
     /// Its form is as wide as it can be.
     pub(super) const fn wide(mut self) -> Self {
         self.widens = false;
+        self
+    }
+
+    /// The forms of the catalogue stand beside its own.
+    pub(super) const fn beside_catalogue(mut self) -> Self {
+        self.covers = false;
         self
     }
 
@@ -125,6 +133,14 @@ impl Variant {
     pub(super) fn kind(&self) -> Option<&str> {
         match &self.owner {
             Owner::Named(family) => Some(&family.kind),
+            Owner::Nameless(_) => None,
+        }
+    }
+
+    /// Its family; `None` of a nameless curve.
+    pub(super) fn family(&self) -> Option<&Family> {
+        match &self.owner {
+            Owner::Named(family) => Some(family),
             Owner::Nameless(_) => None,
         }
     }

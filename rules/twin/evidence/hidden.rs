@@ -79,7 +79,10 @@ pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], noi
     if changes < CHANGES_MIN {
         return None;
     }
-    let ln = chain.evidence(&on, levels).min(-3.0) + SEQUENCE;
+    // When something changes has to be told change by change: what that costs no path can save.
+    let rows = count(inputs.taken(false).count());
+    let told = -count(changes) * (rows / count(changes)).ln();
+    let ln = chain.evidence(&on, levels).min(told) + SEQUENCE;
     chain.follow(&mut on, levels);
     Some(Sequence { on, changes, ln })
 }

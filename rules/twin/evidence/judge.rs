@@ -317,30 +317,40 @@ impl Judge<'_> {
         left
     }
 
-    /// By how much an explanation whose sizes come from the other inner parts lowers the error in each: the paired sum
-    /// over stretches in units of its own deviation.
+    /// By how much an explanation whose sizes come from the other inner parts lowers the error in each, in the metric of
+    /// the noise: the paired sum over stretches in units of its own deviation.
     fn inner_gain(&self, of: &Explanation) -> f64 {
         let setting = &self.settings[of.noise];
         let variance = setting.saturated.variance;
-        let mut gained: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        let mut before = vec![0.0; self.inputs.rows];
+        let mut after = vec![0.0; self.inputs.rows];
         for part in 0..PARTS {
             let others = &setting.gram.whole - &setting.gram.parts[part];
             let with = self.comparison.solve(&others, variance, &of.members);
             let without = self.comparison.solve(&others, variance, &[]);
-            let of_members = |row: usize| {
-                let members = of.members.iter().zip(&with.members);
-                members.map(|((variant, _), w)| self.value(*variant, w, row)).sum::<f64>()
-            };
             for row in self.comparison.part_rows(part) {
                 let base = |w: &[f64]| {
                     let tangents = w.iter().enumerate().map(|(index, w)| w * self.comparison.tangent(index)[row]);
                     self.inputs.simulated[row] + tangents.sum::<f64>()
                 };
-                let before = self.recorded[row] - base(&without.tangents);
-                let after = self.recorded[row] - base(&with.tangents) - of_members(row);
-                let stretch = (row as f64 / (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS)) as usize;
-                *gained.entry((part, stretch)).or_default() += before * before - after * after;
+                let members = of.members.iter().zip(&with.members);
+                let added: f64 = members.map(|((variant, _), w)| self.value(*variant, w, row)).sum();
+                before[row] = self.recorded[row] - base(&without.tangents);
+                after[row] = self.recorded[row] - base(&with.tangents) - added;
             }
+        }
+        self.paired(&before, &after, setting.gram.noise)
+    }
+
+    /// The paired gain of one residual over another.
+    fn paired(&self, before: &[f64], after: &[f64], noise: super::noise::Noise) -> f64 {
+        let (before, after) = (self.comparison.whitened(before, noise), self.comparison.whitened(after, noise));
+        let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
+        let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
+        for ((row, before), after) in self.comparison.rows.iter().zip(&before).zip(&after) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
+            let number = (count(*row) / stretch) as usize;
+            *gained.entry(number).or_default() += before * before - after * after;
         }
         let sum: f64 = gained.values().sum();
         let squares: f64 = gained.values().map(|x| x * x).sum();

@@ -7,7 +7,7 @@ use crate::twin::evidence::inputs::Inputs;
 
 const VELOCITY: &[&str] = &["axis_velocity_mm_min", "z_axis_velocity_mm_min", "velocity_m_s", "velocity"];
 
-const FRICTION: Family = Family::of("axis_friction").signed(1.0).through(VELOCITY);
+const FRICTION: Family = Family::of("axis_friction").beside_catalogue().signed(1.0).through(VELOCITY);
 const INERTIA: Family = Family::of("axis_inertia").signed(1.0);
 const GRAVITY: Family = Family::of("gravity_axis").through(VELOCITY).wide();
 const ASYMMETRY: Family = Family::of("direction_asymmetry").contained().rare(-0.7);

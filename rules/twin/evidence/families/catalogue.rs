@@ -7,16 +7,22 @@ use crate::twin::evidence::inputs::Inputs;
 use crate::twin::model::Model;
 use std::borrow::Cow;
 
-/// Forms of one kind that are tried at most.
+/// Forms of one kind that are tried at most: of a kind without a family, and of one with its own.
 const FORMS_MAX: usize = 24;
+const FORMS_BESIDE: usize = 8;
 
-/// Variants of every kind that has none yet.
+/// Variants of every kind that has none yet, or whose own do not cover the catalogue's.
 pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
-    let is_known = |kind: &str| bank.variants.iter().any(|variant| variant.kind() == Some(kind));
-    let left: Vec<_> = CATALOGUE.iter().filter(|effect| !is_known(effect.doc().kind)).collect();
-    for effect in left {
-        let family = Family { sign: sign(*effect), ..Family::of(effect.doc().kind).rare(-1.0) };
-        for form in effect.forms(inputs.scene).iter().take(FORMS_MAX) {
+    for effect in CATALOGUE {
+        let own = bank.variants.iter().find_map(|variant| variant.family().filter(|f| f.kind == effect.doc().kind));
+        let (family, most) = match own {
+            Some(family) if family.covers => continue,
+            Some(family) => (family.clone(), FORMS_BESIDE),
+            None => (Family { sign: sign(*effect), ..Family::of(effect.doc().kind).rare(-1.0) }, FORMS_MAX),
+        };
+        let forms = effect.forms(inputs.scene);
+        let step = forms.len().div_ceil(most).max(1);
+        for form in forms.iter().step_by(step) {
             let Some(columns) = effect.columns(inputs.scene, form) else { continue };
             let columns = columns.into_iter().map(|(_, column)| (column, 1.0));
             bank.of(family.clone(), format!("{form:?}")).columns(inputs, columns);

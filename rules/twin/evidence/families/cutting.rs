@@ -8,19 +8,19 @@ use crate::twin::evidence::inputs::Inputs;
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
 const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0);
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
-const BUILT_UP: Family = Family::of("built_up_edge").signed(-1.0).through(&["cutting_speed_m_min"]);
+const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
 const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
 const GAIN: Family = Family::of("sensor_gain").wide();
 const TAPER: Family =
     Family::of("depth_taper").at_edges().through(&["axis_position_mm", "z_axis_position_mm", "position", "pass_progress"]);
-const ENTRY: Family = Family::of("entry_exit").rare(-0.5).at_edges();
-const THINNING: Family = Family::of("chip_thinning").signed(1.0).through(&["depth_of_cut_mm"]);
-const THINNING_WIDTH: Family = Family::of("chip_thinning").rare(-0.5);
-const TIMING: Family = Family::of("engagement_timing").rare(-0.7).wide().at_edges();
-const RECIPE: Family = Family::of("recipe_error").rare(-0.5).wide();
+const ENTRY: Family = Family::of("entry_exit").beside_catalogue().rare(-0.5).at_edges();
+const THINNING: Family = Family::of("chip_thinning").beside_catalogue().signed(1.0).through(&["depth_of_cut_mm"]);
+const THINNING_WIDTH: Family = Family::of("chip_thinning").beside_catalogue().rare(-0.5);
+const TIMING: Family = Family::of("engagement_timing").beside_catalogue().rare(-0.7).wide().at_edges();
+const RECIPE: Family = Family::of("recipe_error").beside_catalogue().rare(-0.5).wide();
 const CONSUMER: Family = Family::of("auxiliary_switch").signed(1.0).wide();
-const COOLANT: Family = Family::of("coolant_regime");
-const OVERRIDE: Family = Family::of("override_delay").signed(1.0).rare(-2.0);
+const COOLANT: Family = Family::of("coolant_regime").beside_catalogue();
+const OVERRIDE: Family = Family::of("override_delay").beside_catalogue().signed(1.0).rare(-2.0);
 
 /// Steps at a run that are tried at most.
 const STEPS_MAX: usize = 40;

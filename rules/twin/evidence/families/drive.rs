@@ -6,11 +6,11 @@ use crate::twin::evidence::inputs::Inputs;
 
 const VELOCITY: &[&str] = &["velocity_m_s", "axis_velocity_mm_min", "velocity"];
 
-const DRY: Family = Family::of("dry_friction").signed(1.0).through(VELOCITY);
+const DRY: Family = Family::of("dry_friction").beside_catalogue().signed(1.0).through(VELOCITY);
 const VISCOUS: Family = Family::of("viscous_friction").signed(1.0);
-const ASYMMETRY: Family = Family::of("direction_asymmetry").contained().rare(-0.5);
+const ASYMMETRY: Family = Family::of("direction_asymmetry").beside_catalogue().contained().rare(-0.5);
 const AXIS_FRICTION: Family = Family::of("axis_friction").through(VELOCITY).rare(-1.0);
-const STRIBECK: Family = Family::of("stribeck").signed(1.0).through(VELOCITY);
+const STRIBECK: Family = Family::of("stribeck").beside_catalogue().signed(1.0).through(VELOCITY);
 const INERTIA: Family = Family::of("axis_inertia");
 const OFFSET: Family = Family::of("offset").wide();
 const WINDAGE: Family = Family::of("windage").rare(-1.0);

@@ -9,10 +9,12 @@ const DRIFT: Family = Family::of("zero_drift").through(&["time"]).wide();
 const VOLTAGE: Family = Family::of("supply_voltage").through(&["supply_voltage_v"]);
 const LAG: Family = Family::of("clock_lag").signed(1.0).at_edges();
 const WINDOW: Family = Family::of("meter_window").signed(1.0);
-const SATURATION: Family = Family::of("saturation").signed(1.0).rare(-1.0);
+const SATURATION: Family = Family::of("saturation").beside_catalogue().signed(1.0).rare(-1.0);
 
 /// Widths of the bumps of a drift, as shares of the recording.
 const WIDTHS: [f64; 4] = [0.5, 0.2, 0.08, 0.04];
+/// Seconds below which no zero drifts: electronics warm up over minutes.
+const DRIFT_MIN_S: f64 = 60.0;
 /// Delays in samples and in seconds.
 const SAMPLES: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 15.0, 30.0];
 const SECONDS: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
@@ -41,7 +43,7 @@ fn drift(inputs: &Inputs<'_>, bank: &mut Bank) {
     let time = inputs.column(|row| (inputs.clock_s[row] - inputs.clock_s[0]) / span_s);
     let several = inputs.scene.runs().len() > 3;
     for width in WIDTHS {
-        if width * span_s <= 20.0 * inputs.period_s || width < 0.2 && !several {
+        if width * span_s <= (20.0 * inputs.period_s).max(DRIFT_MIN_S) || width < 0.2 && !several {
             continue;
         }
         let bump = |centre: f64| inputs.column(|row| (-0.5 * ((time[row] - centre) / (0.9 * width)).powi(2)).exp());
@@ -52,6 +54,9 @@ fn drift(inputs: &Inputs<'_>, bank: &mut Bank) {
             centre += width;
         }
         bank.of(DRIFT, width).sized().columns(inputs, columns);
+    }
+    if span_s < DRIFT_MIN_S {
+        return;
     }
     let linear = inputs.column(|row| time[row] - 0.5);
     let bent = inputs.column(|row| (time[row] - 0.5).powi(2) - 1.0 / 12.0);

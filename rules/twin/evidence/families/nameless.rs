@@ -125,7 +125,7 @@ fn channels(inputs: &Inputs<'_>, model: &Model) -> Vec<Channel> {
             all.push(Channel { name: name.to_owned(), values, fine });
         }
     };
-    for name in scene.column_names().filter(|name| is_input(name) && *name != "cutting_time_min") {
+    for name in scene.column_names().filter(|name| is_input(name) && !["cutting_time_min", "engaged"].contains(name)) {
         let fine = name.contains("speed") || name.contains("position") || name.contains("velocity");
         add(name, scene.column(name).unwrap_or_default().to_vec(), fine && !name.contains("feed"));
     }
