@@ -8,6 +8,7 @@
 use super::algebra::{Factor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
+use super::inputs::Inputs;
 use super::noise::Noise;
 use crate::statistics::count;
 use ndarray::linalg::general_mat_mul;
@@ -129,6 +130,30 @@ impl Comparison<'_> {
         -0.5 * self.tempering * (rows * (square.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
     }
 
+    /// What a sequence of two levels loses where the noise may be as slow as it likes: a level that moves as noise does may
+    /// be noise. Zero where it loses nothing.
+    pub(super) fn slow_noise(&self, inputs: &Inputs<'_>, residual: &[f64], on: &[f64]) -> f64 {
+        let gain = |noises: &[Noise]| {
+            let best = |with: bool| {
+                let ln = |noise: &Noise| {
+                    let y = self.whitened(residual, *noise);
+                    let x = self.whitened(on, *noise);
+                    let one = self.whitened(&vec![1.0; on.len()], *noise);
+                    let columns = if with { vec![one, x] } else { vec![one] };
+                    let left = crate::twin::linear::least_squares(&columns, &y).rss;
+                    let rows = count(y.len());
+                    let ln_determinant = noise.ln_determinant(self.rows.len(), self.blocks.len());
+                    -0.5 * self.tempering * (rows * (left.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
+                };
+                noises.iter().map(ln).fold(f64::NEG_INFINITY, f64::max)
+            };
+            best(true) - best(false)
+        };
+        let bounded = Noise::grid(inputs.median_block(), inputs.period_s);
+        let slow = Noise::grid(f64::INFINITY, inputs.period_s);
+        (gain(&slow) - gain(&bounded)).min(0.0)
+    }
+
     fn flat(&self, gram: &Array2<f64>, share: f64) -> f64 {
         let trace: f64 = (0..self.tangents).map(|index| gram[[index, index]]).sum();
         share * trace / count(self.tangents.max(1))
@@ -176,7 +201,7 @@ impl Comparison<'_> {
     }
 
     /// Ridges of the tangents and of the levels of the runs.
-    fn fixed_ridge(&self, gram: &Array2<f64>, variance: f64) -> Vec<f64> {
+    pub(super) fn fixed_ridge(&self, gram: &Array2<f64>, variance: f64) -> Vec<f64> {
         let flat = self.flat(gram, FLAT).max(f64::MIN_POSITIVE);
         let level = variance / (RUN_LEVEL * self.size).powi(2);
         (0..self.first()).map(|index| if index < self.tangents { flat } else { level }).collect()
@@ -299,20 +324,6 @@ impl Comparison<'_> {
             at += size;
         }
         Solved { tangents, members: of_members }
-    }
-
-    /// Sum of squares that a solution leaves in this Gram matrix.
-    pub(super) fn left_by(&self, gram: &Array2<f64>, members: &[(usize, usize)], solved: &Solved) -> f64 {
-        let last = gram.nrows() - 1;
-        let mut all: Vec<usize> = (0..self.tangents).collect();
-        let mut w = solved.tangents.clone();
-        for ((variant, _), own) in members.iter().zip(&solved.members) {
-            all.extend(self.columns(*variant));
-            w.extend(own);
-        }
-        let y = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        let w = Array1::from(w);
-        gram[[last, last]] - 2.0 * w.dot(&y) + w.dot(&block(gram, &all, &all).dot(&w))
     }
 }
 

@@ -1,28 +1,25 @@
 //! The Gram matrix of a stage: inner products of the baseline's tangents, the levels of the runs, every column of the bank
-//! and the output, whitened for one noise, kept for each inner part of the fitted rows.
+//! and the output, whitened for one noise.
 //!
-//! Every hypothesis is a Schur complement of the sum of the parts; leaving a part out is a difference.
+//! Every hypothesis is a Schur complement of it. For the inner test the columns of one hypothesis alone are whitened and
+//! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
 
 use super::algebra::{add_gram, mirror};
 use super::bank::Bank;
 use super::inputs::Inputs;
 use super::noise::Noise;
 use crate::statistics::{count, rms};
-use ndarray::{Array2, ShapeBuilder, s};
+use ndarray::{Array2, ShapeBuilder};
 use std::ops::Range;
 
-/// Inner parts of the fitted rows.
-pub(super) const PARTS: usize = 3;
 /// Independent rows beyond which more rows do not make a form of a law truer: evidence is tempered there.
 const ROWS_OF_A_FORM: f64 = 3000.0;
 
 /// What is compared: the recorded output less the refitted simulation, its tangents and the bank, over the fitted rows.
 pub(super) struct Comparison<'a> {
     pub(super) bank: &'a Bank,
-    /// Fitted rows, those of each inner part together.
+    /// Fitted rows in order.
     pub(super) rows: Vec<usize>,
-    /// Where the rows of each inner part stand in `rows`.
-    parts: Vec<Range<usize>>,
     /// Stretches of unbroken noise, as places in `rows`.
     pub(super) blocks: Vec<Range<usize>>,
     /// Noise of each row relative to the ordinary one.
@@ -45,7 +42,6 @@ pub(super) struct Comparison<'a> {
 pub(super) struct Gram {
     pub(super) noise: Noise,
     pub(super) whole: Array2<f64>,
-    pub(super) parts: Vec<Array2<f64>>,
 }
 
 /// What a comparison is made from, besides the bank.
@@ -60,15 +56,13 @@ pub(super) struct Compared<'a> {
 impl<'a> Comparison<'a> {
     /// Compares over the fitted rows.
     pub(super) fn new(inputs: &Inputs<'_>, bank: &'a Bank, of: &Compared<'_>) -> Self {
-        let (rows, parts) = ordered(inputs);
+        let rows: Vec<usize> = inputs.taken(false).collect();
         let mut blocks: Vec<Range<usize>> = Vec::new();
-        for part in &parts {
-            for at in part.clone() {
-                let goes_on = at > part.start && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
-                match blocks.last_mut() {
-                    Some(last) if goes_on => last.end = at + 1,
-                    _ => blocks.push(at..at + 1),
-                }
+        for at in 0..rows.len() {
+            let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
+            match blocks.last_mut() {
+                Some(last) if goes_on => last.end = at + 1,
+                _ => blocks.push(at..at + 1),
             }
         }
         let recorded: Vec<f64> = rows.iter().map(|row| of.recorded[*row]).collect();
@@ -80,7 +74,6 @@ impl<'a> Comparison<'a> {
         fixed.extend(run_levels(inputs));
         Self {
             bank,
-            parts,
             blocks,
             scale: rows.iter().map(|row| of.scale[*row]).collect(),
             fixed,
@@ -112,6 +105,11 @@ impl<'a> Comparison<'a> {
     /// Levels of the runs.
     pub(super) fn levels(&self) -> Range<usize> {
         self.tangents..self.fixed.len()
+    }
+
+    /// Tangents of the baseline, levels of the runs and the output, as they stand in the Gram matrix.
+    pub(super) fn fixed_and_output(&self) -> (&[Vec<f64>], &[f64]) {
+        (&self.fixed, &self.output)
     }
 
     /// A tangent of the baseline, of the size it has here.
@@ -147,40 +145,11 @@ impl<'a> Comparison<'a> {
     pub(super) fn gram_of(&self, noise: Noise, takes: impl Fn(usize) -> bool) -> Gram {
         let tall = self.whole(noise, takes);
         let size = tall.ncols();
-        let of_part = |part: &Range<usize>| {
-            let mut gram = Array2::zeros((size, size));
-            add_gram(&mut gram, tall.slice(s![part.clone(), ..]));
-            mirror(&mut gram);
-            gram
-        };
-        let parts: Vec<Array2<f64>> = self.parts.iter().map(of_part).collect();
-        let whole = parts.iter().skip(1).fold(parts[0].clone(), |sum, part| sum + part);
-        Gram { noise, whole, parts }
+        let mut whole = Array2::zeros((size, size));
+        add_gram(&mut whole, tall.view());
+        mirror(&mut whole);
+        Gram { noise, whole }
     }
-
-    /// Rows of an inner part.
-    pub(super) fn part_rows(&self, part: usize) -> impl Iterator<Item = usize> + '_ {
-        self.rows[self.parts[part].clone()].iter().copied()
-    }
-}
-
-/// Fitted rows, those of each inner part together: every third fitted unit belongs to the same part.
-fn ordered(inputs: &Inputs<'_>) -> (Vec<usize>, Vec<Range<usize>>) {
-    let mut number = Vec::new();
-    let mut next = 0;
-    let units = inputs.unit.last().map_or(0, |last| last + 1);
-    for unit in 0..units {
-        number.push(next % PARTS);
-        next += usize::from(!inputs.held.contains(&unit));
-    }
-    let mut rows = Vec::new();
-    let mut parts = Vec::new();
-    for part in 0..PARTS {
-        let start = rows.len();
-        rows.extend(inputs.taken(false).filter(|row| number[inputs.unit[*row]] == part));
-        parts.push(start..rows.len());
-    }
-    (rows, parts)
 }
 
 fn unit(column: &[f64], rows: &[usize]) -> Vec<f64> {

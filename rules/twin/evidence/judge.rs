@@ -1,7 +1,8 @@
 //! From explanations to an answer: what is reported, with which names, and what it contributes where.
 
 use super::decision::THRESHOLDS;
-use super::gram::{Comparison, PARTS};
+use super::gram::Comparison;
+use super::inner::Inner;
 use super::inputs::Inputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, Setting, grouped};
@@ -13,9 +14,6 @@ use std::collections::BTreeMap;
 
 /// What has no name.
 pub(super) const UNKNOWN: &str = "unknown";
-/// Stretches over which errors are paired, s, and rows of one at least.
-const PAIRED_S: f64 = 15.0;
-const PAIRED_ROWS: f64 = 10.0;
 /// Groups that are looked at.
 const GROUPS: usize = 8;
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
@@ -74,13 +72,77 @@ impl Judge<'_> {
         let near = groups.iter().take(GROUPS).filter(|group| !group.names.is_empty());
         let mut debug = debug;
         for group in near.take_while(|group| group.ln > first.ln - THRESHOLDS.looked_at) {
-            let gain = self.inner_gain(group.best);
-            debug.push_str(&format!("\ninner {gain:.2}"));
-            if gain > THRESHOLDS.inner_gain {
-                return self.named(group, &groups, 2.0 * (group.ln - nothing), debug);
+            let (kept, gain) = self.carried_over(group.best);
+            debug.push_str(&format!("\ninner {gain:.2} keeps {} of {}", kept.len(), group.best.members.len()));
+            if kept.is_empty() || gain <= THRESHOLDS.inner_gain {
+                continue;
             }
+            let information = 2.0 * (group.ln - nothing);
+            return match self.not_withdrawn(self.less(group.best, &kept)) {
+                Some(best) => self.named(&best, &groups, information, debug),
+                None => self.nothing(format!("{debug}; withdrawn: the held-out error does not fall")),
+            };
         }
         self.nothing(format!("{debug}; inner parts gain nothing"))
+    }
+
+    /// The members that carry over to fitted units which took no part in their sizes, and what they gain there together:
+    /// as long as one does not, the one that costs most goes.
+    fn carried_over(&self, of: &Explanation) -> (Vec<usize>, f64) {
+        let inner = Inner::new(self.inputs, self.comparison, &self.settings[of.noise], &of.members);
+        let mut kept: Vec<usize> = (0..of.members.len()).collect();
+        while kept.len() > 1 {
+            let without = |member: usize| kept.iter().copied().filter(|other| *other != member).collect::<Vec<_>>();
+            let gains = kept.iter().map(|member| (inner.gain(&kept, &without(*member)), *member));
+            let Some((gain, worst)) = gains.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+            if gain > 0.0 {
+                break;
+            }
+            kept = without(worst);
+        }
+        let gain = inner.gain(&kept, &[]);
+        (kept, gain)
+    }
+
+    /// Rows that took no part only withdraw: as long as their error does not fall, the member goes whose absence leaves the
+    /// least; `None` where nothing is left.
+    fn not_withdrawn(&self, mut best: Explanation) -> Option<Explanation> {
+        let before = self.held_out_square(&self.inputs.simulated);
+        let after = |of: &Explanation| self.held_out_square(&self.contributions(of).0);
+        if before <= 0.0 {
+            return Some(best);
+        }
+        while after(&best) >= before {
+            let size = best.members.len();
+            if size < 2 {
+                return None;
+            }
+            let one_less = (0..size).map(|gone| {
+                let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
+                self.less(&best, &kept)
+            });
+            best = one_less.map(|less| (after(&less), less)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        }
+        Some(best)
+    }
+
+    fn held_out_square(&self, total: &[f64]) -> f64 {
+        let recorded = self.inputs.scene.recorded();
+        let rows = (0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]);
+        rows.map(|row| (recorded[row] - total[row]).powi(2)).sum()
+    }
+
+    /// An explanation with some of its members only.
+    pub(super) fn less(&self, of: &Explanation, kept: &[usize]) -> Explanation {
+        let mut less = Explanation {
+            members: kept.iter().map(|member| of.members[*member]).collect(),
+            noise: of.noise,
+            ln: of.ln,
+            claims: kept.iter().map(|member| of.claims[*member].clone()).collect(),
+            names: Vec::new(),
+        };
+        less.names = super::posterior::names(self.second, &less, self.naming);
+        less
     }
 
     fn nothing(&self, debug: String) -> Answer {
@@ -97,8 +159,9 @@ impl Judge<'_> {
     }
 
     /// Verdict and names of a group that holds.
-    fn named(&self, group: &Group<'_>, groups: &[Group<'_>], information: f64, debug: String) -> Answer {
-        let (after, contributions) = self.contributions(group.best);
+    fn named(&self, best: &Explanation, groups: &[Group<'_>], information: f64, debug: String) -> Answer {
+        let ln = groups.iter().find(|group| *group.names == best.names).map_or(best.ln, |group| group.ln);
+        let (after, contributions) = self.contributions(best);
         let remaining: Vec<Named> =
             contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
         let energy = |x: &[f64]| self.inputs.taken(false).map(|row| x[row] * x[row]).sum::<f64>();
@@ -130,22 +193,22 @@ impl Judge<'_> {
             debug,
         };
         if answer.names.is_empty() || unknown > THRESHOLDS.unknown_share {
-            answer.leave_unnamed(groups, group.ln);
+            answer.leave_unnamed(groups, best.ln);
             return answer;
         }
-        self.judge_names(&mut answer, group, groups);
+        self.judge_names(&mut answer, (best, ln), groups);
         answer
     }
 
     /// Explained or ambiguous, and what stands beside the names.
-    fn judge_names(&self, answer: &mut Answer, group: &Group<'_>, groups: &[Group<'_>]) {
+    fn judge_names(&self, answer: &mut Answer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
         let mass = |name: &str| {
             let of = |g: &&Group<'_>| g.names.iter().any(|n| n.as_deref() == Some(name));
             groups.iter().filter(of).map(|g| g.ln.exp()).sum::<f64>()
         };
         let alone = |name: &String| mass(name) >= THRESHOLDS.alone;
         let mut beside: Vec<String> = Vec::new();
-        for other in groups.iter().filter(|other| other.ln > group.ln - THRESHOLDS.beside) {
+        for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
             for name in other.names.iter().flatten().filter(|name| !answer.names.contains(name)) {
                 if !beside.contains(name) {
                     beside.push(name.clone());
@@ -158,13 +221,13 @@ impl Judge<'_> {
         } else if beside.is_empty() {
             let sure: Vec<String> = answer.names.iter().filter(|name| alone(name)).cloned().collect();
             if sure.is_empty() {
-                answer.leave_unnamed(groups, group.ln);
+                answer.leave_unnamed(groups, ln);
                 return;
             }
             answer.names = sure;
             answer.verdict = Verdict::Explained;
         }
-        let class = self.class(answer, group);
+        let class = self.class(answer, best);
         if !class.is_empty() {
             answer.verdict = Verdict::Ambiguous;
         }
@@ -181,9 +244,9 @@ impl Judge<'_> {
     }
 
     /// Names whose law costs little in the place of a member.
-    fn class(&self, answer: &Answer, group: &Group<'_>) -> Vec<(String, String)> {
+    fn class(&self, answer: &Answer, best: &Explanation) -> Vec<(String, String)> {
         let (comparison, gram) = self.first;
-        let variance = self.settings[group.best.noise].saturated.variance;
+        let variance = self.settings[best.noise].saturated.variance;
         let nats = 0.5 * comparison.tempering / variance;
         let mut class = Vec::new();
         for (name, contribution) in &answer.contributions {
@@ -315,51 +378,6 @@ impl Judge<'_> {
             left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);
         }
         left
-    }
-
-    /// By how much an explanation whose sizes come from the other inner parts lowers the error in each, in the metric of
-    /// the noise: the paired sum over stretches in units of its own deviation.
-    fn inner_gain(&self, of: &Explanation) -> f64 {
-        let setting = &self.settings[of.noise];
-        let variance = setting.saturated.variance;
-        let mut before = vec![0.0; self.inputs.rows];
-        let mut after = vec![0.0; self.inputs.rows];
-        for part in 0..PARTS {
-            let others = &setting.gram.whole - &setting.gram.parts[part];
-            let with = self.comparison.solve(&others, variance, &of.members);
-            let without = self.comparison.solve(&others, variance, &[]);
-            for row in self.comparison.part_rows(part) {
-                let base = |w: &[f64]| {
-                    let tangents = w.iter().enumerate().map(|(index, w)| w * self.comparison.tangent(index)[row]);
-                    self.inputs.simulated[row] + tangents.sum::<f64>()
-                };
-                let members = of.members.iter().zip(&with.members);
-                let added: f64 = members.map(|((variant, _), w)| self.value(*variant, w, row)).sum();
-                before[row] = self.recorded[row] - base(&without.tangents);
-                after[row] = self.recorded[row] - base(&with.tangents) - added;
-            }
-        }
-        self.paired(&before, &after, setting.gram.noise)
-    }
-
-    /// The paired gain of one residual over another.
-    fn paired(&self, before: &[f64], after: &[f64], noise: super::noise::Noise) -> f64 {
-        let (before, after) = (self.comparison.whitened(before, noise), self.comparison.whitened(after, noise));
-        let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
-        let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
-        for ((row, before), after) in self.comparison.rows.iter().zip(&before).zip(&after) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
-            let number = (count(*row) / stretch) as usize;
-            *gained.entry(number).or_default() += before * before - after * after;
-        }
-        let sum: f64 = gained.values().sum();
-        let squares: f64 = gained.values().map(|x| x * x).sum();
-        sum / (squares.sqrt() + 1e-30)
-    }
-
-    fn value(&self, variant: usize, w: &[f64], row: usize) -> f64 {
-        let columns = &self.second.bank.columns[self.second.bank.variants[variant].columns.clone()];
-        columns.iter().zip(w).map(|(column, w)| w * column[row]).sum()
     }
 
     fn debug(&self, groups: &[Group<'_>]) -> String {

@@ -18,6 +18,7 @@ mod evidence;
 mod families;
 mod gram;
 mod hidden;
+mod inner;
 mod inputs;
 mod judge;
 mod naming;
@@ -30,7 +31,7 @@ mod settings;
 mod told;
 
 use super::diagnose::Case;
-use super::diagnosis::{Diagnosis, Verdict};
+use super::diagnosis::Diagnosis;
 use super::model::Model;
 use super::verdicts::cannot_tell;
 use adapters::Recording;
@@ -70,8 +71,7 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
     let inputs = Inputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
     let bank = families::bank(&inputs, model);
     let outliers = outliers(&inputs, &bank, &baseline.tangents);
-    let mut answer = answer(&inputs, &bank, &baseline, &outliers);
-    withdraw(&inputs, &mut answer);
+    let answer = answer(&inputs, &bank, &baseline, &outliers);
     let ordinary = outliers.ordinary;
     Ok(told::Told { case: &mut case, inputs: &inputs, baseline: &baseline, answer, ordinary }.diagnosis())
 }
@@ -174,7 +174,8 @@ fn add_sequences(
             let x = first.bank.contribution(&first.bank.variants[*variant], w);
             left.iter_mut().zip(&x).for_each(|(left, x)| *left -= x);
         }
-        let Some(sequence) = hidden::sequence(inputs, &left, &outliers.scale, noise) else { continue };
+        let Some(mut sequence) = hidden::sequence(inputs, &left, &outliers.scale, noise) else { continue };
+        sequence.ln += first.slow_noise(inputs, &left, &sequence.on);
         if known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
             continue;
         }
@@ -205,24 +206,5 @@ fn add_sequence(inputs: &Inputs<'_>, second: &mut Second, sequence: hidden::Sequ
         let top = inputs.taken(false).map(|row| cut[row].abs()).fold(1e-12, f64::max);
         let regime = inputs.column(|row| sequence.on[row] * cut[row] / top);
         second.add(inputs, named("coolant_regime"), label, regime, sequence.ln - 1.0);
-    }
-}
-
-/// Rows that took no part only withdraw: where their error does not fall, nothing is reported.
-fn withdraw(inputs: &Inputs<'_>, answer: &mut Answer) {
-    let recorded = inputs.scene.recorded();
-    let error = |total: &[f64]| -> f64 {
-        let rows = (0..inputs.rows).filter(|row| inputs.held_out[*row]);
-        rows.map(|row| (recorded[row] - total[row]).powi(2)).sum()
-    };
-    let (before, after) = (error(&inputs.simulated), error(&answer.after));
-    if !answer.names.is_empty() && before > 0.0 && after >= before {
-        answer.verdict = Verdict::NoMismatch;
-        answer.names.clear();
-        answer.alternatives.clear();
-        answer.contributions.clear();
-        answer.remaining.clear();
-        answer.after = inputs.simulated.clone();
-        answer.debug.push_str("; withdrawn: the held-out error does not fall");
     }
 }

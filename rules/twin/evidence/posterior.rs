@@ -121,7 +121,7 @@ fn claims(
 }
 
 /// The names of a set.
-fn names(second: &Second, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
+pub(super) fn names(second: &Second, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
     let mut names: Vec<Option<String>> = Vec::new();
     for ((variant, _), claim) in explanation.members.iter().zip(&explanation.claims) {
         match (second.bank.variants[*variant].kind(), claim) {

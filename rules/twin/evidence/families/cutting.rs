@@ -6,7 +6,7 @@ use crate::twin::evidence::bank::{Bank, Family, Since};
 use crate::twin::evidence::inputs::Inputs;
 
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
-const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0);
+const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue();
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
 const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
 const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
