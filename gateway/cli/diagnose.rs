@@ -7,6 +7,15 @@ use rules::physics::explain::Language;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
 
+/// How hypotheses are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Engine {
+    /// Forms of laws one by one, by information.
+    Search,
+    /// Families of laws together, by evidence.
+    Evidence,
+}
+
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
 pub(super) struct DiagnoseArguments {
@@ -41,6 +50,9 @@ pub(super) struct DiagnoseArguments {
     /// Tell the leading hypotheses of the search on standard error.
     #[arg(long)]
     search: bool,
+    /// Which engine compares.
+    #[arg(long, value_enum, default_value_t = Engine::Search, hide = true)]
+    engine: Engine,
     /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
     lang: super::effects::Lang,
@@ -57,7 +69,11 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
         return Err(cannot_use(&unusable));
     }
     examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let mut diagnosis = twin::diagnose(&given.recording, &model, arguments.seed).map_err(|all| cannot_use(&all))?;
+    let found = match arguments.engine {
+        Engine::Search => twin::diagnose(&given.recording, &model, arguments.seed),
+        Engine::Evidence => twin::evidence::diagnose(&given.recording, &model),
+    };
+    let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);
     if arguments.search {
         eprintln!("search: {}", diagnosis.debug);

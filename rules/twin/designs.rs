@@ -79,7 +79,7 @@ pub fn designs(scene: &Scene, frame: &Frame, model: &Model) -> Vec<Design> {
 /// The same of some kinds of the catalogue only.
 pub(super) fn designs_of(scene: &Scene, frame: &Frame, model: &Model, takes: impl Fn(&str) -> bool) -> Vec<Design> {
     let mut all = Vec::new();
-    let recursive = reads_output(model) || repeats_output(model, scene);
+    let recursive = shifts_time_in_vain(model, scene);
     for effect in CATALOGUE.iter().filter(|effect| takes(effect.doc().kind)) {
         let shifts_time = ["clock_lag", "meter_window"].contains(&effect.doc().kind);
         if wanted(*effect, model) && !(recursive && shifts_time) {
@@ -87,6 +87,11 @@ pub(super) fn designs_of(scene: &Scene, frame: &Frame, model: &Model, takes: imp
         }
     }
     all
+}
+
+/// Would a shift in time explain anything of this model and mean nothing?
+pub(super) fn shifts_time_in_vain(model: &Model, scene: &Scene) -> bool {
+    reads_output(model) || repeats_output(model, scene)
 }
 
 /// Does the model predict the output from its own past? Then a shift in time explains anything and means nothing.
@@ -198,12 +203,7 @@ const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// A user's hypothesis: the law at its nominal parameters, and its derivatives by them, as columns.
 fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
-    let columns: Vec<Vec<f64>> = match &part.body {
-        Body::Expression(_) => {
-            (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect::<Option<_>>()?
-        }
-        _ => part.columns(scene)?.into_iter().map(|(_, column)| column).collect(),
-    };
+    let columns = law_columns(part, scene)?;
     let columns: Vec<Vec<f64>> = columns.iter().map(|column| frame.reduce(column)).collect();
     let ranges = vec![ANY; columns.len()];
     Some(Design {
@@ -216,6 +216,14 @@ fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
         columns,
         ranges,
     })
+}
+
+/// The columns of a part, or of an expression its derivatives by the parameters.
+pub(super) fn law_columns(part: &Part, scene: &Scene) -> Option<Vec<Vec<f64>>> {
+    match &part.body {
+        Body::Expression(_) => (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect(),
+        _ => Some(part.columns(scene)?.into_iter().map(|(_, column)| column).collect()),
+    }
 }
 
 fn derivative(part: &Part, index: usize, scene: &Scene) -> Option<Vec<f64>> {

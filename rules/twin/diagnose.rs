@@ -84,7 +84,7 @@ pub struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    fn new(recording: &Recording, model: &'a Model) -> Result<Self, Vec<String>> {
+    pub(super) fn new(recording: &Recording, model: &'a Model) -> Result<Self, Vec<String>> {
         let mut scene = Scene::new(recording, &model.output, &model.roles).map_err(|error| vec![error.to_string()])?;
         let parts = bind(model, &scene)?;
         let Some(nominal) = simulate(&parts, &mut scene) else {
@@ -171,7 +171,7 @@ impl<'a> Case<'a> {
         self.whole.as_deref().unwrap_or(self)
     }
 
-    fn too_little(&self) -> Option<String> {
+    pub(super) fn too_little(&self) -> Option<String> {
         if self.frame.len() < ROWS_MIN {
             return Some(format!("at least {ROWS_MIN} rows with a value of {}", self.model.output));
         }

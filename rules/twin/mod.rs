@@ -27,6 +27,7 @@ pub mod diagnosis;
 mod drift;
 pub mod empirical;
 mod estimate;
+pub mod evidence;
 mod events;
 pub mod examine;
 mod excerpt;

@@ -1,0 +1,50 @@
+//! Kinds without a family of their own: the laws of the catalogue as they are; and what users have written.
+
+use crate::physics::{CATALOGUE, Effect};
+use crate::twin::designs::law_columns;
+use crate::twin::evidence::bank::{Bank, Family};
+use crate::twin::evidence::inputs::Inputs;
+use crate::twin::model::Model;
+use std::borrow::Cow;
+
+/// Forms of one kind that are tried at most: of a kind without a family, and of one with its own.
+const FORMS_MAX: usize = 24;
+const FORMS_BESIDE: usize = 8;
+
+/// Variants of every kind that has none yet, or whose own do not cover the catalogue's.
+pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+    for effect in CATALOGUE {
+        let own = bank.variants.iter().find_map(|variant| variant.family().filter(|f| f.kind == effect.doc().kind));
+        let (family, most) = match own {
+            Some(family) if family.covers => continue,
+            Some(family) => (family.clone(), FORMS_BESIDE),
+            None => (Family { sign: sign(*effect), ..Family::of(effect.doc().kind).rare(-1.0) }, FORMS_MAX),
+        };
+        let forms = effect.forms(inputs.scene);
+        let step = forms.len().div_ceil(most).max(1);
+        for form in forms.iter().step_by(step) {
+            let Some(columns) = effect.columns(inputs.scene, form) else { continue };
+            let columns = columns.into_iter().map(|(_, column)| (column, 1.0));
+            bank.of(family.clone(), format!("{form:?}")).columns(inputs, columns);
+        }
+    }
+}
+
+/// The sign that the range of its first parameter leaves a law.
+fn sign(effect: &dyn Effect) -> f64 {
+    let linear = effect.doc().parameters.iter().find(|parameter| parameter.entry == crate::physics::Entry::Linear);
+    match linear.map(|parameter| parameter.range) {
+        Some((low, _)) if low >= 0.0 => 1.0,
+        Some((_, high)) if high <= 0.0 => -1.0,
+        _ => 0.0,
+    }
+}
+
+/// The user's own hypotheses.
+pub(super) fn hypotheses(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
+    for part in &model.hypotheses {
+        let Some(columns) = law_columns(part, inputs.scene) else { continue };
+        let family = Family { kind: Cow::Owned(part.label().to_owned()), ..Family::of("") };
+        bank.of(family, "hypothesis").columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
+    }
+}

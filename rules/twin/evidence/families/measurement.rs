@@ -1,0 +1,101 @@
+//! The measurement: a zero that drifts, a gain that follows the supply, a clock that is late, a meter that averages or
+//! clips.
+
+use crate::physics::OutputKind;
+use crate::twin::evidence::bank::{Bank, Family};
+use crate::twin::evidence::inputs::Inputs;
+
+const DRIFT: Family = Family::of("zero_drift").through(&["time"]).wide();
+const VOLTAGE: Family = Family::of("supply_voltage").through(&["supply_voltage_v"]);
+const LAG: Family = Family::of("clock_lag").signed(1.0).at_edges();
+const WINDOW: Family = Family::of("meter_window").signed(1.0);
+const SATURATION: Family = Family::of("saturation").beside_catalogue().signed(1.0).rare(-1.0);
+
+/// Widths of the bumps of a drift, as shares of the recording.
+const WIDTHS: [f64; 4] = [0.5, 0.2, 0.08, 0.04];
+/// Seconds below which no zero drifts: electronics warm up over minutes.
+const DRIFT_MIN_S: f64 = 60.0;
+/// Delays in samples and in seconds.
+const SAMPLES: [f64; 8] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 15.0, 30.0];
+const SECONDS: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
+/// Longest delay, s, unless six samples are longer.
+const DELAY_MAX_S: f64 = 6.5;
+
+/// The families of the meter.
+pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+    drift(inputs, bank);
+    voltage(inputs, bank);
+    if inputs.kind != OutputKind::Displacement {
+        delays(inputs, bank);
+    }
+    for share in [0.8, 0.9, 0.95] {
+        let Some(limit) = crate::statistics::quantile(inputs.taken(false).map(|row| inputs.simulated[row]), share)
+        else {
+            continue;
+        };
+        let law = inputs.column(|row| -(inputs.simulated[row] - limit).max(0.0));
+        bank.of(SATURATION, format!("{limit:.0}")).column(inputs, law);
+    }
+}
+
+fn drift(inputs: &Inputs<'_>, bank: &mut Bank) {
+    let span_s = inputs.span_s();
+    let time = inputs.column(|row| (inputs.clock_s[row] - inputs.clock_s[0]) / span_s);
+    let several = inputs.scene.runs().len() > 3;
+    for width in WIDTHS {
+        if width * span_s <= (20.0 * inputs.period_s).max(DRIFT_MIN_S) || width < 0.2 && !several {
+            continue;
+        }
+        let bump = |centre: f64| inputs.column(|row| (-0.5 * ((time[row] - centre) / (0.9 * width)).powi(2)).exp());
+        let mut centre = -width;
+        let mut columns = Vec::new();
+        while centre < 1.0 + 2.0 * width {
+            columns.push((bump(centre), 1.0));
+            centre += width;
+        }
+        bank.of(DRIFT, width).sized().columns(inputs, columns);
+    }
+    if span_s < DRIFT_MIN_S {
+        return;
+    }
+    let linear = inputs.column(|row| time[row] - 0.5);
+    let bent = inputs.column(|row| (time[row] - 0.5).powi(2) - 1.0 / 12.0);
+    bank.of(DRIFT, "line").columns(inputs, [(linear, 1.0), (bent, 0.6)]);
+}
+
+fn voltage(inputs: &Inputs<'_>, bank: &mut Bank) {
+    let Some(voltage) = &inputs.voltage else { return };
+    if inputs.deviation_of(voltage, false) <= 0.0 {
+        return;
+    }
+    let usual = inputs.mean_of(voltage, false);
+    let relative = inputs.column(|row| voltage[row] / usual - 1.0);
+    let output = inputs.column(|row| inputs.simulated[row] * relative[row]);
+    let cut = inputs.column(|row| relative[row] * inputs.cut.as_ref().map_or(1.0, |cut| cut[row]));
+    bank.of(VOLTAGE, "").columns(inputs, [(output, 1.0), (cut, 0.4), (relative, 0.4)]);
+}
+
+/// A delay, a smoothing, and both: one causal kernel.
+fn delays(inputs: &Inputs<'_>, bank: &mut Bank) {
+    let mut taus: Vec<f64> = SAMPLES.iter().map(|k| k * inputs.period_s).chain(SECONDS).collect();
+    taus.sort_by(f64::total_cmp);
+    taus.dedup_by(|b, a| (*b - *a).abs() < 1e-6);
+    let least = if inputs.speed.is_some() { 0.3 } else { 1.0 };
+    taus.retain(|tau| *tau >= least * inputs.period_s && (*tau <= DELAY_MAX_S || *tau <= 6.0 * inputs.period_s));
+    let simulated = &inputs.simulated;
+    let less = |late: Vec<f64>| inputs.column(|row| late[row] - simulated[row]);
+    for tau_s in taus {
+        let delayed = less(inputs.lagged(simulated, tau_s));
+        let smoothed = less(inputs.smoothed(simulated, tau_s));
+        let both = less(inputs.lagged(&inputs.smoothed(simulated, 0.35 * tau_s), 0.8 * tau_s));
+        bank.of(LAG, format!("{tau_s} s")).up_to(3.0).columns(inputs, [(delayed, 1.0), (smoothed.clone(), 0.2)]);
+        bank.of(LAG, format!("{tau_s} s, smoothed")).prior(-0.5).column(inputs, both);
+        if tau_s >= 0.5 * inputs.period_s {
+            bank.of(WINDOW, format!("{tau_s} s, first order")).column(inputs, smoothed);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few samples")]
+            let window = ((2.0 * tau_s / inputs.period_s).round() as usize).max(2);
+            let mean = less(inputs.averaged(simulated, window));
+            bank.of(WINDOW, format!("{tau_s} s, mean")).prior(-0.7).column(inputs, mean);
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Nameless families: whatever changes smoothly over one channel, by levels of a group, or in waves over a way.
+//!
+//! They stand for every law that nobody has written down. What they find may still get a name, when its curve is that of
+//! a named family (`naming.rs`).
+
+use super::drive::is_drive;
+use crate::physics::OutputKind;
+use crate::twin::evidence::bank::{Bank, Drawn};
+use crate::twin::evidence::inputs::Inputs;
+use crate::twin::model::Model;
+
+/// Bumps over a channel, and over one that a machine may resonate or jam along.
+const BUMPS: usize = 7;
+const FINE_BUMPS: usize = 15;
+/// Levels of a group, at most.
+const LEVELS_MAX: usize = 30;
+/// Groups that may have a level each.
+const GROUPS: [&str; 7] = ["run", "tool", "operation", "program", "part", "lot", "pass"];
+/// Waves along the way of a slide.
+const WAVES: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Words in the names of channels that are outputs measured beside this one, and inputs of nothing.
+const MEASURED: [&str; 7] = ["_power", "_current", "_load_", "torque", "force_n", "_counts", "thermal_error"];
+/// Channels that mean something in the cut only.
+const OF_THE_CUT: [&str; 9] = [
+    "depth_of_cut_mm",
+    "feed_per_rev_mm",
+    "cutting_speed_m_min",
+    "diameter_mm",
+    "pass_progress",
+    "load",
+    "torque",
+    "width_of_cut_mm",
+    "removal_rate_cm3_min",
+];
+
+/// What multiplies a curve.
+struct Carrier {
+    name: &'static str,
+    values: Vec<f64>,
+}
+
+/// A channel that a curve is drawn over.
+struct Channel {
+    name: String,
+    values: Vec<f64>,
+    fine: bool,
+}
+
+/// Adds every nameless curve.
+pub(super) fn add(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
+    let carriers = carriers(inputs);
+    for channel in channels(inputs, model) {
+        let cut_only = OF_THE_CUT.contains(&channel.name.as_str());
+        let in_cut = cut_only && inputs.engaged.is_some();
+        let coarse = bumps(inputs, &channel.values, in_cut, BUMPS);
+        let fine = if channel.fine { bumps(inputs, &channel.values, in_cut, FINE_BUMPS) } else { Vec::new() };
+        for carrier in &carriers {
+            let drawn = |shape: &'static str| Drawn { over: channel.name.clone(), times: carrier.name, shape };
+            let cuts = carrier.name == "cut" || carrier.name == "engaged";
+            let alone = inputs.engaged.is_some() && (cut_only || channel.name == "tool_age" || channel.name == "feed_mm_min");
+            if fine.len() > BUMPS + 1 && (carrier.name == "1" || cuts) && !(carrier.name == "engaged" && inputs.knows_cut) {
+                add_curve(inputs, bank, drawn("fine bumps"), &fine, carrier);
+            }
+            let slow = channel.name == "time" || channel.name.contains("temperature");
+            let skipped = carrier.name == "1" && alone
+                || carrier.name == "speed" && !slow
+                || carrier.name == "engaged" && inputs.knows_cut && !tells_in_cut(&channel.name);
+            if !skipped && !coarse.is_empty() {
+                add_curve(inputs, bank, drawn("bumps"), &coarse, carrier);
+            }
+        }
+    }
+    levels(inputs, &carriers, bank);
+    waves(inputs, bank);
+}
+
+/// Channels over which something may stand in the cut that does not grow with it.
+fn tells_in_cut(name: &str) -> bool {
+    let speeds = ["spindle_speed_rpm", "cutting_speed_m_min", "feed_per_rev_mm", "depth_of_cut_mm"];
+    speeds.contains(&name) || ["tool_age", "torque"].contains(&name)
+}
+
+fn add_curve(inputs: &Inputs<'_>, bank: &mut Bank, drawn: Drawn, curve: &[Vec<f64>], carrier: &Carrier) {
+    let columns = curve.iter().map(|bump| (inputs.column(|row| bump[row] * carrier.values[row]), 1.0));
+    bank.nameless(drawn).sized().columns(inputs, columns);
+}
+
+/// Every carrier at unit size where it acts.
+fn carriers(inputs: &Inputs<'_>) -> Vec<Carrier> {
+    let mut all = vec![Carrier { name: "1", values: vec![1.0; inputs.rows] }];
+    if inputs.engaged.is_some() {
+        all.push(Carrier { name: "engaged", values: inputs.column(|row| inputs.cutting(row)) });
+    }
+    if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
+        all.push(Carrier { name: "cut", values: cut.clone() });
+    }
+    if let Some(velocity) = inputs.velocity.as_ref().filter(|_| is_drive(inputs)) {
+        all.push(Carrier { name: "direction", values: velocity.iter().map(|v| if *v == 0.0 { 0.0 } else { v.signum() }).collect() });
+    }
+    if let Some(speed) = inputs.speed.as_ref().filter(|_| inputs.kind != OutputKind::Displacement) {
+        all.push(Carrier { name: "speed", values: speed.clone() });
+    }
+    for carrier in &mut all {
+        let acting: Vec<f64> =
+            inputs.taken(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
+        let size = crate::statistics::rms(&acting).max(f64::MIN_POSITIVE);
+        carrier.values.iter_mut().for_each(|x| *x /= size);
+    }
+    all
+}
+
+fn channels(inputs: &Inputs<'_>, model: &Model) -> Vec<Channel> {
+    let scene = inputs.scene;
+    let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
+    let is_input = |name: &str| {
+        let measured = MEASURED.iter().any(|word| name.contains(word));
+        let declared = crate::physics::Role::ALL.iter().any(|role| scene.role_name(*role) == Some(name));
+        name != scene.output() && (!measured || declared || read.contains(&name))
+    };
+    let mut all: Vec<Channel> = Vec::new();
+    let mut add = |name: &str, values: Vec<f64>, fine: bool| {
+        let spread = inputs.deviation_of(&values, false);
+        let size = inputs.mean_of(&values, false).abs() + 1.0;
+        if spread > 1e-9 * size && !all.iter().any(|known| known.name == name) {
+            all.push(Channel { name: name.to_owned(), values, fine });
+        }
+    };
+    for name in scene.column_names().filter(|name| is_input(name) && !["cutting_time_min", "engaged"].contains(name)) {
+        let fine = name.contains("speed") || name.contains("position") || name.contains("velocity");
+        add(name, scene.column(name).unwrap_or_default().to_vec(), fine && !name.contains("feed"));
+    }
+    if inputs.engaged.is_some() {
+        add("tool_age", inputs.edge_age_min.clone(), false);
+        add("pass_progress", inputs.progress.clone(), true);
+    }
+    add("time", inputs.clock_s.clone(), false);
+    if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
+        add("load", cut.clone(), false);
+        if let Some(speed) = &inputs.speed {
+            add("torque", inputs.column(|row| cut[row] / speed[row].max(30.0)), false);
+        }
+    }
+    all
+}
+
+/// Gaussian bumps on knots between the quantiles and an even spacing; levels where a channel has three values or fewer.
+fn bumps(inputs: &Inputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Vec<Vec<f64>> {
+    let sorted = inputs.sorted(values, in_cut);
+    let mut distinct = sorted.clone();
+    distinct.dedup();
+    if distinct.len() < 2 {
+        return Vec::new();
+    }
+    if distinct.len() <= 3 {
+        return distinct[1..].iter().map(|x| inputs.column(|row| f64::from(u8::from(values[row] == *x)))).collect();
+    }
+    let last = sorted.len() - 1;
+    let at = |share: f64| {
+        let place = share * crate::statistics::count(last);
+        let low = place.floor();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count lies within it")]
+        let index = low as usize;
+        sorted[index] + (place - low) * (sorted[(index + 1).min(last)] - sorted[index])
+    };
+    let step = |k: usize| crate::statistics::count(k) / crate::statistics::count(wanted - 1);
+    let mut quantiles: Vec<f64> = (0..wanted).map(|k| at(0.02 + 0.96 * step(k))).collect();
+    let spread = quantiles[wanted - 1] - quantiles[0];
+    quantiles.dedup_by(|b, a| *b - *a <= 1e-12 * spread.max(1e-9));
+    if quantiles.len() < 2 {
+        return Vec::new();
+    }
+    let (size, low) = (quantiles.len(), quantiles[0]);
+    let range = quantiles[size - 1] - low;
+    let even = |k: usize| low + range * crate::statistics::count(k) / crate::statistics::count(size - 1);
+    let knots: Vec<f64> = (0..size).map(|k| f64::midpoint(quantiles[k], even(k))).collect();
+    let least = range / crate::statistics::count(2 * wanted);
+    let width = |k: usize| {
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(size - 1));
+        ((knots[after] - knots[before]) / crate::statistics::count(after - before)).max(least)
+    };
+    (0..size)
+        .map(|k| {
+            let (centre, width) = (knots[k], width(k));
+            inputs.column(|row| (-0.5 * ((values[row] - centre) / width).powi(2)).exp())
+        })
+        .collect()
+}
+
+fn levels(inputs: &Inputs<'_>, carriers: &[Carrier], bank: &mut Bank) {
+    for group in GROUPS {
+        let Some(codes) = codes(inputs, group) else { continue };
+        let mut used: Vec<usize> = inputs.taken(false).map(|row| codes[row]).collect();
+        used.sort_unstable();
+        used.dedup();
+        if !(2..=LEVELS_MAX).contains(&used.len()) {
+            continue;
+        }
+        for carrier in carriers.iter().filter(|carrier| ["1", "cut"].contains(&carrier.name)) {
+            let of = |code: usize| inputs.column(|row| if codes[row] == code { carrier.values[row] } else { 0.0 });
+            let drawn = Drawn { over: group.to_owned(), times: carrier.name, shape: "levels" };
+            bank.nameless(drawn).columns(inputs, used.iter().map(|code| (of(*code), 1.0)));
+        }
+    }
+}
+
+/// The member of a group that each row belongs to.
+fn codes(inputs: &Inputs<'_>, group: &str) -> Option<Vec<usize>> {
+    if group == "run" {
+        return Some(inputs.run.clone());
+    }
+    let words = inputs.scene.words(group)?;
+    Some((0..inputs.rows).map(|row| words.code(row).map_or(usize::MAX, |code| code as usize)).collect())
+}
+
+fn waves(inputs: &Inputs<'_>, bank: &mut Bank) {
+    let Some(position) = &inputs.position else { return };
+    let sorted = inputs.sorted(position, false);
+    let (Some(low), Some(high)) = (sorted.first(), sorted.last()) else { return };
+    for turns in WAVES.into_iter().filter(|_| high > low) {
+        let angle = |row: usize| std::f64::consts::TAU * turns * position[row] / (high - low);
+        let columns = [(inputs.column(|row| angle(row).cos()), 1.0), (inputs.column(|row| angle(row).sin()), 1.0)];
+        let drawn = Drawn { over: "position".to_owned(), times: "1", shape: "wave" };
+        bank.nameless(drawn).columns(inputs, columns);
+    }
+}

@@ -1,0 +1,170 @@
+//! The Gram matrix of a stage: inner products of the baseline's tangents, the levels of the runs, every column of the bank
+//! and the output, whitened for one noise.
+//!
+//! Every hypothesis is a Schur complement of it. For the inner test the columns of one hypothesis alone are whitened and
+//! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
+
+use super::algebra::{add_gram, mirror};
+use super::bank::Bank;
+use super::inputs::Inputs;
+use super::noise::Noise;
+use crate::statistics::{count, rms};
+use ndarray::{Array2, ShapeBuilder};
+use std::ops::Range;
+
+/// Independent rows beyond which more rows do not make a form of a law truer: evidence is tempered there.
+const ROWS_OF_A_FORM: f64 = 3000.0;
+
+/// What is compared: the recorded output less the refitted simulation, its tangents and the bank, over the fitted rows.
+pub(super) struct Comparison<'a> {
+    pub(super) bank: &'a Bank,
+    /// Fitted rows in order.
+    pub(super) rows: Vec<usize>,
+    /// Stretches of unbroken noise, as places in `rows`.
+    pub(super) blocks: Vec<Range<usize>>,
+    /// Noise of each row relative to the ordinary one.
+    scale: Vec<f64>,
+    /// Tangents of the baseline and levels of the runs, full length.
+    fixed: Vec<Vec<f64>>,
+    /// How many tangents there are; the levels of the runs follow.
+    pub(super) tangents: usize,
+    /// Recorded less simulated, full length.
+    output: Vec<f64>,
+    /// Deviation of the recorded output.
+    pub(super) deviation: f64,
+    /// Size of the recorded output, three deviations at most.
+    pub(super) size: f64,
+    /// Share of each row that counts as evidence.
+    pub(super) tempering: f64,
+}
+
+/// The same whitened for one noise.
+pub(super) struct Gram {
+    pub(super) noise: Noise,
+    pub(super) whole: Array2<f64>,
+}
+
+/// What a comparison is made from, besides the bank.
+pub(super) struct Compared<'a> {
+    pub(super) tangents: &'a [Vec<f64>],
+    /// Recorded output with outliers cut.
+    pub(super) recorded: &'a [f64],
+    /// Noise of each row relative to the ordinary one.
+    pub(super) scale: &'a [f64],
+}
+
+impl<'a> Comparison<'a> {
+    /// Compares over the fitted rows.
+    pub(super) fn new(inputs: &Inputs<'_>, bank: &'a Bank, of: &Compared<'_>) -> Self {
+        let rows: Vec<usize> = inputs.taken(false).collect();
+        let mut blocks: Vec<Range<usize>> = Vec::new();
+        for at in 0..rows.len() {
+            let goes_on = at > 0 && inputs.block[rows[at]] == inputs.block[rows[at - 1]];
+            match blocks.last_mut() {
+                Some(last) if goes_on => last.end = at + 1,
+                _ => blocks.push(at..at + 1),
+            }
+        }
+        let recorded: Vec<f64> = rows.iter().map(|row| of.recorded[*row]).collect();
+        let middle = crate::statistics::mean(&recorded);
+        let around: Vec<f64> = recorded.iter().map(|y| y - middle).collect();
+        let deviation = rms(&around) + 1e-12;
+        let mut fixed: Vec<Vec<f64>> = of.tangents.iter().map(|tangent| unit(tangent, &rows)).collect();
+        let tangents = fixed.len();
+        fixed.extend(run_levels(inputs));
+        Self {
+            bank,
+            blocks,
+            scale: rows.iter().map(|row| of.scale[*row]).collect(),
+            fixed,
+            tangents,
+            output: of.recorded.iter().zip(&inputs.simulated).map(|(y, f)| y - f).collect(),
+            deviation,
+            size: rms(&recorded).min(3.0 * deviation),
+            tempering: (ROWS_OF_A_FORM / count(rows.len().max(1))).min(1.0),
+            rows,
+        }
+    }
+
+    /// How many columns stand before those of the bank.
+    pub(super) fn first(&self) -> usize {
+        self.fixed.len()
+    }
+
+    /// Number of the output's column.
+    pub(super) fn last(&self) -> usize {
+        self.fixed.len() + self.bank.columns.len()
+    }
+
+    /// Columns of a variant.
+    pub(super) fn columns(&self, variant: usize) -> Range<usize> {
+        let of = &self.bank.variants[variant].columns;
+        self.first() + of.start..self.first() + of.end
+    }
+
+    /// Levels of the runs.
+    pub(super) fn levels(&self) -> Range<usize> {
+        self.tangents..self.fixed.len()
+    }
+
+    /// Tangents of the baseline, levels of the runs and the output, as they stand in the Gram matrix.
+    pub(super) fn fixed_and_output(&self) -> (&[Vec<f64>], &[f64]) {
+        (&self.fixed, &self.output)
+    }
+
+    /// A tangent of the baseline, of the size it has here.
+    pub(super) fn tangent(&self, index: usize) -> &[f64] {
+        &self.fixed[index]
+    }
+
+    /// A full-length column whitened over the fitted rows.
+    pub(super) fn whitened(&self, column: &[f64], noise: Noise) -> Vec<f64> {
+        let mut white: Vec<f64> = self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect();
+        noise.whiten(&mut white, &self.blocks);
+        white
+    }
+
+    /// Every column whitened, one after the other: those before the bank, these of the bank, the output.
+    pub(super) fn whole(&self, noise: Noise, takes: impl Fn(usize) -> bool) -> Array2<f64> {
+        let of_bank = self.bank.columns.iter().enumerate().filter(|(index, _)| takes(*index)).map(|(_, c)| c);
+        let columns: Vec<&Vec<f64>> = self.fixed.iter().chain(of_bank).chain([&self.output]).collect();
+        let mut tall = Array2::zeros((self.rows.len(), columns.len()).f());
+        for (index, column) in columns.into_iter().enumerate() {
+            let white = self.whitened(column, noise);
+            tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
+        }
+        tall
+    }
+
+    /// The Gram matrix for this noise.
+    pub(super) fn gram(&self, noise: Noise) -> Gram {
+        self.gram_of(noise, |_| true)
+    }
+
+    /// The same of some columns of the bank only.
+    pub(super) fn gram_of(&self, noise: Noise, takes: impl Fn(usize) -> bool) -> Gram {
+        let tall = self.whole(noise, takes);
+        let size = tall.ncols();
+        let mut whole = Array2::zeros((size, size));
+        add_gram(&mut whole, tall.view());
+        mirror(&mut whole);
+        Gram { noise, whole }
+    }
+}
+
+fn unit(column: &[f64], rows: &[usize]) -> Vec<f64> {
+    let taken: Vec<f64> = rows.iter().map(|row| column[*row]).collect();
+    let size = rms(&taken) + 1e-30;
+    column.iter().map(|x| x / size).collect()
+}
+
+/// A level of each run with fitted rows; none where a recording has too many or too few of them to tell.
+fn run_levels(inputs: &Inputs<'_>) -> Vec<Vec<f64>> {
+    let runs = inputs.scene.runs();
+    let fitted: Vec<usize> = (0..runs.len()).filter(|run| runs[*run].clone().any(|row| inputs.fitted[row])).collect();
+    if !(2..=30).contains(&fitted.len()) {
+        return Vec::new();
+    }
+    let level = |run: &usize| inputs.column(|row| f64::from(u8::from(inputs.run[row] == *run)));
+    fitted.iter().map(level).collect()
+}

@@ -1,0 +1,237 @@
+//! Hidden sequences: something that is on or off and that nobody records, such as a pump or a chip conveyor.
+//!
+//! A residual is split into two levels with a probability of changing from row to row (a hidden Markov chain with noise
+//! that has a memory). The evidence of a sequence is the sum over all paths; rows that are held out follow the state from
+//! earlier rows only.
+
+use super::inputs::Inputs;
+use super::noise::Noise;
+use crate::statistics::{count, median, robust_deviation};
+
+/// Steps between the levels that are tried, in deviations of the residual.
+const STEPS: [f64; 3] = [1.2, 2.2, 3.5];
+/// Rounds of the fit.
+const ROUNDS: usize = 5;
+/// Squared deviations beyond which a row says no more.
+const FARTHEST: f64 = 5.0;
+/// Changes below which nothing switches, and rows that each level must have.
+const CHANGES_MIN: usize = 4;
+const ROWS_MIN: usize = 8;
+/// Longest memory of the noise from row to row.
+const PHI_MAX: f64 = 0.95;
+/// Bounds of the probability of a change.
+const CHANGE: (f64, f64) = (5e-4, 0.1);
+/// Prior of a sequence beside its evidence.
+const SEQUENCE: f64 = -2.0;
+
+/// A sequence that was found.
+pub(super) struct Sequence {
+    /// One where it is on.
+    pub(super) on: Vec<f64>,
+    /// How often it changes in the fitted rows.
+    pub(super) changes: usize,
+    /// Logarithm of the evidence of all paths over that of this one, and the prior.
+    pub(super) ln: f64,
+}
+
+struct Chain<'a> {
+    inputs: &'a Inputs<'a>,
+    /// Innovations of the residual.
+    innovations: Vec<f64>,
+    /// Memory from the row before; zero at the start of a block.
+    memory: Vec<f64>,
+}
+
+/// Two levels with what they are and how noisy.
+#[derive(Debug, Clone, Copy)]
+struct Levels {
+    low: f64,
+    step: f64,
+    deviation: f64,
+    change: f64,
+}
+
+/// The likeliest sequence in a residual; `None` where nothing switches.
+pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], noise: Noise) -> Option<Sequence> {
+    let phi = (noise.share * noise.phi).min(PHI_MAX);
+    let x = inputs.column(|row| if inputs.comparable[row] { residual[row] / scale[row] } else { 0.0 });
+    let starts = |row: usize| row == 0 || inputs.block[row] != inputs.block[row - 1];
+    let memory = inputs.column(|row| if starts(row) { 0.0 } else { phi });
+    let innovations = inputs.column(|row| x[row] - if starts(row) { 0.0 } else { memory[row] * x[row - 1] });
+    let chain = Chain { inputs, innovations, memory };
+    let deviation = inputs.deviation_of(&x, false);
+    let middle = median(inputs.taken(false).map(|row| x[row]).collect())?;
+    let mut best: Option<(f64, Vec<f64>, Levels, usize)> = None;
+    for size in STEPS {
+        for sign in [1.0, -1.0] {
+            let step = sign * size * deviation;
+            let low = if size > 1.5 { middle } else { middle - 0.5 * step };
+            let spread = robust_deviation(inputs.taken(false).map(|row| chain.innovations[row]))? + 1e-12;
+            let fitted = chain.fit(Levels { low, step, deviation: spread, change: 0.01 });
+            if let Some(fitted) = fitted
+                && best.as_ref().is_none_or(|best| fitted.0 > best.0)
+            {
+                best = Some(fitted);
+            }
+        }
+    }
+    let (_, mut on, levels, changes) = best?;
+    if changes < CHANGES_MIN {
+        return None;
+    }
+    // When something changes has to be told change by change: what that costs no path can save.
+    let rows = count(inputs.taken(false).count());
+    let told = -count(changes) * (rows / count(changes)).ln();
+    let ln = chain.evidence(&on, levels).min(told) + SEQUENCE;
+    chain.follow(&mut on, levels);
+    Some(Sequence { on, changes, ln })
+}
+
+impl Chain<'_> {
+    /// Log likelihoods of a row for (now, before) = (off, off), (off, on), (on, off), (on, on).
+    fn likelihoods(&self, row: usize, levels: Levels) -> [f64; 4] {
+        let memory = self.memory[row];
+        let z = self.innovations[row] - levels.low * (1.0 - memory);
+        let of = |shift: f64| -0.5 * ((z - shift) / levels.deviation).clamp(-FARTHEST, FARTHEST).powi(2);
+        let step = levels.step;
+        [of(0.0), of(-step * memory), of(step), of(step - step * memory)]
+    }
+
+    /// Levels and the likeliest path, in turns.
+    fn fit(&self, start: Levels) -> Option<(f64, Vec<f64>, Levels, usize)> {
+        let mut levels = start;
+        let mut on = Vec::new();
+        let mut changes = 0;
+        for _ in 0..ROUNDS {
+            on = self.path(levels);
+            let high = self.inputs.taken(false).filter(|row| on[*row] > 0.5).count();
+            let all = self.inputs.taken(false).count();
+            if high < ROWS_MIN || all - high < ROWS_MIN {
+                return None;
+            }
+            levels = self.levels(&on, levels);
+            changes = self.changes(&on);
+            levels.change = (count(changes + 1) / count(all)).clamp(CHANGE.0, CHANGE.1);
+        }
+        let rows = count(self.inputs.taken(false).count());
+        let loss = |row: usize| {
+            let [off, _, _, _] = self.likelihoods_on(row, &on, levels);
+            off
+        };
+        let fit: f64 = self.inputs.taken(false).map(loss).sum();
+        let told = fit - rows * levels.deviation.ln() - count(changes) * ((rows / count(changes.max(1))).ln() + 1.0);
+        Some((told, on, levels, changes))
+    }
+
+    /// The likelihood of a row on a given path, four times.
+    fn likelihoods_on(&self, row: usize, on: &[f64], levels: Levels) -> [f64; 4] {
+        let before = row.checked_sub(1).is_some_and(|before| on[before] > 0.5);
+        let all = self.likelihoods(row, levels);
+        let own = all[2 * usize::from(on[row] > 0.5) + usize::from(before)];
+        [own; 4]
+    }
+
+    fn changes(&self, on: &[f64]) -> usize {
+        let mut before = None;
+        let mut changes = 0;
+        for row in self.inputs.taken(false) {
+            changes += usize::from(before.is_some_and(|before: f64| (before - on[row]).abs() > 0.5));
+            before = Some(on[row]);
+        }
+        changes
+    }
+
+    /// The likeliest path through the fitted rows (Viterbi).
+    fn path(&self, levels: Levels) -> Vec<f64> {
+        let (turn, stay) = (levels.change.ln(), (1.0 - levels.change).ln());
+        let rows = self.inputs.rows;
+        let mut from = vec![[0_u8, 1]; rows];
+        let (mut off, mut on) = (0.0, 0.0);
+        for (row, from) in from.iter_mut().enumerate().filter(|(row, _)| self.inputs.fitted[*row]) {
+            let [off_off, off_on, on_off, on_on] = self.likelihoods(row, levels);
+            let (a, b) = (off + stay + off_off, on + turn + off_on);
+            let (c, d) = (off + turn + on_off, on + stay + on_on);
+            *from = [u8::from(b > a), u8::from(d >= c)];
+            (off, on) = (a.max(b), c.max(d));
+        }
+        let mut path = vec![0.0; rows];
+        let mut state = u8::from(off <= on);
+        for row in (0..rows).rev() {
+            path[row] = f64::from(state);
+            state = from[row][state as usize];
+        }
+        path
+    }
+
+    /// Levels and noise by least squares along a path.
+    fn levels(&self, on: &[f64], old: Levels) -> Levels {
+        let limit = 6.0 * old.deviation + old.step.abs();
+        let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let of = |row: usize| {
+            let memory = self.memory[row];
+            let before = row.checked_sub(1).map_or(0.0, |before| on[before]);
+            (1.0 - memory, on[row] - memory * before)
+        };
+        for row in self.inputs.taken(false) {
+            let ((a, b), y) = (of(row), self.innovations[row].clamp(-limit, limit));
+            (aa, ab, bb, ay, by) = (aa + a * a, ab + a * b, bb + b * b, ay + a * y, by + b * y);
+        }
+        let determinant = aa * bb - ab * ab;
+        if determinant.abs() < 1e-12 * aa * bb {
+            return old;
+        }
+        let low = (bb * ay - ab * by) / determinant;
+        let step = (aa * by - ab * ay) / determinant;
+        let left = self.inputs.taken(false).map(|row| {
+            let (a, b) = of(row);
+            self.innovations[row] - a * low - b * step
+        });
+        let deviation = robust_deviation(left).unwrap_or(old.deviation) + 1e-12;
+        Levels { low, step, deviation, change: old.change }
+    }
+
+    /// Logarithm of the sum over all paths, less that of this path.
+    fn evidence(&self, on: &[f64], levels: Levels) -> f64 {
+        let (stay, turn) = (1.0 - levels.change, levels.change);
+        let (mut off_share, mut on_share) = (0.5, 0.5);
+        let mut ln = 0.0;
+        for row in self.inputs.taken(false) {
+            let all = self.likelihoods(row, levels);
+            let top = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let [a, b, c, d] = all.map(|l| (l - top).exp());
+            let off = off_share * stay * a + on_share * turn * b;
+            let here = off_share * turn * c + on_share * stay * d;
+            let sum = off + here + 1e-300;
+            let own = self.likelihoods_on(row, on, levels)[0];
+            ln += sum.ln() + top - own;
+            (off_share, on_share) = (off / sum, here / sum);
+        }
+        ln
+    }
+
+    /// Held-out rows follow the state from earlier rows only.
+    fn follow(&self, on: &mut [f64], levels: Levels) {
+        let fitted: Vec<f64> = self.inputs.taken(false).map(|row| on[row]).collect();
+        let usual = crate::statistics::mean(&fitted);
+        let (stay, turn) = (1.0 - levels.change, levels.change);
+        let mut share = usual;
+        for row in 0..self.inputs.rows {
+            if self.inputs.fitted[row] {
+                share = on[row];
+                continue;
+            }
+            if self.memory[row] == 0.0 && (row == 0 || self.inputs.block[row] != self.inputs.block[row - 1]) {
+                share = usual;
+            }
+            let expected = share * stay + (1.0 - share) * turn;
+            on[row] = f64::from(u8::from(expected > 0.5));
+            if !self.inputs.comparable[row] {
+                continue;
+            }
+            let [a, b, c, d] = self.likelihoods(row, levels).map(f64::exp);
+            let off = (1.0 - share) * stay * a + share * turn * b;
+            let here = (1.0 - share) * turn * c + share * stay * d;
+            share = here / (off + here + 1e-300);
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The inner test: does a hypothesis whose sizes come from the other fitted units lower the error in each unit?
+//!
+//! It is asked in the metric of the noise and paired over stretches, so that slow noise, which nothing predicts, does not
+//! drown what is there. Only fitted units are asked; those that are held out stay out of it.
+
+use super::algebra::{Factor, add_gram, mirror};
+use super::evidence::SIZES;
+use super::gram::Comparison;
+use super::inputs::Inputs;
+use super::posterior::Setting;
+use crate::statistics::count;
+use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
+use std::collections::BTreeMap;
+
+/// Stretches over which errors are paired, s, and rows of one at least.
+const PAIRED_S: f64 = 15.0;
+const PAIRED_ROWS: f64 = 10.0;
+/// Inner parts, at most: more units share them in turn.
+const PARTS_MAX: usize = 12;
+
+/// The columns of one hypothesis, whitened, with their inner products in every part.
+pub(super) struct Inner<'a> {
+    comparison: &'a Comparison<'a>,
+    inputs: &'a Inputs<'a>,
+    tall: Array2<f64>,
+    parts: Vec<Vec<usize>>,
+    grams: Vec<Array2<f64>>,
+    ridge: Vec<f64>,
+    /// Columns of each member, and those that every hypothesis has.
+    members: Vec<std::ops::Range<usize>>,
+    fixed: usize,
+}
+
+impl<'a> Inner<'a> {
+    /// Prepares a hypothesis.
+    pub(super) fn new(
+        inputs: &'a Inputs<'a>,
+        comparison: &'a Comparison<'a>,
+        setting: &Setting,
+        members: &[(usize, usize)],
+    ) -> Self {
+        let (fixed, output) = comparison.fixed_and_output();
+        let mut columns: Vec<&[f64]> = fixed.iter().map(Vec::as_slice).collect();
+        let mut ridge = comparison.fixed_ridge(&setting.gram.whole, setting.saturated.variance);
+        let mut places = Vec::new();
+        for (variant, size) in members {
+            let of = &comparison.bank.variants[*variant];
+            places.push(columns.len()..columns.len() + of.relative.len());
+            columns.extend(comparison.bank.columns[of.columns.clone()].iter().map(Vec::as_slice));
+            let deviation = SIZES[*size] * comparison.deviation;
+            ridge.extend(of.relative.iter().map(|d| setting.saturated.variance / (deviation * d).powi(2)));
+        }
+        columns.push(output);
+        let mut tall = Array2::zeros((comparison.rows.len(), columns.len()).f());
+        for (index, column) in columns.into_iter().enumerate() {
+            let white = comparison.whitened(column, setting.gram.noise);
+            tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
+        }
+        let parts = parts(inputs, comparison);
+        let of_part = |part: &Vec<usize>| {
+            let mut gram = Array2::zeros((tall.ncols(), tall.ncols()));
+            add_gram(&mut gram, tall.select(Axis(0), part).view());
+            mirror(&mut gram);
+            gram
+        };
+        let grams = parts.iter().map(of_part).collect();
+        Self { comparison, inputs, tall, parts, grams, ridge, members: places, fixed: fixed.len() }
+    }
+
+    /// Gain of these members over those, in deviations of it.
+    pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> f64 {
+        let whole = self.grams.iter().skip(1).fold(self.grams[0].clone(), |sum, gram| sum + gram);
+        let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
+        let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
+        for (part, gram) in self.parts.iter().zip(&self.grams) {
+            let others = &whole - gram;
+            let (after, before) = (self.solved(&others, with), self.solved(&others, without));
+            for at in part {
+                let line = self.tall.row(*at);
+                let output = line[line.len() - 1];
+                let error = |w: &Array1<f64>| (output - line.slice(s![..line.len() - 1]).dot(w)).powi(2);
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
+                let number = (count(self.comparison.rows[*at]) / stretch) as usize;
+                *gained.entry(number).or_default() += error(&before) - error(&after);
+            }
+        }
+        let sum: f64 = gained.values().sum();
+        let squares: f64 = gained.values().map(|x| x * x).sum();
+        sum / (squares.sqrt() + 1e-30)
+    }
+
+    /// Posterior means of some members, zero for the others; a run that is left out has no level.
+    fn solved(&self, gram: &Array2<f64>, members: &[usize]) -> Array1<f64> {
+        let last = gram.nrows() - 1;
+        let own = members.iter().flat_map(|member| self.members[*member].clone());
+        let all: Vec<usize> = (0..self.fixed).chain(own).collect();
+        let mut inner = super::algebra::block(gram, &all, &all);
+        all.iter().enumerate().for_each(|(at, index)| inner[[at, at]] += self.ridge[*index]);
+        let right = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
+        let solved = Factor::of(&inner).solve(&right);
+        let mut w = Array1::zeros(last);
+        all.iter().zip(&solved).for_each(|(index, x)| w[*index] = *x);
+        w
+    }
+}
+
+/// Places of the rows of each part: the fitted units in turn.
+fn parts(inputs: &Inputs<'_>, comparison: &Comparison<'_>) -> Vec<Vec<usize>> {
+    let mut number: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    for (at, row) in comparison.rows.iter().enumerate() {
+        let next = number.len() % PARTS_MAX;
+        let part = *number.entry(inputs.unit[*row]).or_insert(next);
+        if part == parts.len() {
+            parts.push(Vec::new());
+        }
+        parts[part].push(at);
+    }
+    parts
+}

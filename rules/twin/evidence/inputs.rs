@@ -1,0 +1,334 @@
+//! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
+
+use crate::physics::drive::{is_axis_output, is_signed, rate};
+use crate::physics::{OutputKind, Role, Scene};
+use crate::statistics::{count, median};
+use crate::twin::frame::Unit;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+/// Pause between two runs whose time restarts, s: it is unknown, and short enough to keep a slow state.
+const UNKNOWN_PAUSE_S: f64 = 60.0;
+/// Periods between two rows beyond which the noise starts anew.
+const GAP_PERIODS: f64 = 6.0;
+
+/// The inputs of a recording; columns are full length, absent inputs are `None`.
+pub(super) struct Inputs<'a> {
+    pub(super) scene: &'a Scene,
+    /// Number of rows.
+    pub(super) rows: usize,
+    pub(super) period_s: f64,
+    /// Seconds on a clock that never restarts.
+    pub(super) clock_s: Vec<f64>,
+    /// Stretch of unbroken noise of each row.
+    pub(super) block: Vec<usize>,
+    /// Number of the run of each row.
+    pub(super) run: Vec<usize>,
+    /// Unit of hold-out of each row.
+    pub(super) unit: Vec<usize>,
+    /// Units that are held out.
+    pub(super) held: BTreeSet<usize>,
+    /// Rows with a recorded output and every input of the model.
+    pub(super) comparable: Vec<bool>,
+    /// Comparable rows that are fitted.
+    pub(super) fitted: Vec<bool>,
+    /// Comparable rows that are held out.
+    pub(super) held_out: Vec<bool>,
+    /// The refitted simulation.
+    pub(super) simulated: Vec<f64>,
+    /// Share of the tool in the work; `None` where nothing is cut.
+    pub(super) engaged: Option<Vec<f64>>,
+    /// Rows in the cut; every row where nothing tells.
+    pub(super) in_cut: Vec<bool>,
+    /// Spindle speed without its sign, rpm.
+    pub(super) speed: Option<Vec<f64>>,
+    /// Velocity of the axis or drive, in the unit of its column.
+    pub(super) velocity: Option<Vec<f64>>,
+    pub(super) acceleration: Option<Vec<f64>>,
+    pub(super) position: Option<Vec<f64>>,
+    pub(super) temperature: Option<Vec<f64>>,
+    pub(super) ambient: Option<Vec<f64>>,
+    pub(super) coolant_temperature: Option<Vec<f64>>,
+    pub(super) voltage: Option<Vec<f64>>,
+    pub(super) depth: Option<Vec<f64>>,
+    pub(super) width: Option<Vec<f64>>,
+    pub(super) diameter: Option<Vec<f64>>,
+    pub(super) feed: Option<Vec<f64>>,
+    pub(super) cutting_speed: Option<Vec<f64>>,
+    /// The simulated cut in the output's unit; a stand-in of constant height in the cut where the model has none.
+    pub(super) cut: Option<Vec<f64>>,
+    /// Does the model, or a role, tell how hard the cut is?
+    pub(super) knows_cut: bool,
+    /// Edge of each row, by number; zero where nobody tells.
+    pub(super) edge: Vec<usize>,
+    /// How many edges.
+    pub(super) edges: usize,
+    /// Minutes that each edge has been in the cut.
+    pub(super) edge_age_min: Vec<f64>,
+    /// Way through a pass, 0 to 1.
+    pub(super) progress: Vec<f64>,
+    /// Seconds since the pass began and until it ends; large outside.
+    pub(super) since_s: Vec<f64>,
+    pub(super) to_end_s: Vec<f64>,
+    /// What the output measures.
+    pub(super) kind: OutputKind,
+    /// Does the output belong to a feed drive?
+    pub(super) is_axis: bool,
+    /// Does it change its sign with the direction?
+    pub(super) is_signed: bool,
+}
+
+impl<'a> Inputs<'a> {
+    /// The inputs of a scene whose load and simulated output are set.
+    pub(super) fn new(scene: &'a Scene, units: &[Unit], held: &BTreeSet<usize>, comparable: Vec<bool>) -> Self {
+        let rows = scene.rows();
+        let own = |role: Role| scene.role(role).map(<[f64]>::to_vec);
+        let column = |name: &str| scene.column(name).map(<[f64]>::to_vec);
+        let mut unit = vec![0; rows];
+        units.iter().enumerate().for_each(|(index, of)| unit[of.rows.clone()].fill(index));
+        let mut run = vec![0; rows];
+        scene.runs().iter().enumerate().for_each(|(index, of)| run[of.clone()].fill(index));
+        let held_out: Vec<bool> = (0..rows).map(|row| comparable[row] && held.contains(&unit[row])).collect();
+        let fitted: Vec<bool> = (0..rows).map(|row| comparable[row] && !held_out[row]).collect();
+        let engaged = own(Role::Engaged);
+        let clock_s = clock_s(scene);
+        let mut inputs = Self {
+            scene,
+            rows,
+            period_s: scene.period_s(),
+            block: blocks(&clock_s, scene.period_s(), &unit),
+            run,
+            unit,
+            held: held.clone(),
+            simulated: scene.simulated().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
+            in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| e.iter().map(|e| *e > 0.5).collect()),
+            speed: own(Role::Speed).map(|n| n.iter().map(|n| n.abs()).collect()),
+            velocity: own(Role::Velocity).or_else(|| any_axis(scene, "_velocity_mm_min")),
+            acceleration: own(Role::Acceleration),
+            position: own(Role::Position).or_else(|| any_axis(scene, "_position_mm")),
+            temperature: own(Role::Temperature),
+            ambient: own(Role::Ambient),
+            coolant_temperature: column("coolant_temperature_c"),
+            voltage: own(Role::Voltage),
+            depth: column("depth_of_cut_mm"),
+            width: column("width_of_cut_mm"),
+            diameter: column("diameter_mm"),
+            feed: column("feed_per_rev_mm"),
+            cutting_speed: column("cutting_speed_m_min"),
+            cut: scene.load().map(<[f64]>::to_vec).filter(|cut| cut.iter().any(|x| x.abs() > 0.0)),
+            knows_cut: false,
+            edge: vec![0; rows],
+            edges: 1,
+            edge_age_min: vec![0.0; rows],
+            progress: vec![0.0; rows],
+            since_s: vec![1e9; rows],
+            to_end_s: vec![1e9; rows],
+            kind: scene.output_kind(),
+            is_axis: is_axis_output(scene),
+            is_signed: is_signed(scene),
+            engaged,
+            clock_s,
+            comparable,
+            fitted,
+            held_out,
+        };
+        inputs.take_cut();
+        inputs.take_edges();
+        inputs.take_passes();
+        inputs
+    }
+
+    fn take_cut(&mut self) {
+        self.knows_cut = self.cut.is_some();
+        if self.cut.is_none() && self.kind != OutputKind::Displacement {
+            let usual = self.scene.usual_cut();
+            self.cut = self.engaged.as_ref().map(|e| e.iter().map(|e| e * usual).collect());
+        }
+    }
+
+    fn take_edges(&mut self) {
+        if let Some(tools) = self.scene.words("tool") {
+            self.edges = tools.words().len().max(1);
+            self.edge = (0..self.rows).map(|row| tools.code(row).map_or(0, |code| code as usize)).collect();
+        }
+        if let Some(minutes) = self.scene.column("cutting_time_min") {
+            self.edge_age_min = minutes.to_vec();
+            return;
+        }
+        let mut ages = vec![0.0; self.edges];
+        for row in 0..self.rows {
+            let age = &mut ages[self.edge[row]];
+            if self.in_cut[row] {
+                *age += self.step_s(row) / 60.0;
+            }
+            self.edge_age_min[row] = *age;
+        }
+    }
+
+    fn take_passes(&mut self) {
+        for pass in self.scene.passes() {
+            let (first, last) = (self.clock_s[pass.start], self.clock_s[pass.end - 1]);
+            let whole = last - first + self.period_s;
+            for row in pass.clone() {
+                self.progress[row] = (self.clock_s[row] - first + 0.5 * self.period_s) / whole;
+                self.since_s[row] = self.clock_s[row] - first;
+                self.to_end_s[row] = last - self.clock_s[row];
+            }
+        }
+    }
+
+    /// Seconds since the row before, five periods at most.
+    pub(super) fn step_s(&self, row: usize) -> f64 {
+        let before = row.checked_sub(1).map(|before| self.clock_s[row] - self.clock_s[before]);
+        before.map_or(self.period_s, |step| step.clamp(0.0, 5.0 * self.period_s))
+    }
+
+    /// One number per row.
+    pub(super) fn column(&self, law: impl Fn(usize) -> f64) -> Vec<f64> {
+        (0..self.rows).map(law).collect()
+    }
+
+    /// One in the cut, zero outside.
+    pub(super) fn cutting(&self, row: usize) -> f64 {
+        f64::from(u8::from(self.in_cut[row]))
+    }
+
+    /// Mean over rows that are fitted (and in the cut).
+    pub(super) fn mean_of(&self, values: &[f64], in_cut: bool) -> f64 {
+        let rows: Vec<f64> = self.taken(in_cut).map(|row| values[row]).collect();
+        crate::statistics::mean(&rows)
+    }
+
+    /// Standard deviation over rows that are fitted (and in the cut).
+    pub(super) fn deviation_of(&self, values: &[f64], in_cut: bool) -> f64 {
+        let middle = self.mean_of(values, in_cut);
+        let squares: Vec<f64> = self.taken(in_cut).map(|row| (values[row] - middle).powi(2)).collect();
+        crate::statistics::mean(&squares).sqrt()
+    }
+
+    /// Values at rows that are fitted (and in the cut), sorted.
+    pub(super) fn sorted(&self, values: &[f64], in_cut: bool) -> Vec<f64> {
+        let mut taken: Vec<f64> = self.taken(in_cut).map(|row| values[row]).collect();
+        taken.sort_by(f64::total_cmp);
+        taken
+    }
+
+    /// Rows that are fitted (and in the cut).
+    pub(super) fn taken(&self, in_cut: bool) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows).filter(move |row| self.fitted[*row] && (!in_cut || self.in_cut[*row]))
+    }
+
+    /// Seconds of the whole recording.
+    pub(super) fn span_s(&self) -> f64 {
+        self.clock_s.last().map_or(0.0, |last| last - self.clock_s[0]).max(self.period_s)
+    }
+
+    /// Ranges of rows of each block.
+    pub(super) fn block_rows(&self) -> Vec<Range<usize>> {
+        let mut all: Vec<Range<usize>> = Vec::new();
+        for row in 0..self.rows {
+            match all.last_mut() {
+                Some(last) if self.block[row - 1] == self.block[row] => last.end = row + 1,
+                _ => all.push(row..row + 1),
+            }
+        }
+        all
+    }
+
+    /// Median number of fitted rows in a block that has any.
+    pub(super) fn median_block(&self) -> f64 {
+        let rows = |block: &Range<usize>| count(block.clone().filter(|row| self.fitted[*row]).count());
+        median(self.block_rows().iter().map(rows).filter(|rows| *rows > 0.0).collect()).unwrap_or(1.0)
+    }
+
+    /// `values` so many seconds ago, within the block; held before its start.
+    pub(super) fn lagged(&self, values: &[f64], delay_s: f64) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows];
+        for block in self.block_rows() {
+            let mut at = block.start;
+            for row in block.clone() {
+                let wanted = self.clock_s[row] - delay_s;
+                while at + 1 < row && self.clock_s[at + 1] <= wanted {
+                    at += 1;
+                }
+                let (early, late) = (self.clock_s[at], self.clock_s[(at + 1).min(block.end - 1)]);
+                let share = if late > early { ((wanted - early) / (late - early)).clamp(0.0, 1.0) } else { 0.0 };
+                out[row] = values[at] + share * (values[(at + 1).min(block.end - 1)] - values[at]);
+            }
+        }
+        out
+    }
+
+    /// `values` behind a first-order lag, started in each block at its first value.
+    pub(super) fn smoothed(&self, values: &[f64], tau_s: f64) -> Vec<f64> {
+        let keep = (-self.period_s / tau_s).exp();
+        let mut state = 0.0;
+        self.column_in_order(|row, first| {
+            state = if first { values[row] } else { keep * state + (1.0 - keep) * values[row] };
+            state
+        })
+    }
+
+    /// The mean over so many rows up to this one, within the block.
+    pub(super) fn averaged(&self, values: &[f64], window: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows];
+        for block in self.block_rows() {
+            for row in block.clone() {
+                let from = (row + 1).saturating_sub(window).max(block.start);
+                out[row] = crate::statistics::mean(&values[from..=row]);
+            }
+        }
+        out
+    }
+
+    /// A slow state that is carried through pauses, in which its input is zero.
+    pub(super) fn state(&self, values: &[f64], tau_s: f64, start: f64) -> Vec<f64> {
+        let mut state = start;
+        self.column_in_order(|row, _| {
+            let step_s = row.checked_sub(1).map_or(self.period_s, |before| self.clock_s[row] - self.clock_s[before]);
+            let step_s = step_s.max(self.period_s);
+            let driven_s = if step_s > GAP_PERIODS * self.period_s { self.period_s } else { step_s };
+            state *= (-(step_s - driven_s) / tau_s).exp();
+            let keep = (-driven_s / tau_s).exp();
+            state = keep * state + (1.0 - keep) * values[row];
+            state
+        })
+    }
+
+    /// Rate of change per second.
+    pub(super) fn rate(&self, values: &[f64]) -> Vec<f64> {
+        rate(self.scene, values)
+    }
+
+    fn column_in_order(&self, mut law: impl FnMut(usize, bool) -> f64) -> Vec<f64> {
+        (0..self.rows).map(|row| law(row, row == 0 || self.block[row - 1] != self.block[row])).collect()
+    }
+}
+
+fn any_axis(scene: &Scene, ending: &str) -> Option<Vec<f64>> {
+    let name = scene.column_names().find(|name| name.contains("axis") && name.ends_with(ending))?.to_owned();
+    scene.column(&name).map(<[f64]>::to_vec)
+}
+
+fn clock_s(scene: &Scene) -> Vec<f64> {
+    let time_s = scene.time_s();
+    let restarts = time_s.windows(2).any(|pair| pair[1] < pair[0] - 0.5 * scene.period_s());
+    let mut clock_s = scene.clock_s().to_vec();
+    if !restarts {
+        return clock_s;
+    }
+    // The scene's clock stands still across an unknown pause; a slow state cools in it.
+    for (number, run) in scene.runs().iter().enumerate() {
+        clock_s[run.clone()].iter_mut().for_each(|clock| *clock += count(number) * UNKNOWN_PAUSE_S);
+    }
+    clock_s
+}
+
+fn blocks(clock_s: &[f64], period_s: f64, unit: &[usize]) -> Vec<usize> {
+    let mut block = vec![0; clock_s.len()];
+    for row in 1..clock_s.len() {
+        let breaks = unit[row] != unit[row - 1] || clock_s[row] - clock_s[row - 1] > GAP_PERIODS * period_s;
+        block[row] = block[row - 1] + usize::from(breaks);
+    }
+    block
+}

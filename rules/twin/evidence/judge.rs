@@ -1,0 +1,436 @@
+//! From explanations to an answer: what is reported, with which names, and what it contributes where.
+
+use super::decision::THRESHOLDS;
+use super::gram::Comparison;
+use super::inner::Inner;
+use super::inputs::Inputs;
+use super::naming::Naming;
+use super::posterior::{Explanation, Group, Setting, grouped};
+use super::second::Second;
+use super::bank::Since;
+use crate::statistics::{count, rms};
+use crate::twin::diagnosis::Verdict;
+use std::collections::BTreeMap;
+
+/// What has no name.
+pub(super) const UNKNOWN: &str = "unknown";
+/// Groups that are looked at.
+const GROUPS: usize = 8;
+/// Squared deviations gained from which a step is taken to have begun in a held-out run.
+const BEGUN: f64 = 12.0;
+
+/// Everything a judgement reads.
+pub(super) struct Judge<'a> {
+    pub(super) inputs: &'a Inputs<'a>,
+    pub(super) comparison: &'a Comparison<'a>,
+    pub(super) second: &'a Second,
+    pub(super) settings: &'a [Setting],
+    pub(super) naming: &'a Naming<'a>,
+    /// The recorded output with outliers cut.
+    pub(super) recorded: &'a [f64],
+    /// Tangents of the baseline, full length.
+    pub(super) tangents: &'a [Vec<f64>],
+    /// Deviation of the ordinary noise.
+    pub(super) ordinary: f64,
+    /// The first-stage comparison, whose laws stand in for one another, with the Gram matrix of the likeliest noise.
+    pub(super) first: (&'a Comparison<'a>, &'a super::gram::Gram),
+}
+
+/// The answer.
+#[derive(Debug)]
+pub(super) struct Answer {
+    pub(super) verdict: Verdict,
+    /// Names, the most important first.
+    pub(super) names: Vec<String>,
+    /// Other names with the one they would replace.
+    pub(super) alternatives: Vec<(String, String)>,
+    /// The output with what is missing.
+    pub(super) after: Vec<f64>,
+    /// Contribution of each name.
+    pub(super) contributions: Vec<(String, Vec<f64>)>,
+    /// What each leaves once the baseline has been refitted.
+    pub(super) remaining: Vec<(String, Vec<f64>)>,
+    /// Twice the logarithm of the evidence over nothing.
+    pub(super) information: f64,
+    /// For engineers.
+    pub(super) debug: String,
+}
+
+/// A contribution under a name.
+type Named = (String, Vec<f64>);
+
+impl Judge<'_> {
+    /// The answer.
+    pub(super) fn answer(&self, all: &[Explanation]) -> Answer {
+        let groups = grouped(all);
+        let nothing = groups.iter().find(|group| group.names.is_empty()).map_or(-60.0, |group| group.ln);
+        let debug = self.debug(&groups);
+        let Some(first) = groups.first().filter(|group| !group.names.is_empty()) else { return self.nothing(debug) };
+        if nothing.exp() >= THRESHOLDS.nothing_max {
+            return self.nothing(debug);
+        }
+        let near = groups.iter().take(GROUPS).filter(|group| !group.names.is_empty());
+        let mut debug = debug;
+        for group in near.take_while(|group| group.ln > first.ln - THRESHOLDS.looked_at) {
+            let (kept, gain) = self.carried_over(group.best);
+            debug.push_str(&format!("\ninner {gain:.2} keeps {} of {}", kept.len(), group.best.members.len()));
+            if kept.is_empty() || gain <= THRESHOLDS.inner_gain {
+                continue;
+            }
+            let information = 2.0 * (group.ln - nothing);
+            return match self.not_withdrawn(self.less(group.best, &kept)) {
+                Some(best) => self.named(&best, &groups, information, debug),
+                None => self.nothing(format!("{debug}; withdrawn: the held-out error does not fall")),
+            };
+        }
+        self.nothing(format!("{debug}; inner parts gain nothing"))
+    }
+
+    /// The members that carry over to fitted units which took no part in their sizes, and what they gain there together:
+    /// as long as one does not, the one that costs most goes.
+    fn carried_over(&self, of: &Explanation) -> (Vec<usize>, f64) {
+        let inner = Inner::new(self.inputs, self.comparison, &self.settings[of.noise], &of.members);
+        let mut kept: Vec<usize> = (0..of.members.len()).collect();
+        while kept.len() > 1 {
+            let without = |member: usize| kept.iter().copied().filter(|other| *other != member).collect::<Vec<_>>();
+            let gains = kept.iter().map(|member| (inner.gain(&kept, &without(*member)), *member));
+            let Some((gain, worst)) = gains.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+            if gain > 0.0 {
+                break;
+            }
+            kept = without(worst);
+        }
+        let gain = inner.gain(&kept, &[]);
+        (kept, gain)
+    }
+
+    /// Rows that took no part only withdraw: as long as their error does not fall, the member goes whose absence leaves the
+    /// least; `None` where nothing is left.
+    fn not_withdrawn(&self, mut best: Explanation) -> Option<Explanation> {
+        let before = self.held_out_square(&self.inputs.simulated);
+        let after = |of: &Explanation| self.held_out_square(&self.contributions(of).0);
+        if before <= 0.0 {
+            return Some(best);
+        }
+        while after(&best) >= before {
+            let size = best.members.len();
+            if size < 2 {
+                return None;
+            }
+            let one_less = (0..size).map(|gone| {
+                let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
+                self.less(&best, &kept)
+            });
+            best = one_less.map(|less| (after(&less), less)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        }
+        Some(best)
+    }
+
+    fn held_out_square(&self, total: &[f64]) -> f64 {
+        let recorded = self.inputs.scene.recorded();
+        let rows = (0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]);
+        rows.map(|row| (recorded[row] - total[row]).powi(2)).sum()
+    }
+
+    /// An explanation with some of its members only.
+    pub(super) fn less(&self, of: &Explanation, kept: &[usize]) -> Explanation {
+        let mut less = Explanation {
+            members: kept.iter().map(|member| of.members[*member]).collect(),
+            noise: of.noise,
+            ln: of.ln,
+            claims: kept.iter().map(|member| of.claims[*member].clone()).collect(),
+            names: Vec::new(),
+        };
+        less.names = super::posterior::names(self.second, &less, self.naming);
+        less
+    }
+
+    fn nothing(&self, debug: String) -> Answer {
+        Answer {
+            verdict: Verdict::NoMismatch,
+            names: Vec::new(),
+            alternatives: Vec::new(),
+            after: self.inputs.simulated.clone(),
+            contributions: Vec::new(),
+            remaining: Vec::new(),
+            information: 0.0,
+            debug,
+        }
+    }
+
+    /// Verdict and names of a group that holds.
+    fn named(&self, best: &Explanation, groups: &[Group<'_>], information: f64, debug: String) -> Answer {
+        let ln = groups.iter().find(|group| *group.names == best.names).map_or(best.ln, |group| group.ln);
+        let (after, contributions) = self.contributions(best);
+        let remaining: Vec<Named> =
+            contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
+        let energy = |x: &[f64]| self.inputs.taken(false).map(|row| x[row] * x[row]).sum::<f64>();
+        let sum = sum_of(&remaining, self.inputs.rows);
+        let whole = energy(&sum).max(f64::MIN_POSITIVE);
+        let share: BTreeMap<&str, f64> =
+            remaining.iter().map(|(name, x)| (name.as_str(), energy(x) / whole)).collect();
+        let rows = count(self.comparison.rows.len());
+        let small = |x: &[f64]| {
+            let size = (energy(x) / rows).sqrt();
+            size < THRESHOLDS.size_noise * self.ordinary && size < THRESHOLDS.size_output * self.comparison.size
+        };
+        let mut kept: Vec<&Named> =
+            remaining.iter().filter(|(name, x)| share[name.as_str()] > THRESHOLDS.name_energy && !small(x)).collect();
+        kept.sort_by(|a, b| share[b.0.as_str()].total_cmp(&share[a.0.as_str()]));
+        if kept.is_empty() {
+            return self.nothing(format!("{debug}; too small"));
+        }
+        let names: Vec<String> = kept.iter().map(|(name, _)| name.clone()).filter(|name| name != UNKNOWN).collect();
+        let unknown = share.get(UNKNOWN).copied().unwrap_or(0.0);
+        let mut answer = Answer {
+            verdict: Verdict::Unexplained,
+            names,
+            alternatives: Vec::new(),
+            after,
+            contributions,
+            remaining,
+            information,
+            debug,
+        };
+        if answer.names.is_empty() || unknown > THRESHOLDS.unknown_share {
+            answer.leave_unnamed(groups, best.ln);
+            return answer;
+        }
+        self.judge_names(&mut answer, (best, ln), groups);
+        answer
+    }
+
+    /// Explained or ambiguous, and what stands beside the names.
+    fn judge_names(&self, answer: &mut Answer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
+        let mass = |name: &str| {
+            let of = |g: &&Group<'_>| g.names.iter().any(|n| n.as_deref() == Some(name));
+            groups.iter().filter(of).map(|g| g.ln.exp()).sum::<f64>()
+        };
+        let alone = |name: &String| mass(name) >= THRESHOLDS.alone;
+        let mut beside: Vec<String> = Vec::new();
+        for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
+            for name in other.names.iter().flatten().filter(|name| !answer.names.contains(name)) {
+                if !beside.contains(name) {
+                    beside.push(name.clone());
+                }
+            }
+        }
+        answer.verdict = if answer.names.iter().all(alone) { Verdict::Explained } else { Verdict::Ambiguous };
+        if answer.verdict == Verdict::Explained {
+            beside.retain(|name| mass(name) > 0.1);
+        } else if beside.is_empty() {
+            let sure: Vec<String> = answer.names.iter().filter(|name| alone(name)).cloned().collect();
+            if sure.is_empty() {
+                answer.leave_unnamed(groups, ln);
+                return;
+            }
+            answer.names = sure;
+            answer.verdict = Verdict::Explained;
+        }
+        let class = self.class(answer, best);
+        if !class.is_empty() {
+            answer.verdict = Verdict::Ambiguous;
+        }
+        if answer.verdict == Verdict::Ambiguous {
+            let unsure = answer.names.iter().find(|name| !alone(name)).or(answer.names.first()).cloned();
+            let instead = unsure.unwrap_or_default();
+            answer.alternatives = beside.into_iter().map(|name| (name, instead.clone())).collect();
+            for (other, instead) in class {
+                if !answer.alternatives.iter().any(|(known, _)| *known == other) {
+                    answer.alternatives.push((other, instead));
+                }
+            }
+        }
+    }
+
+    /// Names whose law costs little in the place of a member.
+    fn class(&self, answer: &Answer, best: &Explanation) -> Vec<(String, String)> {
+        let (comparison, gram) = self.first;
+        let variance = self.settings[best.noise].saturated.variance;
+        let nats = 0.5 * comparison.tempering / variance;
+        let mut class = Vec::new();
+        for (name, contribution) in &answer.contributions {
+            if !answer.names.contains(name) {
+                continue;
+            }
+            let (along, square) = self.naming.products(comparison, gram, contribution);
+            let all = self.naming.stand_ins(&along, square, nats);
+            let own = all.iter().find(|(kind, _)| kind == name).map_or(0.0, |(_, loss)| loss.min(1.0));
+            let others = all.into_iter().filter(|(kind, loss)| {
+                !answer.names.contains(kind) && *loss < own + THRESHOLDS.class_nats
+            });
+            class.extend(others.map(|(kind, _)| (kind, name.clone())));
+        }
+        class.sort();
+        class
+    }
+
+    /// The output with what an explanation adds, and each name's contribution.
+    pub(super) fn contributions(&self, of: &Explanation) -> (Vec<f64>, Vec<Named>) {
+        let setting = &self.settings[of.noise];
+        let solved = self.comparison.solve(&setting.gram.whole, setting.saturated.variance, &of.members);
+        let mut after = self.inputs.simulated.clone();
+        for (index, w) in solved.tangents.iter().enumerate() {
+            let tangent = self.comparison.tangent(index);
+            after.iter_mut().zip(tangent).for_each(|(sum, x)| *sum += w * x);
+        }
+        let mut all: Vec<Named> = Vec::new();
+        let mut put = |name: String, x: Vec<f64>| match all.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => sum.iter_mut().zip(&x).for_each(|(sum, x)| *sum += x),
+            None => all.push((name, x)),
+        };
+        let mut steps = Vec::new();
+        let mut shared: Vec<(usize, Vec<f64>)> = Vec::new();
+        for (at, (variant, _)) in of.members.iter().enumerate() {
+            let variant = &self.second.bank.variants[*variant];
+            let x = self.second.bank.contribution(variant, &solved.members[at]);
+            match (variant.kind(), &of.claims[at]) {
+                (Some(kind), _) => {
+                    if let Some(Since::Run(run)) = variant.since {
+                        steps.push((kind.to_owned(), run));
+                    }
+                    put(kind.to_owned(), x);
+                }
+                (None, None) => put(UNKNOWN.to_owned(), x),
+                (None, Some(_)) => shared.push((at, x)),
+            }
+        }
+        self.put_claimed(of, shared, &mut put);
+        after = self.sum_with(after, &all);
+        for (kind, run) in steps {
+            self.begin_earlier(&kind, run, &mut after, &mut all);
+        }
+        (after, all)
+    }
+
+    fn sum_with(&self, mut after: Vec<f64>, all: &[Named]) -> Vec<f64> {
+        for (_, x) in all {
+            after.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+        }
+        after
+    }
+
+    /// A claimed curve goes to its names by the regression; what that leaves of it goes to the larger.
+    fn put_claimed(&self, of: &Explanation, shared: Vec<(usize, Vec<f64>)>, put: &mut impl FnMut(String, Vec<f64>)) {
+        let mut done: Vec<usize> = Vec::new();
+        for (at, _) in &shared {
+            let Some(claim) = of.claims[*at].as_ref().filter(|_| !done.contains(at)) else { continue };
+            // Curves that were claimed together are split together.
+            let same = |other: &usize| of.claims[*other].as_ref().is_some_and(|c| c.laws == claim.laws);
+            let together: Vec<&(usize, Vec<f64>)> = shared.iter().filter(|(other, _)| same(other)).collect();
+            let mut left = vec![0.0; self.inputs.rows];
+            for (other, x) in together {
+                done.push(*other);
+                left.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+            }
+            let parts: Vec<Vec<f64>> = claim.laws.iter().map(|law| self.naming.contribution(law)).collect();
+            for part in &parts {
+                left.iter_mut().zip(part).for_each(|(left, x)| *left -= x);
+            }
+            let largest = (0..parts.len()).max_by(|a, b| rms(&parts[*a]).total_cmp(&rms(&parts[*b])));
+            for (number, mut part) in parts.into_iter().enumerate() {
+                if Some(number) == largest {
+                    part.iter_mut().zip(&left).for_each(|(sum, x)| *sum += x);
+                }
+                put(self.naming.kind(claim.laws[number].0).unwrap_or_default(), part);
+            }
+        }
+    }
+
+    /// A level that begins with a run may have begun in the held-out runs before it: their own earlier rows tell.
+    fn begin_earlier(&self, kind: &str, run: usize, after: &mut [f64], all: &mut [Named]) {
+        let inputs = self.inputs;
+        let law = if kind == "hardness_batch" { inputs.cut.as_ref() } else { Some(&inputs.simulated) };
+        let (Some(law), Some((_, own))) = (law, all.iter_mut().find(|(name, _)| name == kind)) else { return };
+        let later = || (0..inputs.rows).filter(|row| inputs.run[*row] >= run);
+        let height = later().map(|row| own[row]).sum::<f64>() / (later().map(|row| law[row]).sum::<f64>() + 1e-30);
+        for earlier in (0..run).rev() {
+            let rows = inputs.scene.runs()[earlier].clone();
+            if rows.clone().any(|row| inputs.fitted[row]) {
+                break;
+            }
+            let mut gained = 0.0;
+            for row in rows {
+                let step = height * law[row];
+                let before = after[row];
+                if gained > BEGUN {
+                    own[row] += step;
+                    after[row] += step;
+                }
+                if inputs.comparable[row] {
+                    let error = self.recorded[row] - before;
+                    gained += (error * error - (error - step).powi(2)) / self.ordinary.powi(2);
+                }
+            }
+        }
+    }
+
+    /// What the baseline cannot imitate of a contribution.
+    pub(super) fn remaining(&self, x: &[f64]) -> Vec<f64> {
+        let rows: Vec<usize> = self.inputs.taken(false).collect();
+        let sizes: Vec<f64> = self.tangents.iter().map(|t| rms(t) + 1e-30).collect();
+        let scaled = self.tangents.iter().zip(&sizes);
+        let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();
+        let wanted: Vec<f64> = rows.iter().map(|row| x[*row]).collect();
+        let w = crate::twin::linear::least_squares(&columns, &wanted).coefficients;
+        let mut left = x.to_vec();
+        for ((tangent, size), w) in self.tangents.iter().zip(&sizes).zip(&w) {
+            left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);
+        }
+        left
+    }
+
+    fn debug(&self, groups: &[Group<'_>]) -> String {
+        let member = |(variant, size): &(usize, usize)| {
+            let of = &self.second.bank.variants[*variant];
+            format!("{} [{}] {}", of.kind().unwrap_or("?"), of.label, super::evidence::SIZES[*size])
+        };
+        let of = |group: &Group<'_>| {
+            let members: Vec<String> = group.best.members.iter().map(member).collect();
+            let names: Vec<&str> = group.names.iter().map(|name| name.as_deref().unwrap_or("?")).collect();
+            let claims = group.best.claims.iter().flatten().map(|claim| format!("{:.2}", claim.share));
+            format!(
+                "\n{:.4} {:.1} {} | {} | claims {}",
+                group.ln.exp(),
+                group.ln,
+                names.join("+"),
+                members.join(", "),
+                claims.collect::<Vec<_>>().join(" ")
+            )
+        };
+        let noises: Vec<String> =
+            self.settings.iter().map(|s| format!("{:.2}/{:.3}", s.gram.noise.share, s.gram.noise.phi)).collect();
+        let all: Vec<String> = groups.iter().take(GROUPS).map(of).collect();
+        format!("noise {} ordinary {:.4}{}", noises.join(" "), self.ordinary, all.join(""))
+    }
+}
+
+impl Answer {
+    /// Something real that no name explains; names that come near stand beside it.
+    fn leave_unnamed(&mut self, groups: &[Group<'_>], ln: f64) {
+        self.verdict = Verdict::Unexplained;
+        let mut near: Vec<String> = std::mem::take(&mut self.names);
+        for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
+            for name in other.names.iter().flatten() {
+                if !near.contains(name) {
+                    near.push(name.clone());
+                }
+            }
+        }
+        self.alternatives = near.into_iter().map(|name| (name, UNKNOWN.to_owned())).collect();
+        self.names = vec![UNKNOWN.to_owned()];
+        for all in [&mut self.contributions, &mut self.remaining] {
+            let rows = all.first().map_or(0, |(_, x)| x.len());
+            *all = vec![(UNKNOWN.to_owned(), sum_of(all, rows))];
+        }
+    }
+}
+
+/// The sum of all contributions.
+pub(super) fn sum_of(all: &[Named], rows: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; rows];
+    for (_, x) in all {
+        sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
+    }
+    sum
+}

@@ -1,0 +1,210 @@
+//! What is missing, by evidence: estimate first, name second, decide once.
+//!
+//! 1. The model is refitted by plain least squares; from then on the simulation stands still (`baseline.rs`).
+//! 2. Every family of laws, named by the catalogue or nameless, is columns in one bank (`bank.rs`, `families/`).
+//! 3. One Gram matrix for each likely noise, kept for each inner part of the fitted rows (`gram.rs`, `noise.rs`).
+//! 4. The evidence of a set of variants is a Schur complement of it, all sizes summed out (`evidence.rs`, `search.rs`),
+//!    first for the forms as they are, then for the leading ones with their form widened (`second.rs`).
+//! 5. A nameless curve that is the curve of a named law gets its name (`naming.rs`).
+//! 6. One rule decides what is reported (`decision.rs`, `judge.rs`): improbable that there is nothing, better on inner
+//!    parts of the fitted rows; rows that are held out only withdraw.
+//! 7. The nearest textbook law gives parameters, texts and the experiment (`told.rs`).
+
+mod algebra;
+mod bank;
+mod baseline;
+mod decision;
+mod evidence;
+mod families;
+mod gram;
+mod hidden;
+mod inner;
+mod inputs;
+mod judge;
+mod naming;
+mod noise;
+mod outliers;
+mod posterior;
+mod search;
+mod second;
+mod settings;
+mod told;
+
+use super::diagnose::Case;
+use super::diagnosis::Diagnosis;
+use super::model::Model;
+use super::verdicts::cannot_tell;
+use adapters::Recording;
+use bank::{Bank, Drawn, Family, Owner};
+use baseline::{Baseline, refit};
+use gram::{Compared, Comparison};
+use inputs::Inputs;
+use judge::{Answer, Judge};
+use naming::Naming;
+use noise::Noise;
+use outliers::{Outliers, outliers};
+use posterior::{Setting, explanations};
+use search::{Found, Search, priors};
+use second::Second;
+use settings::{Settings, settings};
+
+/// Sets that are followed in the first and in the second stage.
+const BEAMS: (usize, usize) = (5, 6);
+/// Share of the rows in which two hidden sequences may agree (or disagree) before they are one.
+const SAME_SEQUENCE: f64 = 0.97;
+
+/// Compares a model with a recording.
+///
+/// # Errors
+/// Everything that makes the input unusable, with what to record instead.
+pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<String>> {
+    let mut case = Case::new(recording, model)?;
+    if let Some(needed) = case.too_little() {
+        return Ok(cannot_tell(&case, needed));
+    }
+    let parts = case.parts.clone();
+    let fitted: Vec<usize> = (0..case.frame.len()).flat_map(|group| case.frame.rows(group)).collect();
+    let mut scene = case.scene.clone();
+    let Some(baseline) = refit(&mut scene, &parts, &fitted) else {
+        return Ok(cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
+    };
+    let inputs = Inputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
+    let bank = families::bank(&inputs, model);
+    let outliers = outliers(&inputs, &bank, &baseline.tangents);
+    let answer = answer(&inputs, &bank, &baseline, &outliers);
+    let ordinary = outliers.ordinary;
+    Ok(told::Told { case: &mut case, inputs: &inputs, baseline: &baseline, answer, ordinary }.diagnosis())
+}
+
+/// Rows with a recorded output, every input of the model and finite tangents.
+fn comparable(scene: &crate::physics::Scene, baseline: &Baseline) -> Vec<bool> {
+    let finite = |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
+    (0..scene.rows()).map(|row| scene.usable()[row] && finite(row)).collect()
+}
+
+/// Both stages, the names and the decision.
+fn answer(inputs: &Inputs<'_>, bank: &Bank, baseline: &Baseline, outliers: &Outliers) -> Answer {
+    let compared =
+        Compared { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
+    let first = Comparison::new(inputs, bank, &compared);
+    let noises = settings(inputs, &first, &outliers.left);
+    let own = priors(bank);
+    let (found, prepared) = first_stage(&first, &noises, &own);
+    let mut second = Second::of(inputs, bank, &own, &found);
+    let comparison = Comparison::new(inputs, bank, &compared);
+    add_sequences(inputs, &comparison, &prepared, &found, outliers, &noises, &mut second);
+    let wide = Comparison::new(inputs, &second.bank, &compared);
+    let settings: Vec<Setting> = noises
+        .likely
+        .iter()
+        .map(|noise| {
+            let known = prepared.iter().find(|setting| setting.gram.noise == *noise);
+            let saturated = known.map_or_else(|| noises.saturated(*noise), |known| known.saturated);
+            Setting::new(&wide, wide.gram(*noise), saturated)
+        })
+        .collect();
+    let search = Search { comparison: &wide, priors: &second.priors, beam: BEAMS.1 };
+    let mut found = Found::new();
+    for setting in settings.iter().filter(|setting| noises.leading.contains(&setting.gram.noise)) {
+        merge(&mut found, search.run(&setting.ground, setting.ln));
+    }
+    let plain = first.gram(Noise::WHITE);
+    let metric = &prepared[0].gram;
+    let naming = Naming::new(&first, &[metric, &plain]);
+    let all = explanations(&search, &settings, &found, &second, &naming);
+    let judge = Judge {
+        inputs,
+        comparison: &wide,
+        second: &second,
+        settings: &settings,
+        naming: &naming,
+        recorded: &outliers.recorded,
+        tangents: &baseline.tangents,
+        ordinary: outliers.ordinary,
+        first: (&first, metric),
+    };
+    judge.answer(&all)
+}
+
+/// The search among forms as they are, for the leading noises.
+fn first_stage(first: &Comparison<'_>, noises: &Settings, priors: &[f64]) -> (Found, Vec<Setting>) {
+    let mut found = Found::new();
+    let mut prepared = Vec::new();
+    for noise in &noises.leading {
+        let gram = first.gram(*noise);
+        let setting = Setting::new(first, gram, noises.saturated(*noise));
+        let search = Search { comparison: first, priors, beam: BEAMS.0 };
+        merge(&mut found, search.run(&setting.ground, setting.ln));
+        prepared.push(setting);
+    }
+    (found, prepared)
+}
+
+fn merge(into: &mut Found, from: Found) {
+    for (members, ln) in from {
+        let known = into.entry(members).or_insert(f64::NEG_INFINITY);
+        *known = known.max(ln);
+    }
+}
+
+/// Hidden sequences in what the empty and the leading sets leave.
+fn add_sequences(
+    inputs: &Inputs<'_>,
+    first: &Comparison<'_>,
+    prepared: &[Setting],
+    found: &Found,
+    outliers: &Outliers,
+    noises: &Settings,
+    second: &mut Second,
+) {
+    let mut sets: Vec<(&Vec<(usize, usize)>, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
+    sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let empty = Vec::new();
+    let leading = sets.iter().map(|(members, _)| *members).filter(|members| !members.is_empty()).take(2);
+    let mut known: Vec<Vec<f64>> = Vec::new();
+    let noise = noises.leading.last().copied().unwrap_or(Noise::WHITE);
+    for members in std::iter::once(&empty).chain(leading) {
+        let setting = &prepared[0];
+        let solved = first.solve(&setting.gram.whole, setting.saturated.variance, members);
+        let mut left = inputs.column(|row| outliers.recorded[row] - inputs.simulated[row]);
+        for (index, w) in solved.tangents.iter().enumerate() {
+            left.iter_mut().zip(first.tangent(index)).for_each(|(left, t)| *left -= w * t);
+        }
+        for ((variant, _), w) in members.iter().zip(&solved.members) {
+            let x = first.bank.contribution(&first.bank.variants[*variant], w);
+            left.iter_mut().zip(&x).for_each(|(left, x)| *left -= x);
+        }
+        let Some(mut sequence) = hidden::sequence(inputs, &left, &outliers.scale, noise) else { continue };
+        sequence.ln += first.slow_noise(inputs, &left, &sequence.on);
+        if known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
+            continue;
+        }
+        known.push(sequence.on.clone());
+        add_sequence(inputs, second, sequence, known.len());
+    }
+}
+
+fn is_same(inputs: &Inputs<'_>, a: &[f64], b: &[f64]) -> bool {
+    let rows: Vec<usize> = inputs.taken(false).collect();
+    let equal = rows.iter().filter(|row| (a[**row] - b[**row]).abs() < 0.5).count();
+    let share = crate::statistics::count(equal) / crate::statistics::count(rows.len().max(1));
+    share > SAME_SEQUENCE || share < 1.0 - SAME_SEQUENCE
+}
+
+/// A sequence as a consumer, as an event in the cut, and as a regime of the coolant.
+fn add_sequence(inputs: &Inputs<'_>, second: &mut Second, sequence: hidden::Sequence, number: usize) {
+    let label = format!("hidden, {} changes", sequence.changes);
+    let named = |kind: &'static str| Owner::Named(Family::of(kind).wide());
+    second.add(inputs, named("auxiliary_switch"), label.clone(), sequence.on.clone(), sequence.ln);
+    let cuts = inputs.taken(false).filter(|row| inputs.in_cut[*row]).count();
+    if inputs.engaged.is_some() && cuts > 0 && cuts < inputs.taken(false).count() {
+        let event = inputs.column(|row| sequence.on[row] * inputs.cutting(row));
+        let drawn = Drawn { over: format!("event {number}"), times: "engaged", shape: "event" };
+        second.add(inputs, Owner::Nameless(drawn), label.clone(), event, sequence.ln);
+    }
+    if let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.knows_cut) {
+        let top = inputs.taken(false).map(|row| cut[row].abs()).fold(1e-12, f64::max);
+        let regime = inputs.column(|row| sequence.on[row] * cut[row] / top);
+        second.add(inputs, named("coolant_regime"), label, regime, sequence.ln - 1.0);
+    }
+}

@@ -1,0 +1,214 @@
+//! Naming by projection: a nameless curve that is the curve of a named law gets its name.
+//!
+//! The curve, the baseline projected out of it, is regressed on every named family. One name is enough when the family
+//! makes nearly all of the curve with the right sign; two are taken when they do so and one alone falls clearly short, and
+//! then each gets the part that the regression gives it. The metric is that of the noise, or the plain one: the first
+//! alone loses levels, the second alone small effects that change fast.
+
+use super::algebra::{Factor, block, schur};
+use super::bank::{Bank, Variant};
+use super::decision::THRESHOLDS;
+use super::gram::{Comparison, Gram};
+use crate::statistics::count;
+use ndarray::{Array1, Array2};
+
+/// Columns of a law that may claim a curve: wider ones could claim any.
+const COLUMNS_MAX: usize = 5;
+/// Ridge of a claim, as a share of each column's own square.
+const RIDGE: f64 = 1e-3;
+/// Share of the curve that each further column must make.
+const PRICE: f64 = 0.02;
+/// Single names from which pairs are formed, and those looked through for them.
+const PAIRED: usize = 4;
+const LOOKED_THROUGH: usize = 60;
+
+/// A curve that has a name, or two.
+#[derive(Debug, Clone)]
+pub(super) struct Claim {
+    /// Share of the curve that the named laws make, the price of their columns taken off.
+    pub(super) share: f64,
+    /// Each law with its coefficients.
+    pub(super) laws: Vec<(usize, Vec<f64>)>,
+}
+
+/// Projects curves on named laws.
+pub(super) struct Naming<'a> {
+    bank: &'a Bank,
+    first: usize,
+    /// Gram matrices with the baseline projected out: in the metric of the noise, and in the plain one.
+    metrics: Vec<Array2<f64>>,
+    /// Named variants that may claim.
+    named: Vec<usize>,
+}
+
+/// A regression of a curve on one or two laws.
+struct Regression {
+    share: f64,
+    coefficients: Vec<f64>,
+}
+
+impl<'a> Naming<'a> {
+    /// In these metrics.
+    pub(super) fn new(comparison: &Comparison<'a>, grams: &[&Gram]) -> Self {
+        let bank = comparison.bank;
+        let fixed: Vec<usize> = (0..comparison.tangents).collect();
+        let cleared = |gram: &&Gram| {
+            let trace: f64 = fixed.iter().map(|index| gram.whole[[*index, *index]]).sum();
+            let flat = 1e-9 * trace / count(fixed.len().max(1));
+            schur(&gram.whole, &fixed, &vec![flat; fixed.len()]).0
+        };
+        let may = |index: &usize| {
+            let variant = &bank.variants[*index];
+            variant.kind().is_some() && variant.columns.len() <= COLUMNS_MAX && !variant.is_only_a_sign()
+        };
+        let named = (0..bank.variants.len()).filter(may).collect();
+        Self { bank, first: comparison.first(), metrics: grams.iter().map(cleared).collect(), named }
+    }
+
+    /// The best claim on a curve, given as nameless variants with their coefficients.
+    pub(super) fn claim(&self, parts: &[(usize, &[f64])]) -> Option<Claim> {
+        let claims = self.metrics.iter().filter_map(|metric| self.claim_in(metric, parts));
+        let accepted = |claim: &Claim| claim.share >= THRESHOLDS.name_share;
+        let better = |a: &Claim, b: &Claim| {
+            let key = |c: &Claim| (accepted(c), -count(c.laws.len()), c.share);
+            key(b).partial_cmp(&key(a)).is_some_and(std::cmp::Ordering::is_gt)
+        };
+        claims.reduce(|best, next| if better(&best, &next) { next } else { best }).filter(accepted)
+    }
+
+    /// The kind of a named variant.
+    pub(super) fn kind(&self, variant: usize) -> Option<String> {
+        self.bank.variants[variant].kind().map(str::to_owned)
+    }
+
+    /// What a law of these coefficients contributes.
+    pub(super) fn contribution(&self, law: &(usize, Vec<f64>)) -> Vec<f64> {
+        self.bank.contribution(&self.bank.variants[law.0], &law.1)
+    }
+
+    fn columns(&self, variant: usize) -> Vec<usize> {
+        let of = &self.bank.variants[variant].columns;
+        (self.first + of.start..self.first + of.end).collect()
+    }
+
+    fn claim_in(&self, metric: &Array2<f64>, parts: &[(usize, &[f64])]) -> Option<Claim> {
+        let all: Vec<usize> = parts.iter().flat_map(|(variant, _)| self.columns(*variant)).collect();
+        let w = Array1::from_iter(parts.iter().flat_map(|(_, w)| w.iter().copied()));
+        let last = metric.nrows() - 1;
+        let mut along = Array1::zeros(last);
+        for (index, w) in all.iter().zip(&w) {
+            let column = metric.column(*index);
+            along.iter_mut().zip(column).for_each(|(sum, x)| *sum += w * x);
+        }
+        let square: f64 = all.iter().zip(&w).map(|(index, w)| w * along[*index]).sum();
+        if square <= 0.0 {
+            return None;
+        }
+        let mut single: Vec<(f64, usize, Vec<f64>)> = self
+            .named
+            .iter()
+            .filter_map(|variant| {
+                let fit = self.regress(metric, &along, square, &[*variant])?;
+                Some((fit.share, *variant, fit.coefficients))
+            })
+            .collect();
+        single.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = single.first()?;
+        let one = Claim { share: best.0, laws: vec![(best.1, best.2.clone())] };
+        if one.share >= THRESHOLDS.name_share {
+            return Some(one);
+        }
+        let pair = self.pair(metric, &along, square, &single);
+        let enough = (THRESHOLDS.name_share + THRESHOLDS.pair_more).max(one.share + THRESHOLDS.pair_gain);
+        Some(pair.filter(|pair| pair.share > enough).unwrap_or(one))
+    }
+
+    fn pair(
+        &self,
+        metric: &Array2<f64>,
+        along: &Array1<f64>,
+        square: f64,
+        single: &[(f64, usize, Vec<f64>)],
+    ) -> Option<Claim> {
+        let mut firsts: Vec<usize> = Vec::new();
+        let kind = |variant: usize| self.bank.variants[variant].kind();
+        for (_, variant, _) in single.iter().take(LOOKED_THROUGH) {
+            if firsts.len() < PAIRED && !firsts.iter().any(|known| kind(*known) == kind(*variant)) {
+                firsts.push(*variant);
+            }
+        }
+        let mut best: Option<Claim> = None;
+        for first in firsts {
+            for second in self.named.iter().copied().filter(|second| kind(*second) != kind(first)) {
+                let Some(fit) = self.regress(metric, along, square, &[first, second]) else { continue };
+                if best.as_ref().is_none_or(|best| fit.share > best.share) {
+                    let size = self.bank.variants[first].columns.len();
+                    let (a, b) = fit.coefficients.split_at(size);
+                    best = Some(Claim { share: fit.share, laws: vec![(first, a.to_vec()), (second, b.to_vec())] });
+                }
+            }
+        }
+        best
+    }
+
+    /// The curve on some laws; `None` where one of them has the wrong sign.
+    fn regress(&self, metric: &Array2<f64>, along: &Array1<f64>, square: f64, laws: &[usize]) -> Option<Regression> {
+        let all: Vec<usize> = laws.iter().flat_map(|law| self.columns(*law)).collect();
+        let relative = laws.iter().flat_map(|law| self.bank.variants[*law].relative.iter());
+        let mut inner = block(metric, &all, &all);
+        for (at, relative) in relative.enumerate() {
+            let own = inner[[at, at]].abs();
+            inner[[at, at]] += own * RIDGE / (relative * relative) + 1e-12;
+        }
+        let right = Array1::from_iter(all.iter().map(|index| along[*index]));
+        let w = Factor::of(&inner).solve(&right);
+        let mut at = 0;
+        for law in laws {
+            let variant: &Variant = &self.bank.variants[*law];
+            if variant.sign() * w[at] < 0.0 {
+                return None;
+            }
+            at += variant.columns.len();
+        }
+        let share = right.dot(&w) / square - PRICE * count(all.len() - 1);
+        Some(Regression { share, coefficients: w.to_vec() })
+    }
+
+    /// What it costs in nats to put each named kind in the place of a contribution, given its inner products with every
+    /// column in the metric of the noise and its square, the baseline projected out; the best of each kind.
+    pub(super) fn stand_ins(&self, along: &Array1<f64>, square: f64, nats: f64) -> Vec<(String, f64)> {
+        let mut all: Vec<(String, f64)> = Vec::new();
+        for variant in &self.named {
+            let of = &self.bank.variants[*variant];
+            let Some(fit) = self.regress(&self.metrics[0], along, square, &[*variant]) else { continue };
+            let size = count(of.columns.len() - 1);
+            let left = square * (1.0 - fit.share - PRICE * size).max(0.0);
+            let loss = nats * left + 0.7 * size - of.ln_prior.min(0.0);
+            let kind = of.kind().unwrap_or_default().to_owned();
+            match all.iter_mut().find(|(known, _)| *known == kind) {
+                Some((_, known)) => *known = known.min(loss),
+                None => all.push((kind, loss)),
+            }
+        }
+        all
+    }
+
+    /// Inner products of a whitened full contribution with every column, and its square, the baseline projected out.
+    pub(super) fn products(&self, comparison: &Comparison<'_>, gram: &Gram, contribution: &[f64]) -> (Array1<f64>, f64) {
+        let white = Array1::from(comparison.whitened(contribution, gram.noise));
+        let tall = comparison.whole(gram.noise, |_| true);
+        let mut along = tall.t().dot(&white);
+        let fixed: Vec<usize> = (0..comparison.tangents).collect();
+        let mut inner = block(&gram.whole, &fixed, &fixed);
+        let trace: f64 = inner.diag().sum();
+        fixed.iter().for_each(|index| inner[[*index, *index]] += 1e-9 * trace / count(fixed.len().max(1)));
+        let right = Array1::from_iter(fixed.iter().map(|index| along[*index]));
+        let w = Factor::of(&inner).solve(&right);
+        let square = white.dot(&white) - right.dot(&w);
+        for (index, w) in fixed.iter().zip(&w) {
+            let column = gram.whole.column(*index);
+            along.iter_mut().zip(column).for_each(|(sum, x)| *sum -= w * x);
+        }
+        (along, square.max(0.0))
+    }
+}

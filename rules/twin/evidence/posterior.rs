@@ -1,0 +1,161 @@
+//! The posterior: sets of the second stage summed over the likely noises, and by what they say.
+
+use super::evidence::{Ground, Saturated, ln_sum};
+use super::gram::{Comparison, Gram};
+use super::naming::{Claim, Naming};
+use super::search::{Found, Members, Search};
+use super::second::Second;
+use std::collections::BTreeMap;
+
+/// Sets that are evaluated for every noise, and those whose curves are offered names.
+const SETS: usize = 40;
+const OFFERED: usize = 25;
+
+/// A set of variants with its posterior probability.
+pub(super) struct Explanation {
+    /// Its members with the sizes they have in the likeliest noise.
+    pub(super) members: Members,
+    /// Number of the likeliest noise.
+    pub(super) noise: usize,
+    /// Logarithm of its probability.
+    pub(super) ln: f64,
+    /// The claim on each nameless member.
+    pub(super) claims: Vec<Option<Claim>>,
+    /// The names it comes to, sorted; `None` of what has none.
+    pub(super) names: Vec<Option<String>>,
+}
+
+/// A noise with its Gram matrix and the state that every hypothesis starts from.
+pub(super) struct Setting {
+    pub(super) gram: Gram,
+    pub(super) saturated: Saturated,
+    pub(super) ground: Ground,
+    pub(super) ln: f64,
+}
+
+impl Setting {
+    /// Prepares a noise.
+    pub(super) fn new(comparison: &Comparison<'_>, gram: Gram, saturated: Saturated) -> Self {
+        let (ground, ln) = comparison.baseline(&gram, saturated);
+        Self { gram, saturated, ground, ln }
+    }
+}
+
+/// Every explanation, the likeliest first.
+pub(super) fn explanations(
+    search: &Search<'_>,
+    settings: &[Setting],
+    found: &Found,
+    second: &Second,
+    naming: &Naming<'_>,
+) -> Vec<Explanation> {
+    let mut sets: Vec<(&Members, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
+    sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let empty = Vec::new();
+    let mut top: Vec<&Members> = sets.iter().take(SETS).map(|(members, _)| *members).collect();
+    if !top.iter().any(|members| members.is_empty()) {
+        top.push(&empty);
+    }
+    let mut evaluated: BTreeMap<Vec<usize>, Vec<(f64, usize, Members)>> = BTreeMap::new();
+    for (number, setting) in settings.iter().enumerate() {
+        for members in &top {
+            let (ln, sized) = search.evaluate(&setting.ground, setting.ln, members);
+            let key = sized.iter().map(|(variant, _)| *variant).collect();
+            evaluated.entry(key).or_default().push((ln, number, sized));
+        }
+    }
+    let total = |all: &Vec<(f64, usize, Members)>| ln_sum(all.iter().map(|(ln, _, _)| *ln).collect::<Vec<_>>());
+    let whole = ln_sum(evaluated.values().map(total).collect::<Vec<_>>());
+    let mut all: Vec<Explanation> = evaluated
+        .values()
+        .filter_map(|evaluated| {
+            let best = evaluated.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+            let claims = vec![None; best.2.len()];
+            let (members, noise, ln) = (best.2.clone(), best.1, total(evaluated) - whole);
+            Some(Explanation { members, noise, ln, claims, names: Vec::new() })
+        })
+        .collect();
+    all.sort_by(|a, b| b.ln.total_cmp(&a.ln));
+    for (number, explanation) in all.iter_mut().enumerate() {
+        if number < OFFERED {
+            let setting = &settings[explanation.noise];
+            explanation.claims = claims(search.comparison, setting, explanation, second, naming);
+        }
+        explanation.names = names(second, explanation, naming);
+    }
+    all
+}
+
+/// The claims on the nameless members of a set: each by itself, then those that are left together.
+fn claims(
+    comparison: &Comparison<'_>,
+    setting: &Setting,
+    explanation: &Explanation,
+    second: &Second,
+    naming: &Naming<'_>,
+) -> Vec<Option<Claim>> {
+    let variant = |member: usize| &second.bank.variants[explanation.members[member].0];
+    let source = |member: usize| second.source[explanation.members[member].0];
+    let mut claims = vec![None; explanation.members.len()];
+    let offered: Vec<usize> =
+        (0..claims.len()).filter(|member| variant(*member).kind().is_none() && source(*member).is_some()).collect();
+    if offered.is_empty() {
+        return claims;
+    }
+    let solved = comparison.solve(&setting.gram.whole, setting.saturated.variance, &explanation.members);
+    let mut left = Vec::new();
+    for member in offered {
+        let Some(of) = source(member) else { continue };
+        claims[member] = naming.claim(&[(of, &solved.members[member])]);
+        if claims[member].is_none() {
+            left.push((member, of));
+        }
+    }
+    if left.len() > 1 {
+        let parts: Vec<(usize, &[f64])> =
+            left.iter().map(|(member, of)| (*of, solved.members[*member].as_slice())).collect();
+        let claim = naming.claim(&parts);
+        left.iter().for_each(|(member, _)| claims[*member] = claim.clone());
+    }
+    claims
+}
+
+/// The names of a set.
+pub(super) fn names(second: &Second, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
+    let mut names: Vec<Option<String>> = Vec::new();
+    for ((variant, _), claim) in explanation.members.iter().zip(&explanation.claims) {
+        match (second.bank.variants[*variant].kind(), claim) {
+            (Some(kind), _) => names.push(Some(kind.to_owned())),
+            (None, Some(claim)) => names.extend(claim.laws.iter().map(|(law, _)| naming.kind(*law))),
+            (None, None) => names.push(None),
+        }
+    }
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// Explanations that say the same, the likeliest group first: their names, the logarithm of their probability together,
+/// and the likeliest of them.
+pub(super) fn grouped(all: &[Explanation]) -> Vec<Group<'_>> {
+    let mut by_names: BTreeMap<&Vec<Option<String>>, Vec<&Explanation>> = BTreeMap::new();
+    for explanation in all {
+        by_names.entry(&explanation.names).or_default().push(explanation);
+    }
+    let mut groups: Vec<Group<'_>> = by_names
+        .into_iter()
+        .filter_map(|(names, of)| {
+            let best = of.iter().copied().max_by(|a, b| a.ln.total_cmp(&b.ln))?;
+            Some(Group { names, ln: ln_sum(of.iter().map(|of| of.ln).collect::<Vec<_>>()), best })
+        })
+        .collect();
+    groups.sort_by(|a, b| b.ln.total_cmp(&a.ln));
+    groups
+}
+
+/// Explanations that say the same.
+pub(super) struct Group<'a> {
+    pub(super) names: &'a Vec<Option<String>>,
+    pub(super) ln: f64,
+    pub(super) best: &'a Explanation,
+}

@@ -1,0 +1,130 @@
+//! The second stage: the leading variants with their form widened, and hidden sequences beside them.
+//!
+//! A law of a textbook is never quite the law of a machine. So each leading named variant gets departures `law * z` and
+//! `law * (z^2 - 1)` over speed, cut, depth, feed, time, velocity and temperature, all together with a small deviation.
+
+use super::bank::{Bank, Family, Owner, Variant};
+use super::inputs::Inputs;
+use super::search::{Found, NAMED, NAMELESS};
+use crate::statistics::{count, rms};
+use std::collections::BTreeMap;
+
+/// Leading sets whose members go into the second stage, single variants besides, and variants of one owner.
+const SETS: usize = 14;
+const SINGLES: usize = 16;
+const OF_AN_OWNER: usize = 2;
+/// Variants of the second stage, hidden sequences apart.
+const VARIANTS_MAX: usize = 26;
+/// Deviation of all departures of a form together, relative to the law.
+const DEPARTURE: f64 = 0.15;
+/// Deviations of a channel beyond which it departs no further.
+const FARTHEST: f64 = 2.5;
+
+/// The bank of the second stage.
+pub(super) struct Second {
+    pub(super) bank: Bank,
+    /// Logarithm of the prior of each variant.
+    pub(super) priors: Vec<f64>,
+    /// The variant of the first stage that each comes from; `None` of a hidden sequence.
+    pub(super) source: Vec<Option<usize>>,
+}
+
+impl Second {
+    /// The leading variants of the first stage, widened.
+    pub(super) fn of(inputs: &Inputs<'_>, bank: &Bank, priors: &[f64], found: &Found) -> Self {
+        let departures = departures(inputs);
+        let mut second = Self { bank: Bank::default(), priors: Vec::new(), source: Vec::new() };
+        for index in leading(bank, found) {
+            let variant = &bank.variants[index];
+            let start = second.bank.columns.len();
+            let mut relative = variant.relative.clone();
+            second.bank.columns.extend_from_slice(&bank.columns[variant.columns.clone()]);
+            if widens(variant) && !departures.is_empty() {
+                let law = &bank.columns[variant.columns.start];
+                let share = DEPARTURE / (count(departures.len()) / 3.0).sqrt();
+                for departure in &departures {
+                    let bent = inputs.column(|row| law[row] * departure[row]);
+                    let size = rms(&inputs.taken(false).map(|row| bent[row]).collect::<Vec<_>>()) + 1e-30;
+                    second.bank.columns.push(bent.iter().map(|x| x / size).collect());
+                    relative.push(share);
+                }
+            }
+            let columns = start..second.bank.columns.len();
+            second.bank.variants.push(Variant { columns, relative, ..variant.clone() });
+            second.priors.push(priors[index]);
+            second.source.push(Some(index));
+        }
+        second
+    }
+
+    /// Adds a hidden sequence with its own evidence as prior.
+    pub(super) fn add(&mut self, inputs: &Inputs<'_>, owner: Owner, label: String, column: Vec<f64>, ln: f64) {
+        let before = self.bank.variants.len();
+        let prior = if matches!(owner, Owner::Named(_)) { NAMED } else { NAMELESS };
+        match owner {
+            Owner::Named(family) => self.bank.of(family, label).sized().column(inputs, column),
+            Owner::Nameless(drawn) => self.bank.nameless(drawn).sized().column(inputs, column),
+        }
+        if self.bank.variants.len() > before {
+            self.priors.push(prior + ln);
+            self.source.push(None);
+        }
+    }
+}
+
+fn widens(variant: &Variant) -> bool {
+    matches!(&variant.owner, Owner::Named(Family { widens: true, .. }))
+}
+
+/// The variants that lead, the best first.
+fn leading(bank: &Bank, found: &Found) -> Vec<usize> {
+    let mut sets: Vec<(&Vec<(usize, usize)>, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
+    sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut lead: BTreeMap<usize, f64> = BTreeMap::new();
+    for (members, ln) in sets.iter().take(SETS) {
+        for (variant, _) in *members {
+            let known = lead.entry(*variant).or_insert(f64::NEG_INFINITY);
+            *known = known.max(*ln);
+        }
+    }
+    for (members, ln) in sets.iter().filter(|(members, _)| members.len() == 1).take(SINGLES) {
+        lead.entry(members[0].0).or_insert(*ln);
+    }
+    let mut order: Vec<(usize, f64)> = lead.into_iter().collect();
+    order.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut of_owner: BTreeMap<String, usize> = BTreeMap::new();
+    order.retain(|(index, _)| {
+        let variant = &bank.variants[*index];
+        let owner = variant.kind().map_or_else(|| variant.label.clone(), str::to_owned);
+        let seen = of_owner.entry(owner).or_default();
+        *seen += 1;
+        *seen <= OF_AN_OWNER
+    });
+    order.into_iter().take(VARIANTS_MAX).map(|(index, _)| index).collect()
+}
+
+/// What a law may depart by: each channel standardised, and its square.
+fn departures(inputs: &Inputs<'_>) -> Vec<Vec<f64>> {
+    let velocity = if inputs.speed.is_none() { inputs.velocity.as_ref() } else { None };
+    let time = Some(&inputs.clock_s);
+    let cut = inputs.cut.as_ref();
+    let channels = [
+        inputs.speed.as_ref(),
+        cut,
+        inputs.depth.as_ref(),
+        inputs.feed.as_ref(),
+        time,
+        velocity,
+        inputs.temperature.as_ref(),
+    ];
+    let mut all = Vec::new();
+    for channel in channels.into_iter().flatten() {
+        let (middle, spread) = (inputs.mean_of(channel, true), inputs.deviation_of(channel, true));
+        if spread > 1e-9 {
+            let z = inputs.column(|row| ((channel[row] - middle) / spread).clamp(-FARTHEST, FARTHEST));
+            all.push(z.iter().map(|z| (z * z - 1.0) / 1.4).collect());
+            all.push(z);
+        }
+    }
+    all
+}

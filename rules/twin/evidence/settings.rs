@@ -1,0 +1,94 @@
+//! Which settings of the noise are likely: those that the empty or the saturated model makes likely are summed out.
+
+use super::evidence::Saturated;
+use super::gram::{Comparison, Gram};
+use super::inputs::Inputs;
+use super::noise::Noise;
+
+/// Nameless curves that stand for everything that may be there.
+const CURVES_MAX: usize = 16;
+/// Logarithm of the likelihood within which a setting counts as likely.
+const WITHIN: f64 = 12.0;
+/// Settings that go into the comparison from each residual.
+const PRESELECTED: usize = 4;
+/// Settings taken from each model.
+const OF_EACH: usize = 2;
+
+/// The likely settings of the noise.
+pub(super) struct Settings {
+    /// Likely settings, four at most.
+    pub(super) likely: Vec<Noise>,
+    /// The likeliest under the empty and under the saturated model.
+    pub(super) leading: Vec<Noise>,
+    /// The saturated model of each setting that was compared.
+    known: Vec<(Noise, Saturated)>,
+}
+
+impl Settings {
+    /// The saturated model of a likely setting.
+    pub(super) fn saturated(&self, noise: Noise) -> Saturated {
+        let of = self.known.iter().find(|(known, _)| *known == noise).or(self.known.first());
+        of.map_or(Saturated { variance: 1.0, ln_likelihood: 0.0 }, |(_, saturated)| *saturated)
+    }
+}
+
+/// Compares the settings of the grid: all of them by two residuals, the better ones in full. `wide` is what a wide smooth
+/// model leaves.
+pub(super) fn settings(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Settings {
+    let takes = standing_columns(comparison);
+    let mut empty = Vec::new();
+    let mut full = Vec::new();
+    let mut known = Vec::new();
+    for noise in preselected(inputs, comparison, wide) {
+        let gram: Gram = comparison.gram_of(noise, |column| takes[column]);
+        let saturated = comparison.saturated(&gram);
+        empty.push((comparison.empty_likelihood(&gram, saturated), noise));
+        full.push((saturated.ln_likelihood, noise));
+        known.push((noise, saturated));
+    }
+    let mut likely: Vec<Noise> = Vec::new();
+    let mut leading: Vec<Noise> = Vec::new();
+    for all in [&mut empty, &mut full] {
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = all[0];
+        if !leading.contains(&best.1) {
+            leading.push(best.1);
+        }
+        for (ln, noise) in all.iter().take(OF_EACH) {
+            if *ln > best.0 - WITHIN && !likely.contains(noise) {
+                likely.push(*noise);
+            }
+        }
+    }
+    Settings { likely, leading, known }
+}
+
+/// The settings that make one of two residuals likely: that of the baseline, and that of a wide smooth model.
+fn preselected(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Vec<Noise> {
+    let grid = Noise::grid(inputs.median_block(), inputs.period_s);
+    let mut chosen = vec![Noise::WHITE];
+    let base = inputs.column(|row| inputs.scene.recorded()[row] - inputs.simulated[row]);
+    for residual in [base.as_slice(), wide] {
+        let mut ranked: Vec<(f64, Noise)> =
+            grid.iter().map(|noise| (comparison.likelihood_of(residual, *noise), *noise)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, noise) in ranked.into_iter().take(PRESELECTED) {
+            if !chosen.contains(&noise) {
+                chosen.push(noise);
+            }
+        }
+    }
+    chosen
+}
+
+/// Columns of the first smooth curves, by themselves and in the cut.
+fn standing_columns(comparison: &Comparison<'_>) -> Vec<bool> {
+    let mut takes = vec![false; comparison.bank.columns.len()];
+    let curves = comparison.bank.variants.iter().filter(|variant| {
+        variant.drawn().is_some_and(|drawn| drawn.shape == "bumps" && ["1", "cut"].contains(&drawn.times))
+    });
+    for variant in curves.take(CURVES_MAX) {
+        takes[variant.columns.clone()].fill(true);
+    }
+    takes
+}
