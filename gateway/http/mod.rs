@@ -3,27 +3,34 @@
 //! Requests are answered from the latest [`Status`] or from the history through connections of their own; nothing a
 //! client does makes the tick wait. Whatever a query says, the answer is a document or a problem with a hint.
 
+mod files;
+mod handbook;
 mod history;
 mod live;
 mod metrics;
 mod page;
 mod problem;
 mod query;
+mod rules;
+mod series;
 mod server;
 mod twin;
+mod utilisation;
 mod vocabulary;
+mod wear;
 
 pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
 pub use server::{Server, bind, port_trouble};
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
+use crate::config::Config;
 use crate::status::Status;
+use ::rules::physics::explain::Language;
 use axum::Router;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, get};
-use rules::physics::explain::Language;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -50,14 +57,21 @@ pub struct Shared {
     live: watch::Receiver<Option<Published>>,
     listeners: Arc<Semaphore>,
     history: PathBuf,
+    scripts: PathBuf,
     language: Option<Language>,
 }
 
 impl Shared {
-    /// What the tick publishes, where the history is, and the language in which the page opens if not the browser's.
+    /// What the tick publishes, where history and scripts are, and the language in which the page opens if not the browser's.
     #[must_use]
-    pub fn new(live: watch::Receiver<Option<Published>>, history: PathBuf, language: Option<Language>) -> Self {
-        Self { live, listeners: Arc::new(Semaphore::new(live::LISTENERS_MAX)), history, language }
+    pub fn new(live: watch::Receiver<Option<Published>>, config: &Config) -> Self {
+        Self {
+            live,
+            listeners: Arc::new(Semaphore::new(live::LISTENERS_MAX)),
+            history: config.history.path.clone(),
+            scripts: config.scripts.directory.clone(),
+            language: config.gateway.language,
+        }
     }
 
     fn status(&self) -> Result<Arc<Status>, ApiProblem> {
@@ -71,8 +85,16 @@ impl Shared {
 type Route = (&'static str, fn() -> MethodRouter<Shared>);
 
 /// Everything that is served.
-pub const ROUTES: [Route; 16] = [
+pub const ROUTES: [Route; 30] = [
     ("/", || get(page::page)),
+    ("/now", || get(page::page)),
+    ("/history", || get(page::page)),
+    ("/wear", || get(page::page)),
+    ("/thermal", || get(page::page)),
+    ("/twin", || get(page::page)),
+    ("/rules", || get(page::page)),
+    ("/audit", || get(page::page)),
+    ("/help", || get(page::page)),
     ("/web/{file}", || get(page::web)),
     ("/healthz", || get(healthz)),
     ("/metrics", || get(metrics::metrics)),
@@ -88,6 +110,12 @@ pub const ROUTES: [Route; 16] = [
     ("/api/v1/parts", || get(history::parts)),
     ("/api/v1/audit", || get(history::audit)),
     ("/api/v1/twin", || get(twin::twin)),
+    ("/api/v1/utilisation", || get(utilisation::utilisation)),
+    ("/api/v1/series", || get(series::series)),
+    ("/api/v1/wear", || get(wear::wear)),
+    ("/api/v1/rules", || get(rules::rules)),
+    ("/api/v1/rules/words", || get(rules::words)),
+    ("/api/v1/handbook/{chapter}", || get(handbook::chapter)),
 ];
 
 /// All routes with what they see.

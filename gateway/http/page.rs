@@ -1,49 +1,47 @@
-//! The live page: three kinds of file, part of the binary, nothing from elsewhere.
-
-use axum::extract::{Path, State};
-use axum::http::{HeaderValue, header};
-use axum::response::{IntoResponse, Response};
+//! The page: one document at the address of each view, and its files.
 
 use super::Shared;
+use super::files::{FILES, INDEX};
 use super::problem::ApiProblem;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
 use rules::physics::explain::Language;
 
-const INDEX: &str = include_str!("../web/index.html");
-const HTML: &str = "text/html; charset=utf-8";
-const CSS: &str = "text/css; charset=utf-8";
-const SCRIPT: &str = "text/javascript; charset=utf-8";
+/// Only what this box serves may run or load; nothing may frame it. Styles are set from scripts through the object model,
+/// which this allows; no text of a style or script stands in a document.
+const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; frame-ancestors 'none'; \
+                      base-uri 'none'; form-action 'self'";
 
-/// The files below `/web/`: name, type, content.
-const FILES: [(&str, &str, &str); 5] = [
-    ("page.css", CSS, include_str!("../web/page.css")),
-    ("page.js", SCRIPT, include_str!("../web/page.js")),
-    ("chart.js", SCRIPT, include_str!("../web/chart.js")),
-    ("words.js", SCRIPT, include_str!("../web/words.js")),
-    ("icon.svg", "image/svg+xml", include_str!("../web/icon.svg")),
-];
-
-/// Only what this box serves may run or load; nothing may frame it.
-const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'";
-
-/// `GET /`
+/// `GET /` and the address of every view.
 pub(super) async fn page(State(shared): State<Shared>) -> Response {
     let chosen = match shared.language {
-        None => return file(HTML, INDEX),
+        None => return answer(INDEX.kind, INDEX.content),
         Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",
         Some(Language::Zh) => "<html lang=\"zh-CN\" data-opens=\"zh\">",
     };
-    file(HTML, INDEX.replacen("<html lang=\"en\">", chosen, 1))
+    answer(INDEX.kind, INDEX.content.replacen("<html lang=\"en\">", chosen, 1))
 }
 
-/// `GET /web/{file}`
-pub(super) async fn web(Path(name): Path<String>) -> Response {
-    match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, content)) => file(kind, *content),
-        None => ApiProblem::not_found(&format!("/web/{name}")).into_response(),
+/// `GET /web/{file}`: a browser that has this version already is told so.
+pub(super) async fn web(Path(name): Path<String>, headers: HeaderMap) -> Response {
+    let Some(file) = FILES.iter().find(|file| file.name == name) else {
+        return ApiProblem::not_found(&format!("/web/{name}")).into_response();
+    };
+    let tag = format!("\"{:016x}\"", crate::reload::digest(file.content.as_bytes()));
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
+    let mut response = if known == Some(tag.as_str()) {
+        StatusCode::NOT_MODIFIED.into_response()
+    } else {
+        answer(file.kind, file.content)
+    };
+    if let Ok(tag) = HeaderValue::from_str(&tag) {
+        response.headers_mut().insert(header::ETAG, tag);
     }
+    response
 }
 
-fn file(kind: &'static str, content: impl IntoResponse) -> Response {
+pub(super) fn answer(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
@@ -51,4 +49,26 @@ fn file(kind: &'static str, content: impl IntoResponse) -> Response {
         (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
     ];
     (headers, content).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_document_holds_a_script_or_a_style_of_its_own() {
+        assert!(!INDEX.content.contains("style=") && !INDEX.content.contains("<style"));
+        assert!(
+            INDEX.content.matches("<script").count() == INDEX.content.matches("<script type=\"module\" src=").count()
+        );
+        assert!(!POLICY.contains("unsafe"));
+    }
+
+    #[test]
+    fn every_file_of_the_page_is_served_under_one_name() {
+        let mut names: Vec<_> = FILES.iter().map(|file| file.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), FILES.len());
+    }
 }

@@ -266,7 +266,7 @@ async fn serve(
     (report, orders): (watch::Sender<Option<String>>, mpsc::SyncSender<control::Posted>),
 ) {
     let _listening = control::listen(&plan.config.gateway.data_dir, orders);
-    let shared = Shared::new(live.clone(), plan.config.history.path.clone(), plan.config.gateway.language);
+    let shared = Shared::new(live.clone(), &plan.config);
     let server = match address(plan) {
         Ok(Some(address)) => Some(Server::start(address, listener, shared, report)),
         _ => None,

@@ -10,4 +10,7 @@ mod page;
 mod process;
 mod replay;
 mod twin;
+mod views;
+mod watchdog;
 mod wear;
+mod words;
