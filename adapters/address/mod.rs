@@ -10,8 +10,8 @@ pub use fanuc::{FanucOptions, WriteMethod};
 pub use huazhong::{HncNetTarget, HncOffset, NcLinkTarget};
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use target::{
-    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
-    Speed, Target,
+    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDay, SimulatedDevice, SimulatedMachine,
+    SimulatedTarget, Speed, Target,
 };
 
 use keys::Keys;

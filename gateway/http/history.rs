@@ -10,7 +10,7 @@ use crate::samples;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// What is read when nobody says otherwise.
 const SPAN_DEFAULT_NS: i64 = 600 * SECOND_NS;
@@ -119,6 +119,20 @@ pub(super) async fn audit(State(shared): State<Shared>, Pairs(pairs): Given) -> 
             None => reader.audit(i64::MIN, i64::MAX, limit),
         };
         rows.map(|rows| audit_document(&rows)).map_err(|error| trouble(&error))
+    })
+    .await
+}
+
+/// `GET /api/v1/audit/verify`: `history audit --verify`.
+pub(super) async fn verify(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    QueryKeys::of(pairs, &[])?;
+    reading(shared, |reader, _| {
+        let check = reader.verify_audit().map_err(|error| trouble(&error))?;
+        let mut document = json!({ "schema": "audit-check/1" });
+        if let (Some(into), Ok(Value::Object(found))) = (document.as_object_mut(), serde_json::to_value(&check)) {
+            into.extend(found);
+        }
+        Ok(document)
     })
     .await
 }

@@ -85,7 +85,7 @@ impl Shared {
 type Route = (&'static str, fn() -> MethodRouter<Shared>);
 
 /// Everything that is served.
-pub const ROUTES: [Route; 30] = [
+pub const ROUTES: [Route; 31] = [
     ("/", || get(page::page)),
     ("/now", || get(page::page)),
     ("/history", || get(page::page)),
@@ -109,6 +109,7 @@ pub const ROUTES: [Route; 30] = [
     ("/api/v1/events", || get(history::events)),
     ("/api/v1/parts", || get(history::parts)),
     ("/api/v1/audit", || get(history::audit)),
+    ("/api/v1/audit/verify", || get(history::verify)),
     ("/api/v1/twin", || get(twin::twin)),
     ("/api/v1/utilisation", || get(utilisation::utilisation)),
     ("/api/v1/series", || get(series::series)),

@@ -42,6 +42,7 @@ export const PHRASES = [
   ["the sign of life", "心跳"],
   ["the machine was given back to its dial", "已交还操作面板"],
   ["constant load", "恒负荷进给"],
+  ["learned load", "学习负荷"],
   ["the edge is worn", "刀具已磨损"],
   ["thermal error", "热误差补偿"],
   ["the meter gave no answer in time", "功率计未按时应答"],

@@ -98,7 +98,7 @@ export class Editor {
       cm.indentUnit.of("    "), rhai(words), cm.syntaxHighlighting(colours), look, cm.EditorView.lineWrapping, this.readOnly.of(cm.EditorState.readOnly.of(false)),
       cm.autocompletion({ override: [cm.completeFromList(words.options)] }),
       cm.keymap.of([...cm.closeBracketsKeymap, ...cm.defaultKeymap, ...cm.historyKeymap, ...cm.completionKeymap, ...cm.searchKeymap, ...cm.lintKeymap, cm.indentWithTab]),
-      cm.EditorView.contentAttributes.of({ "aria-label": label }),
+      cm.EditorView.contentAttributes.of({ "aria-label": label, tabindex: "0" }),
       cm.EditorView.updateListener.of((update) => { if (update.docChanged) onChange?.(update.state.doc.toString()); }),
     ];
     this.extensions = extensions;

@@ -33,7 +33,7 @@ export function partsTable(root, found, range, context, go) {
   const total = seen.reduce((sum, p) => ({ count: sum.count + p.count, energy: sum.energy + (p.energy_j ?? 0), cutting: sum.cutting + (p.cutting_s ?? 0) }), { count: 0, energy: 0, cutting: 0 });
   const words = t("parts_sum", total.count, duration(total.cutting), energy(total.energy), total.count ? energy(total.energy / total.count) : "–");
   const save = make("button", "", t("export_table"), { type: "button", onclick: () => download("parts.csv", partsCsv(seen)) });
-  fill(root, [make("div", "head", [make("span", "note", words), seen.length > ROWS_MAX || found.partsCut ? make("span", "note", t("newest_only", Math.min(seen.length, ROWS_MAX))) : null, save].filter(Boolean)), stateLegend(context), table(head, rows, { caption: t("parts_title") })]);
+  fill(root, [make("div", "head", [make("span", "note", words), seen.length > ROWS_MAX || found.partsCut ? make("span", "note", t("newest_only", Math.min(seen.length, ROWS_MAX))) : null, save].filter(Boolean)), table(head, rows, { caption: t("parts_title") })]);
 }
 
 function partsCsv(parts) {
@@ -55,7 +55,7 @@ export async function useTable(root, [from, to], context, by, chosen) {
     return [name, { text: shareBar(r.seconds, context) }, { num: duration(r.total_s) }, { num: duration(on) }, { num: duration(cutting) }, { num: on > 0 ? `${number((100 * cutting) / on, "%")} %` : "–" }];
   });
   const head = [t(`by_${by}`), t("time_per_state"), { num: t("recorded") }, { num: t("switched_on") }, { num: t("cutting_time") }, { num: t("cutting_share") }];
-  fill(root, [make("div", "head", [make("div", "buttons", buttons), make("span", "note", t("use_words"))]), stateLegend(context), rows.length ? table(head, rows, { caption: t("use_title") }) : make("p", "empty", t("no_data_here"))]);
+  fill(root, [make("div", "head", [make("div", "buttons", buttons), make("span", "note", t("use_words"))]), rows.length ? table(head, rows, { caption: t("use_title") }) : make("p", "empty", t("no_data_here"))]);
 }
 
 export function marksTable(root, found, range, go) {

@@ -73,7 +73,7 @@ export class Live {
 
   look() {
     const age = this.age();
-    const fresh = age === null ? (this.now() - this.began > 5000 ? "no" : "waiting") : age <= this.limit ? "yes" : "no";
+    const fresh = this.broken?.() ? "no" : age === null ? (this.now() - this.began > 5000 ? "no" : "waiting") : age <= this.limit ? "yes" : "no";
     this.fresh = fresh;
     for (const listener of this.freshListeners) listener(fresh, age);
   }

@@ -92,17 +92,27 @@ function drawTitle(fresh, status) {
   if (document.title !== title) document.title = title;
 }
 
+/** A view that cannot draw what came would go on showing what came before: then nothing counts as fresh. */
+let broken = null;
 live.listeners.add((status) => {
-  drawStatus(status);
-  mounted?.update?.(status);
+  try {
+    drawStatus(status);
+    mounted?.update?.(status);
+    broken = null;
+  } catch (error) {
+    if (!broken) console.error(error);
+    broken = error;
+    live.look();
+  }
   drawTitle(live.fresh, status);
 });
+live.broken = () => broken !== null;
 
 live.freshListeners.add((fresh, age) => {
   if (document.body.dataset.fresh !== fresh) document.body.dataset.fresh = fresh;
   say(at("link"), t(fresh === "yes" ? "live" : fresh === "no" ? "not_live" : "connecting"));
   if (fresh === "no") {
-    const text = live.status
+    const text = broken ? t("page_broken", broken.message) : live.status
       ? t("stale_since", duration((age ?? 0) / 1000), clock(live.status.at_ms))
       : t("stale_never");
     say(at("stale-text"), text);

@@ -6,6 +6,7 @@ export const WORDS = {
   live: ["live", "实时"], not_live: ["not live", "数据中断"], connecting: ["connecting", "连接中"], old: ["old:", "过时："],
   stale_since: ["No news from the box for {0}. Everything here is from {1}: look at the machine itself.", "网关已 {0} 无数据。此处内容停留在 {1}，请以机床实际状态为准。"],
   stale_never: ["The box does not answer. Is it switched on and in the network?", "网关无应答。请检查电源与网络。"],
+  page_broken: ["This page cannot show what the box says ({0}). Load it again.", "页面无法显示数据（{0}），请重新加载。"],
   sign_in: ["Sign in", "登录"], role_viewer: ["viewer", "查看"], role_setter: ["setter", "调机"], role_armer: ["armer", "允许写入"], role_admin: ["admin", "管理"],
   armed_short: ["armed", "已允许写入"], cancel: ["Cancel", "取消"], token: ["Token", "令牌"], back: ["Back", "返回"], loading: ["loading …", "读取中……"],
   // units
@@ -28,7 +29,8 @@ export const WORDS = {
   last_ten_minutes: ["Last ten minutes", "最近十分钟"], open_history: ["Open history", "打开历史"],
   absent_title: ["No value at the moment, and why", "当前无数值及原因"], nothing_absent: ["Every expected value is there.", "所有数值正常。"], silent: ["silent", "无应答"],
   simulated: ["simulated machine", "模拟机床"], meter: ["meter", "功率计"], controller: ["controller", "数控系统"], also_measured: ["Also measured", "其他测量值"],
-  demo_note: ["This is a demonstration: a simulated lathe. Within five minutes it goes through all its states, raises an alarm, wears a tool out, and differs from its simulation (see Twin).", "这是演示：模拟车床。五分钟内会经历所有状态、产生报警、刀具磨损，并与仿真出现偏差（见“仿真对照”）。"],
+  demo_note: ["This is a demonstration: a simulated lathe. Within five minutes it goes through all its states, raises an alarm, wears a tool out (see Tool wear) and begins to differ from its simulation (see Twin).", "这是演示：模拟车床。五分钟内会经历所有状态、产生报警、刀具磨损，并与仿真出现偏差（见“仿真对照”）。"],
+  simulated_note: ["A simulated machine: nothing real is moved.", "模拟机床：无真实动作。"],
   demo_fast: ["This is a demonstration: a simulated machine, {0} times as fast as real time.", "这是演示：模拟机床，以 {0} 倍速运行。"],
   // history
   all: ["All", "全部"], earlier: ["Earlier", "更早"], later: ["Later", "更晚"], zoom_in: ["Zoom in", "放大"], zoom_out: ["Zoom out", "缩小"], export_seen: ["Export what is seen (CSV)", "导出所示数据 (CSV)"], export_table: ["Export table (CSV)", "导出表格 (CSV)"],
@@ -44,7 +46,7 @@ export const WORDS = {
   time: ["Time", "时间"], kind: ["Kind", "类别"], what: ["What", "内容"], still_there: ["still there", "仍存在"], until_clock: ["until {0}", "至 {0}"], override: ["override", "倍率"],
   kind_write: ["written", "写入"], kind_request: ["request", "请求"], kind_armed: ["armed", "允许写入"], kind_disarmed: ["disarmed", "解除写入"], kind_stop: ["stop", "停止"], kind_feed_hold: ["feed hold", "进给保持"], kind_started: ["started", "启动"], kind_reaction: ["seen at the machine", "机床已生效"], kind_acknowledged: ["acknowledged", "确认"],
   // audit and settings
-  every_kind: ["everything", "全部"], search: ["Search", "搜索"], verify: ["Check the chain", "校验链"], audit_title: ["Audit", "审计记录"], no_match: ["Nothing matches.", "无匹配内容。"], no_audit: ["Nothing was asked for or written yet.", "尚无请求或写入。"],
+  every_kind: ["everything", "全部"], what_matters: ["what was asked and done", "请求与操作"], search: ["Search", "搜索"], verify: ["Check the chain", "校验链"], audit_title: ["Audit", "审计记录"], no_match: ["Nothing matches.", "无匹配内容。"], no_audit: ["Nothing was asked for or written yet.", "尚无请求或写入。"],
   audit_words: ["Everything that was asked for, let through, refused and written, and who did it. Rows are chained: nobody can change one unnoticed. A ramp is one line; open it to see each step.", "所有请求、放行、拒绝与写入及操作人。记录以散列链接，无法私改。连续变化合并为一行，可展开。"],
   audit_whole: ["{0} rows up to number {1} are as they were written. Head: {2} …", "至编号 {1} 共 {0} 行，均与写入时一致。链首：{2} …"], audit_broken: ["The chain is broken at row {0}: {1}", "链在第 {0} 行断开：{1}"],
   steps: ["{0} steps", "{0} 步"], asked_let: ["Asked → let through", "请求 → 放行"], why: ["Why", "原因"], who: ["Who", "来源"],
@@ -80,7 +82,7 @@ export const WORDS = {
   // rules
   rules_words: ["A change is a draft until you activate it. It must pass its trials; run it over the history first.", "修改在“启用”前只是草稿，须通过试验，建议先回放历史。"], editor: ["Script", "脚本"], save_draft: ["Save draft", "保存草稿"], run_trials: ["Run trials", "运行试验"], backtest: ["Backtest", "历史回放"], activate: ["Activate", "启用"], discard_draft: ["Discard draft", "放弃草稿"], backtest_span: ["How much history", "回放时长"], last_span: ["last {0}", "最近 {0}"],
   words_title: ["Words and cookbook", "词汇与示例"], search_words: ["Search the words", "搜索词汇"], earlier_versions: ["Earlier versions", "以往版本"], no_versions: ["No earlier version yet.", "尚无以往版本。"], no_scripts: ["There is no script yet.", "尚无脚本。"], draft_of: ["Draft of {0}, {1}", "{0} 的草稿，{1}"], sign_in_to_edit: ["Sign in as a setter to change, try and activate rules. Reading needs nothing.", "修改、试验、启用规则需以“调机”身份登录，查看无需登录。"],
-  draft_saved: ["The draft is saved; the version in charge goes on.", "草稿已保存，当前版本继续生效。"], backtest_runs: ["Running over the history …", "正在回放历史……"], backtest_done: ["{0} samples, {1} of history in {2} s", "{0} 个采样，{1} 历史，用时 {2} 秒"], activated: ["In charge from now on. {0}", "已启用。{0}"], trial_failed: ["failed", "未通过"], trial_passed: ["passed", "通过"], trial_words: ["{0} expectations met, {1} s of machine time", "{0} 项符合，机床时间 {1} 秒"], line: ["Line", "行"], trials: ["Trials", "试验"], trials_fine: ["All {0} trials pass.", "{0} 项试验全部通过。"], trials_failed: ["Not everything passes: it stays a draft.", "未全部通过，仍为草稿。"], no_trials: ["This script has no trials.", "该脚本无试验。"],
+  draft_saved: ["The draft is saved; the version in charge goes on.", "草稿已保存，当前版本继续生效。"], backtest_runs: ["Running over the history …", "正在回放历史……"], backtest_seconds: ["Running over the history: {0} s …", "正在回放历史：{0} 秒……"], backtest_done: ["{0} samples, {1} of history in {2} s", "{0} 个采样，{1} 历史，用时 {2} 秒"], activated: ["In charge from now on. {0}", "已启用。{0}"], trial_failed: ["failed", "未通过"], trial_passed: ["passed", "通过"], trial_words: ["{0} expectations met, {1} s of machine time", "{0} 项符合，机床时间 {1} 秒"], line: ["Line", "行"], trials: ["Trials", "试验"], trials_fine: ["All {0} trials pass.", "{0} 项试验全部通过。"], trials_failed: ["Not everything passes: it stays a draft.", "未全部通过，仍为草稿。"], no_trials: ["This script has no trials.", "该脚本无试验。"],
   alarm_or_stop: ["Alarm or stop", "报警或停止"], backtest_lost: ["lost", "丢失"], backtest_gained: ["new", "新增"], backtest_shifted: ["at another time", "时间变化"], backtest_title: ["What would have been different", "差异清单"], backtest_sum: ["{0} alarms lost, {1} new, {2} at another time; the override differs for {3}.", "丢失 {0} 个报警，新增 {1}，时间变化 {2}；倍率不同 {3}。"], backtest_same: ["Nothing: every alarm comes as before.", "无差异：报警均与之前一致。"],
   is_draft: ["draft", "草稿"], version: ["Version", "版本"], look_at_it: ["open", "打开"], version_opened: ["The version of {0} is in the editor; “Activate” puts it back in charge.", "已打开 {0} 的版本，“启用”即可恢复。"],
 };

@@ -140,10 +140,11 @@ impl Browser {
         result["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true.
+    /// Waits until an expression is true, or anything that counts as true.
     pub(crate) fn wait_until(&mut self, expression: &str) {
         let until = Instant::now() + Duration::from_secs(90);
-        while self.value(expression) != json!(true) {
+        let asked = format!("Boolean({expression})");
+        while self.value(&asked) != json!(true) {
             assert!(
                 Instant::now() < until,
                 "never true: {expression}; the page says:\n{}",

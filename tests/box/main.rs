@@ -14,3 +14,4 @@ mod views;
 mod watchdog;
 mod wear;
 mod words;
+mod year;

@@ -5,7 +5,7 @@ import { bytes, clock, dateTime, duration, number, quantity, when } from "/web/f
 import { box, t } from "/web/words.js";
 import { armDialog, sourceName } from "/web/now.js";
 
-const KINDS = ["", "write", "request", "armed", "disarmed", "change", "login", "stop", "feed_hold", "acknowledged", "reaction", "started"];
+const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "stop", "feed_hold", "acknowledged", "reaction", "started"];
 const PAGE = 1000;
 /** Rows of the same kind, script and outcome that follow each other within this time are one line. */
 const RAMP_S = 10;
@@ -15,7 +15,7 @@ export function mount(root, context) {
   const gate = gateCard(context);
   const list = make("div", "");
   const note = make("p", "note", " ", { role: "status" });
-  const select = make("select", "", KINDS.map((kind) => make("option", "", kind ? t(`kind_${kind}`) : t("every_kind"), { value: kind })), { "aria-label": t("kind") });
+  const select = make("select", "", KINDS.map((kind) => make("option", "", kind === "all" ? t("every_kind") : kind ? t(`kind_${kind}`) : t("what_matters"), { value: kind })), { "aria-label": t("kind") });
   select.addEventListener("change", () => { state.kind = select.value; draw(); });
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
   search.addEventListener("input", () => { state.text = search.value.toLowerCase(); draw(); });
@@ -58,7 +58,9 @@ export function grouped(rows) {
 }
 
 function drawRows(list, state, context) {
-  const groups = grouped(state.rows).filter((g) => (!state.kind || g.kind === state.kind) && (!state.text || JSON.stringify(g).toLowerCase().includes(state.text))).reverse();
+  // That nothing is asked for between two cuts is only of interest to whoever asks for everything.
+  const quiet = (e) => !state.kind && e.kind === "request" && e.asked === null;
+  const groups = grouped(state.rows.filter((e) => !quiet(e))).filter((g) => (["", "all"].includes(state.kind) || g.kind === state.kind) && (!state.text || JSON.stringify(g).toLowerCase().includes(state.text))).reverse();
   if (!groups.length) return fill(list, [make("p", "empty", state.rows.length ? t("no_match") : t("no_audit"))]);
   const now = context.status()?.at_ms ?? 0;
   const value = (v, unit) => (v === null ? "–" : quantity(v, unit));

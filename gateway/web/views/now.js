@@ -48,7 +48,8 @@ function stateCard() {
       values[key].title = text;
     }
     demo.hidden = !status.simulated;
-    if (status.simulated) say(demo, status.speed === 1 ? t("demo_note") : t("demo_fast", status.speed ?? "∞"));
+    const short = status.sources.some((source) => source.name.includes("day=short"));
+    if (status.simulated) say(demo, short ? t("demo_note") : status.speed === 1 ? t("simulated_note") : t("demo_fast", status.speed ?? "∞"));
   };
   return { box, update };
 }
@@ -59,7 +60,7 @@ function alarmCard(context) {
   const section = make("section", "card alarms ages", [make("h2", "", t("alarms")), list], { role: "region", "aria-label": t("alarms") });
   let drawn = "";
   const update = (status) => {
-    const key = JSON.stringify([status.alarms, status.problems, language()]);
+    const key = JSON.stringify([status.alarms, status.acknowledged, status.problems, language(), Boolean(context.session?.person)]);
     if (key === drawn) return;
     drawn = key;
     section.dataset.worst = status.alarms.some((a) => a.severity === "critical") ? "bad" : status.alarms.some((a) => a.severity === "warning") ? "warn" : "";
@@ -74,7 +75,7 @@ function alarmLine(alarm, status, context) {
   const line = make("div", `alarm ${alarm.severity}`);
   const words = language() === "zh" && alarm.zh ? alarm.zh : alarm.text;
   line.append(make("strong", "", words), make("span", "more", `${t(`severity_${alarm.severity}`)} · ${t("since_clock", alarm.since_ms ? when(alarm.since_ms, status.at_ms) : "–")}`));
-  const seen = alarm.acknowledged_by;
+  const seen = status.acknowledged?.find((it) => it.code === alarm.code)?.by;
   if (seen) line.append(make("span", "more", t("seen_by", seen)));
   else line.append(make("button", "", t("acknowledge"), { type: "button", onclick: (event) => acknowledge(event.currentTarget, alarm, context) }));
   return line;

@@ -109,7 +109,16 @@ class RulesView {
 
   async backtest() {
     say(this.note, t("backtest_runs"));
-    const found = await send(`/api/v1/rules/${this.current}/backtest`, { ...this.body(), since: this.since.value });
+    await send(`/api/v1/rules/${this.current}/backtest`, { ...this.body(), since: this.since.value });
+    let run = { state: "running" };
+    while (run.state === "running") {
+      await new Promise((done) => setTimeout(done, 500));
+      run = await ask("/api/v1/backtest");
+      say(this.note, t("backtest_seconds", number(Math.round(run.seconds ?? 0))));
+      if (!this.host.isConnected) return;
+    }
+    if (run.state !== "done") throw new Error(run.what ?? run.state);
+    const found = run.report;
     say(this.note, t("backtest_done", number(found.rows), duration(found.covered_s), number(found.took_s, "s")));
     this.showBacktest(found);
   }

@@ -1,6 +1,6 @@
 // Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try next.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
-import { clock, dateTime, duration, number, quantity } from "/web/format.js";
+import { clock, dateTime, number, quantity } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
@@ -17,7 +17,7 @@ export function mount(root, context) {
   const note = make("p", "note", " ");
   const latest = make("div", "");
   const past = make("div", "");
-  const ranges = make("div", "buttons", SPANS.map((s) => make("button", "", duration(s), { type: "button", "data-span": s, onclick: () => { state.span = s; press(); read(); } })));
+  const ranges = make("div", "buttons", SPANS.map((s) => make("button", "", s < 86400 ? `${s / 3600} ${t("h")}` : `${s / 86400} ${t("d")}`, { type: "button", "data-span": s, onclick: () => { state.span = s; press(); read(); } })));
   const press = () => { for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span)); };
   press();
   root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), card(t("past_diagnoses"), past));
@@ -26,6 +26,7 @@ export function mount(root, context) {
     if (!status) return;
     const twin = await ask("/api/v1/twin?limit=20").catch(() => ({ diagnoses: [] }));
     drawDiagnoses(latest, past, twin.diagnoses, state);
+    figure.closest(".card").hidden = !status.twin;
     if (!status.twin) return;
     try {
       const known = (await ask("/api/v1/series")).series.map((s) => s.name);
