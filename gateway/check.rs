@@ -2,6 +2,7 @@
 //! wrong, before a machine is involved.
 
 use crate::config::{self, Config, Problem};
+use crate::http::Certificate;
 use crate::operations;
 use crate::reload::read_directory;
 use adapters::address::{FanucBackend, Target};
@@ -60,7 +61,8 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
         Ok(config) => {
             let name = file.map_or_else(|| config::BUILT_IN.to_owned(), |file| file.display().to_string());
             report.read.push(summary(&name, &config));
-            report.read.extend(open_to_all(&config));
+            report.read.extend(reach(&config));
+            check_certificate(&config, &mut report);
             check_scripts(&config, &mut report);
             check_operations(&config, &mut report);
             check_model(&config, &mut report);
@@ -86,12 +88,22 @@ fn summary(name: &str, config: &Config) -> String {
     format!("{name}: reads {} at {} ticks per second; {gate}{offsets}", sources.join(", "), config.gateway.tick_hz)
 }
 
-/// A page that others than this box can reach has no password.
-fn open_to_all(config: &Config) -> Option<String> {
-    let listen = &config.http.listen;
-    let own = listen.starts_with("127.") || listen.starts_with("[::1]") || listen.starts_with("localhost");
-    let open = config.http.enabled && !own;
-    open.then(|| format!("{listen}: everybody on this network can read the page; there is no password"))
+/// What a page does that other computers can reach.
+fn reach(config: &Config) -> Option<String> {
+    let http = &config.http;
+    let arming = if http.allow_arming { "; the gate may be armed from it" } else { "" };
+    // The configuration is refused where such a page would be open to all.
+    let far = http.enabled && http.tokens_always && http.tls;
+    far.then(|| format!("{}: the page is served over TLS, and asks everybody for a token{arming}", http.listen))
+}
+
+/// Certificate and key can be read and fit together.
+fn check_certificate(config: &Config, report: &mut Report) {
+    let Some((certificate, key)) = config.http.certificate.as_ref().filter(|_| config.http.tls) else { return };
+    match Certificate::read(certificate, key) {
+        Ok(read) => report.read.push(format!("{}: SHA-256 {}", certificate.display(), read.fingerprint)),
+        Err(error) => report.problems.push(Problem::of(certificate.display().to_string(), error.to_string(), "")),
+    }
 }
 
 fn check_scripts(config: &Config, report: &mut Report) {

@@ -160,6 +160,24 @@ pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
     std::fs::File::open(directory)?.sync_all()
 }
 
+/// The same as [`replace_durably`], for a file that nobody but this user may read (mode 600).
+///
+/// # Errors
+/// As for [`replace`].
+pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(directory)?;
+    let fresh = fresh(path);
+    // One that was left behind may have another mode, or be a link to somewhere else.
+    let _none_left = std::fs::remove_file(&fresh);
+    let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&fresh)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()?;
+    std::fs::rename(&fresh, path)?;
+    std::fs::File::open(directory)?.sync_all()
+}
+
 /// Where a file is written before it takes its place.
 fn fresh(path: &Path) -> PathBuf {
     let mut fresh = path.as_os_str().to_owned();

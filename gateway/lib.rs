@@ -1,5 +1,6 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
 
+pub mod access;
 pub mod alignment;
 pub mod backtest;
 pub mod bench;

@@ -89,6 +89,17 @@ pub struct AlarmStatus {
     pub since_ms: i64,
 }
 
+/// An alarm that stands and that a person has seen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Acknowledged {
+    /// Code of the alarm.
+    pub code: String,
+    /// Who has seen it.
+    pub by: String,
+    /// When, milliseconds since 1970.
+    pub at_ms: i64,
+}
+
 /// A decision worth showing: a change of what scripts ask for or of what the gate lets through.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DecisionStatus {
@@ -314,6 +325,8 @@ pub struct Status {
     pub estimates: Vec<EstimateStatus>,
     /// Alarms that stand.
     pub alarms: Vec<AlarmStatus>,
+    /// Those of them that a person has seen.
+    pub acknowledged: Vec<Acknowledged>,
     /// The simulation beside the machine, where a model is configured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub twin: Option<crate::twin::status::TwinStatus>,

@@ -78,8 +78,12 @@ fn exit_codes_tell_fine_wrong_and_could_not_run() {
     let missing = check(directory.path(), &["--config", "nothing.toml"]);
     assert_eq!(missing.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&missing.stderr).contains("check --example"));
-    let open = text(&check_with(directory.path(), &[], &[("CNC_GATEWAY__HTTP__LISTEN", "0.0.0.0:8080")]));
-    assert!(open.contains("everybody on this network"), "{open}");
+    let far = ("CNC_GATEWAY__HTTP__LISTEN", "0.0.0.0:8080");
+    let open = text(&check_with(directory.path(), &[], &[far]));
+    assert!(open.contains("needs TLS and tokens") && open.contains("tls = true"), "{open}");
+    let safe = [far, ("CNC_GATEWAY__HTTP__TLS", "true"), ("CNC_GATEWAY__HTTP__TOKENS", "always")];
+    let safe = text(&check_with(directory.path(), &[], &safe));
+    assert!(safe.contains("over TLS, and asks everybody for a token"), "{safe}");
     let example = text(&check(directory.path(), &["--example"]));
     fs::write(directory.path().join("new.toml"), example).expect("written");
     let output = check(directory.path(), &["--config", "new.toml"]);

@@ -1,7 +1,6 @@
 //! `cnc-gateway arm`, `disarm`, `acknowledge`: orders of a person at the box to the gateway that runs there.
 
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::config;
+use super::{CommandResult, Outcome, data_dir_of, print, print_json};
 use crate::control::{self, Order};
 use clap::Args;
 use std::path::PathBuf;
@@ -71,25 +70,12 @@ pub(super) fn acknowledge(OrderArguments { to }: OrderArguments) -> CommandResul
 }
 
 fn send(to: &Where, order: &Order) -> CommandResult {
-    let reply = control::order(&data_dir(to)?, order)?;
+    let reply = control::order(&data_dir_of(to.config.as_deref(), to.data_dir.as_deref())?, order)?;
     match to.json {
         true => print_json(&serde_json::json!({ "schema": "order/1", "done": reply.done, "text": reply.text })),
         false => print(&format!("{}\n", reply.text)),
     }
     Ok(if reply.done { Outcome::Fine } else { Outcome::No })
-}
-
-fn data_dir(to: &Where) -> Result<PathBuf, CannotRun> {
-    if let Some(directory) = &to.data_dir {
-        return Ok(directory.clone());
-    }
-    let environment =
-        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    let config = config::load(to.config.as_deref(), environment).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-        CannotRun::new(lines.join("\n"), "")
-    })?;
-    Ok(config.gateway.data_dir)
 }
 
 #[cfg(test)]

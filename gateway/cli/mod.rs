@@ -11,6 +11,7 @@ mod doctor;
 mod effects;
 mod history;
 mod identify;
+mod person;
 mod replay;
 mod rules;
 mod run;
@@ -25,7 +26,7 @@ use ::rules::script::{Host, Problem, shipped};
 use clap::{Args, Parser, Subcommand};
 use std::fmt;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// How a command ended when it could run.
@@ -103,6 +104,8 @@ enum Command {
     Disarm(arm::OrderArguments),
     /// A feed hold or stop was seen to: the next one may pass.
     Acknowledge(arm::OrderArguments),
+    /// Who may do more than read on the page: names, roles, tokens.
+    Person(person::PersonArguments),
     /// Tell everything that is wrong with configuration, scripts, model and recordings.
     Check(check::CheckArguments),
     /// Run recordings through the same pipeline as fast as possible.
@@ -157,6 +160,7 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Arm(arm) => arm::arm(arm),
         Command::Disarm(order) => arm::disarm(order),
         Command::Acknowledge(order) => arm::acknowledge(order),
+        Command::Person(person) => person::run(person),
         Command::Bench(bench) => bench::run(&bench),
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),
@@ -180,6 +184,20 @@ fn print(text: &str) {
 /// Prints a document on lines of its own.
 fn print_json(document: &serde_json::Value) {
     print(&format!("{document:#}\n"));
+}
+
+/// The data directory that is meant: the one that is named, or that of a configuration, or the usual one.
+fn data_dir_of(config: Option<&Path>, data_dir: Option<&Path>) -> Result<PathBuf, CannotRun> {
+    if let Some(directory) = data_dir {
+        return Ok(directory.to_owned());
+    }
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let config = crate::config::load(config, environment).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })?;
+    Ok(config.gateway.data_dir)
 }
 
 /// The operations recipe in a file.

@@ -1,10 +1,11 @@
 //! From checked values to the configuration, and the rules that concern more than one key.
 
+mod http;
+
 use super::check_value::Scalar;
 use super::read::{Found, Origin, Reading, Values};
 use super::{
-    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Http, Log, Offset, Operations, Scripts, Source,
-    Twin,
+    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Log, Offset, Operations, Scripts, Source, Twin,
 };
 use crate::log::LogFormat;
 use adapters::Axis;
@@ -18,6 +19,7 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     let sources: Option<Vec<Source>> = reading.sources.iter().map(source).collect();
     check_names(reading);
     check_gate(reading);
+    http::check(reading);
     let gateway = gateway(reading, base)?;
     Some(Config {
         alignment: Alignment {
@@ -28,7 +30,7 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         operations: Operations { path: text(reading, "operations", "path").map(|path| base.join(path)) },
         gate: gate(reading)?,
         history: history(reading, &gateway.data_dir)?,
-        http: Http { listen: text(reading, "http", "listen")?, enabled: flag(reading, "http", "enabled")? },
+        http: http::http(reading, base)?,
         twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
         log: log(reading)?,
         gateway,

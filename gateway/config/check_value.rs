@@ -116,7 +116,8 @@ fn listen(key: &Key, text: &str) -> Result<Scalar, Refusal> {
     }
     Err((
         format!("`{}` is {text:?}; HOST:PORT is needed", key.name),
-        "\"127.0.0.1:8080\" is reachable from this box only, \"0.0.0.0:8080\" from the whole network".to_owned(),
+        "\"127.0.0.1:8080\" is reachable from this box only, \"0.0.0.0:8080\" from the whole network (with tls and tokens)"
+            .to_owned(),
     ))
 }
 

@@ -231,6 +231,18 @@ pub struct Http {
     pub listen: String,
     /// Serve at all.
     pub enabled: bool,
+    /// Serve over TLS.
+    pub tls: bool,
+    /// Certificate chain and private key; `None`: made at the first start.
+    pub certificate: Option<(PathBuf, PathBuf)>,
+    /// Reading needs a token too.
+    pub tokens_always: bool,
+    /// Whoever has signed in is signed out after this time.
+    pub session: Duration,
+    /// Names by which browsers reach the box, besides its own addresses, in lower case.
+    pub allow_hosts: Vec<String>,
+    /// The gate may be armed from the page.
+    pub allow_arming: bool,
 }
 
 /// `[twin]`.

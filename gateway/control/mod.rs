@@ -1,7 +1,8 @@
-//! Orders of a person standing at the box: arm the gate, disarm it, acknowledge a stop.
+//! Orders of a person: arm the gate, disarm it, acknowledge a stop or an alarm.
 //!
-//! They come through a socket file in the data directory and from nowhere else: not over the network, not from the page, not
-//! from a script. The file belongs to the user that the gateway runs as and nobody else can open it (mode 600); who opened it
+//! A person standing at the box gives them through a socket file in the data directory; a person who is signed in on the page
+//! gives them there, where arming needs `allow_arming` under `[http]` and the token once more. No script can give any. The
+//! file belongs to the user that the gateway runs as and nobody else can open it (mode 600); who opened it
 //! is known by the system (`SO_PEERCRED`) and stands in the audit beside the name that was given. One line of JSON asks, one
 //! answers:
 //!
@@ -13,17 +14,19 @@
 //! | file | what |
 //! |---|---|
 //! | `server` | listens, checks, hands each order to the tick and answers with what the tick says |
+//! | `post` | the way to the tick and back, for the socket and for the page |
 //! | `client` | `cnc-gateway arm`, `disarm`, `acknowledge` |
 
 mod client;
+mod post;
 mod server;
 
 pub use client::order;
+pub use post::{Inbox, Post, PostedRow, Wake, queue};
 pub use server::{Listening, listen};
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
 use std::time::Duration;
 
 /// Name of the socket in the data directory.
@@ -56,6 +59,13 @@ pub enum Order {
         /// Who has seen to it.
         by: String,
     },
+    /// An alarm has been seen; it stands until its reason has gone.
+    AcknowledgeAlarm {
+        /// Who has seen it.
+        by: String,
+        /// Its code.
+        code: String,
+    },
 }
 
 impl Order {
@@ -63,13 +73,17 @@ impl Order {
     #[must_use]
     pub fn by(&self) -> &str {
         match self {
-            Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by } => by,
+            Self::Arm { by, .. }
+            | Self::Disarm { by }
+            | Self::Acknowledge { by }
+            | Self::AcknowledgeAlarm { by, .. } => by,
         }
     }
 
     /// The same with the user that the system knows beside the name.
     fn of_user(mut self, user: Option<u32>) -> Self {
-        let (Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by }) = &mut self;
+        let (Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by } | Self::AcknowledgeAlarm { by, .. }) =
+            &mut self;
         *by = match (by.trim(), user) {
             ("", _) | (_, None) => by.trim().to_owned(),
             (name, Some(user)) => format!("{name} (user {user})"),
@@ -106,12 +120,6 @@ pub struct Posted {
     pub order: Order,
     /// Where the answer goes.
     pub reply: tokio::sync::oneshot::Sender<Reply>,
-}
-
-/// Both ends of the queue of orders.
-#[must_use]
-pub fn queue() -> (mpsc::SyncSender<Posted>, mpsc::Receiver<Posted>) {
-    mpsc::sync_channel(WAITING_MAX)
 }
 
 /// Where the socket of this data directory is.

@@ -1,12 +1,11 @@
-//! Listens for orders and hands each to the tick.
+//! Listens for orders and hands each to the tick, on a thread of its own: however busy the page is, an order is heard.
 
-use super::{ANSWER_WITHIN, LINE_MAX, Order, Posted, Reply, socket};
+use super::{LINE_MAX, Order, Post, Reply, socket};
 use crate::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::{UnixListener, UnixStream};
@@ -23,25 +22,22 @@ const PAUSE: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 pub struct Listening {
     path: PathBuf,
-    task: tokio::task::JoinHandle<()>,
+    /// The thread ends when this goes.
+    _going_on: oneshot::Sender<()>,
 }
 
 impl Drop for Listening {
     fn drop(&mut self) {
-        self.task.abort();
         let _already_gone = std::fs::remove_file(&self.path);
     }
 }
 
 /// Listens in this directory. Without a socket the box goes on; it cannot be armed then, and says so.
 #[must_use]
-pub fn listen(data_dir: &Path, orders: SyncSender<Posted>) -> Option<Listening> {
+pub fn listen(data_dir: &Path, post: Post) -> Option<Listening> {
     let path = socket(data_dir);
-    match bind(&path) {
-        Ok(listener) => {
-            let task = tokio::spawn(take(listener, orders));
-            Some(Listening { path, task })
-        }
+    match bind(&path).and_then(|listener| start(listener, post)) {
+        Ok(going_on) => Some(Listening { path, _going_on: going_on }),
         Err(error) => {
             let text =
                 format!("{}: no orders can be taken there ({error}), so the gate cannot be armed", path.display());
@@ -51,16 +47,33 @@ pub fn listen(data_dir: &Path, orders: SyncSender<Posted>) -> Option<Listening> 
     }
 }
 
+/// The thread that listens; it ends when what is given is dropped.
+fn start(listener: std::os::unix::net::UnixListener, post: Post) -> io::Result<oneshot::Sender<()>> {
+    let (going_on, over) = oneshot::channel::<()>();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let listen = move || {
+        runtime.block_on(async {
+            let Ok(listener) = UnixListener::from_std(listener) else { return };
+            tokio::select! {
+                () = take(listener, post) => {}
+                _ = over => {}
+            }
+        });
+    };
+    std::thread::Builder::new().name("control".to_owned()).spawn(listen)?;
+    Ok(going_on)
+}
+
 /// Takes one order after another; whoever comes while too many are being talked to waits for his turn.
-async fn take(listener: UnixListener, orders: SyncSender<Posted>) {
+async fn take(listener: UnixListener, post: Post) {
     let room = Arc::new(Semaphore::new(TALKING_MAX));
     loop {
         let Ok(place) = room.clone().acquire_owned().await else { return };
         match listener.accept().await {
             Ok((stream, _)) => {
-                let orders = orders.clone();
+                let post = post.clone();
                 tokio::spawn(async move {
-                    answer(stream, orders).await;
+                    answer(stream, &post).await;
                     drop(place);
                 });
             }
@@ -72,10 +85,11 @@ async fn take(listener: UnixListener, orders: SyncSender<Posted>) {
 
 /// Nobody else may ever open it: the file gets its place only when its mode is right. One that a killed gateway has left is
 /// replaced; the history's lock has kept a second gateway away by then.
-fn bind(path: &Path) -> io::Result<UnixListener> {
+fn bind(path: &Path) -> io::Result<std::os::unix::net::UnixListener> {
     let fresh = path.with_extension(format!("{}.sock", std::process::id()));
     let _left_behind = std::fs::remove_file(&fresh);
-    let listener = UnixListener::bind(&fresh)?;
+    let listener = std::os::unix::net::UnixListener::bind(&fresh)?;
+    listener.set_nonblocking(true)?;
     let placed = std::fs::set_permissions(&fresh, std::fs::Permissions::from_mode(0o600))
         .and_then(|()| std::fs::rename(&fresh, path));
     placed.inspect_err(|_| {
@@ -84,10 +98,10 @@ fn bind(path: &Path) -> io::Result<UnixListener> {
     Ok(listener)
 }
 
-async fn answer(mut stream: UnixStream, orders: SyncSender<Posted>) {
+async fn answer(mut stream: UnixStream, post: &Post) {
     let user = stream.peer_cred().ok().map(|peer| peer.uid());
     let reply = match tokio::time::timeout(ASK_WITHIN, read(&mut stream)).await {
-        Ok(Ok(line)) => obey(&line, user, &orders).await,
+        Ok(Ok(line)) => obey(&line, user, post).await,
         Ok(Err(error)) => Reply::refused(format!("the order could not be read: {error}")),
         Err(_) => Reply::refused("nothing was ordered"),
     };
@@ -101,19 +115,9 @@ async fn read(stream: &mut UnixStream) -> io::Result<String> {
     Ok(line)
 }
 
-async fn obey(line: &str, user: Option<u32>, orders: &SyncSender<Posted>) -> Reply {
-    let order: Order = match serde_json::from_str(line) {
-        Ok(order) => order,
-        Err(error) => return Reply::refused(format!("this is no order: {error}")),
-    };
-    let (reply, answered) = oneshot::channel();
-    if orders.try_send(Posted { order: order.of_user(user), reply }).is_err() {
-        return Reply::refused("the box is busy; look at its log and try again");
-    }
-    match tokio::time::timeout(ANSWER_WITHIN, answered).await {
-        Ok(Ok(reply)) => reply,
-        _ => {
-            Reply::refused("the tick does not answer; look at the log, and restart the gateway if it does not recover")
-        }
+async fn obey(line: &str, user: Option<u32>, post: &Post) -> Reply {
+    match serde_json::from_str::<Order>(line) {
+        Ok(order) => post.order(order.of_user(user)).await,
+        Err(error) => Reply::refused(format!("this is no order: {error}")),
     }
 }

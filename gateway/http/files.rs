@@ -1,6 +1,5 @@
 //! The files of the page, part of the binary: nothing is loaded from elsewhere, and no build step makes them.
 
-const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const SVG: &str = "image/svg+xml";
@@ -19,8 +18,7 @@ macro_rules! files {
 }
 
 /// The one document; every view is this with another address.
-pub(super) const INDEX: WebFile =
-    WebFile { name: "index.html", kind: HTML, content: include_str!("../web/index.html") };
+pub(super) const INDEX: &str = include_str!("../web/index.html");
 
 /// Everything below `/web/`.
 pub(super) static FILES: &[WebFile] = files! {

@@ -1,9 +1,11 @@
 //! `GET /api/v1/handbook/{chapter}`: the handbook of the box, part of the binary.
 
 use super::problem::ApiProblem;
+use super::route::Route;
 use axum::extract::Path;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use axum::routing::get;
 use serde_json::{Value, json};
 
 macro_rules! chapters {
@@ -15,7 +17,10 @@ macro_rules! chapters {
 /// Every chapter: name and Markdown, in the order of reading.
 static CHAPTERS: &[(&str, &str)] = chapters! {
     "page",
+    "access",
 };
+
+pub(super) const ROUTES: &[Route] = &[Route::file("/api/v1/handbook/{chapter}", || get(chapter))];
 
 /// The first heading of a chapter.
 fn title(text: &str) -> &str {
@@ -23,7 +28,7 @@ fn title(text: &str) -> &str {
 }
 
 /// `GET /api/v1/handbook/{chapter}`: Markdown; `index` gives the list of the chapters with their titles.
-pub(super) async fn chapter(Path(name): Path<String>) -> Response {
+async fn chapter(Path(name): Path<String>) -> Response {
     if name == "index" {
         let list: Vec<Value> =
             CHAPTERS.iter().map(|(name, text)| json!({ "name": name, "title": title(text) })).collect();

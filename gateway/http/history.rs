@@ -3,6 +3,7 @@
 use super::Shared;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
+use super::route::Route;
 use crate::history::{HistoryError, Query, Reader, audit_document};
 use crate::moment;
 use crate::records::{RecordKind, RecordQuery, document, records};
@@ -10,8 +11,14 @@ use crate::samples;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
 use serde_json::{Value, json};
+use std::time::Duration;
 
+/// Questions that are answered at the same time.
+pub(super) const READERS_MAX: usize = 4;
+/// A question that waits for longer is not answered.
+const READING_WITHIN: Duration = Duration::from_secs(20);
 /// What is read when nobody says otherwise.
 const SPAN_DEFAULT_NS: i64 = 600 * SECOND_NS;
 /// About so many buckets when nobody says otherwise.
@@ -23,6 +30,17 @@ const SERIES_MAX: usize = 32;
 /// Channels shown when nobody asks for others.
 const CHANNELS_DEFAULT: [&str; 3] = ["spindle_speed_rpm", "feed_mm_min", "spindle_power_w"];
 
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/api/v1/samples", || get(sample_series)),
+    Route::read("/api/v1/states", || get(states)),
+    Route::read("/api/v1/alarms", || get(alarms)),
+    Route::read("/api/v1/decisions", || get(decisions)),
+    Route::read("/api/v1/events", || get(events)),
+    Route::read("/api/v1/parts", || get(parts)),
+    Route::read("/api/v1/audit", || get(audit)),
+    Route::read("/api/v1/audit/verify", || get(verify)),
+];
+
 pub(super) type Answer = Result<Json<Value>, ApiProblem>;
 pub(super) type Given = Pairs<Vec<(String, String)>>;
 
@@ -33,7 +51,12 @@ pub(super) async fn reading(
 ) -> Answer {
     let newest_ns = shared.status()?.at_ms.saturating_add(1).saturating_mul(1_000_000);
     let path = shared.history.clone();
+    let place = tokio::time::timeout(READING_WITHIN, shared.readers.acquire_owned()).await;
+    let Ok(Ok(place)) = place else {
+        return Err(ApiProblem::unavailable("too many questions about the history at once", "ask again in a moment"));
+    };
     let task = tokio::task::spawn_blocking(move || {
+        let _held_while_reading = place;
         let reader = Reader::open(&path).map_err(|error| trouble(&error))?;
         read(&reader, newest_ns)
     });

@@ -1,35 +1,48 @@
 //! `GET /api/v1/live`: the status as server-sent events, a few per second.
 
 use super::Shared;
-use super::problem::ApiProblem;
-use axum::extract::State;
+use super::peer::Peer;
+use super::person::{SignedIn, cookie, name_of_cookie};
+use super::route::Route;
+use crate::access::key;
+use axum::extract::{Extension, State};
+use axum::http::{HeaderMap, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
 use std::convert::Infallible;
 use std::time::Duration;
+use tokio_stream::StreamExt;
 use tokio_stream::wrappers::WatchStream;
-use tokio_stream::{Stream, StreamExt};
 
-/// More listeners than this at once are turned away.
-pub(super) const LISTENERS_MAX: usize = 32;
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/live", || get(live))];
 
 /// `GET /api/v1/live`
-///
-/// # Errors
-/// Too many listeners.
-pub(super) async fn live(
+async fn live(
     State(shared): State<Shared>,
-) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiProblem> {
-    let seat = shared.listeners.clone().try_acquire_owned().map_err(|_| {
-        ApiProblem::unavailable(
-            format!("{LISTENERS_MAX} clients listen already"),
-            "close a page, or read /api/v1/status instead",
-        )
-    })?;
-    // The stream ends when the tick ends and drops its side.
-    let events = WatchStream::new(shared.live.clone()).filter_map(move |published| {
-        let _held_while_listening = &seat;
+    Extension(peer): Extension<Peer>,
+    person: Option<SignedIn>,
+    headers: HeaderMap,
+) -> Response {
+    let held = match shared.streams.take(peer.from) {
+        Ok(held) => held,
+        // Whoever reads until the end has his answer now.
+        Err(problem) => return ([(header::CONNECTION, "close")], problem).into_response(),
+    };
+    let session = cookie(&headers, name_of_cookie(&peer)).map(key);
+    let access = shared.access.clone();
+    // Where reading needs a person, the stream ends with the session, or when the person is not known any more.
+    let goes_on = move || match (&session, &person) {
+        _ if !access.rules().tokens_always => true,
+        (Some(session), _) => access.of_key(session).is_some(),
+        (None, Some(SignedIn(person))) => access.knows(&person.name),
+        (None, None) => false,
+    };
+    // It also ends when the tick ends and drops its side.
+    let events = WatchStream::new(shared.live.clone()).take_while(move |_| goes_on()).filter_map(move |published| {
+        let _held_while_listening = &held;
         let text = serde_json::to_string(&*published?.status).ok()?;
-        Some(Ok(Event::default().event("status").data(text)))
+        Some(Ok::<_, Infallible>(Event::default().event("status").data(text)))
     });
-    Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))))
+    Sse::new(events).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))).into_response()
 }

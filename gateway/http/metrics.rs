@@ -3,11 +3,13 @@
 
 use super::Shared;
 use super::problem::ApiProblem;
+use super::route::Route;
 use crate::alignment::AlignmentStatus;
 use crate::status::{Shown, Status};
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
+use axum::routing::get;
 use std::fmt::Write;
 
 /// Our unit suffix, the base unit of Prometheus, and the factor to it.
@@ -210,6 +212,8 @@ pub fn render(status: &Status) -> String {
     own(&mut page, status);
     page.0
 }
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/metrics", || get(metrics))];
 
 /// `GET /metrics`
 pub(super) async fn metrics(State(shared): State<Shared>) -> Result<impl IntoResponse, ApiProblem> {

@@ -1,43 +1,67 @@
-//! The box on the network: the live page, the API, the metrics. Everything here only reads.
+//! The box on the network: the page, the API, the metrics.
 //!
 //! Requests are answered from the latest [`Status`] or from the history through connections of their own; nothing a
 //! client does makes the tick wait. Whatever a query says, the answer is a document or a problem with a hint.
+//!
+//! A request comes through three doors before a handler sees it: `connection` (how many connections, how slow a head may
+//! come, TLS), `host` (is this box meant at all) and `guard` (who asks, from where, how long the body is). What the guard
+//! demands stands in the row of the table of routes, see [`Route`].
 
+mod backtests;
+mod connection;
+mod description;
 mod files;
+mod guard;
 mod handbook;
+mod headers;
 mod history;
+mod host;
 mod live;
 mod metrics;
+mod orders;
 mod page;
+mod peer;
+mod person;
+mod plain;
 mod problem;
 mod query;
+mod route;
 mod rules;
 mod series;
 mod server;
+mod sign_in;
+mod streams;
 mod twin;
 mod utilisation;
 mod vocabulary;
 mod wear;
 
+pub use connection::{Certificate, CertificateError};
+pub use description::{described, description};
 pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
+pub use route::{Needs, Route, Verb};
 pub use server::{Server, bind, port_trouble};
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
-use crate::config::Config;
+use crate::access::Access;
+use crate::control::Post;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
 use axum::Router;
 use axum::http::{StatusCode, Uri, header};
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{MethodRouter, get};
+use axum::routing::get;
+use backtests::Backtests;
+use guard::{Guarded, guard};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use streams::Streams;
 use tokio::sync::{Semaphore, watch};
-
-/// The description of the API (OpenAPI 3.1), written by hand and held against [`ROUTES`] by a test.
-pub const OPENAPI: &str = include_str!("openapi.json");
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
 
 /// A status older than this means that the tick stands still.
 const ALIVE_WITHIN: Duration = Duration::from_secs(5);
@@ -51,26 +75,61 @@ pub struct Published {
     pub at: Instant,
 }
 
+/// What the server is made from.
+#[derive(Debug)]
+pub struct Parts {
+    /// What the tick publishes.
+    pub live: watch::Receiver<Option<Published>>,
+    /// Where the history is.
+    pub history: PathBuf,
+    /// Where the scripts are.
+    pub scripts: PathBuf,
+    /// Where everything else is that the box keeps.
+    pub data_dir: PathBuf,
+    /// The language in which the page opens, if not the browser's.
+    pub language: Option<Language>,
+    /// Who may do what.
+    pub access: Arc<Access>,
+    /// The way of orders to the tick.
+    pub post: Post,
+    /// Names by which browsers reach the box, besides its own addresses, in lower case.
+    pub hosts: Vec<String>,
+}
+
 /// What every request can see.
 #[derive(Clone)]
 pub struct Shared {
     live: watch::Receiver<Option<Published>>,
-    listeners: Arc<Semaphore>,
+    streams: Streams,
+    readers: Arc<Semaphore>,
     history: PathBuf,
     scripts: PathBuf,
+    data_dir: PathBuf,
+    backtests: Backtests,
     language: Option<Language>,
+    access: Arc<Access>,
+    post: Post,
+    hosts: Arc<[String]>,
 }
 
 impl Shared {
-    /// What the tick publishes, where history and scripts are, and the language in which the page opens if not the browser's.
+    /// From these parts.
     #[must_use]
-    pub fn new(live: watch::Receiver<Option<Published>>, config: &Config) -> Self {
+    pub fn new(parts: Parts) -> Self {
+        let Parts { live, history, scripts, data_dir, language, access, post, hosts } = parts;
+        let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
-            listeners: Arc::new(Semaphore::new(live::LISTENERS_MAX)),
-            history: config.history.path.clone(),
-            scripts: config.scripts.directory.clone(),
-            language: config.gateway.language,
+            streams: Streams::default(),
+            readers,
+            history,
+            scripts,
+            data_dir,
+            backtests: Backtests::default(),
+            language,
+            access,
+            post,
+            hosts: hosts.into(),
         }
     }
 
@@ -81,51 +140,72 @@ impl Shared {
     }
 }
 
-/// A path and what answers there.
-type Route = (&'static str, fn() -> MethodRouter<Shared>);
-
-/// Everything that is served.
-pub const ROUTES: [Route; 31] = [
-    ("/", || get(page::page)),
-    ("/now", || get(page::page)),
-    ("/history", || get(page::page)),
-    ("/wear", || get(page::page)),
-    ("/thermal", || get(page::page)),
-    ("/twin", || get(page::page)),
-    ("/rules", || get(page::page)),
-    ("/audit", || get(page::page)),
-    ("/help", || get(page::page)),
-    ("/web/{file}", || get(page::web)),
-    ("/healthz", || get(healthz)),
-    ("/metrics", || get(metrics::metrics)),
-    ("/openapi.json", || get(openapi)),
-    ("/api/v1/status", || get(status)),
-    ("/api/v1/live", || get(live::live)),
-    ("/api/v1/channels", || get(vocabulary::channels)),
-    ("/api/v1/samples", || get(history::sample_series)),
-    ("/api/v1/states", || get(history::states)),
-    ("/api/v1/alarms", || get(history::alarms)),
-    ("/api/v1/decisions", || get(history::decisions)),
-    ("/api/v1/events", || get(history::events)),
-    ("/api/v1/parts", || get(history::parts)),
-    ("/api/v1/audit", || get(history::audit)),
-    ("/api/v1/audit/verify", || get(history::verify)),
-    ("/api/v1/twin", || get(twin::twin)),
-    ("/api/v1/utilisation", || get(utilisation::utilisation)),
-    ("/api/v1/series", || get(series::series)),
-    ("/api/v1/wear", || get(wear::wear)),
-    ("/api/v1/rules", || get(rules::rules)),
-    ("/api/v1/rules/words", || get(rules::words)),
-    ("/api/v1/handbook/{chapter}", || get(handbook::chapter)),
+/// What stands in this file.
+const OWN: &[Route] = &[
+    Route::file("/healthz", || get(healthz)),
+    Route::file("/openapi.json", || get(openapi)),
+    Route::read("/api/v1/status", || get(status)),
 ];
 
-/// All routes with what they see.
+/// The rows of every module.
+const GROUPS: &[&[Route]] = &[
+    OWN,
+    page::ROUTES,
+    plain::ROUTES,
+    metrics::ROUTES,
+    live::ROUTES,
+    vocabulary::ROUTES,
+    history::ROUTES,
+    twin::ROUTES,
+    series::ROUTES,
+    utilisation::ROUTES,
+    wear::ROUTES,
+    handbook::ROUTES,
+    rules::ROUTES,
+    backtests::ROUTES,
+    sign_in::ROUTES,
+    orders::ROUTES,
+];
+
+/// Everything that is served.
+pub fn routes() -> impl Iterator<Item = &'static Route> {
+    GROUPS.iter().flat_map(|group| group.iter())
+}
+
+/// All routes with what they see, each behind its guard.
 pub fn router(shared: Shared) -> Router {
-    ROUTES
-        .iter()
-        .fold(Router::new(), |router, (path, method)| router.route(path, method()))
+    let routes = routes().fold(Router::new(), |router, route| {
+        let guarded = Guarded { shared: shared.clone(), route: *route };
+        router.route(route.path(), route.method_router().route_layer(from_fn_with_state(guarded, guard)))
+    });
+    let routes = routes
         .fallback(|uri: Uri| async move { ApiProblem::not_found(uri.path()) })
-        .with_state(shared)
+        .layer(from_fn(in_our_words))
+        .layer(CompressionLayer::new())
+        .layer(CatchPanicLayer::custom(|_| ApiProblem::broken().into_response()))
+        .layer(from_fn_with_state(shared.clone(), host::check));
+    headers::on(routes).with_state(shared)
+}
+
+/// What the library refuses by itself is told as everything else is: a wrong method, a query that cannot be read.
+async fn in_our_words(request: axum::extract::Request, next: axum::middleware::Next) -> Response {
+    let answer = next.run(request).await;
+    let plain = |kind: &header::HeaderValue| kind.to_str().is_ok_and(|kind| kind.starts_with("text/plain"));
+    let own = answer.headers().get(header::CONTENT_TYPE).is_some_and(|kind| !plain(kind));
+    match answer.status() {
+        StatusCode::METHOD_NOT_ALLOWED if !own => {
+            let allow = answer.headers().get(header::ALLOW).cloned();
+            let takes = allow.as_ref().and_then(|value| value.to_str().ok()).unwrap_or("other methods").to_owned();
+            let mut told = ApiProblem::method(&takes).into_response();
+            allow.map(|value| told.headers_mut().insert(header::ALLOW, value));
+            told
+        }
+        StatusCode::BAD_REQUEST if !own => {
+            let hint = "GET /openapi.json describes every address";
+            ApiProblem::request("the address or its query cannot be read", hint).into_response()
+        }
+        _ => answer,
+    }
 }
 
 async fn status(axum::extract::State(shared): axum::extract::State<Shared>) -> Response {
@@ -133,7 +213,7 @@ async fn status(axum::extract::State(shared): axum::extract::State<Shared>) -> R
 }
 
 async fn openapi() -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], OPENAPI).into_response()
+    ([(header::CONTENT_TYPE, "application/json")], description()).into_response()
 }
 
 /// `GET /healthz`: 200 while the tick goes on, 503 with the reason otherwise.

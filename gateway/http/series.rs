@@ -3,12 +3,16 @@
 use super::Shared;
 use super::history::{Answer, Given, reading, trouble};
 use super::query::QueryKeys;
+use super::route::Route;
 use crate::history::SeriesKind;
 use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
 use serde_json::{Value, json};
 
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(series))];
+
 /// `GET /api/v1/series`
-pub(super) async fn series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
         let span = reader.span().map_err(|error| trouble(&error))?;

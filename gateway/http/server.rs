@@ -1,6 +1,6 @@
 //! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
 
-use super::{Shared, router};
+use super::{Certificate, Shared, connection, router};
 use crate::log::{Notice, Severity};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -38,17 +38,17 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves on `listener`, or keeps trying to open `listen` when there is none. `report` says why nothing listens
-    /// while that is so.
+    /// Serves on `listener`, or keeps trying to open `listen` when there is none; over TLS where there is a `certificate`.
+    /// `report` says why nothing listens while that is so.
     #[must_use]
     pub fn start(
-        listen: SocketAddr,
-        listener: Option<TcpListener>,
+        (listen, listener): (SocketAddr, Option<TcpListener>),
+        certificate: Option<Certificate>,
         shared: Shared,
         report: watch::Sender<Option<String>>,
     ) -> Self {
         let (stop, stopped) = watch::channel(false);
-        let task = tokio::spawn(serve(listen, listener, shared, stopped, report));
+        let task = tokio::spawn(serve((listen, listener), certificate, shared, stopped, report));
         Self { stop, task }
     }
 
@@ -60,8 +60,8 @@ impl Server {
 }
 
 async fn serve(
-    listen: SocketAddr,
-    listener: Option<TcpListener>,
+    (listen, listener): (SocketAddr, Option<TcpListener>),
+    certificate: Option<Certificate>,
     shared: Shared,
     mut stopped: watch::Receiver<bool>,
     report: watch::Sender<Option<String>>,
@@ -75,15 +75,17 @@ async fn serve(
     };
     report.send_replace(None);
     let address = listener.local_addr().unwrap_or(listen);
-    Notice::new(Severity::Info, "serving", format!("live page: http://{address}/")).say();
-    let ended = axum::serve(listener, router(shared))
-        .with_graceful_shutdown(async move {
-            let _stop_or_gone = stopped.wait_for(|stop| *stop).await;
-        })
-        .await;
-    if let Err(error) = ended {
-        Notice::new(Severity::Error, "http_ended", format!("the page has gone: {error}; restart the gateway")).say();
+    let scheme = if certificate.is_some() { "https" } else { "http" };
+    Notice::new(Severity::Info, "serving", format!("live page: {scheme}://{address}/")).say();
+    if let Some(certificate) = &certificate {
+        let text = format!(
+            "the certificate is {}; a browser that asks shows the SHA-256 fingerprint {}",
+            certificate.file.display(),
+            certificate.fingerprint
+        );
+        Notice::new(Severity::Info, "certificate", text).say();
     }
+    connection::serve(listener, certificate.map(|it| it.acceptor()), router(shared), stopped).await;
 }
 
 async fn keep_trying(listen: SocketAddr, report: &watch::Sender<Option<String>>) -> TcpListener {

@@ -3,13 +3,17 @@
 use super::Shared;
 use super::history::{Answer, Given, reading, trouble};
 use super::query::QueryKeys;
+use super::route::Route;
 use crate::history::{Diagnosis, Span};
 use adapters::clock::TimeNs;
 use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
 use serde_json::{Value, json};
 
 /// Diagnoses told when nobody says otherwise.
 const DIAGNOSES_DEFAULT: u32 = 5;
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/twin", || get(twin))];
 
 /// `GET /api/v1/twin`
 pub(super) async fn twin(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {

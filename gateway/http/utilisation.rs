@@ -4,9 +4,11 @@ use super::Shared;
 use super::history::{Answer, Given, range, reading, trouble};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
+use super::route::Route;
 use crate::history::{Reader, Span, StateHour};
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -86,8 +88,10 @@ fn cut(keys: &QueryKeys) -> Result<By, ApiProblem> {
     }
 }
 
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(utilisation))];
+
 /// `GET /api/v1/utilisation`
-pub(super) async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     let keys = QueryKeys::of(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
     let by = cut(&keys)?;
     let offset_min = keys.number("offset_min", -1080_i64, 1080)?.unwrap_or(0);

@@ -1,8 +1,10 @@
 //! `GET /api/v1/channels`: every name the box uses, with unit, range and text in English and Chinese.
 
+use super::route::Route;
 use adapters::channel::Kind;
 use adapters::{Absence, ChannelId};
 use axum::Json;
+use axum::routing::get;
 use rules::estimators::State;
 use serde_json::{Map, Value, json};
 
@@ -73,6 +75,20 @@ pub fn state(state: State) -> (&'static str, &'static str) {
     }
 }
 
+/// The name of a state in one language, by its word.
+pub(super) fn state_text(word: &str, zh: bool) -> &'static str {
+    let found = State::ALL.into_iter().find(|state| state.word() == word).unwrap_or(State::Unknown);
+    let (en, cn) = state(found);
+    if zh { cn } else { en }
+}
+
+/// Why a value is missing, in one language, by its word.
+pub(super) fn absence_text(word: &str, zh: bool) -> &'static str {
+    let found = Absence::ALL.into_iter().find(|reason| reason.word() == word).unwrap_or(Absence::NotProvided);
+    let (en, cn) = absence(found);
+    if zh { cn } else { en }
+}
+
 fn texts(en: &str, zh: &str) -> Value {
     json!({ "en": en, "zh": zh })
 }
@@ -118,6 +134,8 @@ pub fn document() -> Value {
         "absences": reasons.chain(no_estimates).collect::<Map<_, _>>(),
     })
 }
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/channels", || get(channels))];
 
 /// `GET /api/v1/channels`
 pub(super) async fn channels() -> Json<Value> {

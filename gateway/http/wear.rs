@@ -3,13 +3,17 @@
 use super::Shared;
 use super::history::{Answer, Given, reading, trouble};
 use super::query::QueryKeys;
+use super::route::Route;
 use crate::history::StoredWearModel;
 use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
 use rules::estimators::wear::WearModel;
 use serde_json::{Value, json};
 
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(wear))];
+
 /// `GET /api/v1/wear`
-pub(super) async fn wear(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn wear(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
         let models = reader.wear_models().map_err(|error| trouble(&error))?;

@@ -4,23 +4,25 @@
 use super::hand::{Hand, Said};
 use super::health::Health;
 use super::report::milliseconds;
+use super::seen::Seen;
 use super::shifting::{self, Shifting};
 use crate::config::{self, GateMode};
-use crate::control::{self, Posted, Reply};
+use crate::control::{self, Inbox, Posted, PostedRow, Reply};
 use crate::gate::offset::{Moved, Order};
-use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, trail};
-use crate::history::{Alarm, AlarmClear, ReactionTime};
+use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Verdict, trail};
+use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::status::{AlarmStatus, Problem};
+use crate::status::{Acknowledged, AlarmStatus, Problem};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
-use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 /// Who raises the alarm.
 const SOURCE: &str = "gate";
 const CODE: &str = "gate_disarmed";
+/// Rows of the page that are accounted for at a time.
+const ROWS_AT_ONCE_MAX: usize = 32;
 
 /// See the [module](self).
 pub struct Commands {
@@ -28,7 +30,8 @@ pub struct Commands {
     shifting: Shifting,
     /// Name of the source that is written to.
     target: String,
-    orders: Receiver<Posted>,
+    inbox: Inbox,
+    seen: Seen,
     trail: trail::Trail,
     /// Who armed it last.
     by: String,
@@ -43,12 +46,13 @@ pub struct Commands {
 impl Commands {
     /// Writes through this hand to the source of this name.
     #[must_use]
-    pub fn new(hand: Hand, shifting: Shifting, target: String, orders: Receiver<Posted>) -> Self {
+    pub fn new(hand: Hand, shifting: Shifting, target: String, inbox: Inbox) -> Self {
         Self {
             hand,
             shifting,
             target,
-            orders,
+            inbox,
+            seen: Seen::default(),
             trail: trail::Trail::default(),
             by: String::new(),
             was_armed: false,
@@ -59,16 +63,38 @@ impl Commands {
         }
     }
 
+    /// What the page has to account for: who signed in, what was refused, what was changed.
+    fn account(&mut self, at_ns: TimeNs, health: &mut Health) {
+        for PostedRow { row, stored } in self.inbox.rows.try_iter().take(ROWS_AT_ONCE_MAX) {
+            let kept = health.stores() && health.audit(Audit { at_ns, ..row });
+            let _gone = stored.send(kept);
+        }
+    }
+
+    /// Between two ticks: an arming that an order has ended is at once seen by the hand, which gives the machine back.
+    pub fn let_go(&mut self, pipeline: &mut Pipeline, sample: &Sample, now_ns: TimeNs, health: &mut Health) {
+        if !self.was_armed || pipeline.gate().armed().is_ok() {
+            return;
+        }
+        if let Some(verdict) = pipeline.verdict().copied() {
+            let mut said = Vec::new();
+            self.hand.step(&Verdict { armed: false, ..verdict }, &[], now_ns, |it| said.push(it));
+            self.hear(said, sample, pipeline.gate_mut(), health);
+        }
+        self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
+    }
+
     /// Before the tick is decided: what persons at the box have ordered meanwhile.
     pub fn obey(&mut self, gate: &mut Gate, sample: &Sample, health: &mut Health) {
         if !std::mem::replace(&mut self.begun, true) {
             self.keep(trail::started(gate.limits(), sample.at_ns), gate, health);
         }
-        while let Ok(Posted { order, reply }) = self.orders.try_recv() {
+        while let Ok(Posted { order, reply }) = self.inbox.orders.try_recv() {
             let answer = self.order(&order, gate, sample.at_ns, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
         }
+        self.account(sample.at_ns, health);
         if !health.stores() {
             gate.disarm(Disarmed::NoAudit);
         }
@@ -94,6 +120,15 @@ impl Commands {
                     health,
                 );
                 Reply::done("the next feed hold or stop may pass")
+            }
+            control::Order::AcknowledgeAlarm { by, code } => {
+                let stands = self.seen.acknowledge(code, by, at_ns);
+                let outcome = if stands { "done" } else { "refused" };
+                self.keep(trail::order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns), gate, health);
+                match stands {
+                    true => Reply::done(format!("the alarm {code} was seen; it stands until its reason has gone")),
+                    false => Reply::refused(format!("no alarm {code:?} stands")),
+                }
             }
         }
     }
@@ -121,7 +156,7 @@ impl Commands {
     }
 
     /// What cannot be accounted for is not written.
-    fn keep(&self, row: crate::history::Audit, gate: &mut Gate, health: &mut Health) {
+    fn keep(&self, row: Audit, gate: &mut Gate, health: &mut Health) {
         if !health.audit(row) {
             gate.disarm(Disarmed::NoAudit);
         }
@@ -249,6 +284,12 @@ impl Commands {
         self.hand.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
         self.hand.close(|it| said.push(it));
         self.hear(said, sample, gate, health);
+    }
+
+    /// Which alarms have been seen; told which ones stand.
+    pub fn seen(&mut self, standing: &[AlarmStatus]) -> Vec<Acknowledged> {
+        self.seen.stand(standing);
+        self.seen.all()
     }
 
     /// What stands in the machine's mailbox, percent.

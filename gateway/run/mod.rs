@@ -15,18 +15,20 @@ pub mod recent;
 pub mod report;
 pub mod rules;
 pub mod save;
+pub mod seen;
 pub mod shifting;
 pub mod tick;
 pub mod twin;
 pub mod wear;
 
+use crate::access::{self, Access};
 use crate::alignment;
 use crate::cli::CannotRun;
 use crate::config::{self, Config, GateMode};
-use crate::control;
+use crate::control::{self, Inbox};
 use crate::gate::Gate;
-use crate::http::{Published, Server, Shared, bind, port_trouble};
-use crate::log::{Notice, Severity};
+use crate::http::{Certificate, Parts, Published, Server, Shared, bind, port_trouble};
+use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
@@ -45,13 +47,17 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc;
 use std::time::Duration;
 use tick::{Identity, Ticker, Wishes};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use twin::Twin;
 use wear::Wear;
+
+/// Questions about the history, hashes of tokens and the like, at the same time.
+const BLOCKING_MAX: usize = 6;
+/// Time between two looks at the file of persons.
+const FOLLOW_EVERY: Duration = Duration::from_secs(1);
 
 /// What the box shall do.
 #[derive(Debug)]
@@ -73,9 +79,6 @@ type Begun = (Ticker, watch::Receiver<Option<Published>>);
 /// The ways to the feed override and to the offsets, where they may be written.
 type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
 
-/// Orders of persons at the box.
-type Orders = mpsc::Receiver<control::Posted>;
-
 /// Runs until told to stop.
 ///
 /// # Errors
@@ -83,21 +86,23 @@ type Orders = mpsc::Receiver<control::Posted>;
 pub fn run(plan: Plan) -> Result<(), CannotRun> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
-        .max_blocking_threads(4)
+        .max_blocking_threads(BLOCKING_MAX)
         .thread_name("serve")
+        .on_thread_start(priority::give_way)
         .enable_all()
         .build()
         .map_err(|error| CannotRun::new(format!("no threads to serve with: {error}"), ""))?;
     let listener = runtime.block_on(listen(&plan))?;
+    let certificate = certificate(&plan)?;
     let wishes = Arc::new(Wishes::default());
     let (report, port) = watch::channel(None);
-    let (order, orders) = control::queue();
-    let (ticker, live) = ticker(&plan, &wishes, port, orders)?;
+    let (post, inbox) = control::queue();
+    let (ticker, live) = ticker(&plan, &wishes, port, inbox)?;
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, listener, live, &wishes, (report, order)));
+    runtime.block_on(serve(&plan, (listener, certificate), live, &wishes, (report, post)));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -112,6 +117,18 @@ fn address(plan: &Plan) -> Result<Option<SocketAddr>, CannotRun> {
     http.listen.parse().map(Some).map_err(bad)
 }
 
+/// What is shown to whoever connects, where the page is served over TLS.
+fn certificate(plan: &Plan) -> Result<Option<Certificate>, CannotRun> {
+    let http = &plan.config.http;
+    let Some(listen) = address(plan)?.filter(|_| http.tls) else { return Ok(None) };
+    let directory = plan.config.gateway.data_dir.join("tls");
+    let certificate = match &http.certificate {
+        Some((certificate, key)) => Certificate::read(certificate, key),
+        None => Certificate::own(&directory, listen, &http.allow_hosts),
+    };
+    certificate.map(Some).map_err(|error| CannotRun::new(error.to_string(), "cnc-gateway check says more"))
+}
+
 /// A port that the user named is opened before anything else starts.
 async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
     let Some(address) = address(plan)?.filter(|_| plan.port_named) else { return Ok(None) };
@@ -123,7 +140,7 @@ fn ticker(
     plan: &Plan,
     wishes: &Arc<Wishes>,
     port: watch::Receiver<Option<String>>,
-    orders: Orders,
+    inbox: Inbox,
 ) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
@@ -143,7 +160,8 @@ fn ticker(
     let opened = open::sources(config, plan.speed, &clock, start_ns);
     let Sources { feed, pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
-    let commands = commands(plan, ways, orders, &clock, pipeline.gate_mut())?;
+    let wake = inbox.wake.clone();
+    let commands = commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,
@@ -177,6 +195,7 @@ fn ticker(
             scripts: watched,
             health,
             wishes,
+            wake,
             publish,
             stop_after_ns,
         },
@@ -189,7 +208,7 @@ fn ticker(
 fn commands(
     plan: &Plan,
     mut ways: Vec<Way>,
-    orders: Orders,
+    inbox: Inbox,
     clock: &Arc<dyn Clock>,
     gate: &mut Gate,
 ) -> Result<Commands, CannotRun> {
@@ -197,7 +216,7 @@ fn commands(
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();
     if limits.greatest_mode() != GateMode::Armed {
-        return Ok(Commands::new(Hand::None, Shifting::idle(data_dir), target, orders));
+        return Ok(Commands::new(Hand::None, Shifting::idle(data_dir), target, inbox));
     }
     let (actuator, sink) = tools(limits, &mut ways)?;
     let (shifting, offsets) = match sink {
@@ -210,7 +229,7 @@ fn commands(
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
         MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(tools, limits),
     };
-    Ok(Commands::new(hand, shifting, target, orders))
+    Ok(Commands::new(hand, shifting, target, inbox))
 }
 
 /// What may be written, and nothing else.
@@ -260,15 +279,23 @@ fn estimators(memory: &Path) -> estimators::Pipeline {
 /// Serves until a signal says stop, or the tick has ended by itself.
 async fn serve(
     plan: &Plan,
-    listener: Option<TcpListener>,
+    (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
     wishes: &Arc<Wishes>,
-    (report, orders): (watch::Sender<Option<String>>, mpsc::SyncSender<control::Posted>),
+    (report, post): (watch::Sender<Option<String>>, control::Post),
 ) {
-    let _listening = control::listen(&plan.config.gateway.data_dir, orders);
-    let shared = Shared::new(live.clone(), &plan.config);
+    let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
     let server = match address(plan) {
-        Ok(Some(address)) => Some(Server::start(address, listener, shared, report)),
+        Ok(Some(address)) => {
+            let access = Arc::new(open_access(&plan.config, post.clone()));
+            tokio::spawn(follow(access.clone()));
+            let (history, language) = (plan.config.history.path.clone(), plan.config.gateway.language);
+            let hosts = plan.config.http.allow_hosts.clone();
+            let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
+            let live = live.clone();
+            let shared = Shared::new(Parts { live, history, scripts, data_dir, language, access, post, hosts });
+            Some(Server::start((address, listener), certificate, shared, report))
+        }
         _ => None,
     };
     tokio::select! {
@@ -278,6 +305,34 @@ async fn serve(
     wishes.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {
         server.stop().await;
+    }
+}
+
+/// Who may do what on the page. The first start makes an administrator, whose token is shown this once.
+fn open_access(config: &Config, post: control::Post) -> Access {
+    let rules = access::Rules {
+        tokens_always: config.http.tokens_always,
+        session: config.http.session,
+        allow_arming: config.http.allow_arming,
+    };
+    let (access, first) = Access::open(access::path(&config.gateway.data_dir), rules, post);
+    if let Some(token) = first {
+        let name = access::FIRST;
+        log::say_to_operator_alone(&format!(
+            "to change something on the page, sign in as {name} with the token {}; it is shown only now",
+            token.text()
+        ));
+    }
+    access
+}
+
+/// Whoever changes the file of persons is followed, and it stands in the audit.
+async fn follow(access: Arc<Access>) {
+    access.tell_persons().await;
+    let mut beat = tokio::time::interval(FOLLOW_EVERY);
+    loop {
+        beat.tick().await;
+        access.follow().await;
     }
 }
 

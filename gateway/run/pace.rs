@@ -1,5 +1,6 @@
 //! When the next tick is: on the box's clock, or at a multiple of real time for a machine that is simulated.
 
+use crate::control::Wake;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,12 +70,23 @@ impl Pace {
 
     /// Waits for the next tick and gives its time; `None` when it shall stop.
     pub fn next_tick(&mut self, stop: &AtomicBool) -> Option<TimeNs> {
+        self.next_tick_or(stop, &Wake::default(), || {})
+    }
+
+    /// The same; whenever the waiting thread is woken, `meanwhile` is done.
+    pub fn next_tick_or(&mut self, stop: &AtomicBool, wake: &Wake, mut meanwhile: impl FnMut()) -> Option<TimeNs> {
+        let mut look = || {
+            if wake.take() {
+                meanwhile();
+            }
+        };
         self.due_ns += self.period_ns;
         match &mut self.beat {
             Beat::Clock(clock, early_ns) => {
                 let wake_ns = self.due_ns - *early_ns;
                 while !stop.load(Ordering::SeqCst) && clock.now_ns() < wake_ns {
-                    clock.sleep_until(wake_ns.min(clock.now_ns() + STOP_LOOK_NS));
+                    look();
+                    park((wake_ns - clock.now_ns()).min(STOP_LOOK_NS));
                 }
                 while !stop.load(Ordering::SeqCst) && clock.now_ns() < self.due_ns {
                     // Others of the same priority may go on meanwhile, on a box with one processor.
@@ -89,7 +101,7 @@ impl Pace {
             }
             Beat::Stepped { speed: None, .. } => {}
             Beat::Stepped { speed: Some(speed), anchor } => {
-                let late = wait(*speed, *anchor, self.due_ns);
+                let late = wait(*speed, *anchor, self.due_ns, look);
                 if late > BEHIND_MAX {
                     *anchor = (Instant::now(), self.due_ns);
                 }
@@ -127,12 +139,22 @@ impl Pace {
     }
 }
 
-/// Sleeps until machine time `due_ns`; gives how late it is in real time.
-fn wait(speed: f64, (began, began_ns): (Instant, TimeNs), due_ns: TimeNs) -> Duration {
+/// Sleeps until machine time `due_ns`, and does `look` whenever it is woken; gives how late it is in real time.
+fn wait(speed: f64, (began, began_ns): (Instant, TimeNs), due_ns: TimeNs, mut look: impl FnMut()) -> Duration {
     let machine = Duration::from_nanos((due_ns - began_ns).max(0).unsigned_abs());
     let due = began + machine.div_f64(speed);
-    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    while let Some(left) = due.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
+        look();
+        std::thread::park_timeout(left);
+    }
     Instant::now().saturating_duration_since(due)
+}
+
+/// Sleeps so long, or until somebody wakes this thread.
+fn park(ns: i64) {
+    if ns > 0 {
+        std::thread::park_timeout(Duration::from_nanos(ns.unsigned_abs()));
+    }
 }
 
 #[cfg(test)]
@@ -152,6 +174,25 @@ mod tests {
         assert_eq!(pace.next_tick(&GO), Some(400_000_000));
         assert_eq!(pace.skipped(), 2);
         assert_eq!(pace.late_ms().1, 250.0);
+    }
+
+    #[test]
+    fn whoever_is_woken_does_what_is_asked_and_the_tick_comes_when_it_is_due() {
+        let wake = Wake::default();
+        let mut pace = Pace::stepped(Some(1.0), 0, Duration::from_millis(300));
+        let of_other = wake.clone();
+        let (began, mut after) = (Instant::now(), None);
+        let tick = std::thread::scope(|scope| {
+            wake.here();
+            scope.spawn(move || {
+                std::thread::sleep(Duration::from_millis(20));
+                of_other.wake();
+            });
+            pace.next_tick_or(&GO, &wake, || after = Some(began.elapsed()))
+        });
+        assert_eq!(tick, Some(300_000_000));
+        assert!(after.is_some_and(|after| after < Duration::from_millis(200)), "{after:?}");
+        assert!(began.elapsed() >= Duration::from_millis(300));
     }
 
     #[test]

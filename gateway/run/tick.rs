@@ -10,6 +10,7 @@ use super::rules::Watched;
 use super::twin::Twin;
 use super::wear::Wear;
 use crate::config::GateMode;
+use crate::control::Wake;
 use crate::gate::Ask;
 use crate::http::Published;
 use crate::log::{Notice, Severity};
@@ -26,6 +27,9 @@ use tokio::sync::watch;
 
 /// The status is published at most this often.
 const PUBLISH_EVERY: Duration = Duration::from_millis(190);
+
+/// Orders are carried out between two ticks so many times; what comes then waits for the tick.
+const ORDERS_BETWEEN_MAX: u32 = 32;
 
 /// What the rest of the process asks of the tick.
 #[derive(Debug, Default)]
@@ -75,6 +79,8 @@ pub struct Ticker {
     pub health: Health,
     /// What the rest of the process wants.
     pub wishes: Arc<Wishes>,
+    /// How somebody who orders wakes this thread.
+    pub wake: Wake,
     /// Where the status goes.
     pub publish: watch::Sender<Option<Published>>,
     /// End after so much machine time.
@@ -95,7 +101,10 @@ impl Ticker {
                 self.pace.lie_in_wait();
             }
         }
-        while let Some(now_ns) = self.pace.next_tick(&self.wishes.stop) {
+        self.wake.here();
+        let mut last_ns = None;
+        while let Some(now_ns) = self.next_tick(&sample, last_ns) {
+            last_ns = Some(now_ns);
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.complete(&mut sample, now_ns);
@@ -134,6 +143,19 @@ impl Ticker {
         self.wishes.stop.store(true, Ordering::SeqCst);
     }
 
+    /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
+    fn next_tick(&mut self, sample: &Sample, last_ns: Option<TimeNs>) -> Option<TimeNs> {
+        let Self { pace, wake, wishes, commands, pipeline, health, .. } = self;
+        let mut left = ORDERS_BETWEEN_MAX;
+        pace.next_tick_or(&wishes.stop, wake, || {
+            // Before the first tick there is nothing to order about.
+            let Some(last_ns) = last_ns.filter(|_| left > 0) else { return };
+            left -= 1;
+            commands.obey(pipeline.gate_mut(), sample, health);
+            commands.let_go(pipeline, sample, last_ns, health);
+        })
+    }
+
     /// What the simulated controllers have counted, for whoever does not believe the gateway's own figures.
     fn tell_writes(&mut self, at_ns: TimeNs) {
         for machine in &self.machines {
@@ -151,12 +173,14 @@ impl Ticker {
         operations.step(sample, reload, |notice| self.health.event(now_ns, SOURCE, notice));
     }
 
-    fn send(&self, sample: &Sample, now_ns: TimeNs, started: Instant) {
+    fn send(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) {
         let status = Arc::new(self.status(sample, now_ns, started));
         self.publish.send_replace(Some(Published { status, at: Instant::now() }));
     }
 
-    fn status(&self, sample: &Sample, now_ns: TimeNs, started: Instant) -> Status {
+    fn status(&mut self, sample: &Sample, now_ns: TimeNs, started: Instant) -> Status {
+        let alarms = self.alarms();
+        let acknowledged = self.commands.seen(&alarms);
         let Identity { machine, simulated, speed, rate_hz } = self.identity.clone();
         let (late_p50_ms, late_p99_ms) = self.pace.late_ms();
         let count = self.pipeline.tally().ticks();
@@ -173,7 +197,8 @@ impl Ticker {
             state: report::state(&self.pipeline),
             channels: report::channels(sample),
             estimates: report::estimates(self.pipeline.estimates()),
-            alarms: self.alarms(),
+            alarms,
+            acknowledged,
             twin: self.twin.as_ref().map(Twin::status),
             parts: self.pipeline.parts().finished(),
             gate: report::gate(&self.pipeline, self.commands.written_pct()),

@@ -132,7 +132,7 @@ at("language").addEventListener("click", () => { setLanguage(language() === "zh"
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
 
 /** For tests and for whoever looks closely: when the newest status is from, in the clock of the box. */
-globalThis.cncGateway = { live, when: () => (live.status ? dateTime(live.status.at_ms) : null) };
+globalThis.cncGateway = { live, view: () => mounted, when: () => (live.status ? dateTime(live.status.at_ms) : null) };
 
 show();
 live.start();

@@ -29,7 +29,7 @@ export const WORDS = {
   last_ten_minutes: ["Last ten minutes", "最近十分钟"], open_history: ["Open history", "打开历史"],
   absent_title: ["No value at the moment, and why", "当前无数值及原因"], nothing_absent: ["Every expected value is there.", "所有数值正常。"], silent: ["silent", "无应答"],
   simulated: ["simulated machine", "模拟机床"], meter: ["meter", "功率计"], controller: ["controller", "数控系统"], also_measured: ["Also measured", "其他测量值"],
-  demo_note: ["This is a demonstration: a simulated lathe. Within five minutes it goes through all its states, raises an alarm, wears a tool out (see Tool wear) and begins to differ from its simulation (see Twin).", "这是演示：模拟车床。五分钟内会经历所有状态、产生报警、刀具磨损，并与仿真出现偏差（见“仿真对照”）。"],
+  demo_note: ["This is a demonstration: a simulated lathe. Within five minutes it goes through all its states, raises an alarm, wears a tool out (see Tool wear) and differs from its simulation since an earlier day (see Twin).", "这是演示：模拟车床。五分钟内会经历所有状态、产生报警、刀具磨损，并自前日起与仿真有偏差（见“仿真对照”）。"],
   simulated_note: ["A simulated machine: nothing real is moved.", "模拟机床：无真实动作。"],
   demo_fast: ["This is a demonstration: a simulated machine, {0} times as fast as real time.", "这是演示：模拟机床，以 {0} 倍速运行。"],
   // history
@@ -52,7 +52,7 @@ export const WORDS = {
   steps: ["{0} steps", "{0} 步"], asked_let: ["Asked → let through", "请求 → 放行"], why: ["Why", "原因"], who: ["Who", "来源"],
   outcome_permitted: ["as asked", "按请求"], outcome_limited: ["limited", "受限"], outcome_held: ["held at 100 %", "保持 100 %"], outcome_refused: ["refused", "拒绝"], outcome_shadow: ["noted only", "仅记录"], outcome_written: ["written", "已写入"], outcome_failed: ["failed", "失败"], outcome_seen: ["seen", "已生效"], outcome_armed: ["armed", "允许"], outcome_disarmed: ["disarmed", "解除"], outcome_done: ["done", "完成"], outcome_started: ["started", "启动"], outcome_sent: ["sent", "已发送"], outcome_latched: ["waits for the operator", "等待操作员"], outcome_acknowledged: ["acknowledged", "已确认"], outcome_person: ["by a person", "人工"], outcome_expired: ["time is over", "到时"], outcome_start: ["start", "启动"], outcome_off: ["off", "关闭"],
   outcome_read_back: ["not taken by the machine", "机床未接受"], outcome_offset: ["offset not taken", "补偿未接受"], outcome_line: ["machine not reached", "无法连接"], outcome_clock: ["clock jumped", "时钟跳变"], outcome_silent: ["no fresh values", "无新数据"], outcome_no_audit: ["history full", "无法留痕"],
-  kind_change: ["change by a person", "人工更改"], kind_login: ["sign-in", "登录"], kind_offset: ["offset", "补偿"],
+  kind_change: ["change by a person", "人工更改"], kind_login: ["sign-in", "登录"], kind_logout: ["sign-out", "退出"], kind_persons: ["persons", "人员"], kind_request_refused: ["refused request", "被拒请求"], outcome_known: ["known", "已知"], outcome_added: ["added", "新增"], outcome_removed: ["removed", "移除"], kind_offset: ["offset", "补偿"],
   gate_title: ["May the box change the feed?", "网关是否可调整进给？"], arm_at_box: ["Arming is done at the box itself: cnc-gateway arm --for 30m --by NAME", "需在网关本机上允许：cnc-gateway arm --for 30m --by 姓名"], arm_here: ["Arming asks for your token again.", "允许写入时需再次输入令牌。"],
   sources: ["Sources", "数据源"], store: ["Store", "存储"], scripts: ["Rules", "规则"], polled_every: ["every {0}", "每 {0}"], readings: ["{0} readings", "{0} 次读数"], answers_in: ["answers in {0}", "应答 {0}"], failed_polls: ["{0} failed", "{0} 次失败"],
   source_reading: ["reads", "正常"], source_off: ["machine is off", "机床关机"], source_failing: ["fails", "失败"], source_stuck: ["hangs", "无响应"], source_ended: ["ended", "已结束"], source_opening: ["opening", "连接中"], source_waiting: ["waits", "等待"], source_starting: ["starting", "启动中"],

@@ -1,10 +1,8 @@
 //! The API: described completely, answers anything with a document or a problem, and never troubles the tick.
 
 use super::process::{Gateway, get, request, wait_for};
-use gateway::http::{OPENAPI, ROUTES};
 use proptest::prelude::*;
 use serde_json::Value;
-use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
@@ -22,27 +20,19 @@ fn started() -> (tempfile::TempDir, Gateway, String) {
 }
 
 #[test]
-fn every_route_is_described_and_every_description_has_its_route() {
-    let document: Value = serde_json::from_str(OPENAPI).expect("JSON");
-    let described: BTreeSet<&str> = document["paths"].as_object().expect("paths").keys().map(String::as_str).collect();
-    let routes: BTreeSet<&str> = ROUTES.iter().map(|(path, _)| *path).collect();
-    assert_eq!(described, routes);
-    let references =
-        OPENAPI.split("#/components/schemas/").skip(1).map(|rest| rest.split('"').next().unwrap_or_default());
-    for name in references {
-        assert!(document["components"]["schemas"][name].is_object(), "no schema {name}");
-    }
-}
-
-#[test]
 fn every_described_address_answers_with_what_is_described() {
     let (_directory, gateway, address) = started();
     let document: Value = get(&address, "/openapi.json").json();
     for (path, item) in document["paths"].as_object().expect("paths") {
-        if path.ends_with("/live") {
+        // Streams do not end; what needs a person is tried in the suite of the access.
+        if path.ends_with("/live") || item["get"].is_null() || item["get"]["security"].is_array() {
             continue;
         }
-        let answer = get(&address, &path.replace("{file}", "page.js"));
+        // An earlier version of a script is there only after somebody has changed one.
+        if path.contains("{digest}") {
+            continue;
+        }
+        let answer = get(&address, &path.replace("{file}", "page.js").replace("{chapter}", "page"));
         assert_eq!(answer.status, 200, "{path}: {}", answer.body);
         let described = item["get"]["responses"]["200"]["content"].as_object().expect("content");
         let kind = described.keys().next().expect("a type");
@@ -87,8 +77,10 @@ fn whatever_is_asked_is_answered_and_the_tick_goes_on() {
         let said = answer.body.replace("write 2026-01-31T08:15:00Z", "RFC 3339");
         assert!(said.contains(part) && answer.json()["hint"].is_string(), "{path}: {}", answer.body);
     }
-    let posted = request(&address, "POST /api/v1/status HTTP/1.0\r\nContent-Length: 0\r\n\r\n");
+    let posted =
+        request(&address, &format!("POST /api/v1/status HTTP/1.0\r\nHost: {address}\r\nContent-Length: 0\r\n\r\n"));
     assert_eq!(posted.status, 405);
+    assert_eq!(request(&address, "GET /api/v1/status HTTP/1.0\r\n\r\n").status, 400, "no Host");
     let long = request(&address, &format!("GET /{} HTTP/1.0\r\n\r\n", "x".repeat(1 << 20)));
     assert!([400, 414, 431, 0].contains(&long.status), "{}", long.status);
     let before = get(&address, "/api/v1/status").json()["tick"]["count"].as_u64();
@@ -128,7 +120,7 @@ fn live_sends_a_status_several_times_a_second_to_a_limited_number() {
         }
     }
     assert!(seen.windows(2).all(|pair| pair[0] < pair[1]), "{seen:?}");
-    let mut others: Vec<_> = (0..32).map(|_| listen(&address)).collect();
+    let mut others: Vec<_> = (0..8).map(|_| listen(&address)).collect();
     let firsts: Vec<String> = others
         .iter_mut()
         .map(|stream| {

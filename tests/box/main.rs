@@ -2,6 +2,7 @@
 
 mod browser;
 mod cost;
+mod editing;
 mod http;
 mod kill;
 mod lives;

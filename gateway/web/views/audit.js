@@ -2,10 +2,10 @@
 // the store, the scripts, as an integrator needs them.
 import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { bytes, clock, dateTime, duration, number, quantity, when } from "/web/format.js";
-import { box, t } from "/web/words.js";
+import { box, has, t } from "/web/words.js";
 import { armDialog, sourceName } from "/web/now.js";
 
-const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "stop", "feed_hold", "acknowledged", "reaction", "started"];
+const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "persons", "request_refused", "stop", "feed_hold", "acknowledged", "reaction", "started"];
 const PAGE = 1000;
 /** Rows of the same kind, script and outcome that follow each other within this time are one line. */
 const RAMP_S = 10;
@@ -57,6 +57,9 @@ export function grouped(rows) {
   return groups;
 }
 
+/** A word of the box; one that the page does not know stands as it is. */
+const word = (what, key) => (has(`${what}_${key}`) ? t(`${what}_${key}`) : key.replaceAll("_", " "));
+
 function drawRows(list, state, context) {
   // That nothing is asked for between two cuts is only of interest to whoever asks for everything.
   const quiet = (e) => !state.kind && e.kind === "request" && e.asked === null;
@@ -71,7 +74,7 @@ function drawRows(list, state, context) {
     const time = ramp ? `${when(first.at_ns / 1e6, now)} – ${clock(last.at_ns / 1e6)}` : when(first.at_ns / 1e6, now);
     const words = ramp ? `${t("steps", g.rows.length)} · ${box(last.reason)}` : box(g.reason);
     const tone = ["failed", "refused"].includes(g.outcome) ? "bad" : g.kind === "armed" ? "warn" : "";
-    const line = [time, { text: make("span", tone ? `${tone}-text` : "", `${t(`kind_${g.kind}`)} · ${t(`outcome_${g.outcome}`)}`) }, figures, words, [g.script, g.person].filter(Boolean).join(" · ") || "–"];
+    const line = [time, { text: make("span", tone ? `${tone}-text` : "", `${word("kind", g.kind)} · ${word("outcome", g.outcome)}`) }, figures, words, [g.script, g.person].filter(Boolean).join(" · ") || "–"];
     if (!ramp) return [line];
     const opened = state.open.has(first.number);
     line[0] = { text: make("button", "link-button", `${opened ? "▾" : "▸"} ${time}`, { type: "button", "aria-expanded": String(opened), onclick: () => { if (!state.open.delete(first.number)) state.open.add(first.number); drawRows(list, state, context); } }) };

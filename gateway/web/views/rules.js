@@ -10,7 +10,7 @@ const BACKTESTS = ["1h", "8h", "24h", "7d", "30d"];
 export function mount(root, context) {
   const view = new RulesView(root, context);
   view.begin();
-  return { update: (status) => view.update(status), session: () => view.enable(), leave: () => view.leave() };
+  return { rules: view, update: (status) => view.update(status), session: () => view.enable(), leave: () => view.leave() };
 }
 
 class RulesView {

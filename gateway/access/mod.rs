@@ -1,0 +1,39 @@
+//! Who may do what on the page: persons with roles, tokens, sessions, and an account of all of it in the audit.
+//!
+//! Whoever is at the box itself - who can open its data directory - needs none of this: `cnc-gateway person` makes persons,
+//! `cnc-gateway arm` arms. Over the network, and on the page at the box too, whoever changes something signs in.
+//!
+//! | file | what |
+//! |---|---|
+//! | `role` | viewer, setter, armer, admin |
+//! | `persons` | the file of persons, and the differences between two readings of it |
+//! | `token` | made, hashed with argon2, known again |
+//! | `sessions` | who is signed in, for how long |
+//! | `tries` | wrong tokens, and who has to wait |
+//! | `account` | rows of the audit, and how many at most |
+//! | `sign_in` | all of these together: from a name and a token to a session, from a request to a person |
+
+mod account;
+mod persons;
+mod role;
+mod sessions;
+mod sign_in;
+mod token;
+mod tries;
+
+pub use persons::{Difference, Entry, FIRST, NAME_MAX, PERSONS_MAX, Persons, PersonsError, differences, path};
+pub use role::Role;
+pub use sessions::{Key, key};
+pub use sign_in::{Access, Begun, Rules, SignInError};
+pub(crate) use token::random;
+pub use token::{Token, TokenError};
+pub use tries::{LOCKED_FOR, TRIES_MAX};
+
+/// Somebody who has been recognised.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Person {
+    /// Name, as in the file of persons.
+    pub name: String,
+    /// What he or she may do.
+    pub role: Role,
+}

@@ -1,0 +1,311 @@
+//! From a name and a token to a session, and from a request to a person.
+
+use super::account::Account;
+use super::persons::{Persons, PersonsError, differences};
+use super::sessions::{Key, Sessions, key};
+use super::token::Token;
+use super::tries::Tries;
+use super::{Person, Role};
+use crate::control::Post;
+use crate::files::{Mark, mark};
+use crate::log::{Notice, Severity};
+use std::collections::HashMap;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::Semaphore;
+
+/// A token that came with a request is not hashed again for so long.
+const BEARER_KEPT: Duration = Duration::from_secs(300);
+/// So many such tokens.
+const BEARERS_MAX: usize = 64;
+/// Whoever waits for a hash for longer is told that the box is busy.
+const HASH_WITHIN: Duration = Duration::from_secs(5);
+
+/// What the configuration says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rules {
+    /// Reading needs a person too.
+    pub tokens_always: bool,
+    /// Whoever has signed in is signed out after this time.
+    pub session: Duration,
+    /// The gate may be armed from the page.
+    pub allow_arming: bool,
+}
+
+/// Why somebody could not sign in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SignInError {
+    /// Name or token is wrong; so many tries are left.
+    Wrong(u32),
+    /// Too many wrong tokens; so long nothing is tried.
+    Wait(Duration),
+    /// The box is busy, or has no memory.
+    Busy,
+}
+
+/// A session that has begun.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Begun {
+    /// What the cookie shall hold.
+    pub cookie: String,
+    /// Who signed in.
+    pub person: Person,
+}
+
+#[derive(Debug)]
+struct Known {
+    mark: Mark,
+    persons: Persons,
+}
+
+#[derive(Debug)]
+struct Bearer {
+    name: String,
+    token_hash: String,
+    until: Instant,
+}
+
+/// See the [module](self).
+#[derive(Debug)]
+pub struct Access {
+    rules: Rules,
+    file: PathBuf,
+    known: Mutex<Known>,
+    sessions: Mutex<Sessions>,
+    tries: Mutex<Tries>,
+    bearers: Mutex<HashMap<Key, Bearer>>,
+    /// One hash at a time: it takes 19 MB and some hundredths of a second.
+    hashing: Semaphore,
+    account: Account,
+    /// What a name that nobody has is compared with, so that it takes as long as one that somebody has.
+    nobody: String,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is behind these locks is complete whenever they are free.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Access {
+    /// Reads the persons of `file`; where there is none the first administrator is made, and the token is given to be shown
+    /// once.
+    #[must_use]
+    pub fn open(file: PathBuf, rules: Rules, post: Post) -> (Self, Option<Token>) {
+        let (persons, first) = match first(&file) {
+            Ok(found) => found,
+            Err(error) => {
+                let text = format!("nobody can sign in on the page: {error}");
+                Notice::new(Severity::Error, "no_persons", text).say();
+                (Persons::default(), None)
+            }
+        };
+        let nobody = persons.all().first().map(|entry| entry.token_hash.clone()).unwrap_or_default();
+        let known = Mutex::new(Known { mark: mark(&file), persons });
+        let access = Self {
+            rules,
+            file,
+            known,
+            sessions: Mutex::default(),
+            tries: Mutex::default(),
+            bearers: Mutex::default(),
+            hashing: Semaphore::new(1),
+            account: Account::new(post),
+            nobody,
+        };
+        (access, first)
+    }
+
+    /// What the configuration says.
+    #[must_use]
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// Everybody, as last read.
+    #[must_use]
+    pub fn persons(&self) -> Persons {
+        lock(&self.known).persons.clone()
+    }
+
+    /// Is there still a person of this name?
+    #[must_use]
+    pub fn knows(&self, name: &str) -> bool {
+        lock(&self.known).persons.named(name).is_some()
+    }
+
+    /// Writes into the audit who the persons are, for whoever compares it with the last end.
+    pub async fn tell_persons(&self) {
+        let persons = self.persons();
+        let words: Vec<String> = persons.all().iter().map(|it| format!("{}: {}", it.name, it.role)).collect();
+        self.account.row("persons", "known", &words.join(", "), "").await;
+    }
+
+    /// Reads the file again if it has changed, and accounts for every difference.
+    pub async fn follow(&self) {
+        let now = mark(&self.file);
+        if lock(&self.known).mark == now {
+            return;
+        }
+        let read = match Persons::read(&self.file) {
+            Ok(read) => read.unwrap_or_default(),
+            Err(error) => {
+                lock(&self.known).mark = now;
+                let text = format!("{error}. Those who were known before still are");
+                return Notice::new(Severity::Error, "persons_refused", text).say();
+            }
+        };
+        let before = {
+            let mut known = lock(&self.known);
+            known.mark = now;
+            std::mem::replace(&mut known.persons, read.clone())
+        };
+        for difference in differences(&before, &read) {
+            self.account.row("persons", difference.outcome, &difference.text, &difference.by).await;
+        }
+    }
+
+    /// Changes the file, then follows it.
+    ///
+    /// # Errors
+    /// What `change` says, or the file cannot be read or written.
+    pub async fn change<T>(
+        &self,
+        change: impl FnOnce(&mut Persons) -> Result<T, PersonsError>,
+    ) -> Result<T, PersonsError> {
+        let mut persons = Persons::read(&self.file)?.unwrap_or_default();
+        let given = change(&mut persons)?;
+        persons.write(&self.file)?;
+        self.follow().await;
+        Ok(given)
+    }
+
+    /// Begins a session.
+    ///
+    /// # Errors
+    /// Wrong name or token, too many tries, a busy box.
+    pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<Begun, SignInError> {
+        self.follow().await;
+        let person = self.check(name, token, from, "login").await?;
+        let hash = self.hash_of(&person.name).unwrap_or_default();
+        let begun = lock(&self.sessions).begin((&person.name, &hash), self.rules.session, Instant::now());
+        let cookie = begun.map_err(|_| SignInError::Busy)?;
+        self.account.row("login", "done", &format!("{} from {from}", person.role), &person.name).await;
+        Ok(Begun { cookie, person })
+    }
+
+    /// Is this the token of this name? Wrong ones are counted and accounted for as `kind`.
+    ///
+    /// # Errors
+    /// Wrong name or token, too many tries, a busy box.
+    pub async fn check(&self, name: &str, token: &Token, from: IpAddr, kind: &str) -> Result<Person, SignInError> {
+        let name = name.trim();
+        let place = tokio::time::timeout(HASH_WITHIN, self.hashing.acquire()).await;
+        let Ok(Ok(_place)) = place else { return Err(SignInError::Busy) };
+        if let Some(wait) = lock(&self.tries).wait(from, name, Instant::now()) {
+            self.account.refused(
+                kind,
+                &format!("from {from}: waits after too many wrong tokens"),
+                name,
+                Instant::now(),
+            );
+            return Err(SignInError::Wait(wait));
+        }
+        let entry = lock(&self.known).persons.named(name).cloned();
+        let hash = entry.as_ref().map_or(&self.nobody, |entry| &entry.token_hash).clone();
+        let token = token.clone();
+        let right = tokio::task::spawn_blocking(move || token.is(&hash)).await.map_err(|_| SignInError::Busy)?;
+        match entry.filter(|_| right) {
+            Some(entry) => {
+                lock(&self.tries).right(from, name);
+                Ok(Person { name: entry.name, role: entry.role })
+            }
+            None => {
+                let left = lock(&self.tries).wrong(from, name, Instant::now());
+                let wait = if left == 0 { "; it has to wait now" } else { "" };
+                let text = format!("from {from}: wrong name or token{wait}");
+                self.account.refused(kind, &text, name, Instant::now());
+                Err(SignInError::Wrong(left))
+            }
+        }
+    }
+
+    /// Who holds this cookie.
+    #[must_use]
+    pub fn of_cookie(&self, cookie: &str) -> Option<(Person, Instant)> {
+        self.of_key(&key(cookie))
+    }
+
+    /// The same by its digest: what a stream keeps to see when its session has ended.
+    #[must_use]
+    pub fn of_key(&self, key: &Key) -> Option<(Person, Instant)> {
+        let sessions = lock(&self.sessions);
+        let session = sessions.find(key, Instant::now())?;
+        let known = lock(&self.known);
+        let entry = known.persons.named(&session.name).filter(|entry| entry.token_hash == session.token_hash)?;
+        Some((Person { name: entry.name.clone(), role: entry.role }, session.until))
+    }
+
+    /// Who gave name and token with the request itself, as `NAME:TOKEN`.
+    ///
+    /// # Errors
+    /// Wrong name or token, too many tries, a busy box.
+    pub async fn of_bearer(&self, given: &str, from: IpAddr) -> Result<Person, SignInError> {
+        let digest = key(given);
+        if let Some(person) = self.kept_bearer(&digest) {
+            return Ok(person);
+        }
+        let (name, token) = given.split_once(':').unwrap_or((given, ""));
+        let person = self.check(name, &Token::typed(token), from, "login").await?;
+        let (name, until) = (person.name.clone(), Instant::now() + BEARER_KEPT);
+        let token_hash = self.hash_of(&name).unwrap_or_default();
+        let mut bearers = lock(&self.bearers);
+        bearers.retain(|_, bearer| Instant::now() < bearer.until);
+        if bearers.len() < BEARERS_MAX {
+            bearers.insert(digest, Bearer { name, token_hash, until });
+        }
+        Ok(person)
+    }
+
+    fn kept_bearer(&self, digest: &Key) -> Option<Person> {
+        let bearers = lock(&self.bearers);
+        let bearer = bearers.get(digest).filter(|bearer| Instant::now() < bearer.until)?;
+        let known = lock(&self.known);
+        let entry = known.persons.named(&bearer.name).filter(|entry| entry.token_hash == bearer.token_hash)?;
+        Some(Person { name: entry.name.clone(), role: entry.role })
+    }
+
+    fn hash_of(&self, name: &str) -> Option<String> {
+        lock(&self.known).persons.named(name).map(|entry| entry.token_hash.clone())
+    }
+
+    /// Ends a session.
+    pub async fn sign_out(&self, cookie: &str, from: IpAddr) {
+        if let Some((person, _)) = self.of_cookie(cookie) {
+            lock(&self.sessions).end(&key(cookie));
+            self.account.row("logout", "done", &format!("from {from}"), &person.name).await;
+        }
+    }
+
+    /// A request was refused.
+    pub fn refused(&self, reason: &str, person: Option<&Person>) {
+        self.account.refused("request_refused", reason, person.map_or("", |person| &person.name), Instant::now());
+    }
+
+    /// A request that changes something was answered; false when that will not be stored.
+    pub async fn changed(&self, outcome: &str, reason: &str, person: &Person) -> bool {
+        self.account.row("change", outcome, reason, &person.name).await
+    }
+}
+
+/// The persons of the file. Where there is none the first administrator is made.
+fn first(file: &std::path::Path) -> Result<(Persons, Option<Token>), PersonsError> {
+    if let Some(persons) = Persons::read(file)? {
+        return Ok((persons, None));
+    }
+    let mut persons = Persons::default();
+    let token = persons.add(super::FIRST, Role::Admin, "the first start")?;
+    persons.write(file)?;
+    Ok((persons, Some(token)))
+}

@@ -1,0 +1,157 @@
+//! `cnc-gateway person`: who may do more than read on the page. Works on the box itself, whether the gateway runs or not; one
+//! that runs follows within a second and writes every difference into the audit.
+
+use super::{CannotRun, CommandResult, Outcome, data_dir_of, print, print_json};
+use crate::access::{self, Persons, PersonsError, Role};
+use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Arguments of `person`.
+#[derive(Debug, Args)]
+pub(super) struct PersonArguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+/// Which gateway, and how the answer is printed.
+#[derive(Debug, Args)]
+struct Where {
+    /// Configuration of the gateway, for its data directory.
+    #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
+    config: Option<PathBuf>,
+    /// Data directory of the gateway.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print the answer as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Who makes the change; stands in the audit.
+#[derive(Debug, Args)]
+struct By {
+    /// Who makes the change; stands in the audit.
+    #[arg(long, value_name = "NAME", default_value = "at the box")]
+    by: String,
+    #[command(flatten)]
+    at: Where,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Everybody, with the role.
+    List(Where),
+    /// Somebody new. The token is printed once.
+    Add {
+        /// 1 to 40 letters, digits, spaces, or any of . - _
+        name: String,
+        /// What he or she may do.
+        #[arg(long, value_enum)]
+        role: Role,
+        #[command(flatten)]
+        by: By,
+    },
+    /// Another role.
+    Role {
+        /// Whose.
+        name: String,
+        /// What he or she may do from now on.
+        #[arg(value_enum)]
+        role: Role,
+        #[command(flatten)]
+        by: By,
+    },
+    /// A new token in the place of the one before, printed once. Sessions end at once.
+    Token {
+        /// Whose.
+        name: String,
+        #[command(flatten)]
+        by: By,
+    },
+    /// Remove a person. Sessions end at once.
+    Remove {
+        /// Who.
+        name: String,
+        #[command(flatten)]
+        by: By,
+    },
+}
+
+/// Does what the arguments say.
+pub(super) fn run(arguments: PersonArguments) -> CommandResult {
+    match arguments.what {
+        What::List(at) => list(&at),
+        What::Add { name, role, by } => change(&by, |persons, by| {
+            let token = persons.add(&name, role, by)?;
+            Ok((format!("{} is {role}. The token, shown only now: {}", name.trim(), token.text()), Some(token)))
+        }),
+        What::Role { name, role, by } => change(&by, |persons, by| {
+            persons.give_role(&name, role, by)?;
+            Ok((format!("{name} is {role}"), None))
+        }),
+        What::Token { name, by } => change(&by, |persons, by| {
+            let token = persons.give_token(&name, by)?;
+            Ok((format!("the new token of {name}, shown only now: {}", token.text()), Some(token)))
+        }),
+        What::Remove { name, by } => change(&by, |persons, _| {
+            persons.remove(&name)?;
+            Ok((format!("{name} was removed"), None))
+        }),
+    }
+}
+
+fn file(at: &Where) -> Result<PathBuf, CannotRun> {
+    Ok(access::path(&data_dir_of(at.config.as_deref(), at.data_dir.as_deref())?))
+}
+
+fn list(at: &Where) -> CommandResult {
+    let path = file(at)?;
+    let persons = Persons::read(&path).map_err(cannot)?;
+    let Some(persons) = persons else {
+        let next = "start the gateway once, or add somebody: cnc-gateway person add NAME --role admin";
+        return Err(CannotRun::new(format!("{}: there are no persons yet", path.display()), next));
+    };
+    if at.json {
+        let rows: Vec<Value> =
+            persons.all().iter().map(|it| json!({ "name": it.name, "role": it.role, "by": it.by })).collect();
+        print_json(&json!({ "schema": "persons/1", "persons": rows }));
+    } else {
+        persons
+            .all()
+            .iter()
+            .for_each(|it| print(&format!("{:8} {} (written by {})\n", it.role.word(), it.name, it.by)));
+    }
+    Ok(Outcome::Fine)
+}
+
+type Changed = (String, Option<access::Token>);
+
+fn change(by: &By, change: impl FnOnce(&mut Persons, &str) -> Result<Changed, PersonsError>) -> CommandResult {
+    let path = file(&by.at)?;
+    let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
+    let (text, token) = match change(&mut persons, &by.by) {
+        Ok(changed) => changed,
+        Err(error @ (PersonsError::Token(_) | PersonsError::File(..))) => return Err(cannot(error)),
+        Err(error) => {
+            tell(by.at.json, false, &error.to_string(), None);
+            return Ok(Outcome::No);
+        }
+    };
+    persons.write(&path).map_err(cannot)?;
+    tell(by.at.json, true, &text, token.as_ref());
+    Ok(Outcome::Fine)
+}
+
+fn tell(json: bool, done: bool, text: &str, token: Option<&access::Token>) {
+    match json {
+        true => print_json(&json!({
+            "schema": "person/1", "done": done, "text": text, "token": token.map(access::Token::text)
+        })),
+        false => print(&format!("{text}\n")),
+    }
+}
+
+fn cannot(error: PersonsError) -> CannotRun {
+    CannotRun::new(error.to_string(), "run it as the user that the gateway runs as")
+}

@@ -1,0 +1,107 @@
+//! `[http]`: what is served, and what a page that other computers reach must have.
+
+use super::{flag, seconds, text};
+use crate::config::Http;
+use crate::config::read::{Origin, Reading};
+use std::net::SocketAddr;
+use std::path::Path;
+
+const SECTION: &str = "http";
+
+pub(super) fn http(reading: &Reading<'_>, base: &Path) -> Option<Http> {
+    let file = |key| text(reading, SECTION, key).map(|path| base.join(path));
+    Some(Http {
+        listen: text(reading, SECTION, "listen")?,
+        enabled: flag(reading, SECTION, "enabled")?,
+        tls: flag(reading, SECTION, "tls")?,
+        certificate: file("certificate").zip(file("key")),
+        tokens_always: text(reading, SECTION, "tokens")? == "always",
+        session: seconds(reading, SECTION, "session_s")?,
+        allow_hosts: hosts(&text(reading, SECTION, "allow_hosts").unwrap_or_default()),
+        allow_arming: flag(reading, SECTION, "allow_arming")?,
+    })
+}
+
+/// Names with blanks or commas between them, in lower case.
+fn hosts(text: &str) -> Vec<String> {
+    text.split([' ', ',']).filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
+}
+
+/// Can only this box reach the address?
+#[must_use]
+pub(super) fn own(listen: &str) -> bool {
+    match listen.parse::<SocketAddr>() {
+        Ok(address) => address.ip().is_loopback(),
+        Err(_) => listen.rsplit_once(':').is_some_and(|(host, _)| host.eq_ignore_ascii_case("localhost")),
+    }
+}
+
+pub(super) fn check(reading: &mut Reading<'_>) {
+    check_files(reading);
+    check_hosts(reading);
+    check_reach(reading);
+}
+
+fn origin(reading: &Reading<'_>, key: &str) -> Origin {
+    reading.get(SECTION, key).map_or(Origin::Default, |found| found.origin.clone())
+}
+
+/// Certificate and key belong together.
+fn check_files(reading: &mut Reading<'_>) {
+    let tls = flag(reading, SECTION, "tls").unwrap_or(false);
+    for (one, other) in [("certificate", "key"), ("key", "certificate")] {
+        if text(reading, SECTION, one).is_none() {
+            continue;
+        }
+        let at = origin(reading, one);
+        if text(reading, SECTION, other).is_none() {
+            let next = format!("write {other} = \"...\" too, or leave both out: a certificate is made then");
+            reading.problem(&at, format!("`{one}` is there without `{other}`"), next);
+        } else if !tls && one == "certificate" {
+            reading.problem(&at, "`certificate` is there, but `tls` is false", "write tls = true, or leave it out");
+        }
+    }
+}
+
+fn check_hosts(reading: &mut Reading<'_>) {
+    let named = |host: &String| {
+        !host.is_empty()
+            && host.len() <= 253
+            && host.chars().all(|sign| sign.is_ascii_alphanumeric() || "-.".contains(sign))
+    };
+    let wrong = hosts(&text(reading, SECTION, "allow_hosts").unwrap_or_default()).into_iter().find(|host| !named(host));
+    if let Some(wrong) = wrong {
+        let at = origin(reading, "allow_hosts");
+        let next = "write names alone, without https:// and without a port: \"gateway.local cnc7\"";
+        reading.problem(&at, format!("`allow_hosts` holds {wrong:?}, which is no name of a computer"), next);
+    }
+}
+
+/// What other computers reach is encrypted and asks who is there.
+fn check_reach(reading: &mut Reading<'_>) {
+    let Some(listen) = text(reading, SECTION, "listen") else { return };
+    let enabled = flag(reading, SECTION, "enabled").unwrap_or(true);
+    let safe =
+        flag(reading, SECTION, "tls") == Some(true) && text(reading, SECTION, "tokens").as_deref() == Some("always");
+    if enabled && !own(&listen) && !safe {
+        let at = origin(reading, "listen");
+        let what = format!("`listen` is {listen:?}, which other computers can reach: that needs TLS and tokens");
+        let next = "write tls = true and tokens = \"always\" under [http], or listen on 127.0.0.1";
+        reading.problem(&at, what, next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::own;
+
+    #[test]
+    fn only_loopback_is_this_box_alone() {
+        for listen in ["127.0.0.1:8080", "127.3.2.1:1", "[::1]:80", "localhost:8080"] {
+            assert!(own(listen), "{listen}");
+        }
+        for listen in ["0.0.0.0:8080", "[::]:80", "192.168.1.5:80", "cnc7:80", "127.0.0.1.evil.com:80"] {
+            assert!(!own(listen), "{listen}");
+        }
+    }
+}

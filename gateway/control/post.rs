@@ -1,0 +1,111 @@
+//! The way of orders and of rows of the audit to the tick, and of its answers back.
+//!
+//! Orders and rows go by queues of their own: however many rows a flood of refused requests makes, an order to disarm finds
+//! its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
+
+use super::{ANSWER_WITHIN, Order, Posted, Reply, WAITING_MAX};
+use crate::history::Audit;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, OnceLock};
+use std::thread::Thread;
+use std::time::Duration;
+use tokio::sync::oneshot;
+
+/// Rows that wait for the tick.
+const ROWS_MAX: usize = 64;
+/// A row is accounted for within this time, or not at all.
+const ACCOUNT_WITHIN: Duration = Duration::from_secs(3);
+
+/// Wakes the tick's thread while it waits for the next tick.
+#[derive(Debug, Clone, Default)]
+pub struct Wake(Arc<Woken>);
+
+#[derive(Debug, Default)]
+struct Woken {
+    thread: OnceLock<Thread>,
+    wanted: AtomicBool,
+}
+
+impl Wake {
+    /// From now on the calling thread is the one that is woken.
+    pub fn here(&self) {
+        let _only_once = self.0.thread.set(std::thread::current());
+    }
+
+    /// Wakes it.
+    pub fn wake(&self) {
+        self.0.wanted.store(true, Ordering::SeqCst);
+        self.0.thread.get().map(Thread::unpark);
+    }
+
+    /// Was it woken since the last call?
+    #[must_use]
+    pub fn take(&self) -> bool {
+        self.0.wanted.swap(false, Ordering::SeqCst)
+    }
+}
+
+/// A row of the audit on its way, with the way back.
+#[derive(Debug)]
+pub struct PostedRow {
+    /// The row; the tick puts its own time into it.
+    pub row: Audit,
+    /// Will it be stored?
+    pub stored: oneshot::Sender<bool>,
+}
+
+/// The end of those who order.
+#[derive(Debug, Clone)]
+pub struct Post {
+    orders: SyncSender<Posted>,
+    rows: SyncSender<PostedRow>,
+    wake: Wake,
+}
+
+/// The end of the tick.
+#[derive(Debug)]
+pub struct Inbox {
+    /// Orders of persons.
+    pub orders: Receiver<Posted>,
+    /// What is to be accounted for.
+    pub rows: Receiver<PostedRow>,
+    /// How the tick is woken.
+    pub wake: Wake,
+}
+
+/// Both ends.
+#[must_use]
+pub fn queue() -> (Post, Inbox) {
+    let (orders, to_obey) = sync_channel(WAITING_MAX);
+    let (rows, to_keep) = sync_channel(ROWS_MAX);
+    let wake = Wake::default();
+    (Post { orders, rows, wake: wake.clone() }, Inbox { orders: to_obey, rows: to_keep, wake })
+}
+
+impl Post {
+    /// Hands an order to the tick and gives what it says.
+    pub async fn order(&self, order: Order) -> Reply {
+        let (reply, answered) = oneshot::channel();
+        if self.orders.try_send(Posted { order, reply }).is_err() {
+            return Reply::refused("the box is busy; look at its log and try again");
+        }
+        self.wake.wake();
+        match tokio::time::timeout(ANSWER_WITHIN, answered).await {
+            Ok(Ok(reply)) => reply,
+            _ => Reply::refused(
+                "the tick does not answer; look at the log, and restart the gateway if it does not recover",
+            ),
+        }
+    }
+
+    /// Hands in a row of the audit; false when it will not be stored, or when that is not known in time.
+    pub async fn account(&self, row: Audit) -> bool {
+        let (stored, answered) = oneshot::channel();
+        if self.rows.try_send(PostedRow { row, stored }).is_err() {
+            return false;
+        }
+        self.wake.wake();
+        matches!(tokio::time::timeout(ACCOUNT_WITHIN, answered).await, Ok(Ok(true)))
+    }
+}

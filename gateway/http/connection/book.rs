@@ -1,0 +1,207 @@
+//! Which connections there are, what each is doing, and which one has to go for another.
+
+use std::collections::HashMap;
+use std::net::IpAddr;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::Notify;
+
+/// What one connection is doing. Times are milliseconds since the book was opened.
+#[derive(Debug)]
+pub(super) struct Line {
+    opened: Instant,
+    from: IpAddr,
+    answering: AtomicBool,
+    /// Since when it waits or answers.
+    since_ms: AtomicU64,
+    /// When the first byte of a request came for which it waits; 0: none has come.
+    first_byte_ms: AtomicU64,
+    /// Requests so far.
+    requests: AtomicU64,
+    go: Notify,
+}
+
+/// What a connection waits for, and for how long it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Waits {
+    /// An answer is under way.
+    No,
+    /// The first request, of which no byte has come.
+    First(Duration),
+    /// Another request, of which no byte has come.
+    Next(Duration),
+    /// The rest of the head of a request.
+    Rest(Duration),
+}
+
+impl Line {
+    fn now_ms(&self) -> u64 {
+        // From 1, so that 0 means never.
+        u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX).saturating_add(1)
+    }
+
+    /// A request is complete as far as its head goes.
+    pub(super) fn answers(&self) {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.since_ms.store(self.now_ms(), Ordering::Relaxed);
+        self.answering.store(true, Ordering::Release);
+    }
+
+    /// The answer has gone, or nobody wants it.
+    pub(super) fn waits(&self) {
+        self.first_byte_ms.store(0, Ordering::Relaxed);
+        self.since_ms.store(self.now_ms(), Ordering::Relaxed);
+        self.answering.store(false, Ordering::Release);
+    }
+
+    /// Something came.
+    pub(super) fn heard(&self) {
+        if !self.answering.load(Ordering::Acquire) && self.first_byte_ms.load(Ordering::Relaxed) == 0 {
+            self.first_byte_ms.store(self.now_ms(), Ordering::Relaxed);
+        }
+    }
+
+    /// What it waits for.
+    pub(super) fn state(&self) -> Waits {
+        if self.answering.load(Ordering::Acquire) {
+            return Waits::No;
+        }
+        let for_ms = |since_ms: u64| Duration::from_millis(self.now_ms().saturating_sub(since_ms));
+        match self.first_byte_ms.load(Ordering::Relaxed) {
+            0 if self.requests.load(Ordering::Relaxed) == 0 => {
+                Waits::First(for_ms(self.since_ms.load(Ordering::Relaxed)))
+            }
+            0 => Waits::Next(for_ms(self.since_ms.load(Ordering::Relaxed))),
+            first_ms => Waits::Rest(for_ms(first_ms)),
+        }
+    }
+
+    /// Returns when it has to go for another.
+    pub(super) async fn has_to_go(&self) {
+        self.go.notified().await;
+    }
+}
+
+/// All of them.
+#[derive(Debug, Clone)]
+pub(super) struct Book {
+    opened: Instant,
+    most: usize,
+    of_one: usize,
+    lines: Arc<Mutex<Lines>>,
+}
+
+#[derive(Debug, Default)]
+struct Lines {
+    next: u64,
+    by_number: HashMap<u64, Arc<Line>>,
+}
+
+/// A place in the book; it is given back when this goes.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) line: Arc<Line>,
+    number: u64,
+    book: Book,
+}
+
+impl Drop for Entry {
+    fn drop(&mut self) {
+        self.book.lock().by_number.remove(&self.number);
+    }
+}
+
+impl Book {
+    /// With room for so many, and for so many of one address.
+    pub(super) fn new(most: usize, of_one: usize) -> Self {
+        Self { opened: Instant::now(), most, of_one, lines: Arc::default() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Lines> {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Another connection of this address. One that waits goes for it where there is no room; `None` where none waits.
+    pub(super) fn enter(&self, from: IpAddr) -> Option<Entry> {
+        let mut lines = self.lock();
+        let own = lines.by_number.values().filter(|line| line.from == from).count();
+        if own >= self.of_one {
+            lines.close_one(|line| line.from == from)?;
+        } else if lines.by_number.len() >= self.most {
+            let crowded = lines.most_waiting()?;
+            lines.close_one(|line| line.from == crowded)?;
+        }
+        let line = Arc::new(Line {
+            opened: self.opened,
+            from,
+            answering: AtomicBool::new(false),
+            since_ms: AtomicU64::new(0),
+            first_byte_ms: AtomicU64::new(0),
+            requests: AtomicU64::new(0),
+            go: Notify::new(),
+        });
+        line.waits();
+        let number = lines.next;
+        lines.next += 1;
+        lines.by_number.insert(number, line.clone());
+        Some(Entry { line, number, book: self.clone() })
+    }
+}
+
+impl Lines {
+    /// The address with most connections that wait.
+    fn most_waiting(&self) -> Option<IpAddr> {
+        let mut counts: HashMap<IpAddr, usize> = HashMap::new();
+        let waiting = self.by_number.values().filter(|line| line.state() != Waits::No);
+        waiting.for_each(|line| *counts.entry(line.from).or_default() += 1);
+        counts.into_iter().max_by_key(|(_, count)| *count).map(|(from, _)| from)
+    }
+
+    /// Closes the oldest of these that wait.
+    fn close_one(&mut self, which: impl Fn(&Line) -> bool) -> Option<()> {
+        let waiting = self.by_number.iter().filter(|(_, line)| which(line) && line.state() != Waits::No);
+        let oldest = waiting.min_by_key(|(number, line)| (line.since_ms.load(Ordering::Relaxed), **number));
+        let number = oldest.map(|(number, _)| *number)?;
+        self.by_number.remove(&number)?.go.notify_one();
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_only_waits_goes_for_another_and_whoever_is_answered_stays() {
+        let address = |n: u8| IpAddr::from([10, 0, 0, n]);
+        let book = Book::new(10, 6);
+        let mut of_one: Vec<Entry> = (0..100).filter_map(|_| book.enter(address(1))).collect();
+        assert_eq!(of_one.len(), 100, "each finds a place");
+        assert_eq!(book.lock().by_number.len(), 6, "and of each address there are only so many");
+        of_one.drain(..94);
+        let mut others: Vec<Entry> = (2..6).filter_map(|n| book.enter(address(n))).collect();
+        assert_eq!(book.lock().by_number.len(), 10);
+        others.extend(book.enter(address(7)));
+        assert_eq!(book.lock().by_number.values().filter(|line| line.from == address(1)).count(), 5, "the crowd pays");
+        book.lock().by_number.values().for_each(|line| line.answers());
+        assert!(book.enter(address(9)).is_none(), "nobody waits");
+        others[0].line.waits();
+        assert!(book.enter(address(9)).is_some());
+        drop((of_one, others));
+        assert!(book.lock().by_number.is_empty());
+    }
+
+    #[test]
+    fn a_line_tells_what_it_waits_for() {
+        let entry = Book::new(1, 1).enter(IpAddr::from([10, 0, 0, 1])).expect("room");
+        let line = &entry.line;
+        assert!(matches!(line.state(), Waits::First(_)));
+        line.heard();
+        assert!(matches!(line.state(), Waits::Rest(_)));
+        line.answers();
+        assert_eq!(line.state(), Waits::No);
+        line.waits();
+        assert!(matches!(line.state(), Waits::Next(_)));
+    }
+}

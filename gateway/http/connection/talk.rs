@@ -1,0 +1,160 @@
+//! One connection: encrypted where that is wanted, one request after another, each with its head in time.
+
+use super::book::{Entry, Line, Waits};
+use super::paced::Paced;
+use super::raw;
+use crate::http::ApiProblem;
+use crate::http::peer::Peer;
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::http::{Request, Response};
+use http_body::{Frame, SizeHint};
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper_util::rt::TokioIo;
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::sync::watch;
+use tokio_rustls::TlsAcceptor;
+use tower::ServiceExt;
+
+/// The head of a request is complete so long after its first byte, the first request so long after connecting.
+const HEAD_WITHIN: Duration = Duration::from_secs(10);
+/// Another request may come so long after the last answer.
+const NEXT_WITHIN: Duration = Duration::from_secs(60);
+/// How often a connection looks whether its time is over.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+/// Head of a request, bytes.
+const HEAD_BYTES_MAX: usize = 16 * 1024;
+/// Header lines of a request.
+const HEADERS_MAX: usize = 64;
+/// What is said to a client that is sent away is written within this time.
+const FAREWELL_WITHIN: Duration = Duration::from_secs(1);
+
+/// What every connection needs.
+pub(super) struct Talk {
+    pub(super) tls: Option<TlsAcceptor>,
+    pub(super) router: Router,
+    pub(super) stopped: watch::Receiver<bool>,
+}
+
+impl Talk {
+    /// Until the client has gone, has to go, or the box stops.
+    pub(super) async fn run(self, stream: TcpStream, from: SocketAddr, entry: Entry) {
+        let Ok(to) = stream.local_addr() else { return };
+        let _as_it_is = stream.set_nodelay(true);
+        let line = entry.line.clone();
+        let peer = Peer::new(from, to, self.tls.is_some());
+        let talk = async {
+            match self.tls.clone() {
+                None => self.speak(Paced::new(stream, line.clone()), peer, &line).await,
+                Some(acceptor) => {
+                    let greeted = tokio::time::timeout(HEAD_WITHIN, acceptor.accept(stream)).await;
+                    if let Ok(Ok(stream)) = greeted {
+                        self.speak(Paced::new(stream, line.clone()), peer, &line).await;
+                    }
+                }
+            }
+        };
+        tokio::select! {
+            () = talk => {}
+            () = line.has_to_go() => {}
+        }
+        drop(entry);
+    }
+
+    async fn speak<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: S, peer: Peer, line: &Arc<Line>) {
+        let service = hyper::service::service_fn(|request: Request<Incoming>| {
+            line.answers();
+            let (line, router) = (line.clone(), self.router.clone());
+            async move { Ok::<_, Infallible>(answer(router, request, peer, line).await) }
+        });
+        let mut connection = http1::Builder::new()
+            .max_headers(HEADERS_MAX)
+            .max_buf_size(HEAD_BYTES_MAX)
+            .serve_connection(TokioIo::new(stream), service);
+        let mut stopped = self.stopped.clone();
+        let mut stopping = false;
+        loop {
+            tokio::select! {
+                _done_or_broken = &mut connection => return,
+                () = tokio::time::sleep(LOOK_EVERY) => {}
+                () = until_stopped(&mut stopped), if !stopping => {
+                    stopping = true;
+                    Pin::new(&mut connection).graceful_shutdown();
+                }
+            }
+            match line.state() {
+                Waits::Rest(waited) if waited >= HEAD_WITHIN => {
+                    return farewell(connection.into_parts().io.into_inner()).await;
+                }
+                Waits::First(waited) if waited >= HEAD_WITHIN => return,
+                Waits::Next(waited) if waited >= NEXT_WITHIN => return,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Returns when the box stops.
+pub(super) async fn until_stopped(stopped: &mut watch::Receiver<bool>) {
+    let _stop_or_gone = stopped.wait_for(|stop| *stop).await;
+}
+
+/// The head did not come in time.
+async fn farewell<S: AsyncWrite + Unpin>(mut stream: S) {
+    let text = raw(&ApiProblem::slow(HEAD_WITHIN), "408 Request Timeout");
+    let _gone = tokio::time::timeout(FAREWELL_WITHIN, async {
+        stream.write_all(text.as_bytes()).await?;
+        stream.shutdown().await
+    })
+    .await;
+}
+
+async fn answer(router: Router, request: Request<Incoming>, peer: Peer, line: Arc<Line>) -> Response<Watched> {
+    let mut request = request.map(Body::new);
+    request.extensions_mut().insert(peer);
+    let Ok(response) = router.oneshot(request).await;
+    response.map(|body| Watched { body, _line: Answering(line) })
+}
+
+/// While it is there, the connection answers.
+struct Answering(Arc<Line>);
+
+impl Drop for Answering {
+    fn drop(&mut self) {
+        self.0.waits();
+    }
+}
+
+/// A body that tells the book when it has gone.
+struct Watched {
+    body: Body,
+    _line: Answering,
+}
+
+impl http_body::Body for Watched {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}

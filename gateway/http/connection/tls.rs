@@ -1,0 +1,177 @@
+//! Certificate and key: the user's own, or made at the first start for the names and addresses of this box.
+//!
+//! A certificate that the box makes is signed by nobody else, so a browser asks once whether it shall be trusted; the
+//! fingerprint that is told at every start is what to compare then. It lasts for 825 days, the longest that every browser
+//! takes, and is made anew at a start in its last 60 days.
+
+use crate::files;
+use rcgen::{CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, KeyPair, date_time_ymd};
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+use tokio_rustls::{TlsAcceptor, rustls};
+
+const DAY: Duration = Duration::from_secs(86_400);
+/// Apple's limit for certificates of servers, 2019; the others allow as much or more for those that a user trusts himself.
+const LASTS_DAYS: u32 = 825;
+/// Made anew so long before the end.
+const RENEWED_DAYS: u32 = 60;
+
+/// Why there is no TLS.
+#[derive(Debug, thiserror::Error)]
+pub enum CertificateError {
+    /// A file cannot be read or holds something else.
+    #[error("{0}: {1}; `certificate` and `key` under [http] name PEM files")]
+    File(PathBuf, String),
+    /// Certificate and key do not fit.
+    #[error("certificate and key do not fit together: {0}")]
+    Pair(String),
+    /// None could be made.
+    #[error("no certificate could be made: {0}")]
+    Make(String),
+}
+
+/// What the box shows to whoever connects.
+pub struct Certificate {
+    acceptor: TlsAcceptor,
+    /// SHA-256 of the certificate, as browsers show it.
+    pub fingerprint: String,
+    /// The file of the certificate.
+    pub file: PathBuf,
+}
+
+impl std::fmt::Debug for Certificate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Certificate").field("fingerprint", &self.fingerprint).finish_non_exhaustive()
+    }
+}
+
+impl Certificate {
+    /// The user's own.
+    ///
+    /// # Errors
+    /// A file that cannot be used, or two that do not fit together.
+    pub fn read(certificate: &Path, key: &Path) -> Result<Self, CertificateError> {
+        let bad = |path: &Path, what: String| CertificateError::File(path.to_owned(), what);
+        let chain = CertificateDer::pem_file_iter(certificate).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let chain = chain.map_err(|error| bad(certificate, error.to_string()))?;
+        let first = chain.first().ok_or_else(|| bad(certificate, "there is no certificate in it".to_owned()))?;
+        let fingerprint = fingerprint(first);
+        let key = PrivateKeyDer::from_pem_file(key).map_err(|error| bad(key, error.to_string()))?;
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let server = rustls::ServerConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .map_err(|error| CertificateError::Pair(error.to_string()))?
+            .with_no_client_auth()
+            .with_single_cert(chain, key);
+        let mut server = server.map_err(|error| CertificateError::Pair(error.to_string()))?;
+        server.alpn_protocols = vec![b"http/1.1".to_vec()];
+        Ok(Self { acceptor: TlsAcceptor::from(Arc::new(server)), fingerprint, file: certificate.to_owned() })
+    }
+
+    /// The box's own, in this directory; made for these names where there is none, or where it ends soon.
+    ///
+    /// # Errors
+    /// It cannot be made, written or read.
+    pub fn own(directory: &Path, listen: SocketAddr, names: &[String]) -> Result<Self, CertificateError> {
+        let (certificate, key) = (directory.join("certificate.pem"), directory.join("key.pem"));
+        if !lasts(&certificate, SystemTime::now()) || !key.is_file() {
+            let (chain, secret) = make(listen, names)?;
+            let trouble = |error: std::io::Error| CertificateError::Make(format!("{}: {error}", directory.display()));
+            files::replace_privately(&key, &secret).map_err(trouble)?;
+            files::replace_durably(&certificate, &chain).map_err(trouble)?;
+        }
+        Self::read(&certificate, &key)
+    }
+
+    pub(in crate::http) fn acceptor(&self) -> TlsAcceptor {
+        self.acceptor.clone()
+    }
+}
+
+/// Was the file written so lately that its certificate goes on lasting?
+fn lasts(certificate: &Path, now: SystemTime) -> bool {
+    let written = std::fs::metadata(certificate).and_then(|metadata| metadata.modified());
+    let age = written.ok().map(|written| now.duration_since(written).unwrap_or_default());
+    age.is_some_and(|age| age < DAY * (LASTS_DAYS - RENEWED_DAYS))
+}
+
+fn make(listen: SocketAddr, names: &[String]) -> Result<(String, String), CertificateError> {
+    let bad = |error: rcgen::Error| CertificateError::Make(error.to_string());
+    let mut all = vec!["localhost".to_owned(), "127.0.0.1".to_owned()];
+    all.extend(addresses(listen).iter().map(IpAddr::to_string));
+    all.extend(std::fs::read_to_string("/etc/hostname").ok().map(|name| name.trim().to_lowercase()));
+    all.extend(names.iter().cloned());
+    all.retain(|name| !name.is_empty());
+    all.sort();
+    all.dedup();
+    let mut params = CertificateParams::new(all).map_err(bad)?;
+    params.distinguished_name = DistinguishedName::new();
+    params.distinguished_name.push(DnType::CommonName, "cnc-gateway");
+    params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
+    let at = |(year, month, day)| date_time_ymd(year, month, day);
+    (params.not_before, params.not_after) = (at(day(-1)), at(day(i64::from(LASTS_DAYS) - 1)));
+    let key = KeyPair::generate().map_err(bad)?;
+    let certificate = params.self_signed(&key).map_err(bad)?;
+    Ok((certificate.pem(), key.serialize_pem()))
+}
+
+/// Year, month and day of the day that lies so many days after today.
+fn day(from_today: i64) -> (i32, u8, u8) {
+    let span = jiff::SignedDuration::from_hours(24 * from_today);
+    let date = jiff::Timestamp::now().saturating_add(span).map(|at| at.to_zoned(jiff::tz::TimeZone::UTC).date());
+    date.map_or((2000, 1, 1), |date| (date.year().into(), date.month().unsigned_abs(), date.day().unsigned_abs()))
+}
+
+/// The addresses by which others reach the box: the one it listens on, or the one by which it would reach others.
+fn addresses(listen: SocketAddr) -> Vec<IpAddr> {
+    if !listen.ip().is_unspecified() {
+        return vec![listen.ip()];
+    }
+    // Nothing is sent: a datagram socket that is connected knows the way it would take.
+    let way = |from: &str, to: &str| {
+        let socket = UdpSocket::bind(from).ok()?;
+        socket.connect(to).ok()?;
+        socket.local_addr().ok().map(|address| address.ip())
+    };
+    [way("0.0.0.0:0", "192.0.2.1:9"), way("[::]:0", "[2001:db8::1]:9")].into_iter().flatten().collect()
+}
+
+fn fingerprint(certificate: &CertificateDer<'_>) -> String {
+    let digest = Sha256::digest(certificate.as_ref());
+    digest.iter().enumerate().fold(String::with_capacity(95), |mut text, (index, byte)| {
+        let _infallible = write!(text, "{}{byte:02X}", if index == 0 { "" } else { ":" });
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn the_box_makes_a_certificate_once_and_keeps_its_key_to_itself() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let listen = "0.0.0.0:0".parse().expect("one");
+        let names = ["gateway.local".to_owned()];
+        let made = Certificate::own(directory.path(), listen, &names).expect("made");
+        assert_eq!(made.fingerprint.len(), 95);
+        let again = Certificate::own(directory.path(), listen, &names).expect("read");
+        assert_eq!(made.fingerprint, again.fingerprint);
+        let mode = std::fs::metadata(directory.path().join("key.pem")).expect("there").permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        let file = directory.path().join("certificate.pem");
+        assert!(lasts(&file, SystemTime::now()) && !lasts(&file, SystemTime::now() + DAY * 800));
+        let other = tempfile::tempdir().expect("a directory");
+        Certificate::own(other.path(), listen, &names).expect("made");
+        let mixed = Certificate::read(&file, &other.path().join("key.pem"));
+        assert!(matches!(mixed, Err(CertificateError::Pair(_))), "{mixed:?}");
+        assert!(matches!(Certificate::read(&file, &file), Err(CertificateError::File(..))));
+    }
+}

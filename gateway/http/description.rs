@@ -1,0 +1,119 @@
+//! The description of the API (OpenAPI 3.1): written by hand for what a request and an answer hold, completed from the table of
+//! routes for what stands before every route - who may ask, and how a request is refused.
+
+use super::route::{Needs, Route};
+use super::routes;
+use serde_json::{Map, Value, json};
+use std::sync::LazyLock;
+
+/// The parts that are written by hand: paths and schemas, by subject.
+const WRITTEN: [&str; 3] =
+    [include_str!("openapi.json"), include_str!("openapi_access.json"), include_str!("openapi_page.json")];
+
+static DESCRIPTION: LazyLock<String> = LazyLock::new(|| merged().to_string());
+
+/// The whole document as text.
+#[must_use]
+pub fn description() -> &'static str {
+    &DESCRIPTION
+}
+
+/// The whole document.
+fn merged() -> Value {
+    let mut parts = WRITTEN.iter().map(|text| serde_json::from_str::<Value>(text).unwrap_or(Value::Null));
+    let mut document = parts.next().unwrap_or(Value::Null);
+    for part in parts {
+        adopt(&mut document["paths"], &part["paths"]);
+        adopt(&mut document["components"]["schemas"], &part["schemas"]);
+    }
+    document["components"]["securitySchemes"] = json!({
+        "session": { "type": "apiKey", "in": "cookie", "name": "cnc_gateway",
+                     "description": "Set by POST /api/v1/login; named __Host-cnc_gateway over TLS" },
+        "token": { "type": "http", "scheme": "bearer", "description": "NAME:TOKEN" },
+    });
+    routes().for_each(|route| complete(&mut document, route));
+    document
+}
+
+/// Takes over the entries of another object, deeply where both have one.
+fn adopt(into: &mut Value, from: &Value) {
+    let (Some(into), Some(from)) = (into.as_object_mut(), from.as_object()) else { return };
+    for (key, value) in from {
+        match into.get_mut(key) {
+            Some(known) if known.is_object() => adopt(known, value),
+            _ => drop(into.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+/// What the guard of this route demands and how it refuses.
+fn complete(document: &mut Value, route: &Route) {
+    let verb = route.verb().word().to_ascii_lowercase();
+    let Some(operation) = document["paths"][route.path()].get_mut(verb.as_str()).filter(|it| it.is_object()) else {
+        return;
+    };
+    let role = match route.needs() {
+        Needs::Nothing => json!("none"),
+        Needs::Reading => json!("viewer where tokens = \"always\", otherwise none"),
+        Needs::Role(role) => json!(role),
+    };
+    operation["x-role"] = role;
+    if matches!(route.needs(), Needs::Role(_)) {
+        operation["security"] = json!([{ "session": [] }, { "token": [] }]);
+    }
+    for (code, why) in refusals(route) {
+        let responses = operation["responses"].as_object_mut();
+        let Some(responses) = responses.filter(|known| !known.contains_key(code)) else { continue };
+        responses.insert(code.to_owned(), problem(why));
+    }
+    if route.changes() {
+        operation["x-body-max-bytes"] = json!(route.body_max());
+    }
+}
+
+/// The refusals that any request to this route may meet before its handler is asked.
+fn refusals(route: &Route) -> Vec<(&'static str, &'static str)> {
+    let mut refusals = vec![
+        ("400", "The request cannot be understood"),
+        ("421", "The request is meant for another host"),
+        ("503", "The box cannot answer now"),
+    ];
+    if route.needs() != Needs::Nothing {
+        refusals.extend([
+            ("401", "Nobody is signed in"),
+            ("403", "The role does not allow it"),
+            ("429", "Too many wrong tokens"),
+        ]);
+    }
+    if route.changes() {
+        refusals.extend([
+            ("403", "The request comes from another site"),
+            ("408", "The request came too slowly"),
+            ("413", "The body is too long"),
+            ("415", "The body is of another kind"),
+        ]);
+    }
+    refusals
+}
+
+fn problem(why: &str) -> Value {
+    json!({
+        "description": why,
+        "content": { "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } },
+    })
+}
+
+/// The paths of the document with their methods, for whoever holds them against the table.
+#[must_use]
+pub fn described(document: &Value) -> Vec<(String, String)> {
+    let none = Map::new();
+    let paths = document["paths"].as_object().unwrap_or(&none);
+    let pairs = paths.iter().flat_map(|(path, item)| {
+        item.as_object()
+            .unwrap_or(&none)
+            .keys()
+            .map(move |verb| (verb.to_ascii_uppercase(), path.clone()))
+            .collect::<Vec<_>>()
+    });
+    pairs.collect()
+}

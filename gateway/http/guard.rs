@@ -1,0 +1,233 @@
+//! What stands before every route, made from its row of the table: the method, who asks, where the request comes from, the
+//! length and the pace of its body, and afterwards the account of it in the audit.
+
+use super::Shared;
+use super::peer::Peer;
+use super::person::{SignedIn, cookie, name_of_cookie};
+use super::problem::ApiProblem;
+use super::route::{Needs, Route};
+use crate::access::{Person, Role, SignInError};
+use axum::body::{Body, Bytes};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Redirect, Response};
+use std::time::Duration;
+
+/// A body of the greatest length that any route allows is here within this time, or it is refused.
+const BODY_WITHIN: Duration = Duration::from_secs(10);
+/// An answer begins within this time.
+const ANSWER_WITHIN: Duration = Duration::from_secs(60);
+
+/// What a handler says about what it has changed, for the audit.
+#[derive(Debug, Clone)]
+struct Told(String);
+
+/// The answer with what stands in the audit about it: which thing was changed, from what to what. One line.
+pub(super) fn told(answer: impl IntoResponse, words: impl Into<String>) -> Response {
+    let mut answer = answer.into_response();
+    answer.extensions_mut().insert(Told(words.into()));
+    answer
+}
+
+/// What the guard of one route knows.
+#[derive(Clone)]
+pub(super) struct Guarded {
+    pub(super) shared: Shared,
+    pub(super) route: Route,
+}
+
+/// See the [module](self).
+pub(super) async fn guard(State(guarded): State<Guarded>, request: Request, next: Next) -> Response {
+    match admit(&guarded, request).await {
+        Ok((request, person)) => answer(&guarded, request, person, next).await,
+        Err(refused) => *refused,
+    }
+}
+
+type Admitted = (Request, Option<Person>);
+
+async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Result<Admitted, Box<Response>> {
+    let refuse = |problem: ApiProblem| Box::new(problem.into_response());
+    if !route.verb().is(request.method()) {
+        return Err(refuse(ApiProblem::method(route.verb().word())));
+    }
+    let Some(peer) = request.extensions().get::<Peer>().copied() else {
+        return Err(refuse(ApiProblem::unavailable("the connection has no address", "connect again")));
+    };
+    let person = recognise(shared, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
+    if let Err(problem) = allowed(shared, route, person.as_ref()) {
+        let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
+        if route.changes() {
+            shared.access.refused(&what, person.as_ref());
+        }
+        return Err(Box::new(ask_to_sign_in(&request, problem)));
+    }
+    if route.changes() {
+        same_origin(request.headers(), &peer)
+            .inspect_err(|problem| {
+                let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
+                shared.access.refused(&what, person.as_ref());
+            })
+            .map_err(refuse)?;
+        accountable(shared, route).map_err(refuse)?;
+        request = with_body(request, route.body_max()).await.map_err(refuse)?;
+    }
+    if let Some(person) = &person {
+        request.extensions_mut().insert(SignedIn(person.clone()));
+    }
+    Ok((request, person))
+}
+
+async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: Option<Person>, next: Next) -> Response {
+    let path = request.uri().path().to_owned();
+    let answer = match tokio::time::timeout(ANSWER_WITHIN, next.run(request)).await {
+        Ok(answer) => answer,
+        Err(_) => {
+            let title = format!("no answer within {} s", ANSWER_WITHIN.as_secs());
+            ApiProblem::unavailable(title, "ask for less, or again when the box has less to do").into_response()
+        }
+    };
+    if let (true, Some(person)) = (route.changes(), person) {
+        let outcome = match answer.status() {
+            status if status.is_success() || status.is_redirection() => "done",
+            status if status.is_client_error() => "refused",
+            _ => "failed",
+        };
+        let words = answer.extensions().get::<Told>().map_or(String::new(), |told| format!(": {}", told.0));
+        let code = answer.status().as_u16();
+        shared.access.changed(outcome, &format!("{} {path} ({code}){words}", route.verb().word()), &person).await;
+    }
+    answer
+}
+
+/// Who asks: by the cookie of a session, or by name and token in the request itself.
+async fn recognise(shared: &Shared, headers: &HeaderMap, peer: &Peer) -> Result<Option<Person>, SignInError> {
+    let given = headers.get(header::AUTHORIZATION).and_then(|value| std::str::from_utf8(value.as_bytes()).ok());
+    if let Some(given) = given.and_then(|text| text.strip_prefix("Bearer ")) {
+        return shared.access.of_bearer(given.trim(), peer.from).await.map(Some);
+    }
+    Ok(cookie(headers, name_of_cookie(peer))
+        .and_then(|cookie| shared.access.of_cookie(cookie))
+        .map(|(person, _)| person))
+}
+
+/// Why nobody was recognised.
+pub(super) fn wrong(error: &SignInError) -> ApiProblem {
+    match error {
+        SignInError::Wrong(0) => ApiProblem::too_many(crate::access::LOCKED_FOR),
+        SignInError::Wrong(left) => ApiProblem::unauthorised(
+            "name or token is wrong",
+            format!("{left} tries are left; an administrator gives a new token with `cnc-gateway person token NAME`"),
+        ),
+        SignInError::Wait(wait) => ApiProblem::too_many(*wait),
+        SignInError::Busy => ApiProblem::unavailable("the box is busy", "try again in a few seconds"),
+    }
+}
+
+fn allowed(shared: &Shared, route: &Route, person: Option<&Person>) -> Result<(), ApiProblem> {
+    let needed = match route.needs() {
+        Needs::Nothing => return Ok(()),
+        Needs::Reading if !shared.access.rules().tokens_always => return Ok(()),
+        Needs::Reading => Role::Viewer,
+        Needs::Role(role) => role,
+    };
+    match person {
+        None => Err(ApiProblem::unauthorised("nobody is signed in", "sign in at /sign-in, or POST /api/v1/login")),
+        Some(person) if person.role < needed => Err(ApiProblem::forbidden(
+            format!("{} is {}; this needs the role {needed}", person.name, person.role),
+            format!("an administrator gives it: `cnc-gateway person role {:?} {needed}`", person.name),
+        )),
+        Some(_) => Ok(()),
+    }
+}
+
+/// Whoever asked for a page is brought to where he can sign in.
+fn ask_to_sign_in(request: &Request, problem: ApiProblem) -> Response {
+    let accepts = request.headers().get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    let wants_page = request.method() == axum::http::Method::GET && accepts.contains("text/html");
+    let path = request.uri().path();
+    match problem.status == StatusCode::UNAUTHORIZED.as_u16() && wants_page && super::plain::local(path) {
+        true => Redirect::to(&format!("/sign-in?next={path}")).into_response(),
+        false => problem.into_response(),
+    }
+}
+
+/// A page of another site must not be able to change anything here, even where a browser would send the cookie along.
+fn same_origin(headers: &HeaderMap, peer: &Peer) -> Result<(), ApiProblem> {
+    let text = |name: header::HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or("unreadable"));
+    let foreign = |from: &str| {
+        let hint = "open the page of this box itself and do it there";
+        Err(ApiProblem::forbidden(format!("the request comes from another site ({from:?})"), hint))
+    };
+    let site = text(header::HeaderName::from_static("sec-fetch-site"));
+    if let Some(site) = site.filter(|site| !["same-origin", "none"].contains(site)) {
+        return foreign(site);
+    }
+    let own = text(header::HOST).map(|host| format!("{}://{host}", peer.scheme()));
+    match text(header::ORIGIN) {
+        Some(origin) if own.as_deref() != Some(origin) => foreign(origin),
+        _ => Ok(()),
+    }
+}
+
+/// What cannot be accounted for is not changed. What a viewer may do - give the machine back, sign out - always works.
+fn accountable(shared: &Shared, route: &Route) -> Result<(), ApiProblem> {
+    let more = matches!(route.needs(), Needs::Role(role) if role > Role::Viewer);
+    let error = shared.live.borrow().as_ref().and_then(|published| published.status.history.error.clone());
+    match error.filter(|_| more) {
+        Some(error) => Err(ApiProblem::unavailable(
+            format!("the change could not be accounted for: {error}"),
+            "`cnc-gateway history info` says more; disarming works",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// The request with its whole body, which is no longer than `most` bytes and has come in time.
+async fn with_body(request: Request, most: usize) -> Result<Request, ApiProblem> {
+    let (parts, body) = request.into_parts();
+    let announced =
+        parts.headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if announced.is_some_and(|length| length > most as u64) {
+        return Err(ApiProblem::too_large(most));
+    }
+    let bytes: Bytes = match tokio::time::timeout(BODY_WITHIN, axum::body::to_bytes(body, most)).await {
+        Ok(Ok(bytes)) => bytes,
+        Ok(Err(error)) => return Err(broken(&error, most)),
+        Err(_) => return Err(ApiProblem::slow(BODY_WITHIN)),
+    };
+    Ok(Request::from_parts(parts, Body::from(bytes)))
+}
+
+fn broken(error: &axum::Error, most: usize) -> ApiProblem {
+    let text = format!("{error}");
+    match text.contains("length limit") {
+        true => ApiProblem::too_large(most),
+        false => ApiProblem::request(format!("the body broke off: {text}"), "send it again"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_sites_change_nothing() {
+        let peer = Peer::new("10.0.0.9:1".parse().expect("one"), "10.0.0.1:8080".parse().expect("one"), true);
+        let headers = |pairs: &[(&'static str, &'static str)]| {
+            pairs
+                .iter()
+                .map(|(name, value)| (header::HeaderName::from_static(name), value.parse().expect("one")))
+                .collect()
+        };
+        let allowed = |pairs: &[(&'static str, &'static str)]| same_origin(&headers(pairs), &peer).is_ok();
+        assert!(allowed(&[("host", "cnc7:8080")]), "no browser");
+        assert!(allowed(&[("host", "cnc7:8080"), ("origin", "https://cnc7:8080"), ("sec-fetch-site", "same-origin")]));
+        assert!(!allowed(&[("host", "cnc7:8080"), ("origin", "http://cnc7:8080")]), "another scheme");
+        assert!(!allowed(&[("host", "cnc7:8080"), ("origin", "https://evil.example")]));
+        assert!(!allowed(&[("host", "cnc7:8080"), ("origin", "null")]));
+        assert!(!allowed(&[("host", "cnc7:8080"), ("sec-fetch-site", "same-site")]));
+        assert!(!allowed(&[("host", "cnc7:8080"), ("sec-fetch-site", "cross-site")]));
+    }
+}

@@ -1,0 +1,144 @@
+//! The table of routes: one row per method and path, with what a request needs before it is answered.
+//!
+//! The router, the description of the API and the tests are all made from these rows, so that none of them can know a route
+//! that the others do not. There is no way to write a row that changes something and needs no role: [`Route::post`],
+//! [`Route::put`] and [`Route::delete`] ask for one, and the guard answers a row of [`Route::read`] to `GET` and `HEAD`
+//! alone, whatever handler it was given.
+
+use super::Shared;
+use crate::access::Role;
+use axum::http::Method;
+use axum::routing::MethodRouter;
+
+/// The method of a route.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Verb {
+    /// Reads.
+    Get,
+    /// Does something.
+    Post,
+    /// Puts something in the place of what was there.
+    Put,
+    /// Removes something.
+    Delete,
+}
+
+impl Verb {
+    /// The word on the wire.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Get => "GET",
+            Self::Post => "POST",
+            Self::Put => "PUT",
+            Self::Delete => "DELETE",
+        }
+    }
+
+    /// Is this the method of the request? `HEAD` is a `GET` without its body.
+    #[must_use]
+    pub fn is(self, method: &Method) -> bool {
+        method.as_str() == self.word() || (self == Self::Get && *method == Method::HEAD)
+    }
+}
+
+/// What a request needs before it is answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing: the files of the page, the health of the box, signing in.
+    Nothing,
+    /// Nothing where `tokens = "changes"`; a person of any role where `tokens = "always"`.
+    Reading,
+    /// A person of at least this role.
+    Role(Role),
+}
+
+/// What answers at a path.
+type Answers = fn() -> MethodRouter<Shared>;
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Route {
+    verb: Verb,
+    path: &'static str,
+    needs: Needs,
+    body_max: usize,
+    answers: Answers,
+}
+
+impl Route {
+    /// `GET` that shows something of the machine or the box.
+    #[must_use]
+    pub const fn read(path: &'static str, answers: Answers) -> Self {
+        Self { verb: Verb::Get, path, needs: Needs::Reading, body_max: 0, answers }
+    }
+
+    /// `GET` that shows something to persons of this role only.
+    #[must_use]
+    pub const fn read_by(role: Role, path: &'static str, answers: Answers) -> Self {
+        Self { verb: Verb::Get, path, needs: Needs::Role(role), body_max: 0, answers }
+    }
+
+    /// `GET` of something that says nothing of the machine: a file of the page, the health of the box.
+    #[must_use]
+    pub const fn file(path: &'static str, answers: Answers) -> Self {
+        Self { verb: Verb::Get, path, needs: Needs::Nothing, body_max: 0, answers }
+    }
+
+    /// `POST` by a person of at least this role, with a body of at most so many bytes.
+    #[must_use]
+    pub const fn post(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
+        Self { verb: Verb::Post, path, needs: Needs::Role(role), body_max, answers }
+    }
+
+    /// `PUT` by a person of at least this role, with a body of at most so many bytes.
+    #[must_use]
+    pub const fn put(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
+        Self { verb: Verb::Put, path, needs: Needs::Role(role), body_max, answers }
+    }
+
+    /// `DELETE` by a person of at least this role, with a body of at most so many bytes.
+    #[must_use]
+    pub const fn delete(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
+        Self { verb: Verb::Delete, path, needs: Needs::Role(role), body_max, answers }
+    }
+
+    /// The one `POST` that nobody can be signed in for: signing in itself.
+    pub(super) const fn sign_in(path: &'static str, body_max: usize, answers: Answers) -> Self {
+        Self { verb: Verb::Post, path, needs: Needs::Nothing, body_max, answers }
+    }
+
+    /// The method.
+    #[must_use]
+    pub const fn verb(&self) -> Verb {
+        self.verb
+    }
+
+    /// The path, with `{name}` for a part that varies.
+    #[must_use]
+    pub const fn path(&self) -> &'static str {
+        self.path
+    }
+
+    /// What a request needs.
+    #[must_use]
+    pub const fn needs(&self) -> Needs {
+        self.needs
+    }
+
+    /// The longest body that is read, bytes.
+    #[must_use]
+    pub const fn body_max(&self) -> usize {
+        self.body_max
+    }
+
+    /// Does it change something?
+    #[must_use]
+    pub const fn changes(&self) -> bool {
+        !matches!(self.verb, Verb::Get)
+    }
+
+    pub(super) fn method_router(&self) -> MethodRouter<Shared> {
+        (self.answers)()
+    }
+}

@@ -1,0 +1,62 @@
+//! Which of the alarms that stand a person has seen. To have seen one changes nothing about it: it stands until its reason has
+//! gone, and when it comes again it has not been seen.
+
+use crate::status::{Acknowledged, AlarmStatus};
+use adapters::clock::TimeNs;
+
+/// See the [module](self).
+#[derive(Debug, Default)]
+pub struct Seen {
+    standing: Vec<String>,
+    seen: Vec<Acknowledged>,
+}
+
+impl Seen {
+    /// These alarms stand now.
+    pub fn stand(&mut self, alarms: &[AlarmStatus]) {
+        self.standing = alarms.iter().map(|alarm| alarm.code.clone()).collect();
+        self.seen.retain(|seen| alarms.iter().any(|alarm| alarm.code == seen.code && alarm.since_ms <= seen.at_ms));
+    }
+
+    /// Somebody has seen this one; false when it does not stand.
+    pub fn acknowledge(&mut self, code: &str, by: &str, at_ns: TimeNs) -> bool {
+        if !self.standing.iter().any(|standing| standing == code) {
+            return false;
+        }
+        self.seen.retain(|seen| seen.code != code);
+        let (code, by, at_ms) = (code.to_owned(), by.to_owned(), at_ns.div_euclid(1_000_000));
+        self.seen.push(Acknowledged { code, by, at_ms });
+        true
+    }
+
+    /// Those that have been seen.
+    #[must_use]
+    pub fn all(&self) -> Vec<Acknowledged> {
+        self.seen.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alarm(code: &str, since_ms: i64) -> AlarmStatus {
+        let (severity, text) = ("warning".to_owned(), String::new());
+        AlarmStatus { code: code.to_owned(), severity, zh: text.clone(), text, since_ms }
+    }
+
+    #[test]
+    fn an_alarm_that_comes_again_has_not_been_seen() {
+        let mut seen = Seen::default();
+        assert!(!seen.acknowledge("overload", "Li", 5_000_000), "it does not stand");
+        seen.stand(&[alarm("overload", 1)]);
+        assert!(seen.acknowledge("overload", "Li", 5_000_000));
+        seen.stand(&[alarm("overload", 1)]);
+        assert_eq!(seen.all().len(), 1);
+        seen.stand(&[alarm("overload", 9)]);
+        assert!(seen.all().is_empty(), "raised again since");
+        seen.acknowledge("overload", "Li", 10_000_000);
+        seen.stand(&[]);
+        assert!(seen.all().is_empty(), "gone");
+    }
+}

@@ -1,0 +1,55 @@
+//! The description of the API against a box, by schemathesis (PyPI): whatever it makes of the description, the answer is one of
+//! those that are described, and never a 500.
+
+use super::client::house;
+use super::process::{stderr, stdout};
+use std::process::Command;
+
+/// The program, or `None` where it is absent and may be.
+fn schemathesis() -> Option<Command> {
+    let there = |name: &str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
+    let name = std::env::var("SCHEMATHESIS").unwrap_or_else(|_| "schemathesis".to_owned());
+    if there(&name) {
+        return Some(Command::new(name));
+    }
+    assert!(std::env::var_os("CNC_GATEWAY_CI").is_none(), "no schemathesis: python3 -m pip install schemathesis");
+    eprintln!("SKIPPED: no schemathesis here; python3 -m pip install schemathesis");
+    None
+}
+
+fn tried(examples: &str) {
+    let Some(mut command) = schemathesis() else { return };
+    let house = house("allow_arming = true\n");
+    // The persons must still be there in the end, and streams do not end: both are tried elsewhere.
+    let schema = format!("http://{}/openapi.json", house.address);
+    let bearer = format!("Authorization: Bearer admin:{}", house.token);
+    command.args(["run", &schema, "--header", &bearer, "--max-examples", examples, "--seed", "1", "--workers", "1"]);
+    command.args(["--checks", "not_a_server_error,status_code_conformance,content_type_conformance"]);
+    command.args([
+        "--exclude-path",
+        "/api/v1/live",
+        "--exclude-path",
+        "/api/v1/logout",
+        "--phases",
+        "examples,coverage,fuzzing",
+    ]);
+    command.args(["--exclude-path", "/api/v1/persons/{name}/token", "--exclude-path", "/api/v1/login"]);
+    command.args(["--request-timeout", "10", "--no-color"]).env("HYPOTHESIS_STORAGE_DIRECTORY", house.directory.path());
+    let output = command.current_dir(house.directory.path()).output().expect("it runs");
+    assert!(output.status.success(), "{}\n{}", stdout(&output), stderr(&output));
+    let told = stdout(&output);
+    println!("{}", told.lines().rev().take(12).collect::<Vec<_>>().into_iter().rev().collect::<Vec<_>>().join("\n"));
+    house.gateway.stop();
+}
+
+#[test]
+fn nothing_that_the_description_allows_breaks_the_box() {
+    tried("3");
+}
+
+/// `cargo test --test access described -- --ignored --nocapture`
+#[test]
+#[ignore = "takes minutes"]
+fn nothing_of_many_examples_breaks_the_box() {
+    tried("100");
+}
