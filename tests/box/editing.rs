@@ -70,7 +70,7 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
     let (setter, viewer) = (person(&data, "Li", "setter"), person(&data, "Wang", "viewer"));
     let mut browser = Browser::start(directory.path());
     browser.open(&format!("http://{address}/rules?file={FILE}&lang=en"));
-    browser.wait_until("document.body?.dataset.fresh === 'yes' && cncGateway.view()?.rules?.editor?.text");
+    browser.wait_until("document.body?.dataset.fresh === 'yes' && globalThis.cncGateway?.view()?.rules?.editor?.text");
     let original = browser.value("cncGateway.view().rules.editor.text").as_str().expect("text").to_owned();
     let before = in_charge(&address);
     let rule = format!("/api/v1/rules/{FILE}");
@@ -89,7 +89,7 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
     sign_in(&mut browser, "Li", &setter);
 
     browser.open(&format!("http://{address}/rules?file={FILE}&lang=en"));
-    browser.wait_until("cncGateway.view()?.rules?.editor?.text && cncGateway.view().rules.may()");
+    browser.wait_until("globalThis.cncGateway?.view()?.rules?.editor?.text && cncGateway.view().rules.may()");
     typed(&mut browser, &format!("{original}\nlet broken = ;\n"));
     browser.wait_until("document.querySelector('.editor-host').shadowRoot.querySelector('.cm-lint-marker-error')");
     press(&mut browser, "activate");

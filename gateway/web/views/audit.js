@@ -94,9 +94,9 @@ function gateCard(context) {
     const gate = status.gate;
     say(words, gate.mode === "armed" ? t("gate_armed", gate.armed_by, gate.armed_until_ms ? clock(gate.armed_until_ms) : "–") : t(gate.mode === "off" ? "gate_off" : "gate_shadow"));
     words.classList.toggle("warn-text", gate.mode === "armed");
-    if (gate.mode !== "armed") say(note, context.session?.arming ? t("arm_here") : t("arm_at_box"));
+    if (gate.mode !== "armed") say(note, context.session?.arming_allowed ? t("arm_here") : t("arm_at_box"));
     back.hidden = gate.mode !== "armed";
-    arm.hidden = gate.mode === "armed" || !context.session?.arming;
+    arm.hidden = gate.mode === "armed" || !(context.session?.arming_allowed && context.session?.may?.arm);
   };
   return { box: box_, update };
 }

@@ -147,7 +147,7 @@ function feedCard(context) {
     armed.classList.toggle("warn-text", gate.mode === "armed");
     say(why, gate.reason ? `${t("because")}: ${box(gate.reason)}${gate.held ? ` · ${box(gate.held)}` : ""}` : " ");
     back.hidden = gate.mode !== "armed";
-    arm.hidden = gate.mode === "armed" || !context.session?.arming;
+    arm.hidden = gate.mode === "armed" || !(context.session?.arming_allowed && context.session?.may?.arm);
   };
   return { box: section, update };
 }

@@ -70,7 +70,7 @@ class RulesView {
     if (this.may()) this.timer = setTimeout(() => this.check().catch(() => {}), 700);
   }
 
-  may() { return ["setter", "armer", "admin"].includes(this.context.session?.person?.role); }
+  may() { return Boolean(this.context.session?.may?.edit); }
 
   enable() {
     const may = this.may();

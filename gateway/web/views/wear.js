@@ -48,10 +48,11 @@ function legend() {
 
 function drawEdge(lamp, facts, status, context, state) {
   const wear = status.wear;
-  const worn = status.alarms.some((a) => /tool_worn/.test(a.code));
-  const look = status.alarms.some((a) => /tool_wear/.test(a.code));
   const tool = context.quantity("tool");
   const name = tool && !tool.missing ? tool.value : "–";
+  // Of the model: the alarm names its tool. Of a script: it is about the tool in use.
+  const about = (code) => status.alarms.some((a) => a.code === `${code} ${name}` || a.code.startsWith(`${code} (`));
+  const [worn, look] = [about("tool_worn"), about("tool_wear")];
   lamp.dataset.tone = worn ? "bad" : look ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
   say(lamp, `${name}: ${t(worn ? "lamp_worn" : look ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown")}`);
   const left = remaining(state);
@@ -87,7 +88,7 @@ function drawFigure(figure, below, state) {
   const plot = new uPlot({
     width: Math.max(200, figure.clientWidth), height: 320, legend: { show: false }, cursor: { drag: { x: false, y: false }, y: false },
     scales: { x: { time: false }, y: { range: (_, a, b) => [0, Math.max(100, b * 1.12)] }, mm: { range: (_, a, b) => [0, Math.max(0.4, (b ?? 0) * 1.2)] } },
-    axes: [{ ...axis, label: t("part_number"), labelSize: 22, labelFont: "12px system-ui" }, { ...axis, size: 64, label: "W", labelSize: 18, labelFont: "12px system-ui" }, { ...axis, scale: "mm", side: 1, size: 56, grid: { show: false }, label: "mm", labelSize: 18, labelFont: "12px system-ui" }],
+    axes: [{ ...axis, incrs: [1, 2, 5, 10, 20, 50, 100], label: t("part_number"), labelSize: 22, labelFont: "12px system-ui" }, { ...axis, size: 64, label: "W", labelSize: 18, labelFont: "12px system-ui" }, { ...axis, scale: "mm", side: 1, size: 56, grid: { show: false }, label: "mm", labelSize: 18, labelFont: "12px system-ui" }],
     series: [{}, { label: t("wear_limit"), stroke: colour("bad"), width: 2 }, { label: t("measured_power"), stroke: colour("good"), width: 2, points: dots }, { label: t("flank_wear"), scale: "mm", stroke: colour("line-d"), width: 1.5, dash: [4, 4] }],
     hooks: { setCursor: [(u) => { const i = u.cursor.idx; if (i !== null && i !== undefined) say(below, told(use[i])); }] },
   }, [use.map((u) => u.at), pick("limit_w"), pick("cutting_power_w"), pick("wear_mm")], figure);
