@@ -76,6 +76,8 @@ pub struct Access {
     sessions: Mutex<Sessions>,
     tries: Mutex<Tries>,
     bearers: Mutex<HashMap<Key, Bearer>>,
+    /// One change of the file at a time.
+    changing: tokio::sync::Mutex<()>,
     /// One hash at a time: it takes 19 MB and some hundredths of a second.
     hashing: Semaphore,
     account: Account,
@@ -110,6 +112,7 @@ impl Access {
             sessions: Mutex::default(),
             tries: Mutex::default(),
             bearers: Mutex::default(),
+            changing: tokio::sync::Mutex::default(),
             hashing: Semaphore::new(1),
             account: Account::new(post),
             nobody,
@@ -174,6 +177,7 @@ impl Access {
         &self,
         change: impl FnOnce(&mut Persons) -> Result<T, PersonsError>,
     ) -> Result<T, PersonsError> {
+        let _alone = self.changing.lock().await;
         let mut persons = Persons::read(&self.file)?.unwrap_or_default();
         let given = change(&mut persons)?;
         persons.write(&self.file)?;

@@ -372,7 +372,7 @@ pub const KEYS: &[Key] = &[
     ),
     key(
         ("http", "session_s"),
-        Number(60.0, 604_800.0),
+        Number(10.0, 604_800.0),
         Default("28800.0"),
         "Whoever has signed in is signed out after this time",
         "登录有效时间（秒）",

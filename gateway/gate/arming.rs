@@ -62,7 +62,7 @@ impl fmt::Display for Disarmed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Start => "not armed since the start",
-            Self::Person => "disarmed on the box",
+            Self::Person => "disarmed by a person",
             Self::Expired => "the time of arming is over",
             Self::ReadBack => "the machine did not take the override that was written",
             Self::Offset => "the control did not take the offset that was written",

@@ -58,7 +58,8 @@ async fn admit(Guarded { shared, route }: &Guarded, mut request: Request) -> Res
     let person = recognise(shared, request.headers(), &peer).await.map_err(|error| refuse(wrong(&error)))?;
     if let Err(problem) = allowed(shared, route, person.as_ref()) {
         let what = format!("{} {} from {}: {}", route.verb().word(), route.path(), peer.from, problem.title);
-        if route.changes() {
+        // Whoever reads without having signed in is shown where to do so, which a page may ask for again and again.
+        if matches!(route.needs(), Needs::Role(_)) {
             shared.access.refused(&what, person.as_ref());
         }
         return Err(Box::new(ask_to_sign_in(&request, problem)));

@@ -142,6 +142,8 @@ impl Commands {
         match armed {
             Ok(armed) => {
                 self.by = by.to_owned();
+                // Whoever disarms before the next tick ends an arming too.
+                self.was_armed = true;
                 self.keep(trail::armed(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
                 let text = told(&armed, &self.target, gate.limits());

@@ -23,7 +23,20 @@ fn tried(examples: &str) {
     // The persons must still be there in the end, and streams do not end: both are tried elsewhere.
     let schema = format!("http://{}/openapi.json", house.address);
     let bearer = format!("Authorization: Bearer admin:{}", house.token);
-    command.args(["run", &schema, "--header", &bearer, "--max-examples", examples, "--seed", "1", "--workers", "1"]);
+    command.args([
+        "run",
+        &schema,
+        "--url",
+        &format!("http://{}", house.address),
+        "--header",
+        &bearer,
+        "--max-examples",
+        examples,
+        "--seed",
+        "1",
+        "--workers",
+        "1",
+    ]);
     command.args(["--checks", "not_a_server_error,status_code_conformance,content_type_conformance"]);
     command.args([
         "--exclude-path",
