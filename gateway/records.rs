@@ -1,6 +1,7 @@
 //! What the history holds besides samples, as rows of JSON: the same for the API and the command line.
 
 use crate::history::{AlarmEntry, Command, Decision, Event, HistoryError, Part, Reader, Span, StateInterval};
+use crate::pipeline::PartDetail;
 use adapters::clock::TimeNs;
 use serde_json::{Value, json};
 
@@ -171,7 +172,9 @@ fn event(event: &Event) -> Value {
     json!({ "at_ms": ms(*at_ns), "kind": kind, "source": source, "text": text, "detail": known(detail) })
 }
 
+/// Parts of an older version carry no detail.
 fn part(part: &Part) -> Value {
+    let detail: Option<PartDetail> = serde_json::from_str(&part.detail).ok();
     json!({
         "from_ms": ms(part.began_ns),
         "to_ms": ms(part.ended_ns),
@@ -180,5 +183,8 @@ fn part(part: &Part) -> Value {
         "count": part.count,
         "cutting_s": part.cutting_s,
         "energy_j": part.energy_j,
+        "seconds": detail.as_ref().map(|it| &it.seconds),
+        "peak_power_w": detail.as_ref().and_then(|it| it.peak_power_w),
+        "tools": detail.as_ref().map(|it| &it.tools),
     })
 }

@@ -65,7 +65,8 @@ fn read_list(path: &Path) -> BTreeMap<String, u64> {
 }
 
 /// FNV-1a: tells one text from another, keeps no secret.
-fn digest(bytes: &[u8]) -> u64 {
+#[must_use]
+pub fn digest(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 

@@ -87,6 +87,8 @@ pub struct AlarmStatus {
     pub severity: String,
     /// What the operator reads.
     pub text: String,
+    /// The same in Chinese.
+    pub zh: String,
     /// Since when, milliseconds since 1970.
     pub since_ms: i64,
 }

@@ -13,8 +13,8 @@ pub use keys::Keys;
 pub use meter::{Circuit, EdaTarget, MeterTarget, WaveformKeep};
 pub use secured::{Login, tls_files};
 pub use target::{
-    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDevice, SimulatedMachine, SimulatedTarget,
-    Speed, Target, endpoint,
+    Endpoint, FanucBackend, Parity, ReplayTarget, SerialTarget, SimulatedDay, SimulatedDevice, SimulatedMachine,
+    SimulatedTarget, Speed, Target, endpoint,
 };
 
 use crate::fanuc::own::OwnChannel;

@@ -38,6 +38,17 @@ pub enum SimulatedDevice {
     Meter,
 }
 
+/// How the days of the built-in machine go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatedDay {
+    /// Eight hours of work, then a night.
+    Work,
+    /// The next shift comes after twenty minutes: for a demonstration faster than real time.
+    Shifts,
+    /// A whole day again and again in five minutes, with quick wear: for a demonstration.
+    Short,
+}
+
 /// The built-in machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedTarget {
@@ -73,6 +84,8 @@ pub struct SimulatedTarget {
     pub change_friction_pct: f64,
     /// Its day has begun so many seconds ago.
     pub begun_s: f64,
+    /// How its days go.
+    pub day: SimulatedDay,
     /// How the ladder combines the operator's dial and the gateway's override.
     pub ladder: LadderRule,
 }
@@ -246,6 +259,10 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
         change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
         begun_s: keys.number("begun_s", 0.0, 0.0, 86_400.0),
+        day: keys.choice(
+            "day",
+            &[("work", SimulatedDay::Work), ("shifts", SimulatedDay::Shifts), ("short", SimulatedDay::Short)],
+        ),
         ladder: keys.choice(
             "ladder",
             &[("least", LadderRule::Least), ("product", LadderRule::Product), ("replace", LadderRule::Replace)],

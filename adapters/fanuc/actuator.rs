@@ -32,6 +32,9 @@ use std::time::Duration;
 const TAKEN: [i32; 2] = [1, 3];
 const HEARTBEAT_LOST: i32 = 2;
 
+/// Whether the enable byte of a way of writing is on.
+type IsLeftOn = fn(i32) -> bool;
+
 /// The way to the feed override of one path.
 pub struct FanucActuator {
     name: String,
@@ -122,7 +125,7 @@ impl FanucActuator {
     }
 
     /// The byte that an earlier run may have left on, and what it holds then.
-    fn leftover(&self) -> Option<(Item, fn(i32) -> bool)> {
+    fn leftover(&self) -> Option<(Item, IsLeftOn)> {
         match self.method {
             WriteMethod::Mailbox { area, at } => {
                 Some((Item::Pmc(Stretch::bytes(area, at, 1)), |byte| byte == i32::from(ENABLED)))

@@ -82,7 +82,8 @@ pub(super) fn timeout(name: &str) -> SourceError {
         source_name: name.to_owned(),
         request: "the measured values".to_owned(),
         deadline_ms: 200,
-        next: "Check the cable and the power of the meter.".to_owned(),
+        next: "It is a simulated one that is silent now and then on purpose (dropouts_per_h); nothing is to be done."
+            .to_owned(),
     }
 }
 

@@ -200,7 +200,7 @@ impl Machine {
         self.load = cutting::load(self.frame, stage, &self.cut, &now, self.cut_level(since_s));
         let lathe = self.settings.machine == SimulatedMachine::Lathe;
         let tool = self.control.tool_index();
-        self.control.wear_mm[tool] += STEP_S * cutting::wear_rate_mm_s(lathe, &now);
+        self.control.wear_mm[tool] += STEP_S * self.settings.day.wear_factor * cutting::wear_rate_mm_s(lathe, &now);
     }
 
     fn cut_level(&self, since_s: f64) -> CutLevel {

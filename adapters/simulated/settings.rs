@@ -1,7 +1,7 @@
 //! How the simulated machine and its two devices are set up.
 
 use super::ladder::LadderSettings;
-use crate::address::{SimulatedMachine, SimulatedTarget};
+use crate::address::{SimulatedDay, SimulatedMachine, SimulatedTarget};
 use std::time::Duration;
 
 /// Wear land of an edge that has just been changed.
@@ -93,6 +93,43 @@ pub struct DaySettings {
     pub pause_s: f64,
     /// Parts of one program and lot.
     pub parts_per_lot: u32,
+    /// Every day begins so long after the one before, s, and holds little of everything: for a demonstration. `None`: a working
+    /// day as above.
+    pub rhythm_s: Option<f64>,
+    /// Edges wear so many times as fast as the laws say.
+    pub wear_factor: f64,
+}
+
+impl DaySettings {
+    /// A day of five minutes: power-up, warm-up, four short parts, an alarm, a pause, off.
+    #[must_use]
+    pub fn short() -> Self {
+        Self {
+            shift_s: 235.0,
+            lunch_s: 0.0,
+            night_s: 0.0,
+            parts_per_pause: 2,
+            pause_s: 8.0,
+            parts_per_lot: u32::MAX,
+            rhythm_s: Some(300.0),
+            wear_factor: 8.0,
+        }
+    }
+}
+
+impl Default for DaySettings {
+    fn default() -> Self {
+        Self {
+            shift_s: 8.0 * 3600.0,
+            lunch_s: 1800.0,
+            night_s: 15.0 * 3600.0,
+            parts_per_pause: 10,
+            pause_s: 240.0,
+            parts_per_lot: 8,
+            rhythm_s: None,
+            wear_factor: 1.0,
+        }
+    }
 }
 
 /// The simulated machine with its controller and meter.
@@ -149,14 +186,7 @@ impl Default for SimulatedSettings {
                 clock_drift_ppm: -11.0,
             },
             meter: MeterSettings::default(),
-            day: DaySettings {
-                shift_s: 8.0 * 3600.0,
-                lunch_s: 1800.0,
-                night_s: 15.0 * 3600.0,
-                parts_per_pause: 10,
-                pause_s: 240.0,
-                parts_per_lot: 8,
-            },
+            day: DaySettings::default(),
         }
     }
 }
@@ -208,6 +238,8 @@ impl SimulatedSettings {
     pub fn of(target: &SimulatedTarget) -> Self {
         let base = Self::default();
         let noise_share = target.noise_pct / 100.0;
+        // A pulse while the machine is off looks like a fault to whoever sees the machine for the first time.
+        let pulse_probability = if target.day == SimulatedDay::Short { 0.0 } else { base.meter.pulse_probability };
         Self {
             machine: target.machine,
             seed: target.seed,
@@ -222,8 +254,18 @@ impl SimulatedSettings {
                 friction: target.change_friction_pct / 100.0,
             },
             ladder: LadderSettings { rule: target.ladder, ..base.ladder },
-            meter: MeterSettings { noise_share, dropouts_per_h: target.dropouts_per_h, ..base.meter }
-                .lagging(Duration::from_secs_f64(target.meter_lag_ms / 1e3), &base.controller),
+            day: match target.day {
+                SimulatedDay::Work => base.day,
+                SimulatedDay::Shifts => DaySettings { night_s: 1200.0, ..base.day },
+                SimulatedDay::Short => DaySettings::short(),
+            },
+            meter: MeterSettings {
+                noise_share,
+                pulse_probability,
+                dropouts_per_h: target.dropouts_per_h,
+                ..base.meter
+            }
+            .lagging(Duration::from_secs_f64(target.meter_lag_ms / 1e3), &base.controller),
             ..base
         }
     }

@@ -2,10 +2,11 @@
 
 use super::{CannotRun, CommandResult, LogArguments, Outcome};
 use crate::config;
+use crate::demo;
 use crate::run::{self, Plan, open::MachineSpeed};
 use clap::Args;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// RunArguments of `run`.
 #[derive(Debug, Args)]
@@ -61,11 +62,18 @@ fn plan(arguments: RunArguments) -> Result<Plan, CannotRun> {
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
     let environment: Vec<_> = environment.filter(|(name, _)| !own(name)).collect();
-    let config = config::load(arguments.config.as_deref(), environment.into_iter().chain(overrides.clone()));
-    let config = config.map_err(|problems| {
+    let variables = environment.into_iter().chain(overrides.clone());
+    let config = match arguments.config.as_deref() {
+        Some(path) => config::load(Some(path), variables),
+        None => config::parse(config::BUILT_IN, &demo::text(arguments.speed), Path::new(""), variables),
+    };
+    let mut config = config.map_err(|problems| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")
     })?;
+    if arguments.config.is_none() {
+        demo::furnish(&mut config, arguments.speed);
+    }
     Ok(Plan { config, port_named, speed: arguments.speed, stop_after_s: arguments.seconds })
 }
 

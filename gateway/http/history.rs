@@ -12,7 +12,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use axum::Json;
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::time::Duration;
 
 /// Questions that are answered at the same time.
@@ -38,6 +38,7 @@ pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/events", || get(events)),
     Route::read("/api/v1/parts", || get(parts)),
     Route::read("/api/v1/audit", || get(audit)),
+    Route::read("/api/v1/audit/verify", || get(verify)),
 ];
 
 pub(super) type Answer = Result<Json<Value>, ApiProblem>;
@@ -71,7 +72,7 @@ pub(super) fn trouble(error: &HistoryError) -> ApiProblem {
 }
 
 /// `from` and `to`.
-fn range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
+pub(super) fn range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, TimeNs), ApiProblem> {
     let bad = |key: &str, what: String| ApiProblem::request(format!("{key}: {what}"), moment::NOTATION);
     let moment = |key: &str| keys.text(key).map(|text| moment::parse(text, newest_ns).map_err(|what| bad(key, what)));
     let to_ns = moment("to").transpose()?.unwrap_or(newest_ns);
@@ -121,17 +122,40 @@ pub(super) async fn parts(State(shared): State<Shared>, Pairs(pairs): Given) -> 
     rows(shared, RecordKind::Parts, pairs).await
 }
 
-/// `GET /api/v1/audit`: `history audit --json`, by pages. Without `since` the newest rows; with it those after that number.
+/// `GET /api/v1/audit`: `history audit --json`, by pages. With `since` the rows after that number, with `from` and `to` those of
+/// the time range, otherwise the newest.
 pub(super) async fn audit(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
-    let keys = QueryKeys::of(pairs, &["since", "limit"])?;
+    let keys = QueryKeys::of(pairs, &["since", "limit", "from", "to"])?;
     let limit = keys.number("limit", 1, 10_000)?.unwrap_or(1000);
     let since = keys.number("since", 0, i64::MAX)?;
-    reading(shared, move |reader, _| {
+    let timed = keys.text("from").is_some() || keys.text("to").is_some();
+    if timed && since.is_some() {
+        return Err(ApiProblem::request("since and a time range are given", "give the one or the other"));
+    }
+    reading(shared, move |reader, newest_ns| {
         let rows = match since {
             Some(number) => reader.audit_after(number, limit),
+            None if timed => {
+                let (from_ns, to_ns) = range(&keys, newest_ns)?;
+                reader.audit(from_ns, to_ns, limit)
+            }
             None => reader.audit(i64::MIN, i64::MAX, limit),
         };
         rows.map(|rows| audit_document(&rows)).map_err(|error| trouble(&error))
+    })
+    .await
+}
+
+/// `GET /api/v1/audit/verify`: `history audit --verify`.
+pub(super) async fn verify(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    QueryKeys::of(pairs, &[])?;
+    reading(shared, |reader, _| {
+        let check = reader.verify_audit().map_err(|error| trouble(&error))?;
+        let mut document = json!({ "schema": "audit-check/1" });
+        if let (Some(into), Ok(Value::Object(found))) = (document.as_object_mut(), serde_json::to_value(&check)) {
+            into.extend(found);
+        }
+        Ok(document)
     })
     .await
 }

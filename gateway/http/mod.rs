@@ -7,9 +7,12 @@
 //! come, TLS), `host` (is this box meant at all) and `guard` (who asks, from where, how long the body is). What the guard
 //! demands stands in the row of the table of routes, see [`Route`].
 
+mod backtests;
 mod connection;
 mod description;
+mod files;
 mod guard;
+mod handbook;
 mod headers;
 mod history;
 mod host;
@@ -23,11 +26,15 @@ mod plain;
 mod problem;
 mod query;
 mod route;
+mod rules;
+mod series;
 mod server;
 mod sign_in;
 mod streams;
 mod twin;
+mod utilisation;
 mod vocabulary;
+mod wear;
 
 pub use connection::{Certificate, CertificateError};
 pub use description::{described, description};
@@ -40,13 +47,14 @@ pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 use crate::access::Access;
 use crate::control::Post;
 use crate::status::Status;
+use ::rules::physics::explain::Language;
 use axum::Router;
 use axum::http::{StatusCode, Uri, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use backtests::Backtests;
 use guard::{Guarded, guard};
-use rules::physics::explain::Language;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -74,6 +82,10 @@ pub struct Parts {
     pub live: watch::Receiver<Option<Published>>,
     /// Where the history is.
     pub history: PathBuf,
+    /// Where the scripts are.
+    pub scripts: PathBuf,
+    /// Where everything else is that the box keeps.
+    pub data_dir: PathBuf,
     /// The language in which the page opens, if not the browser's.
     pub language: Option<Language>,
     /// Who may do what.
@@ -91,6 +103,9 @@ pub struct Shared {
     streams: Streams,
     readers: Arc<Semaphore>,
     history: PathBuf,
+    scripts: PathBuf,
+    data_dir: PathBuf,
+    backtests: Backtests,
     language: Option<Language>,
     access: Arc<Access>,
     post: Post,
@@ -101,9 +116,21 @@ impl Shared {
     /// From these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { live, history, language, access, post, hosts } = parts;
+        let Parts { live, history, scripts, data_dir, language, access, post, hosts } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
-        Self { live, streams: Streams::default(), readers, history, language, access, post, hosts: hosts.into() }
+        Self {
+            live,
+            streams: Streams::default(),
+            readers,
+            history,
+            scripts,
+            data_dir,
+            backtests: Backtests::default(),
+            language,
+            access,
+            post,
+            hosts: hosts.into(),
+        }
     }
 
     fn status(&self) -> Result<Arc<Status>, ApiProblem> {
@@ -130,6 +157,12 @@ const GROUPS: &[&[Route]] = &[
     vocabulary::ROUTES,
     history::ROUTES,
     twin::ROUTES,
+    series::ROUTES,
+    utilisation::ROUTES,
+    wear::ROUTES,
+    handbook::ROUTES,
+    rules::ROUTES,
+    backtests::ROUTES,
     sign_in::ROUTES,
     orders::ROUTES,
 ];

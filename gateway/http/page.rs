@@ -1,32 +1,30 @@
-//! The live page: three kinds of file, part of the binary, nothing from elsewhere.
+//! The page: one document at the address of each view, and its files.
 
-use axum::extract::{Path, State};
-use axum::http::{HeaderValue, header};
-use axum::response::{IntoResponse, Response};
-use axum::routing::get;
-
+use super::files::{FILES, INDEX};
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::{Shared, headers};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
 use rules::physics::explain::Language;
 
-const INDEX: &str = include_str!("../web/index.html");
-const CSS: &str = "text/css; charset=utf-8";
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-
-/// The files below `/web/`: name, type, content.
-const FILES: [(&str, &str, &str); 5] = [
-    ("page.css", CSS, include_str!("../web/page.css")),
-    ("page.js", SCRIPT, include_str!("../web/page.js")),
-    ("chart.js", SCRIPT, include_str!("../web/chart.js")),
-    ("words.js", SCRIPT, include_str!("../web/words.js")),
-    ("icon.svg", "image/svg+xml", include_str!("../web/icon.svg")),
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/", || get(page)),
+    Route::read("/now", || get(page)),
+    Route::read("/history", || get(page)),
+    Route::read("/wear", || get(page)),
+    Route::read("/thermal", || get(page)),
+    Route::read("/twin", || get(page)),
+    Route::read("/rules", || get(page)),
+    Route::read("/audit", || get(page)),
+    Route::read("/help", || get(page)),
+    Route::file("/web/{file}", || get(web)),
 ];
 
-pub(super) const ROUTES: &[Route] = &[Route::read("/", || get(page)), Route::file("/web/{file}", || get(web))];
-
-/// `GET /`
-pub(super) async fn page(State(shared): State<Shared>) -> Response {
+/// `GET /` and the address of every view.
+async fn page(State(shared): State<Shared>) -> Response {
     let chosen = match shared.language {
         None => return headers::page(INDEX),
         Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",
@@ -35,18 +33,47 @@ pub(super) async fn page(State(shared): State<Shared>) -> Response {
     headers::page(&INDEX.replacen("<html lang=\"en\">", chosen, 1))
 }
 
-/// `GET /web/{file}`
-pub(super) async fn web(Path(name): Path<String>) -> Response {
-    match FILES.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, content)) => file(kind, *content),
-        None => ApiProblem::not_found(&format!("/web/{name}")).into_response(),
+/// `GET /web/{file}`: a browser that has this version already is told so.
+async fn web(Path(name): Path<String>, asked: HeaderMap) -> Response {
+    let Some(file) = FILES.iter().find(|file| file.name == name) else {
+        return ApiProblem::not_found(&format!("/web/{name}")).into_response();
+    };
+    let tag = format!("\"{:016x}\"", crate::reload::digest(file.content.as_bytes()));
+    let known = asked.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
+    let mut response = if known == Some(tag.as_str()) {
+        StatusCode::NOT_MODIFIED.into_response()
+    } else {
+        answer(file.kind, file.content)
+    };
+    if let Ok(tag) = HeaderValue::from_str(&tag) {
+        response.headers_mut().insert(header::ETAG, tag);
     }
+    response
 }
 
-fn file(kind: &'static str, content: impl IntoResponse) -> Response {
+fn answer(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
     ];
     (headers, content).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_document_holds_a_script_or_a_style_of_its_own() {
+        assert!(!INDEX.contains("style=") && !INDEX.contains("<style"));
+        assert!(INDEX.matches("<script").count() == INDEX.matches("<script type=\"module\" src=").count());
+    }
+
+    #[test]
+    fn every_file_of_the_page_is_served_under_one_name() {
+        let mut names: Vec<_> = FILES.iter().map(|file| file.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), FILES.len());
+    }
 }

@@ -7,6 +7,7 @@ mod channels;
 mod decide;
 mod extras;
 mod journal;
+mod part_detail;
 mod parts;
 mod tally;
 
@@ -15,6 +16,7 @@ pub use decide::{Change, Decisions};
 use extras::{own, own_value};
 pub use extras::{series as stored_series, values as stored_values};
 pub use journal::Journal;
+pub use part_detail::{PartDetail, ToolUse};
 pub use parts::Parts;
 pub use tally::Tally;
 
@@ -126,7 +128,7 @@ impl Pipeline {
         store.sample(sample, &self.extras);
         self.journal.step(&self.channels, sample, &estimates, |record| store.record(record));
         self.decisions.step(self.scripts.decision(), &verdict, |record| store.record(record));
-        if let Some(part) = self.parts.step(&self.channels, sample, estimates.state) {
+        if let Some(part) = self.parts.step(&self.channels, sample, &estimates) {
             store.record(part.into());
         }
     }

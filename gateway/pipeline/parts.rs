@@ -1,10 +1,11 @@
 //! Finished parts, from what the controller says: its part counter, or the name of the part where it has no counter.
 
 use super::channels::Channels;
+use super::part_detail::Gathering;
 use crate::history::Part;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::estimators::State;
+use rules::estimators::{Estimates, State};
 use std::sync::Arc;
 
 /// Longer steps between two ticks are pauses in which nothing is integrated.
@@ -20,6 +21,9 @@ pub struct Parts {
     cutting_s: f64,
     energy_j: f64,
     energy_known: bool,
+    /// The program that ran when something was last cut: a controller has often left it when it counts the part.
+    program: Option<Arc<str>>,
+    gathering: Gathering,
     finished: u64,
 }
 
@@ -31,8 +35,8 @@ impl Parts {
     }
 
     /// Takes one tick; gives the part that it finishes.
-    pub fn step(&mut self, channels: &Channels, sample: &Sample, state: State) -> Option<Part> {
-        self.integrate(channels, sample, state);
+    pub fn step(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) -> Option<Part> {
+        self.integrate(channels, sample, estimates);
         let parts = self.parts_by_count(channels, sample).or_else(|| self.part_by_name(channels, sample));
         self.last_ns = Some(sample.at_ns);
         let began_ns = *self.began_ns.get_or_insert(sample.at_ns);
@@ -61,33 +65,41 @@ impl Parts {
         (!counted && !before.is_empty()).then(|| (1, before.to_string()))
     }
 
-    fn integrate(&mut self, channels: &Channels, sample: &Sample, state: State) {
+    fn integrate(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) {
         let step_ns = self.last_ns.map_or(0, |last_ns| sample.at_ns - last_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             return;
         }
         #[expect(clippy::cast_precision_loss, reason = "at most two seconds in ns")]
         let step_s = step_ns as f64 / SECOND_NS as f64;
-        if state == State::Cutting {
+        if estimates.state == State::Cutting {
             self.cutting_s += step_s;
+            let now = sample.text(channels.program).filter(|name| !name.is_empty());
+            if now.is_some() && now != self.program.as_deref() {
+                self.program = now.map(Arc::from);
+            }
         }
         let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
         if let Ok(power_w) = power {
             self.energy_j += power_w * step_s;
             self.energy_known = true;
         }
+        let tool = sample.text(channels.tool).unwrap_or_default();
+        self.gathering.step(estimates, tool, power.ok(), step_s);
     }
 
     fn close(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {
+        let program = self.program.take().or_else(|| sample.text(channels.program).map(Arc::from));
         let finished = Part {
             began_ns,
             ended_ns: sample.at_ns,
             part,
-            program: sample.text(channels.program).unwrap_or_default().to_owned(),
+            program: program.map(|name| name.to_string()).unwrap_or_default(),
             count,
             cutting_s: Some(self.cutting_s),
             energy_j: self.energy_known.then_some(self.energy_j),
-            detail: String::new(),
+            // Numbers and texts only: there is nothing in it that JSON could not hold.
+            detail: serde_json::to_string(&self.gathering.finish()).unwrap_or_default(),
         };
         self.finished += u64::try_from(count).unwrap_or(0);
         (self.began_ns, self.cutting_s, self.energy_j, self.energy_known) = (Some(sample.at_ns), 0.0, 0.0, false);
@@ -109,10 +121,14 @@ mod tests {
         sample
     }
 
+    fn in_state(state: State) -> Estimates {
+        Estimates { state, ..Estimates::none(0) }
+    }
+
     #[test]
     fn the_counter_finishes_parts_and_a_reset_does_not() {
         let (channels, mut parts) = (Channels::new(), Parts::default());
-        let mut step = |at_s, count| parts.step(&channels, &sample(at_s, Ok(count), "A"), State::Cutting);
+        let mut step = |at_s, count| parts.step(&channels, &sample(at_s, Ok(count), "A"), &in_state(State::Cutting));
         assert_eq!(step(0, 7.0), None);
         assert_eq!(step(1, 7.0), None);
         let part = step(2, 8.0).expect("finished");
@@ -126,7 +142,8 @@ mod tests {
     #[test]
     fn without_a_counter_the_name_tells() {
         let (channels, mut parts) = (Channels::new(), Parts::default());
-        let mut step = |at_s, part| parts.step(&channels, &sample(at_s, Err(Absence::NotProvided), part), State::Idle);
+        let mut step =
+            |at_s, part| parts.step(&channels, &sample(at_s, Err(Absence::NotProvided), part), &in_state(State::Idle));
         assert_eq!(step(0, "A"), None);
         assert_eq!(step(1, "A"), None);
         assert_eq!(step(2, "B").expect("A is finished").part, "A");

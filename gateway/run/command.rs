@@ -37,7 +37,8 @@ pub struct Commands {
     /// Who armed it last.
     by: String,
     was_armed: bool,
-    alarm: Option<(TimeNs, String)>,
+    /// Since when, English, Chinese.
+    alarm: Option<(TimeNs, String, String)>,
     written: Option<f64>,
     begun: bool,
     place: [Option<ChannelId>; 3],
@@ -260,9 +261,9 @@ impl Commands {
         if self.alarm.is_none() {
             let (code, source, severity) = (CODE.to_owned(), SOURCE.to_owned(), "critical".to_owned());
             let zh = fault.zh().to_owned();
+            self.alarm = Some((at_ns, en.clone(), zh.clone()));
             health.keep(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
-            Notice::new(Severity::Error, CODE, en.clone()).say();
-            self.alarm = Some((at_ns, en));
+            Notice::new(Severity::Error, CODE, en).say();
         } else {
             // What follows from the first fault is told, and raises no alarm of its own.
             health.event(at_ns, SOURCE, &Notice::new(Severity::Error, "gate_fault", en));
@@ -308,10 +309,11 @@ impl Commands {
 
     /// The alarm that stands.
     pub fn alarm(&self) -> Option<AlarmStatus> {
-        self.alarm.as_ref().map(|(since_ns, text)| AlarmStatus {
+        self.alarm.as_ref().map(|(since_ns, text, zh)| AlarmStatus {
             code: CODE.to_owned(),
             severity: "critical".to_owned(),
             text: text.clone(),
+            zh: zh.clone(),
             since_ms: milliseconds(*since_ns),
         })
     }
@@ -319,7 +321,7 @@ impl Commands {
     /// What is wrong with the way to the machine.
     pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
-        let alarm = self.alarm.as_ref().map(|(_, text)| Problem { what: text.clone(), next });
+        let alarm = self.alarm.as_ref().map(|(_, text, _)| Problem { what: text.clone(), next });
         alarm.into_iter().chain(self.shifting.problems(gate))
     }
 }

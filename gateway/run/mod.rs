@@ -299,7 +299,9 @@ async fn serve(
             tokio::spawn(follow(access.clone()));
             let (history, language) = (plan.config.history.path.clone(), plan.config.gateway.language);
             let hosts = plan.config.http.allow_hosts.clone();
-            let shared = Shared::new(Parts { live: live.clone(), history, language, access, post, hosts });
+            let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
+            let live = live.clone();
+            let shared = Shared::new(Parts { live, history, scripts, data_dir, language, access, post, hosts });
             Some(Server::start((address, listener), certificate, shared, report))
         }
         _ => None,

@@ -83,12 +83,14 @@ pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
         code: "controller".to_owned(),
         severity: "critical".to_owned(),
         text: text.to_owned(),
+        zh: text.to_owned(),
         since_ms: milliseconds(since_ns),
     });
     let scripts = pipeline.scripts().alarms().iter().map(|alarm| AlarmStatus {
         code: format!("{} ({})", alarm.name, alarm.script),
         severity: alarm.level.word().to_owned(),
         text: alarm.en.to_string(),
+        zh: alarm.zh.to_string(),
         since_ms: milliseconds(alarm.since_ns),
     });
     controller.into_iter().chain(scripts).collect()

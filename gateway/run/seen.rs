@@ -42,7 +42,7 @@ mod tests {
 
     fn alarm(code: &str, since_ms: i64) -> AlarmStatus {
         let (severity, text) = ("warning".to_owned(), String::new());
-        AlarmStatus { code: code.to_owned(), severity, text, since_ms }
+        AlarmStatus { code: code.to_owned(), severity, zh: text.clone(), text, since_ms }
     }
 
     #[test]

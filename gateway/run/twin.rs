@@ -12,7 +12,6 @@ use crate::twin::words;
 use crate::twin::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
-use rules::physics::explain::Language;
 use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
 use rules::twin::verdicts::unit_of;
 use serde::{Deserialize, Serialize};
@@ -60,7 +59,6 @@ struct InCharge {
 pub struct Twin {
     places: Places,
     memory: PathBuf,
-    language: Language,
     in_charge: Option<InCharge>,
     /// Unit and end of the name of the stored series; they stay while the box runs.
     suffix: String,
@@ -92,7 +90,6 @@ impl Twin {
         let mut twin = Self {
             places,
             memory: data_dir.join("twin.json"),
-            language: config.gateway.language.unwrap_or_default(),
             in_charge: None,
             suffix: String::new(),
             stored: false,

@@ -49,7 +49,7 @@ struct Judged {
 /// One tool, as the controller or the recipe names it; a new edge may have a new name or take less power.
 struct Edge {
     alarm: WearAlarm,
-    raised: Option<(TimeNs, String)>,
+    raised: Option<(TimeNs, String, String)>,
 }
 
 /// See the [module](self).
@@ -183,7 +183,7 @@ impl Wear {
             None => {}
             Some(Change::Raised) => {
                 let (en, zh) = texts(limit, power_w, tool);
-                edge.raised = Some((at_ns, en.clone()));
+                edge.raised = Some((at_ns, en.clone(), zh.clone()));
                 health.keep(Alarm { at_ns, code, source, severity: "warning".to_owned(), en, zh }.into());
             }
             Some(Change::Cleared) => {
@@ -196,10 +196,11 @@ impl Wear {
     /// The alarms that stand.
     pub fn alarms(&self) -> impl Iterator<Item = AlarmStatus> {
         let raised = self.edges.iter().filter_map(|(tool, edge)| Some((tool, edge.raised.clone()?)));
-        raised.map(|(tool, (since_ns, text))| AlarmStatus {
+        raised.map(|(tool, (since_ns, text, zh))| AlarmStatus {
             code: format!("{WORN} {tool}"),
             severity: "warning".to_owned(),
             text,
+            zh,
             since_ms: super::report::milliseconds(since_ns),
         })
     }

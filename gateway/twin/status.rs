@@ -27,6 +27,9 @@ pub struct RegimeStatus {
     /// In plain words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
+    /// The same in Chinese.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zh: Option<String>,
 }
 
 /// A finished diagnosis in short.

@@ -1,7 +1,6 @@
 //! What the twin notices, in plain words.
 
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::physics::explain::Language;
 use rules::twin::live::{Mismatch, Onset, Regime};
 use rules::twin::text::short;
 
@@ -58,12 +57,6 @@ pub fn agreement(regime: Regime, quantity: (&str, &str)) -> (String, String) {
     let (en_where, zh_where) = regime.words();
     let (en, zh) = quantity;
     (format!("{} {en_where} agrees with the simulation again", short_name(en)), format!("{zh_where}{zh}与仿真重新一致"))
-}
-
-/// The text in this language.
-#[must_use]
-pub fn in_language((en, zh): (String, String), language: Language) -> String {
-    if language == Language::Zh { zh } else { en }
 }
 
 /// `Power into the spindle drive, negative when ...` up to the comma.

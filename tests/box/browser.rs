@@ -25,6 +25,7 @@ pub(crate) struct Browser {
     from: BufReader<File>,
     session: Option<String>,
     last: u64,
+    events: Vec<Value>,
 }
 
 impl Browser {
@@ -42,7 +43,8 @@ impl Browser {
         let child = command.spawn().expect("sh starts");
         let open_to = OpenOptions::new().write(true).open(to).expect("the browser opens its side");
         let open_from = File::open(from).expect("the browser opens its side");
-        let mut browser = Self { child, to: open_to, from: BufReader::new(open_from), session: None, last: 0 };
+        let mut browser =
+            Self { child, to: open_to, from: BufReader::new(open_from), session: None, last: 0, events: Vec::new() };
         browser.attach();
         browser
     }
@@ -52,10 +54,54 @@ impl Browser {
         let target = target["targetId"].as_str().expect("a target").to_owned();
         let attached = self.call("Target.attachToTarget", &json!({ "targetId": target, "flatten": true }));
         self.session = attached["sessionId"].as_str().map(str::to_owned);
-        let size = json!({ "width": 1400, "height": 1300, "deviceScaleFactor": 1, "mobile": false });
+        self.size(1400, 1300);
+        for domain in ["Runtime.enable", "Log.enable", "Network.enable", "Page.enable"] {
+            self.call(domain, &json!({}));
+        }
+    }
+
+    /// The window, in CSS pixels.
+    pub(crate) fn size(&mut self, width: u32, height: u32) {
+        let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", &size);
-        self.call("Runtime.enable", &json!({}));
-        self.call("Log.enable", &json!({}));
+    }
+
+    /// `light` or `dark`, as the operating system would say it.
+    pub(crate) fn scheme(&mut self, scheme: &str) {
+        let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
+        self.call("Emulation.setEmulatedMedia", &features);
+    }
+
+    /// Runs before every document that is opened from now on.
+    pub(crate) fn before_every_document(&mut self, script: &str) {
+        self.call("Page.addScriptToEvaluateOnNewDocument", &json!({ "source": script }));
+    }
+
+    /// A picture of the whole page as PNG.
+    pub(crate) fn picture(&mut self) -> String {
+        let answer = self.call("Page.captureScreenshot", &json!({ "format": "png", "captureBeyondViewport": true }));
+        answer["data"].as_str().expect("base64").to_owned()
+    }
+
+    /// What has gone wrong in the page since this was last asked: exceptions, errors of the console, answers that are not 2xx
+    /// or 3xx, requests to anything but `address`.
+    pub(crate) fn faults(&mut self, address: &str) -> Vec<String> {
+        self.value("0");
+        let own = [format!("http://{address}/"), "blob:".to_owned(), "data:".to_owned(), "about:".to_owned()];
+        let fault = |event: &Value| {
+            let told = &event["params"];
+            match event["method"].as_str().unwrap_or_default() {
+                "Runtime.exceptionThrown" => Some(format!("exception: {}", told["exceptionDetails"])),
+                "Runtime.consoleAPICalled" if told["type"] == "error" => Some(format!("console: {}", told["args"])),
+                "Log.entryAdded" if told["entry"]["level"] == "error" => Some(format!("log: {}", told["entry"])),
+                "Network.requestWillBeSent" => {
+                    let url = told["request"]["url"].as_str().unwrap_or_default();
+                    (!own.iter().any(|known| url.starts_with(known))).then(|| format!("request off the box: {url}"))
+                }
+                _ => None,
+            }
+        };
+        std::mem::take(&mut self.events).iter().filter_map(fault).collect()
     }
 
     /// One command of the DevTools protocol and its result.
@@ -77,6 +123,7 @@ impl Browser {
                 assert!(answer["error"].is_null(), "{method}: {answer}");
                 return answer["result"].clone();
             }
+            self.events.push(answer);
         }
     }
 
@@ -93,10 +140,11 @@ impl Browser {
         result["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true.
+    /// Waits until an expression is true, or anything that counts as true.
     pub(crate) fn wait_until(&mut self, expression: &str) {
         let until = Instant::now() + Duration::from_secs(90);
-        while self.value(expression) != json!(true) {
+        let asked = format!("Boolean({expression})");
+        while self.value(&asked) != json!(true) {
             assert!(
                 Instant::now() < until,
                 "never true: {expression}; the page says:\n{}",

@@ -28,7 +28,11 @@ fn every_described_address_answers_with_what_is_described() {
         if path.ends_with("/live") || item["get"].is_null() || item["get"]["security"].is_array() {
             continue;
         }
-        let answer = get(&address, &path.replace("{file}", "page.js"));
+        // An earlier version of a script is there only after somebody has changed one.
+        if path.contains("{digest}") {
+            continue;
+        }
+        let answer = get(&address, &path.replace("{file}", "page.js").replace("{chapter}", "page"));
         assert_eq!(answer.status, 200, "{path}: {}", answer.body);
         let described = item["get"]["responses"]["200"]["content"].as_object().expect("content");
         let kind = described.keys().next().expect("a type");

@@ -2,6 +2,7 @@
 
 mod browser;
 mod cost;
+mod editing;
 mod http;
 mod kill;
 mod lives;
@@ -10,4 +11,8 @@ mod page;
 mod process;
 mod replay;
 mod twin;
+mod views;
+mod watchdog;
 mod wear;
+mod words;
+mod year;

@@ -37,8 +37,8 @@ fn page_and_history_agree(for_s: &str, wanted: usize) {
     println!("first page after {:?}", began.elapsed());
     let mut browser = Browser::start(directory.path());
     browser.open(&format!("http://{address}/"));
-    browser.wait_until("document.body?.dataset.connected === 'true'");
-    browser.wait_until("document.getElementById('state').dataset.word === 'cutting'");
+    browser.wait_until("document.body?.dataset.fresh === 'yes'");
+    browser.wait_until("document.getElementById('state')?.dataset.word === 'cutting'");
     languages(&mut browser);
     let shots = shots(&mut browser, wanted);
     chart(&mut browser);
@@ -52,7 +52,7 @@ fn page_and_history_agree(for_s: &str, wanted: usize) {
     let seconds = seconds_per_state(database);
     assert!(FIVE.iter().all(|word| seconds.iter().any(|(state, _)| state == word)), "{seconds:?}");
     println!("{} moments of the page agree with the history; seconds per state: {seconds:?}", shots.len());
-    browser.wait_until("document.body.dataset.connected === 'false'");
+    browser.wait_until("document.body.dataset.fresh === 'no'");
 }
 
 fn seconds_per_state(database: &str) -> Vec<(String, f64)> {
@@ -68,8 +68,8 @@ fn seconds_per_state(database: &str) -> Vec<(String, f64)> {
 /// Several moments as the page shows them: its own time, state word and numbers.
 fn shots(browser: &mut Browser, wanted: usize) -> Vec<(i64, Value)> {
     let read = "(() => {
-        const tile = (name) => document.querySelector(`[data-quantity=${name}] [data-value]`)?.dataset.value ?? null;
-        return { at: Number(document.getElementById('clock').dataset.ms), word: document.getElementById('state').dataset.word,
+        const tile = (name) => document.querySelector(`[data-quantity=${name}][data-value]`)?.dataset.value ?? null;
+        return { at: Number(document.getElementById('state').dataset.ms), word: document.getElementById('state').dataset.word,
                  spindle_power_w: tile('spindle_power_w'), spindle_speed_rpm: tile('spindle_speed_rpm'), feed_mm_min: tile('feed_mm_min') };
     })()";
     let mut shots: Vec<(i64, Value)> = Vec::new();
@@ -111,22 +111,27 @@ fn compare(database: &str, at_ms: i64, shown: &Value) {
 }
 
 fn languages(browser: &mut Browser) {
-    browser.value("localStorage.setItem('language', 'en'); document.getElementById('language').textContent === '中文' || document.getElementById('language').click()");
-    browser.wait_until("document.querySelector('[data-text=state]').textContent === 'Machine state'");
+    browser.value("document.documentElement.lang === 'en' || document.getElementById('language').click()");
+    browser.wait_until("document.querySelector('nav a').textContent === 'Now'");
     browser.value("document.getElementById('language').click()");
-    browser.wait_until("document.querySelector('[data-text=state]').textContent === '机床状态'");
+    browser.wait_until("document.querySelector('nav a').textContent === '实时'");
     browser.value("document.getElementById('language').click()");
+    browser.wait_until("document.querySelector('nav a').textContent === 'Now'");
+    browser.wait_until("document.getElementById('state')?.dataset.ms");
 }
 
 /// Something was drawn: the line of the spindle power and the band of states in their colours.
 fn chart(browser: &mut Browser) {
-    browser.wait_until(
-        "(() => {
-            const canvas = document.getElementById('plot');
-            const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
-            const colours = new Set();
-            for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200) colours.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
-            return colours.size > 20;
-        })()",
-    );
+    for (canvas, colours) in [(".trend .uplot canvas", 8), (".trend canvas.ribbon", 2)] {
+        browser.wait_until(&format!(
+            "(() => {{
+                const canvas = document.querySelector('{canvas}');
+                if (!canvas?.width) return false;
+                const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+                const colours = new Set();
+                for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 100) colours.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+                return colours.size >= {colours};
+            }})()"
+        ));
+    }
 }

@@ -65,6 +65,22 @@ static PARTS: [Shaft; 3] = [
     },
 ];
 
+/// A pin that is made in less than a minute.
+static PIN: Shaft = Shaft {
+    program: 1004,
+    stock_mm: 52.0,
+    large_mm: 48.4,
+    small_mm: 45.6,
+    large_length_mm: 10.0,
+    small_length_mm: 10.0,
+    rough_rpm: 960.0,
+    rough_depth_mm: 1.4,
+    rough_feed_mm: 0.25,
+    finish_rpm: 980.0,
+    finish_feed_mm: 0.12,
+    thread_pitch_mm: None,
+};
+
 /// Tools of the turret.
 const ROUGHER: u8 = 1;
 const FINISHER: u8 = 2;
@@ -72,7 +88,15 @@ const THREADER: u8 = 3;
 
 /// Writes the program of lot number `lot`. `vary` gives factors about 1 for the speed of each pass.
 pub(super) fn part(out: &mut Writer<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
-    let part = &PARTS[lot % PARTS.len()];
+    turn(out, &PARTS[lot % PARTS.len()], vary);
+}
+
+/// The same for the short part.
+pub(super) fn pin(out: &mut Writer<'_>) {
+    turn(out, &PIN, &mut || 1.0);
+}
+
+fn turn(out: &mut Writer<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     out.program = part.program;
     out.operation = "facing";
     out.put(Action::ToolChange(ROUGHER));

@@ -5,6 +5,7 @@ mod experiment;
 mod lathe;
 mod mill;
 mod planner;
+mod short_day;
 
 pub(super) use control::{Control, Motion};
 pub use experiment::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};

@@ -2,6 +2,7 @@
 
 use super::super::settings::SimulatedSettings;
 use super::experiment::{self, ExperimentStep};
+use super::short_day;
 use super::{Action, Block, Writer, lathe, mill};
 use crate::address::SimulatedMachine;
 use crate::words::{execution, mode};
@@ -42,16 +43,24 @@ impl Planner {
         }
         let Some(up_since_s) = self.up_since_s else {
             self.up_since_s = Some(since_s);
-            self.morning(&mut out);
+            match self.settings.day.rhythm_s {
+                Some(_) => short_day::morning(&mut out),
+                None => self.morning(&mut out),
+            }
             return;
         };
         let worked_s = since_s - up_since_s;
         if worked_s > self.settings.day.shift_s {
-            return self.night(&mut out);
+            let Some(rhythm_s) = self.settings.day.rhythm_s else { return self.night(&mut out) };
+            self.up_since_s = None;
+            return short_day::night(&mut out, since_s, rhythm_s);
         }
-        if worked_s > self.settings.day.shift_s / 2.0 && !self.lunch_taken {
+        if worked_s > self.settings.day.shift_s / 2.0 && !self.lunch_taken && self.settings.day.lunch_s > 0.0 {
             self.lunch_taken = true;
             return pause(&mut out, self.settings.day.lunch_s);
+        }
+        if self.settings.day.rhythm_s.is_some() {
+            return self.short_part(&mut out, worst);
         }
         if let Some((tool, _)) = worst.filter(|(_, wear_mm)| *wear_mm > WORN_MM) {
             return self.new_edge(&mut out, tool);
@@ -118,6 +127,18 @@ impl Planner {
         }
         out.put(Action::PartDone);
         self.parts += 1;
+    }
+
+    /// The second part of a short day has an alarm before it; a pause follows; a worn edge is changed quickly.
+    fn short_part(&mut self, out: &mut Writer<'_>, worst: Option<(u8, f64)>) {
+        let of_day = self.parts % short_day::PARTS;
+        self.parts += 1;
+        short_day::part(
+            out,
+            of_day,
+            worst.filter(|(_, wear_mm)| *wear_mm > WORN_MM).map(|(tool, _)| tool),
+            self.settings.day.pause_s,
+        );
     }
 
     fn new_edge(&mut self, out: &mut Writer<'_>, tool: u8) {

@@ -11,17 +11,30 @@ impl Twin {
     /// Differences that stand.
     #[must_use]
     pub fn alarms(&self) -> Vec<AlarmStatus> {
-        let alarm = |mismatch: &Mismatch| AlarmStatus {
-            code: code(mismatch.regime),
-            severity: "warning".to_owned(),
-            text: self.text(mismatch),
-            since_ms: mismatch.onset.map_or(0, |onset| milliseconds(onset.at_s)),
+        let alarm = |mismatch: &Mismatch| {
+            let (text, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+            AlarmStatus {
+                code: code(mismatch.regime),
+                severity: "warning".to_owned(),
+                text,
+                zh,
+                since_ms: mismatch.onset.map_or(0, |onset| milliseconds(onset.at_s)),
+            }
         };
         self.mismatches().iter().map(alarm).collect()
     }
 
-    fn text(&self, mismatch: &Mismatch) -> String {
-        words::in_language(words::mismatch(mismatch, self.quantity(), self.unit()), self.language)
+    fn differing(&self, mismatch: &Mismatch, none: RegimeStatus) -> RegimeStatus {
+        let (text, zh) = words::mismatch(mismatch, self.quantity(), self.unit());
+        RegimeStatus {
+            stage: "differing",
+            difference: Some(mismatch.mean),
+            difference_pct: mismatch.percent(),
+            since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(milliseconds)),
+            text: Some(text),
+            zh: Some(zh),
+            ..none
+        }
     }
 
     /// For the status document.
@@ -58,18 +71,12 @@ impl Twin {
                 difference_pct: None,
                 since_ms: None,
                 text: None,
+                zh: None,
             };
             match stage {
                 Stage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
                 Stage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
-                Stage::Differing(mismatch) => RegimeStatus {
-                    stage: "differing",
-                    difference: Some(mismatch.mean),
-                    difference_pct: mismatch.percent(),
-                    since_ms: mismatch.onset.map(|onset| [onset.at_s, onset.low_s, onset.high_s].map(milliseconds)),
-                    text: Some(self.text(&mismatch)),
-                    ..none
-                },
+                Stage::Differing(mismatch) => self.differing(&mismatch, none),
             }
         };
         live.stages().map(status).collect()

@@ -1,0 +1,140 @@
+//! What runs when no configuration is given: a simulated lathe that shows in five minutes what the box can do.
+//!
+//! At real time its whole day takes five minutes: off, power-up, warm-up, parts, an alarm, a pause. It begins in a cut. A tool is
+//! nearly worn: the wear model that comes with the demonstration says so within minutes. Estimators and twin remember earlier
+//! days (`demo/estimators.json`, `demo/twin.json`): on those the same machine ran through this program, healthy for sixteen hours
+//! and then with more friction in the spindle, which the twin has noticed and still tells. Their times are moved so that those
+//! days ended an hour before the start. Faster than real time the machine works in shifts with short nights.
+
+use crate::config::Config;
+use crate::files::replace;
+use crate::history::{Reader, store_wear_model};
+use crate::log::{Notice, Severity};
+use crate::run::open::MachineSpeed;
+use adapters::clock::{Clock, SECOND_NS, SystemClock};
+use rules::estimators::wear::WearRecord;
+use serde_json::{Value, json};
+use std::ops::Range;
+use std::path::Path;
+
+/// The model of the lathe.
+const MODEL: &str = include_str!("demo/lathe.toml");
+/// What the twin has learned under it.
+const LEARNED: &str = include_str!("demo/twin.json");
+/// What the estimators have learned.
+const ESTIMATED: &str = include_str!("demo/estimators.json");
+/// Cutting power over the wear, in the cuts of the short part.
+const WEAR: &str = include_str!("demo/wear.toml");
+
+const HOUR_S: i64 = 3600;
+/// 2017 to 2096, in seconds since 1970.
+const DECADES_S: Range<f64> = 1.5e9..4e9;
+
+/// The configuration at this speed.
+#[must_use]
+pub fn text(speed: MachineSpeed) -> String {
+    let day = match speed {
+        MachineSpeed::Real => "day=short&begun_s=54&wear_mm=0.235&change_h=0&change_friction_pct=150&dropouts_per_h=0",
+        MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
+    };
+    format!("[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe?{day}\"\n")
+}
+
+/// Puts models and memory of the demonstration into the data directory, unless something is there already. A demonstration
+/// that cannot be furnished runs without them, and says so.
+pub fn furnish(config: &mut Config, speed: MachineSpeed) {
+    if speed != MachineSpeed::Real {
+        return;
+    }
+    let data_dir = config.gateway.data_dir.clone();
+    match models(&data_dir, &config.history.path) {
+        Ok(()) => config.twin.model = Some(data_dir.join("demo-lathe.toml")),
+        Err(error) => {
+            let text = format!("the demonstration runs without its models: {error}");
+            Notice::new(Severity::Warning, "demo", text).say();
+        }
+    }
+}
+
+fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
+    let words = |error: std::io::Error| error.to_string();
+    std::fs::create_dir_all(data_dir).map_err(words)?;
+    let model = data_dir.join("demo-lathe.toml");
+    let now_ns = SystemClock::new().now_ns();
+    if !model.exists() {
+        let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
+        replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, ended_s)?).map_err(words)?;
+        replace(&model, MODEL).map_err(words)?;
+    }
+    let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);
+    if !known {
+        let record = WearRecord::parse(WEAR)?;
+        store_wear_model(history, now_ns, &record).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+/// The same memory with all its times moved so that the newest of them is `newest_s`.
+fn moved(text: &str, newest_s: f64) -> Result<String, String> {
+    let mut memory: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    let mut newest: f64 = 0.0;
+    each_time(&mut memory, &mut |at_s| {
+        newest = newest.max(at_s);
+        at_s
+    });
+    each_time(&mut memory, &mut |at_s| at_s + newest_s - newest);
+    Ok(memory.to_string())
+}
+
+/// Every number that is a time of these decades, in seconds or in nanoseconds since 1970, handed over in seconds.
+fn each_time(memory: &mut Value, take: &mut impl FnMut(f64) -> f64) {
+    match memory {
+        Value::Array(list) => list.iter_mut().for_each(|it| each_time(it, take)),
+        Value::Object(map) => map.values_mut().for_each(|it| each_time(it, take)),
+        Value::Number(number) => {
+            let value = number.as_f64().unwrap_or(0.0);
+            if DECADES_S.contains(&value) {
+                *memory = json!(take(value));
+            } else if DECADES_S.contains(&(value / 1e9)) {
+                #[expect(clippy::cast_possible_truncation, reason = "within the decades above")]
+                let at_ns = (take(value / 1e9) * 1e9) as i64;
+                *memory = json!(at_ns);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::parse;
+
+    #[test]
+    fn the_demonstration_is_a_configuration_and_its_models_are_sound() {
+        for speed in [MachineSpeed::Real, MachineSpeed::Times(60.0), MachineSpeed::Max] {
+            assert!(parse("demo", &text(speed), Path::new(""), []).is_ok(), "{speed:?}");
+        }
+        assert!(WearRecord::parse(WEAR).is_ok());
+        let directory = tempfile::tempdir().expect("a directory");
+        let history = directory.path().join("history.db");
+        for _start in 0..2 {
+            models(directory.path(), &history).expect("furnished");
+        }
+        let library = Reader::open(&history).and_then(|reader| reader.wear_models()).expect("readable");
+        assert_eq!(library.len(), 1, "stored once");
+        let learned: Value = serde_json::from_str(LEARNED).expect("JSON");
+        assert_eq!(learned["toml"], MODEL, "what was learned belongs to the model");
+    }
+
+    #[test]
+    fn times_are_moved_and_nothing_else_is() {
+        let text =
+            r#"{"at_s":2000000000.5,"due":{"at_ns":2000000001000000000},"watts":850.25,"count":3,"word":"idle"}"#;
+        let memory: Value = serde_json::from_str(&moved(text, 1_700_000_000.0).expect("moved")).expect("JSON");
+        assert_eq!(memory["at_s"], 1_699_999_999.5);
+        assert_eq!(memory["due"]["at_ns"], 1_700_000_000_000_000_000_i64);
+        assert_eq!((&memory["watts"], &memory["count"], &memory["word"]), (&json!(850.25), &json!(3), &json!("idle")));
+    }
+}

@@ -1,0 +1,139 @@
+//! Edited scripts over the history: one run at a time, in the background, with its report kept until the next one.
+
+use super::Shared;
+use super::guard::told;
+use super::person::{JsonBody, SignedIn};
+use super::problem::ApiProblem;
+use super::route::Route;
+use super::rules::{named, on_disk, with};
+use crate::access::Role;
+use crate::backtest::{Plan, backtest};
+use crate::history::Reader;
+use crate::in_charge;
+use crate::moment;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::response::Response;
+use axum::routing::{get, post};
+use rules::script::{self, Problem, TEXT_MAX};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/api/v1/backtest", || get(state)),
+    Route::post(Role::Setter, "/api/v1/rules/{file}/backtest", 2 * TEXT_MAX + 4096, || post(begin)),
+];
+
+/// What is asked for.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Asked {
+    text: String,
+    #[serde(default)]
+    #[expect(dead_code, reason = "sent with every text of the editor; a backtest changes nothing and needs it not")]
+    digest: String,
+    /// So long before the newest sample: `24h`.
+    since: String,
+}
+
+/// The one run, and what came of it.
+#[derive(Debug, Default)]
+enum Run {
+    #[default]
+    None,
+    Running {
+        file: String,
+        by: String,
+        since: Instant,
+    },
+    Done(Value),
+    Failed(String),
+}
+
+/// Shared by every request.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Backtests(Arc<Mutex<Run>>);
+
+impl Backtests {
+    fn locked(&self) -> MutexGuard<'_, Run> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// `GET /api/v1/backtest`
+async fn state(State(shared): State<Shared>) -> Json<Value> {
+    Json(match &*shared.backtests.locked() {
+        Run::None => json!({ "schema": "backtest-run/1", "state": "none" }),
+        Run::Running { file, by, since } => {
+            let seconds = since.elapsed().as_secs_f64();
+            json!({ "schema": "backtest-run/1", "state": "running", "file": file, "by": by, "seconds": seconds })
+        }
+        Run::Done(report) => json!({ "schema": "backtest-run/1", "state": "done", "report": report }),
+        Run::Failed(what) => json!({ "schema": "backtest-run/1", "state": "failed", "what": what }),
+    })
+}
+
+/// `POST /api/v1/rules/{file}/backtest`: begins; `GET /api/v1/backtest` tells how it goes.
+async fn begin(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    SignedIn(person): SignedIn,
+    JsonBody(asked): JsonBody<Asked>,
+) -> Result<Response, ApiProblem> {
+    named(&name)?;
+    let shown = shared.clone();
+    let plan = super::rules::aside(move || plan(&shown, &name, &asked).map(|plan| (plan, name))).await;
+    let (plan, name) = plan?;
+    {
+        let mut run = shared.backtests.locked();
+        if let Run::Running { by, .. } = &*run {
+            let title = format!("a backtest of {by} is under way");
+            return Err(ApiProblem::conflict(title, "wait for it; there is one at a time"));
+        }
+        *run = Run::Running { file: name.clone(), by: person.name, since: Instant::now() };
+    }
+    let (backtests, free) = (shared.backtests.clone(), shared.backtests.clone());
+    let work = move || {
+        let done = match backtest(plan) {
+            Ok(report) => Run::Done(report.json()),
+            Err(error) => Run::Failed(error.to_string()),
+        };
+        *backtests.locked() = done;
+    };
+    let thread = std::thread::Builder::new().name("backtest".to_owned()).spawn(move || {
+        // A run that breaks off leaves the place free.
+        if std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).is_err() {
+            *shared.backtests.locked() = Run::Failed("the run broke off; the log says more".to_owned());
+        }
+    });
+    if let Err(error) = thread {
+        *free.locked() = Run::None;
+        return Err(ApiProblem::unavailable(format!("no thread for the run: {error}"), "try again"));
+    }
+    Ok(told(Json(json!({ "schema": "backtest-run/1", "state": "running" })), format!("{name}: a backtest")))
+}
+
+fn plan(shared: &Shared, name: &str, asked: &Asked) -> Result<Plan, ApiProblem> {
+    let unusable = |found: Vec<Problem>| {
+        let all: Vec<String> = found.iter().map(ToString::to_string).collect();
+        ApiProblem::request(all.join("\n"), "mend it; `Run trials` marks the line")
+    };
+    let newest = Reader::open(&shared.history).and_then(|reader| reader.span());
+    let newest = newest.map_err(|error| ApiProblem::unavailable(error.to_string(), "look at the history"))?;
+    let nothing = || ApiProblem::conflict("the history holds no samples yet", "let the box run for a while first");
+    let (_, newest_ns) = newest.ok_or_else(nothing)?;
+    let bad = |what: String| ApiProblem::request(format!("since: {what}"), "write 24h, 7d or 90m");
+    let from_ns = moment::parse(&format!("-{}", asked.since), newest_ns).map_err(bad)?;
+    let files = on_disk(shared)?;
+    let running = in_charge::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
+    Ok(Plan {
+        history: shared.history.clone(),
+        from_ns,
+        to_ns: None,
+        every_ns: 0,
+        running: script::compile(&running).map_err(unusable)?,
+        edited: script::compile(&with(files, name, &asked.text)).map_err(unusable)?,
+    })
+}

@@ -1,0 +1,53 @@
+//! The files of the page, part of the binary: nothing is loaded from elsewhere, and no build step makes them.
+
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+/// Name below `/web/`, type, content.
+pub(super) struct WebFile {
+    pub(super) name: &'static str,
+    pub(super) kind: &'static str,
+    pub(super) content: &'static str,
+}
+
+macro_rules! files {
+    ($($kind:ident $name:literal from $path:literal,)*) => {
+        &[$(WebFile { name: $name, kind: $kind, content: include_str!(concat!("../web/", $path)) },)*]
+    };
+}
+
+/// The one document; every view is this with another address.
+pub(super) const INDEX: &str = include_str!("../web/index.html");
+
+/// Everything below `/web/`.
+pub(super) static FILES: &[WebFile] = files! {
+    SVG "icon.svg" from "icon.svg",
+    CSS "theme.css" from "theme.css",
+    CSS "page.css" from "page.css",
+    CSS "views.css" from "views.css",
+    SCRIPT "page.js" from "page.js",
+    SCRIPT "live.js" from "live.js",
+    SCRIPT "parts.js" from "parts.js",
+    SCRIPT "format.js" from "format.js",
+    SCRIPT "words.js" from "words.js",
+    SCRIPT "word-table.js" from "word-table.js",
+    SCRIPT "box-texts.js" from "box-texts.js",
+    SCRIPT "plot.js" from "plot.js",
+    SCRIPT "ribbon.js" from "ribbon.js",
+    SCRIPT "history-data.js" from "history-data.js",
+    SCRIPT "history-tables.js" from "history-tables.js",
+    SCRIPT "editor.js" from "editor.js",
+    SCRIPT "now.js" from "views/now.js",
+    SCRIPT "history.js" from "views/history.js",
+    SCRIPT "wear.js" from "views/wear.js",
+    SCRIPT "thermal.js" from "views/thermal.js",
+    SCRIPT "twin.js" from "views/twin.js",
+    SCRIPT "rules.js" from "views/rules.js",
+    SCRIPT "audit.js" from "views/audit.js",
+    SCRIPT "help.js" from "views/help.js",
+    CSS "uplot.css" from "vendor/uplot.min.css",
+    SCRIPT "uplot.js" from "vendor/uplot.min.js",
+    SCRIPT "codemirror.js" from "vendor/codemirror.min.js",
+    SCRIPT "marked.js" from "vendor/marked.min.js",
+};

@@ -1,0 +1,263 @@
+//! The scripts over the API: as they are on disk, as drafts, their trials, edited ones over the history, put in charge, earlier
+//! versions.
+
+use super::Shared;
+use super::guard::told;
+use super::person::{JsonBody, SignedIn};
+use super::problem::ApiProblem;
+use super::route::Route;
+use crate::access::Role;
+use crate::drafts::{Draft, Drafts, Version, digest_of, is_name};
+use crate::files::replace;
+use crate::reload::read_directory;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use axum::routing::{delete, get, post, put};
+use rules::script::{self, Problem, ScriptFile, TEXT_MAX, TrialResult};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// A text, and a little around it.
+const BODY_MAX: usize = 2 * TEXT_MAX + 4096;
+
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/api/v1/rules", || get(rules)),
+    Route::read("/api/v1/rules/words", || get(words)),
+    Route::read("/api/v1/rules/{file}/versions/{digest}", || get(version)),
+    Route::post(Role::Setter, "/api/v1/rules/{file}/check", BODY_MAX, || post(check)),
+    Route::post(Role::Setter, "/api/v1/rules/{file}/trials", BODY_MAX, || post(trials)),
+    Route::put(Role::Setter, "/api/v1/rules/{file}/draft", BODY_MAX, || put(save)),
+    Route::delete(Role::Setter, "/api/v1/rules/{file}/draft", 1024, || delete(discard)),
+    Route::post(Role::Setter, "/api/v1/rules/{file}/activate", BODY_MAX, || post(activate)),
+];
+
+/// A text that somebody has typed, and the digest of the text that he began from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Edited {
+    pub(super) text: String,
+    #[serde(default)]
+    pub(super) digest: String,
+}
+
+fn broken(what: impl std::fmt::Display) -> ApiProblem {
+    ApiProblem::unavailable(what.to_string(), "look at the data directory and at [scripts] directory")
+}
+
+/// Runs what waits for a disk or computes, off the threads that serve.
+pub(super) async fn aside<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, ApiProblem> + Send + 'static,
+) -> Result<T, ApiProblem> {
+    tokio::task::spawn_blocking(work).await.map_err(|_| ApiProblem::broken())?
+}
+
+pub(super) fn named(name: &str) -> Result<(), ApiProblem> {
+    let bad = || ApiProblem::request(format!("{name:?} is no name of a script"), "write it as my_rule.rhai");
+    if is_name(name) { Ok(()) } else { Err(bad()) }
+}
+
+pub(super) fn on_disk(shared: &Shared) -> Result<Vec<ScriptFile>, ApiProblem> {
+    let problems = |found: Vec<Problem>| broken(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
+    read_directory(&shared.scripts).map_err(problems)
+}
+
+/// The scripts of the directory with this text in the place of one of them.
+pub(super) fn with(files: Vec<ScriptFile>, name: &str, text: &str) -> Vec<ScriptFile> {
+    let mut files: Vec<ScriptFile> = files.into_iter().filter(|file| file.name != name).collect();
+    files.push(ScriptFile { name: name.to_owned(), text: text.to_owned() });
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    files
+}
+
+/// `GET /api/v1/rules`
+async fn rules(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+    aside(move || {
+        let drafts = Drafts::of(&shared.data_dir);
+        let rows: Vec<Value> = on_disk(&shared)?.iter().map(|file| row(&drafts, file)).collect();
+        let directory = shared.scripts.display().to_string();
+        Ok(Json(json!({ "schema": "rules/1", "directory": directory, "scripts": rows })))
+    })
+    .await
+}
+
+fn row(drafts: &Drafts, file: &ScriptFile) -> Value {
+    let draft = drafts
+        .draft(&file.name)
+        .map(|it| json!({ "text": it.text, "digest": digest_of(&it.text), "by": it.by, "at_ms": it.at_ms }));
+    let versions: Vec<Value> = drafts
+        .versions(&file.name)
+        .iter()
+        .map(|it| json!({ "digest": digest_of(&it.text), "by": it.by, "at_ms": it.at_ms }))
+        .collect();
+    json!({ "file": file.name, "digest": digest_of(&file.text), "text": file.text, "draft": draft, "versions": versions })
+}
+
+/// `GET /api/v1/rules/words`: what `rules api --json` prints.
+async fn words() -> Json<Value> {
+    Json(script::api_json())
+}
+
+/// `GET /api/v1/rules/{file}/versions/{digest}`
+async fn version(
+    State(shared): State<Shared>,
+    Path((name, digest)): Path<(String, String)>,
+) -> Result<Json<Value>, ApiProblem> {
+    named(&name)?;
+    aside(move || {
+        let versions = Drafts::of(&shared.data_dir).versions(&name);
+        let found = versions.into_iter().find(|it| digest_of(&it.text) == digest);
+        let found = found.ok_or_else(|| ApiProblem::not_found(&format!("version {digest} of {name}")))?;
+        Ok(Json(json!({ "schema": "rule-version/1", "file": name, "digest": digest, "text": found.text,
+            "by": found.by, "at_ms": found.at_ms })))
+    })
+    .await
+}
+
+/// `POST /api/v1/rules/{file}/check`: does it compile, beside the others?
+async fn check(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    JsonBody(edited): JsonBody<Edited>,
+) -> Result<Json<Value>, ApiProblem> {
+    named(&name)?;
+    aside(move || {
+        let files = with(on_disk(&shared)?, &name, &edited.text);
+        let found = script::compile(&files).err().unwrap_or_default();
+        Ok(Json(json!({ "schema": "check/1", "fine": found.is_empty(), "problems": problems(&found, &name) })))
+    })
+    .await
+}
+
+/// `POST /api/v1/rules/{file}/trials`
+async fn trials(Path(name): Path<String>, JsonBody(edited): JsonBody<Edited>) -> Result<Json<Value>, ApiProblem> {
+    named(&name)?;
+    aside(move || Ok(Json(tried(&name, &edited.text)))).await
+}
+
+/// The trials of one text, as `rules test --json` tells them.
+fn tried(name: &str, text: &str) -> Value {
+    let file = ScriptFile { name: name.to_owned(), text: text.to_owned() };
+    let (results, found) = match script::compile(std::slice::from_ref(&file)) {
+        Ok(set) => (script::trials(&set), Vec::new()),
+        Err(found) => (Vec::new(), found),
+    };
+    let fine = found.is_empty() && results.iter().all(|result| result.problem.is_none());
+    let rows: Vec<Value> = results.iter().map(trial).collect();
+    json!({ "schema": "trials/1", "fine": fine, "trials": rows, "problems": problems(&found, name) })
+}
+
+fn trial(result: &TrialResult) -> Value {
+    json!({
+        "name": result.name, "line": result.line, "passed": result.problem.is_none(), "met": result.met,
+        "seconds": result.passed_s, "problem": result.problem.as_ref().map(problem),
+    })
+}
+
+/// Those of this file; problems of others are told without a place in it.
+fn problems(found: &[Problem], name: &str) -> Vec<Value> {
+    let place = |it: &Problem| if it.file == name { problem(it) } else { elsewhere(it) };
+    found.iter().map(place).collect()
+}
+
+fn problem(it: &Problem) -> Value {
+    json!({ "file": it.file, "line": it.line, "column": it.column, "what": it.what, "next": it.next })
+}
+
+fn elsewhere(it: &Problem) -> Value {
+    json!({ "file": it.file, "line": 0, "column": 0, "what": it.to_string(), "next": it.next })
+}
+
+/// Is the text that somebody began from still the newest? Otherwise whoever was quicker would lose what he wrote.
+fn still_newest(drafts: &Drafts, files: &[ScriptFile], name: &str, began_from: &str) -> Result<(), ApiProblem> {
+    let draft = drafts.draft(name);
+    let newest = match (&draft, files.iter().find(|file| file.name == name)) {
+        (Some(draft), _) => digest_of(&draft.text),
+        (None, Some(file)) => digest_of(&file.text),
+        (None, None) => String::new(),
+    };
+    if newest == began_from {
+        return Ok(());
+    }
+    let who = draft.map_or("on the disk of the box".to_owned(), |draft| format!("by {}", draft.by));
+    let hint = "copy what you wrote, open the script again, and put it in there; nothing is lost";
+    Err(ApiProblem::conflict(format!("{name} was changed meanwhile {who}"), hint))
+}
+
+fn now_ms(shared: &Shared) -> i64 {
+    shared.status().map(|status| status.at_ms).unwrap_or_default()
+}
+
+/// `PUT /api/v1/rules/{file}/draft`
+async fn save(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    SignedIn(person): SignedIn,
+    JsonBody(edited): JsonBody<Edited>,
+) -> Result<Response, ApiProblem> {
+    named(&name)?;
+    let (words, answer) = aside(move || {
+        let drafts = Drafts::of(&shared.data_dir);
+        let files = on_disk(&shared)?;
+        let own = drafts.draft(&name).is_some_and(|draft| draft.text == edited.text);
+        if !own {
+            still_newest(&drafts, &files, &name, &edited.digest)?;
+        }
+        let digest = digest_of(&edited.text);
+        let draft = Draft { text: edited.text, by: person.name, at_ms: now_ms(&shared) };
+        drafts.save(&name, &draft).map_err(broken)?;
+        Ok((format!("{name}: a draft, {digest}"), json!({ "schema": "draft/1", "file": name, "digest": digest })))
+    })
+    .await?;
+    Ok(told(Json(answer), words))
+}
+
+/// `DELETE /api/v1/rules/{file}/draft`
+async fn discard(State(shared): State<Shared>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
+    named(&name)?;
+    let words = format!("{name}: its draft is discarded");
+    aside(move || Drafts::of(&shared.data_dir).discard(&name).map_err(broken)).await?;
+    Ok(told(Json(json!({ "done": true })), words))
+}
+
+/// `POST /api/v1/rules/{file}/activate`: comes into charge when every script compiles and every trial passes; otherwise it stays
+/// a draft, and the answer (422) says why.
+async fn activate(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    SignedIn(person): SignedIn,
+    JsonBody(edited): JsonBody<Edited>,
+) -> Result<Response, ApiProblem> {
+    named(&name)?;
+    aside(move || {
+        let drafts = Drafts::of(&shared.data_dir);
+        let files = on_disk(&shared)?;
+        still_newest(&drafts, &files, &name, &edited.digest)?;
+        let before = files.iter().find(|file| file.name == name).map(|file| file.text.clone());
+        if let Err(found) = script::prepare(&with(files, &name, &edited.text)) {
+            return Ok(refused(&name, &edited.text, &found));
+        }
+        let (at_ms, by) = (now_ms(&shared), person.name);
+        if let Some(text) = before.clone().filter(|_| drafts.versions(&name).is_empty()) {
+            drafts.keep(&name, Version { text, by: String::new(), at_ms }).map_err(broken)?;
+        }
+        replace(&shared.scripts.join(&name), &edited.text).map_err(broken)?;
+        let digest = digest_of(&edited.text);
+        drafts.keep(&name, Version { text: edited.text, by, at_ms }).map_err(broken)?;
+        drafts.discard(&name).map_err(broken)?;
+        let was = before.map_or("nothing".to_owned(), |text| digest_of(&text));
+        let words = format!("{name}: version {digest} in the place of {was}");
+        Ok(told(Json(json!({ "done": true, "version": digest })), words))
+    })
+    .await
+}
+
+fn refused(name: &str, text: &str, found: &[Problem]) -> Response {
+    let mut document = tried(name, text);
+    document["status"] = json!(422);
+    document["title"] = json!("it does not come into charge: not every trial passes");
+    document["hint"] = json!("it stays a draft; the version in charge goes on");
+    document["problems"] = json!(problems(found, name));
+    told((StatusCode::UNPROCESSABLE_ENTITY, Json(document)).into_response(), format!("{name}: its trials do not pass"))
+}

@@ -1,0 +1,39 @@
+//! `GET /api/v1/series`: what this history holds, and from when to when.
+
+use super::Shared;
+use super::history::{Answer, Given, reading, trouble};
+use super::query::QueryKeys;
+use super::route::Route;
+use crate::history::SeriesKind;
+use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
+use serde_json::{Value, json};
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(series))];
+
+/// `GET /api/v1/series`
+async fn series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    QueryKeys::of(pairs, &[])?;
+    reading(shared, |reader, _| {
+        let span = reader.span().map_err(|error| trouble(&error))?;
+        let known = reader.series().map_err(|error| trouble(&error))?;
+        let rows: Vec<Value> = known
+            .iter()
+            .map(|series| {
+                let kind = if series.kind == SeriesKind::Number { "number" } else { "text" };
+                json!({
+                    "name": &*series.name, "unit": &*series.unit, "kind": kind,
+                    "en": &*series.en, "zh": &*series.zh, "estimated": series.estimated,
+                })
+            })
+            .collect();
+        let ms = |at_ns: i64| at_ns.div_euclid(1_000_000);
+        Ok(json!({
+            "schema": "series/1",
+            "first_ms": span.map(|(first_ns, _)| ms(first_ns)),
+            "last_ms": span.map(|(_, last_ns)| ms(last_ns)),
+            "series": rows,
+        }))
+    })
+    .await
+}

@@ -1,0 +1,192 @@
+//! `GET /api/v1/utilisation`: seconds in each machine state, by hour, shift, day or week of the reader's own clock.
+
+use super::Shared;
+use super::history::{Answer, Given, range, reading, trouble};
+use super::problem::ApiProblem;
+use super::query::QueryKeys;
+use super::route::Route;
+use crate::history::{Reader, Span, StateHour};
+use adapters::clock::{SECOND_NS, TimeNs};
+use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+const MINUTE_NS: i64 = 60 * SECOND_NS;
+const HOUR_NS: i64 = 60 * MINUTE_NS;
+const DAY_MINUTES: i64 = 24 * 60;
+/// Rows of hours and states in one answer: eight states for five years.
+const HOURS_MAX: u32 = 400_000;
+/// Shifts of one day.
+const SHIFTS_MAX: usize = 12;
+/// Three shifts, where nobody says otherwise.
+const SHIFTS_DEFAULT: [i64; 3] = [6 * 60, 14 * 60, 22 * 60];
+
+/// How the time is cut.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum By {
+    Hour,
+    Day,
+    Week,
+    /// Minutes after midnight at which a shift begins, increasing.
+    Shift(Vec<i64>),
+}
+
+impl By {
+    /// Beginning of the stretch that holds this minute of the reader's clock (minutes since 1970, local).
+    fn begin(&self, minute: i64) -> i64 {
+        let day = minute.div_euclid(DAY_MINUTES);
+        match self {
+            Self::Hour => minute.div_euclid(60) * 60,
+            Self::Day => day * DAY_MINUTES,
+            // The first of January 1970 was a Thursday; weeks begin on Monday.
+            Self::Week => ((day + 3).div_euclid(7) * 7 - 3) * DAY_MINUTES,
+            Self::Shift(starts) => {
+                let within = minute.rem_euclid(DAY_MINUTES);
+                let begun = starts.iter().rev().find(|start| **start <= within);
+                match (begun, starts.last()) {
+                    (Some(start), _) => day * DAY_MINUTES + start,
+                    (None, Some(last)) => (day - 1) * DAY_MINUTES + last,
+                    (None, None) => day * DAY_MINUTES,
+                }
+            }
+        }
+    }
+}
+
+/// `6:00,14:00,22:00` in minutes after midnight.
+fn shifts(keys: &QueryKeys) -> Result<Vec<i64>, ApiProblem> {
+    let bad = |text: &str| {
+        ApiProblem::request(format!("shifts: {text:?} is no time of day"), "write the beginnings as 6:00,14:00,22:00")
+    };
+    let minutes = |text: &str| {
+        let (hour, minute) = text.split_once(':').unwrap_or((text, "0"));
+        let (hour, minute): (i64, i64) = (hour.parse().ok()?, minute.parse().ok()?);
+        ((0..24).contains(&hour) && (0..60).contains(&minute)).then_some(60 * hour + minute)
+    };
+    let mut starts =
+        keys.list("shifts").map(|text| minutes(text).ok_or_else(|| bad(text))).collect::<Result<Vec<_>, _>>()?;
+    if starts.is_empty() {
+        starts = SHIFTS_DEFAULT.to_vec();
+    }
+    if starts.len() > SHIFTS_MAX {
+        return Err(ApiProblem::request(format!("{} shifts in one day", starts.len()), "give at most 12"));
+    }
+    starts.sort_unstable();
+    Ok(starts)
+}
+
+fn cut(keys: &QueryKeys) -> Result<By, ApiProblem> {
+    match keys.text("by") {
+        None | Some("day") => Ok(By::Day),
+        Some("hour") => Ok(By::Hour),
+        Some("week") => Ok(By::Week),
+        Some("shift") => shifts(keys).map(By::Shift),
+        Some(other) => {
+            Err(ApiProblem::request(format!("by={other} is not known"), "write by=hour, shift, day or week"))
+        }
+    }
+}
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(utilisation))];
+
+/// `GET /api/v1/utilisation`
+async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    let keys = QueryKeys::of(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
+    let by = cut(&keys)?;
+    let offset_min = keys.number("offset_min", -1080_i64, 1080)?.unwrap_or(0);
+    reading(shared, move |reader, newest_ns| {
+        let (from_ns, to_ns) = range(&keys, newest_ns)?;
+        let hours = hours(reader, from_ns, to_ns, newest_ns)?;
+        let rows = gathered(&hours, &by, offset_min);
+        Ok(json!({
+            "schema": "utilisation/1",
+            "from_ms": from_ns.div_euclid(1_000_000),
+            "to_ms": to_ns.div_euclid(1_000_000),
+            "rows": rows,
+        }))
+    })
+    .await
+}
+
+/// The stored hours, and those of the state that lasts.
+fn hours(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs, newest_ns: TimeNs) -> Result<Vec<StateHour>, ApiProblem> {
+    let span = Span::between(from_ns, to_ns, HOURS_MAX);
+    let mut hours = reader.state_hours(span).map_err(|error| trouble(&error))?;
+    let newest = reader.states(Span::between(from_ns, to_ns, 1)).map_err(|error| trouble(&error))?;
+    let open = newest.into_iter().find(|interval| interval.until_ns.is_none());
+    let Some(open) = open else { return Ok(hours) };
+    let (mut at_ns, end_ns) = (open.since_ns.max(from_ns), newest_ns.min(to_ns));
+    while at_ns < end_ns {
+        let start_ns = at_ns.div_euclid(HOUR_NS) * HOUR_NS;
+        let until_ns = end_ns.min(start_ns + HOUR_NS);
+        hours.push(StateHour { start_ns, state: open.state.clone(), seconds: seconds(until_ns - at_ns) });
+        at_ns = until_ns;
+    }
+    Ok(hours)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "less than an hour")]
+fn seconds(ns: i64) -> f64 {
+    ns as f64 / SECOND_NS as f64
+}
+
+/// Seconds per state, by beginning.
+fn gathered(hours: &[StateHour], by: &By, offset_min: i64) -> Vec<Value> {
+    let mut rows: BTreeMap<i64, BTreeMap<&str, f64>> = BTreeMap::new();
+    for hour in hours {
+        let local = hour.start_ns.div_euclid(MINUTE_NS) + offset_min;
+        let begin = (by.begin(local) - offset_min).saturating_mul(60_000);
+        *rows.entry(begin).or_default().entry(&hour.state).or_default() += hour.seconds;
+    }
+    let row = |(from_ms, states): (i64, BTreeMap<&str, f64>)| {
+        let total: f64 = states.values().sum();
+        let states: Map<String, Value> = states.into_iter().map(|(word, s)| (word.to_owned(), json!(s))).collect();
+        json!({ "from_ms": from_ms, "total_s": total, "seconds": states })
+    };
+    rows.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_weeks_and_shifts_begin_where_the_readers_clock_says() {
+        // 1970-01-07 was a Wednesday; its week began on Monday the 5th, day number 4.
+        let wednesday_5_00 = 6 * DAY_MINUTES + 5 * 60;
+        assert_eq!(By::Day.begin(wednesday_5_00), 6 * DAY_MINUTES);
+        assert_eq!(By::Week.begin(wednesday_5_00), 4 * DAY_MINUTES);
+        let shift = By::Shift(SHIFTS_DEFAULT.to_vec());
+        assert_eq!(shift.begin(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
+        assert_eq!(shift.begin(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
+        assert_eq!(By::Week.begin(-1), -3 * DAY_MINUTES);
+    }
+
+    #[test]
+    fn hours_are_added_up_by_local_day() {
+        let hour = |at: i64, seconds| StateHour { start_ns: at * HOUR_NS, state: "idle".to_owned(), seconds };
+        let rows = gathered(&[hour(15, 100.0), hour(16, 200.0), hour(40, 50.0)], &By::Day, 8 * 60);
+        let told: Vec<_> = rows.iter().map(|row| (row["from_ms"].as_i64(), row["total_s"].as_f64())).collect();
+        let day_ms = 86_400_000;
+        let eight_h_ms = 8 * 3_600_000;
+        assert_eq!(
+            told,
+            [
+                (Some(-eight_h_ms), Some(100.0)),
+                (Some(day_ms - eight_h_ms), Some(200.0)),
+                (Some(2 * day_ms - eight_h_ms), Some(50.0)),
+            ]
+        );
+    }
+
+    #[test]
+    fn a_shift_that_is_no_time_is_refused() {
+        let keys =
+            |text: &str| QueryKeys::of(vec![("shifts".to_owned(), text.to_owned())], &["shifts"]).expect("known");
+        for text in ["25:00", "6:61", "six", "-1:00"] {
+            assert!(shifts(&keys(text)).is_err(), "{text}");
+        }
+        assert_eq!(shifts(&keys("14,6:30")), Ok(vec![390, 840]));
+    }
+}

@@ -1,0 +1,40 @@
+//! `GET /api/v1/wear`: the library of wear models, each with what it is for and how well it fits.
+
+use super::Shared;
+use super::history::{Answer, Given, reading, trouble};
+use super::query::QueryKeys;
+use super::route::Route;
+use crate::history::StoredWearModel;
+use axum::extract::{Query as Pairs, State};
+use axum::routing::get;
+use rules::estimators::wear::WearModel;
+use serde_json::{Value, json};
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(wear))];
+
+/// `GET /api/v1/wear`
+async fn wear(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+    QueryKeys::of(pairs, &[])?;
+    reading(shared, |reader, _| {
+        let models = reader.wear_models().map_err(|error| trouble(&error))?;
+        let rows: Vec<Value> = models.iter().rev().map(row).collect();
+        Ok(json!({ "schema": "wear-models/1", "models": rows }))
+    })
+    .await
+}
+
+/// Newest first.
+fn row(stored: &StoredWearModel) -> Value {
+    let record = &stored.record;
+    let (formula, residual_sd_w) = match &record.model {
+        WearModel::Surface(surface) => (surface.formula(), surface.residual_sd_w),
+        WearModel::Physical(it) => ("P = P0 (vc/vc0)^x (f/f0)^y (ap/ap0)^z + W VB vc ap".to_owned(), it.residual_sd_w),
+    };
+    json!({
+        "id": stored.id, "at_ms": stored.at_ns.div_euclid(1_000_000), "in_force": stored.in_force,
+        "machine": record.key.machine, "tool": record.key.tool, "work_material": record.key.work_material,
+        "operation": record.key.operation, "form": record.model.form(), "formula": formula,
+        "criterion_mm": record.criterion_mm, "cuts": record.cuts, "r2": record.r2, "residual_sd_w": residual_sd_w,
+        "origin": record.origin,
+    })
+}

@@ -1,0 +1,171 @@
+//! What a finished part was made with: time in each machine state, greatest power, and, for each tool, how long it cut, with
+//! what mean cutting power, against what limit of the wear model.
+
+use rules::estimators::{Estimates, State};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Tools of one part that are told apart; further ones are not listed.
+const TOOLS_MAX: usize = 64;
+
+/// The detail of a part as it is stored and shown (JSON in the column `detail` of the table `parts`).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PartDetail {
+    /// Seconds in each machine state, without those that did not occur.
+    pub seconds: BTreeMap<String, f64>,
+    /// Greatest power of a sample, W: of the whole machine where it is measured, else of the spindle.
+    pub peak_power_w: Option<f64>,
+    /// The tools that cut, in the order of their first cut.
+    pub tools: Vec<ToolUse>,
+}
+
+/// One tool in one part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ToolUse {
+    /// Its name in the controller; empty where the controller has none.
+    pub tool: String,
+    /// Seconds of cutting.
+    pub cutting_s: f64,
+    /// Mean cutting power over the time in which it was known, W.
+    pub cutting_power_w: Option<f64>,
+    /// Mean limit of the wear model for these cuts, W.
+    pub limit_w: Option<f64>,
+    /// Mean flank wear that the power means, mm.
+    pub wear_mm: Option<f64>,
+    /// Mean half width of its 95 % interval, mm.
+    pub wear_uncertainty_mm: Option<f64>,
+}
+
+/// A mean over time.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    seconds: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: Option<f64>, step_s: f64) {
+        if let Some(value) = value {
+            self.sum += value * step_s;
+            self.seconds += step_s;
+        }
+    }
+
+    fn value(self) -> Option<f64> {
+        (self.seconds > 0.0).then(|| self.sum / self.seconds)
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+struct Tool {
+    name: String,
+    cutting_s: f64,
+    power: Mean,
+    limit: Mean,
+    wear: Mean,
+    wear_uncertainty: Mean,
+}
+
+/// Gathers the detail of the part in progress. Allocates only when a tool cuts for the first time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Gathering {
+    seconds: [f64; State::ALL.len()],
+    peak_power_w: Option<f64>,
+    tools: Vec<Tool>,
+}
+
+impl Gathering {
+    /// Takes `step_s` seconds of the part.
+    pub(super) fn step(&mut self, estimates: &Estimates, tool: &str, power_w: Option<f64>, step_s: f64) {
+        if let Some(index) = State::ALL.iter().position(|state| *state == estimates.state) {
+            self.seconds[index] += step_s;
+        }
+        if let Some(power_w) = power_w {
+            self.peak_power_w = Some(self.peak_power_w.map_or(power_w, |peak| peak.max(power_w)));
+        }
+        if estimates.state == State::Cutting {
+            self.cut(estimates, tool, step_s);
+        }
+    }
+
+    fn cut(&mut self, estimates: &Estimates, name: &str, step_s: f64) {
+        let index = self.tools.iter().position(|tool| tool.name == name).or_else(|| {
+            (self.tools.len() < TOOLS_MAX).then(|| {
+                self.tools.push(Tool { name: name.to_owned(), ..Tool::default() });
+                self.tools.len() - 1
+            })
+        });
+        let Some(tool) = index.and_then(|index| self.tools.get_mut(index)) else { return };
+        tool.cutting_s += step_s;
+        let wear = estimates.tool_wear_mm.ok();
+        tool.power.add(estimates.cutting_power_w.ok().map(|it| it.value), step_s);
+        tool.limit.add(estimates.wear_limit_w.ok().map(|it| it.value), step_s);
+        tool.wear.add(wear.map(|it| it.value), step_s);
+        tool.wear_uncertainty.add(wear.map(|it| 1.96 * it.sd), step_s);
+    }
+
+    /// The detail of the finished part; what follows belongs to the next one.
+    pub(super) fn finish(&mut self) -> PartDetail {
+        let done = std::mem::take(self);
+        let named = State::ALL.iter().zip(done.seconds).filter(|(_, seconds)| *seconds > 0.0);
+        PartDetail {
+            seconds: named.map(|(state, seconds)| (state.word().to_owned(), rounded(seconds, 1.0))).collect(),
+            peak_power_w: done.peak_power_w,
+            tools: done.tools.into_iter().map(ToolUse::of).collect(),
+        }
+    }
+}
+
+impl ToolUse {
+    fn of(tool: Tool) -> Self {
+        Self {
+            tool: tool.name,
+            cutting_s: rounded(tool.cutting_s, 1.0),
+            cutting_power_w: tool.power.value().map(|watts| rounded(watts, 1.0)),
+            limit_w: tool.limit.value().map(|watts| rounded(watts, 1.0)),
+            wear_mm: tool.wear.value().map(|mm| rounded(mm, 4.0)),
+            wear_uncertainty_mm: tool.wear_uncertainty.value().map(|mm| rounded(mm, 4.0)),
+        }
+    }
+}
+
+/// To so many places, for short texts in the history.
+fn rounded(value: f64, places: f64) -> f64 {
+    let scale = 10_f64.powf(places);
+    (value * scale).round() / scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rules::estimators::Estimate;
+
+    fn cutting(power_w: f64) -> Estimates {
+        let estimate = Estimate { value: power_w, sd: 1.0 };
+        Estimates { state: State::Cutting, cutting_power_w: Ok(estimate), ..Estimates::none(0) }
+    }
+
+    #[test]
+    fn means_are_over_the_time_and_the_next_part_begins_anew() {
+        let mut gathering = Gathering::default();
+        gathering.step(&Estimates { state: State::Idle, ..Estimates::none(0) }, "T1", Some(300.0), 4.0);
+        gathering.step(&cutting(1000.0), "T1", Some(1300.0), 1.0);
+        gathering.step(&cutting(400.0), "T2", Some(700.0), 1.0);
+        gathering.step(&cutting(1300.0), "T1", None, 2.0);
+        let detail = gathering.finish();
+        assert_eq!(detail.seconds, BTreeMap::from([("cutting".to_owned(), 4.0), ("idle".to_owned(), 4.0)]));
+        assert_eq!(detail.peak_power_w, Some(1300.0));
+        let tools: Vec<_> =
+            detail.tools.iter().map(|it| (it.tool.as_str(), it.cutting_s, it.cutting_power_w)).collect();
+        assert_eq!(tools, [("T1", 3.0, Some(1200.0)), ("T2", 1.0, Some(400.0))]);
+        assert_eq!(detail.tools[0].limit_w, None);
+        assert_eq!(gathering.finish(), PartDetail::default());
+    }
+
+    #[test]
+    fn a_part_with_endless_tools_stays_small() {
+        let mut gathering = Gathering::default();
+        (0..1000).for_each(|at| gathering.step(&cutting(1.0), &format!("T{at}"), None, 1.0));
+        assert_eq!(gathering.finish().tools.len(), TOOLS_MAX);
+    }
+}

@@ -1,0 +1,67 @@
+// Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets proposed and written.
+import { ask, card, fill, make, row, say } from "/web/parts.js";
+import { number, quantity } from "/web/format.js";
+import { t } from "/web/words.js";
+import { TimePlot } from "/web/plot.js";
+import { columns } from "/web/history-data.js";
+
+const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
+const SPAN_S = 8 * 3600;
+
+export function mount(root, context) {
+  const now = make("div", "");
+  const offsets = make("div", "");
+  const error = make("div", "plot-box");
+  const warmth = make("div", "plot-box");
+  const note = make("p", "note", " ");
+  const list = make("div", "legend");
+  root.append(make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]), card("", [make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]), error, note]), card("", [make("h2", "", t("temperatures")), list, warmth]));
+  let plots = [];
+  const read = async () => {
+    const status = context.status();
+    if (!status) return;
+    try {
+      const known = (await ask("/api/v1/series")).series.map((s) => s.name);
+      const wanted = known.filter((n) => TEMPERATURE.test(n) && context.quantity(n)).slice(0, 6);
+      const [measured, predicted] = ["thermal_error_um", "thermal_predicted_um"].map((n) => (known.includes(n) ? n : null));
+      const names = [...wanted, measured, predicted].filter(Boolean);
+      const [from, to] = [new Date(status.at_ms - SPAN_S * 1000).toISOString(), new Date(status.at_ms).toISOString()];
+      const found = await ask(`/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=60`);
+      draw(found.series, wanted, measured, predicted, status);
+    } catch (problem) { say(note, problem.message); }
+  };
+  const draw = (series, wanted, measured, predicted, status) => {
+    plots.forEach((plot) => plot.destroy());
+    plots = [];
+    const range = [(status.at_ms - SPAN_S * 1000) / 1000, status.at_ms / 1000];
+    const of = (name) => series.find((s) => s.channel === name)?.points ?? [];
+    const last = (name) => of(name).findLast?.((p) => typeof p[1] === "number")?.[1] ?? null;
+    const any = [measured, predicted].some((name) => name && last(name) !== null);
+    if (any) {
+      const names = [measured, predicted].filter(Boolean);
+      const data = columns(series, names);
+      const [m, p] = [names.indexOf(measured), names.indexOf(predicted)];
+      const drawn = names.map((name, at) => ({ label: t(name === measured ? "thermal_measured" : "thermal_predicted"), unit: "um", line: at ? "line-b" : "line-a" }));
+      if (m >= 0 && p >= 0) { const left = data[0].map((_, i) => (data[1 + 3 * m][i] === null || data[1 + 3 * p][i] === null ? null : data[1 + 3 * m][i] - data[1 + 3 * p][i])); data.push(left, left.map(() => null), left.map(() => null)); drawn.push({ label: t("thermal_left"), unit: "um", line: "line-c" }); }
+      const plot = new TimePlot(error, { series: drawn, height: 240, label: t("thermal_error_figure"), low: 0, sync: "thermal" });
+      plot.give(data); plot.show(...range);
+      plots.push(plot);
+      say(note, drawn.map((d) => d.label).join(" · "));
+    } else say(note, t("no_thermal"));
+    const plot = new TimePlot(warmth, { series: wanted.map((name) => ({ label: context.name(name), unit: "°C" })), height: 240, label: t("temperatures"), sync: "thermal" });
+    plot.give(columns(series, wanted)); plot.show(...range);
+    plots.push(plot);
+    fill(list, wanted.map((name, at) => { const mark = make("i"); mark.style.background = `var(--line-${"abcdef"[at]})`; return make("span", "", [mark, `${context.name(name)} ${last(name) === null ? "–" : quantity(last(name), "°C")}`]); }));
+  };
+  const timer = setInterval(read, 20000);
+  let begun = false;
+  return {
+    update(status) {
+      if (!begun) { begun = true; read(); }
+      fill(now, status.channels.filter((c) => TEMPERATURE.test(c.name) || c.name === "thermal_error_um").map((c) => row(context.name(c.name), c.missing ? context.reason(c.missing) : quantity(c.value, c.unit))));
+      const offset = status.gate.offset;
+      fill(offsets, offset ? [row(t("offset_mode"), t(offset.mode === "armed" ? "armed_short" : "only_noted")), ...offset.axes.map((a) => row(a.axis.toUpperCase(), `${number(a.shift_um, "um")} µm`, a.wanted_um === null ? t("no_proposal") : t("proposed", quantity(a.wanted_um, "um"))))] : [make("p", "empty", t("no_offsets"))]);
+    },
+    leave() { clearInterval(timer); plots.forEach((plot) => plot.destroy()); },
+  };
+}

@@ -1,0 +1,111 @@
+// Tool wear: as the source's figure has it, the limit of the cutting power in red against the measured power in green, part by
+// part; how worn the edge is, and how many parts are left.
+import uPlot from "/web/uplot.js";
+import { ask, card, colour, fill, make, row, say, table } from "/web/parts.js";
+import { dateTime, number, quantity } from "/web/format.js";
+import { box, t } from "/web/words.js";
+
+const PARTS = 400;
+const READ_EVERY_MS = 15000;
+/** Parts from which the trend of the wear is drawn to the criterion. */
+const TREND_PARTS = 30;
+
+export function mount(root, context) {
+  const state = { tool: null, parts: [], models: [] };
+  const lamp = make("p", "lamp", " ");
+  const facts = make("div", "");
+  const tools = make("select", "", null, { "aria-label": t("tool") });
+  const figure = make("div", "plot-box wear-figure");
+  const below = make("p", "note", " ");
+  const models = make("div", "");
+  tools.addEventListener("change", () => { state.tool = tools.value; draw(); });
+  root.append(make("div", "columns", [card(t("edge_now"), [lamp, facts], "ages"), card(t("wear_models"), models)]), card("", [make("div", "head", [make("h2", "", t("wear_figure")), tools]), legend(), figure, below]));
+  let plot = null;
+  const draw = () => {
+    plot?.destroy();
+    plot = drawFigure(figure, below, state, context);
+  };
+  const read = async () => {
+    try {
+      const [parts, library] = await Promise.all([ask(`/api/v1/parts?from=1990-01-01&limit=${PARTS}`), ask("/api/v1/wear")]);
+      [state.parts, state.models] = [parts.rows.filter((p) => p.tools), library.models];
+      const known = [...new Set(state.parts.flatMap((p) => p.tools.map((u) => u.tool)))].filter(Boolean).sort();
+      if (!known.includes(state.tool)) state.tool = context.quantity("tool")?.value ?? null;
+      if (!known.includes(state.tool)) state.tool = known[0] ?? null;
+      fill(tools, known.map((tool) => make("option", "", tool, { value: tool, selected: tool === state.tool })));
+      drawModels(models, state.models);
+      draw();
+    } catch (error) { say(below, error.message); }
+  };
+  read();
+  const timer = setInterval(read, READ_EVERY_MS);
+  return { update: (status) => drawEdge(lamp, facts, status, context, state), leave() { clearInterval(timer); plot?.destroy(); } };
+}
+
+function legend() {
+  return make("div", "legend", [["bad", "wear_limit"], ["good", "measured_power"], ["line-d", "flank_wear"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); }));
+}
+
+function drawEdge(lamp, facts, status, context, state) {
+  const wear = status.wear;
+  const tool = context.quantity("tool");
+  const name = tool && !tool.missing ? tool.value : "–";
+  // Of the model: the alarm names its tool. Of a script: it is about the tool in use.
+  const about = (code) => status.alarms.some((a) => a.code === `${code} ${name}` || a.code.startsWith(`${code} (`));
+  const [worn, look] = [about("tool_worn"), about("tool_wear")];
+  lamp.dataset.tone = worn ? "bad" : look ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
+  say(lamp, `${name}: ${t(worn ? "lamp_worn" : look ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown")}`);
+  const left = remaining(state);
+  const rows = wear ? [
+    row(t("flank_wear"), wear.flank_wear_mm === null ? "–" : `${number(wear.flank_wear_mm, "mm")} ± ${quantity(wear.flank_wear_uncertainty_mm, "mm")}`, wear.why ? box(wear.why) : t("criterion", quantity(wear.criterion_mm, "mm"))),
+    row(t("wear_limit"), wear.limit_w === null ? "–" : `${number(wear.limit_w, "W")} ± ${quantity(wear.limit_uncertainty_w, "W")}`, wear.observability === "not_observable_here" ? t("not_observable") : wear.extrapolated?.length ? t("outside_model", wear.extrapolated.join(", ")) : null),
+    row(t("wear_form"), t(`form_${wear.form}`))] : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
+  const cutting = context.quantity("cutting_power_w");
+  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided")));
+  rows.push(row(t("remaining_parts"), left === null ? "–" : t("about", number(Math.round(left.parts))), left === null ? t("remaining_unknown") : t("remaining_words", left.from)));
+  fill(facts, rows);
+}
+
+/** The line through the wear of the newest parts, drawn to the criterion. */
+function remaining(state) {
+  const use = state.parts.map((p) => p.tools.find((u) => u.tool === state.tool)).filter((u) => u && u.wear_mm !== null).slice(-TREND_PARTS);
+  const limit = state.models.find((m) => m.in_force)?.criterion_mm ?? 0.3;
+  if (use.length < 5) return null;
+  const n = use.length;
+  const [mx, my] = [(n - 1) / 2, use.reduce((s, u) => s + u.wear_mm, 0) / n];
+  const slope = use.reduce((s, u, i) => s + (i - mx) * (u.wear_mm - my), 0) / use.reduce((s, _, i) => s + (i - mx) ** 2, 0);
+  const now = my + slope * (n - 1 - mx);
+  return slope > 1e-6 && now < limit ? { parts: (limit - now) / slope, from: n } : null;
+}
+
+function drawFigure(figure, below, state) {
+  figure.replaceChildren();
+  const use = state.parts.map((p, i) => ({ at: i + 1, part: p, tool: p.tools.find((u) => u.tool === state.tool) })).filter((u) => u.tool);
+  if (!use.length) { fill(figure, [make("p", "empty", t("no_wear_parts"))]); say(below, ""); return null; }
+  const pick = (key) => use.map((u) => u.tool[key]);
+  const axis = { stroke: colour("soft"), grid: { stroke: colour("grid") }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+  const dots = { show: true, size: 7 };
+  const plot = new uPlot({
+    width: Math.max(200, figure.clientWidth), height: 320, legend: { show: false }, cursor: { drag: { x: false, y: false }, y: false },
+    scales: { x: { time: false }, y: { range: (_, a, b) => [0, Math.max(100, b * 1.12)] }, mm: { range: (_, a, b) => [0, Math.max(0.4, (b ?? 0) * 1.2)] } },
+    axes: [{ ...axis, incrs: [1, 2, 5, 10, 20, 50, 100], label: t("part_number"), labelSize: 22, labelFont: "12px system-ui" }, { ...axis, size: 64, label: "W", labelSize: 18, labelFont: "12px system-ui" }, { ...axis, scale: "mm", side: 1, size: 56, grid: { show: false }, label: "mm", labelSize: 18, labelFont: "12px system-ui" }],
+    series: [{}, { label: t("wear_limit"), stroke: colour("bad"), width: 2 }, { label: t("measured_power"), stroke: colour("good"), width: 2, points: dots }, { label: t("flank_wear"), scale: "mm", stroke: colour("line-d"), width: 1.5, dash: [4, 4] }],
+    hooks: { setCursor: [(u) => { const i = u.cursor.idx; if (i !== null && i !== undefined) say(below, told(use[i])); }] },
+  }, [use.map((u) => u.at), pick("limit_w"), pick("cutting_power_w"), pick("wear_mm")], figure);
+  say(below, told(use.at(-1)));
+  return plot;
+}
+
+function told({ part, tool }) {
+  const power = tool.cutting_power_w === null ? "–" : quantity(tool.cutting_power_w, "W");
+  const limit = tool.limit_w === null ? "–" : quantity(tool.limit_w, "W");
+  const wear = tool.wear_mm === null ? "–" : `${number(tool.wear_mm, "mm")} ± ${quantity(tool.wear_uncertainty_mm ?? 0, "mm")}`;
+  return t("wear_told", dateTime(part.to_ms), power, limit, wear);
+}
+
+function drawModels(root, models) {
+  if (!models.length) return fill(root, [make("p", "empty", t("no_wear_model_words"))]);
+  const any = (text) => text || t("any");
+  const rows = models.map((m) => [any(m.machine), any(m.tool), any(m.work_material), any(m.operation), t(`form_${m.form}`), { num: quantity(m.criterion_mm, "mm") }, { num: String(m.cuts) }, { num: `${number(100 * m.r2)} %` }, m.in_force ? t("in_charge") : t("replaced")]);
+  fill(root, [table([t("machine"), t("tool"), t("material"), t("operation"), t("wear_form"), { num: t("criterion_short") }, { num: t("cuts") }, { num: "R²" }, ""], rows, { caption: t("wear_models") }), ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula)), make("p", "note", t("anova_where"))]);
+}
