@@ -46,7 +46,8 @@ pub(super) fn refit(scene: &mut Scene, parts: &[Part], rows: &[usize]) -> Option
         error = here;
         let columns: Vec<Vec<f64>> = tangents.iter().map(|t| rows.iter().map(|row| t[*row]).collect()).collect();
         let sizes: Vec<f64> = columns.iter().map(|column| rms(column) + 1e-30).collect();
-        let scaled = columns.iter().zip(&sizes).map(|(c, size)| c.iter().map(|x| x / size).collect()).collect::<Vec<_>>();
+        let scaled =
+            columns.iter().zip(&sizes).map(|(c, size)| c.iter().map(|x| x / size).collect()).collect::<Vec<_>>();
         let step = least_squares(&scaled, &left).coefficients;
         let step: Vec<f64> = step.iter().zip(&sizes).map(|(step, size)| step / size).collect();
         advance(scene, &mut parts, &free, &step, rows, error)?;

@@ -79,7 +79,11 @@ impl<'a> Inner<'a> {
                 let line = self.tall.row(*at);
                 let output = line[line.len() - 1];
                 let error = |w: &Array1<f64>| (output - line.slice(s![..line.len() - 1]).dot(w)).powi(2);
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a share of a count of rows"
+                )]
                 let number = (count(self.comparison.rows[*at]) / stretch) as usize;
                 *gained.entry(number).or_default() += error(&before) - error(&after);
             }

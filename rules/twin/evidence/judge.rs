@@ -1,5 +1,6 @@
 //! From explanations to an answer: what is reported, with which names, and what it contributes where.
 
+use super::bank::Since;
 use super::decision::THRESHOLDS;
 use super::gram::Comparison;
 use super::inner::Inner;
@@ -7,7 +8,6 @@ use super::inputs::Inputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, Setting, grouped};
 use super::second::Second;
-use super::bank::Since;
 use crate::statistics::{count, rms};
 use crate::twin::diagnosis::Verdict;
 use std::collections::BTreeMap;
@@ -162,13 +162,11 @@ impl Judge<'_> {
     fn named(&self, best: &Explanation, groups: &[Group<'_>], information: f64, debug: String) -> Answer {
         let ln = groups.iter().find(|group| *group.names == best.names).map_or(best.ln, |group| group.ln);
         let (after, contributions) = self.contributions(best);
-        let remaining: Vec<Named> =
-            contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
+        let remaining: Vec<Named> = contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
         let energy = |x: &[f64]| self.inputs.taken(false).map(|row| x[row] * x[row]).sum::<f64>();
         let sum = sum_of(&remaining, self.inputs.rows);
         let whole = energy(&sum).max(f64::MIN_POSITIVE);
-        let share: BTreeMap<&str, f64> =
-            remaining.iter().map(|(name, x)| (name.as_str(), energy(x) / whole)).collect();
+        let share: BTreeMap<&str, f64> = remaining.iter().map(|(name, x)| (name.as_str(), energy(x) / whole)).collect();
         let rows = count(self.comparison.rows.len());
         let small = |x: &[f64]| {
             let size = (energy(x) / rows).sqrt();
@@ -256,9 +254,9 @@ impl Judge<'_> {
             let (along, square) = self.naming.products(comparison, gram, contribution);
             let all = self.naming.stand_ins(&along, square, nats);
             let own = all.iter().find(|(kind, _)| kind == name).map_or(0.0, |(_, loss)| loss.min(1.0));
-            let others = all.into_iter().filter(|(kind, loss)| {
-                !answer.names.contains(kind) && *loss < own + THRESHOLDS.class_nats
-            });
+            let others = all
+                .into_iter()
+                .filter(|(kind, loss)| !answer.names.contains(kind) && *loss < own + THRESHOLDS.class_nats);
             class.extend(others.map(|(kind, _)| (kind, name.clone())));
         }
         class.sort();

@@ -78,14 +78,14 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
 
 /// Rows with a recorded output, every input of the model and finite tangents.
 fn comparable(scene: &crate::physics::Scene, baseline: &Baseline) -> Vec<bool> {
-    let finite = |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
+    let finite =
+        |row: usize| baseline.tangents.iter().all(|t| t[row].is_finite()) && baseline.simulated[row].is_finite();
     (0..scene.rows()).map(|row| scene.usable()[row] && finite(row)).collect()
 }
 
 /// Both stages, the names and the decision.
 fn answer(inputs: &Inputs<'_>, bank: &Bank, baseline: &Baseline, outliers: &Outliers) -> Answer {
-    let compared =
-        Compared { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
+    let compared = Compared { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(inputs, bank, &compared);
     let noises = settings(inputs, &first, &outliers.left);
     let own = priors(bank);

@@ -194,7 +194,12 @@ impl<'a> Naming<'a> {
     }
 
     /// Inner products of a whitened full contribution with every column, and its square, the baseline projected out.
-    pub(super) fn products(&self, comparison: &Comparison<'_>, gram: &Gram, contribution: &[f64]) -> (Array1<f64>, f64) {
+    pub(super) fn products(
+        &self,
+        comparison: &Comparison<'_>,
+        gram: &Gram,
+        contribution: &[f64],
+    ) -> (Array1<f64>, f64) {
         let white = Array1::from(comparison.whitened(contribution, gram.noise));
         let tall = comparison.whole(gram.noise, |_| true);
         let mut along = tall.t().dot(&white);
