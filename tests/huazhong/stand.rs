@@ -122,6 +122,7 @@ pub(crate) fn link(port: u16) -> Link {
         port,
         serial: SERIAL.to_owned(),
         login: None,
+        tls: None,
         deadline: Duration::from_secs(2),
     }
 }

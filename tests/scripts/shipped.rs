@@ -62,8 +62,8 @@ fn parts(count: u32, worn: f64) -> Vec<String> {
 
 #[test]
 fn the_shipped_tool_wear_takes_no_heavy_cut_for_a_worn_edge() {
-    assert_eq!(parts(12, 1.0), [String::new(); 0]);
-    assert_eq!(parts(12, 1.15), [String::new(); 0], "a harder lot of material");
+    assert_eq!(parts(12, 1.0), Vec::<String>::new());
+    assert_eq!(parts(12, 1.15), Vec::<String>::new(), "a harder lot of material");
 }
 
 #[test]
