@@ -61,7 +61,8 @@ def main():
                 if name not in known:
                     unknown.append(name)
                     continue
-                agent.push_data(name, value)
+                sample = agent.item_dict[name].category == "SAMPLE" and value != "UNAVAILABLE"
+                agent.push_data(name, float(value) if sample else value)
                 pushed.append([name, at, value])
     current = ElementTree.fromstring(agent.current().get_xml())
     values = {entry.get("dataItemId"): entry.text for entry in current.iter() if entry.get("dataItemId")}

@@ -1,6 +1,6 @@
 //! `devices.xml`: what an MTConnect agent must know of the machine before it reads the lines.
 //!
-//! Source: MTConnect Standard 1.7, Part 2, and its schema `MTConnectDevices_1.7.xsd`.
+//! Source: MTConnect Standard 1.6, Part 2, and its schema `MTConnectDevices_1.6.xsd`.
 
 use super::model::{ALARMS, AVAILABILITY, Category, Component, DataItem, ITEMS};
 use std::fmt::Write;
@@ -12,12 +12,12 @@ pub fn devices_xml(machine: &str, created_utc: &str, delivered: impl Fn(&str) ->
     let (name, uuid) = (xml_name(machine), uuid(machine));
     let mut out = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <MTConnectDevices xmlns:m=\"urn:mtconnect.org:MTConnectDevices:1.7\" \
-         xmlns=\"urn:mtconnect.org:MTConnectDevices:1.7\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \
-         xsi:schemaLocation=\"urn:mtconnect.org:MTConnectDevices:1.7 \
-         http://schemas.mtconnect.org/schemas/MTConnectDevices_1.7.xsd\">\n\
+         <MTConnectDevices xmlns:m=\"urn:mtconnect.org:MTConnectDevices:1.6\" \
+         xmlns=\"urn:mtconnect.org:MTConnectDevices:1.6\" xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" \
+         xsi:schemaLocation=\"urn:mtconnect.org:MTConnectDevices:1.6 \
+         http://schemas.mtconnect.org/schemas/MTConnectDevices_1.6.xsd\">\n\
          \u{20} <Header creationTime=\"{created_utc}\" sender=\"cnc-gateway\" instanceId=\"1\" bufferSize=\"131072\" \
-         assetBufferSize=\"1024\" assetCount=\"0\" version=\"1.7.0.0\"/>\n  <Devices>\n    \
+         assetBufferSize=\"1024\" assetCount=\"0\" version=\"1.6.0.0\"/>\n  <Devices>\n    \
          <Device id=\"machine\" name=\"{name}\" uuid=\"{uuid}\">\n"
     );
     let mut put = |indent: usize, line: &str| {
@@ -30,8 +30,6 @@ pub fn devices_xml(machine: &str, created_utc: &str, delivered: impl Fn(&str) ->
         8,
         &format!("<DataItem id=\"{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\" type=\"AVAILABILITY\"/>"),
     );
-    put(8, "<DataItem id=\"asset_changed\" category=\"EVENT\" type=\"ASSET_CHANGED\"/>");
-    put(8, "<DataItem id=\"asset_removed\" category=\"EVENT\" type=\"ASSET_REMOVED\"/>");
     put(6, "</DataItems>");
     put(6, "<Components>");
     let of = |component| items.iter().copied().filter(|item| item.component == component).collect::<Vec<_>>();
@@ -62,7 +60,7 @@ fn axes(of: &Of<'_>, put: &mut Put<'_>) {
 }
 
 fn controller(of: &Of<'_>, put: &mut Put<'_>) {
-    put(8, "<Controller id=\"controller\">");
+    put(8, "<Controller id=\"controller\" name=\"controller\">");
     put(10, "<DataItems>");
     of(Component::Controller).iter().for_each(|item| put(12, &data_item(item)));
     put(12, &format!("<DataItem id=\"{ALARMS}\" name=\"{ALARMS}\" category=\"CONDITION\" type=\"SYSTEM\"/>"));
@@ -98,8 +96,8 @@ fn group(put: &mut Put<'_>, tag: &str, id: &str, parts: &[(&str, &str, Option<&s
 }
 
 fn component(put: &mut Put<'_>, indent: usize, tag: &str, id: &str, name: Option<&str>, items: &[&DataItem]) {
-    let name = name.map_or_else(String::new, |name| format!(" name=\"{name}\""));
-    put(indent, &format!("<{tag} id=\"{id}\"{name}>"));
+    // A name is optional in the standard; some agents cannot do without.
+    put(indent, &format!("<{tag} id=\"{id}\" name=\"{}\">", name.unwrap_or(id)));
     put(indent + 2, "<DataItems>");
     items.iter().for_each(|item| put(indent + 4, &data_item(item)));
     put(indent + 2, "</DataItems>");

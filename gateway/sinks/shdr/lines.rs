@@ -64,7 +64,10 @@ impl Machine {
     fn take(&mut self, readings: &[Reading]) -> Vec<(&'static str, String)> {
         let changed = readings.iter().filter_map(|reading| {
             let item = of_channel(&reading.series.name).filter(|_| !reading.series.estimated)?;
-            Some((item.channel, shown(&reading.value)))
+            // What the machine has never delivered need not stand in its `devices.xml`.
+            let never = matches!(&reading.value, Cell::Missing(reason) if **reason == *"not_provided");
+            let known = self.values.contains_key(item.channel);
+            (known || !never).then(|| (item.channel, shown(&reading.value)))
         });
         let changed: Vec<(&'static str, String)> = changed.collect();
         self.values.extend(changed.iter().cloned());

@@ -3,7 +3,7 @@
 //! The data item has the name of the channel. Values are sent as the channel has them; where the standard wants another
 //! unit, `devices.xml` names the native one and the agent converts.
 //!
-//! Source: MTConnect Standard 1.7, Part 2 (devices), tables of data items and units.
+//! Source: MTConnect Standard 1.6, Part 2 (devices), tables of data items and units.
 
 /// A data item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
