@@ -34,7 +34,7 @@ const DECADES_S: Range<f64> = 1.5e9..4e9;
 #[must_use]
 pub fn text(speed: MachineSpeed) -> String {
     let day = match speed {
-        MachineSpeed::Real => "day=short&begun_s=54&wear_mm=0.235&change_h=0&change_friction_pct=150&dropouts_per_h=0",
+        MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.235&change_h=0&change_friction_pct=150&dropouts_per_h=0",
         MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
     };
     format!("[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe?{day}\"\n")
