@@ -130,6 +130,12 @@ pub trait Source: Send {
     /// The pace at which it wants to be read.
     fn period(&self) -> Duration;
 
+    /// The pace that the device can keep, asked for after every read: at least [`Source::period`], longer where the device
+    /// takes its time. What is older than two of these counts as stale.
+    fn pace(&self) -> Duration {
+        self.period()
+    }
+
     /// Who answers, as far as it is known after a successful read: pairs of a word and a text. May ask the device; for
     /// what is shown all the time there are [`Source::facts`].
     fn identity(&self) -> Vec<(&'static str, String)> {
@@ -178,6 +184,9 @@ pub enum LadderRule {
     Least,
     /// One of the other: dial 50 % and gateway 120 % are 60 %. A dial at zero still stops the feed.
     Product,
+    /// The gateway's override takes the place of the dial while it is enabled. Such ladders exist and nobody should build
+    /// one: the operator's dial is without effect meanwhile. Only served and recognised, never configured.
+    Replace,
 }
 
 impl LadderRule {
@@ -186,6 +195,7 @@ impl LadderRule {
     pub fn combine(self, dial: OverridePct, mail: OverridePct) -> OverridePct {
         match self {
             Self::Least => dial.min(mail),
+            Self::Replace => mail,
             Self::Product => {
                 let product = u32::from(dial.percent()) * u32::from(mail.percent()) / 100;
                 u8::try_from(product.min(254)).ok().and_then(OverridePct::new).unwrap_or(dial.min(mail))
@@ -251,6 +261,15 @@ pub trait Actuator: Send {
         self.write_feed_override(clock, OverridePct::FULL)
     }
 
+    /// Withdraws an override that an earlier run has left enabled, and tells whether there was one. A way of writing that
+    /// cannot tell says that there was none.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    fn withdraw_leftover(&mut self, _clock: &dyn Clock) -> Result<bool, SourceError> {
+        Ok(false)
+    }
+
     /// Asks the ladder for a feed hold or a stop.
     ///
     /// # Errors
@@ -289,6 +308,10 @@ impl<A: Actuator + ?Sized> Actuator for Box<A> {
 
     fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         (**self).release(clock)
+    }
+
+    fn withdraw_leftover(&mut self, clock: &dyn Clock) -> Result<bool, SourceError> {
+        (**self).withdraw_leftover(clock)
     }
 
     fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {

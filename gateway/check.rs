@@ -7,6 +7,7 @@ use crate::reload::read_directory;
 use adapters::address::{FanucBackend, Target};
 use adapters::open::missing_driver;
 use adapters::recording::{RecordingError, read_path};
+use rules::estimators::StateBasis;
 use rules::{script, twin};
 use serde::Serialize;
 use std::fmt;
@@ -65,6 +66,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
             check_operations(&config, &mut report);
             check_model(&config, &mut report);
             check_sources(&name, &config, &mut report);
+            report.read.extend(state_basis(&name, &config));
         }
         Err(problems) => report.problems = problems,
     }
@@ -84,6 +86,21 @@ fn summary(name: &str, config: &Config) -> String {
         config::GateMode::Armed => "; thermal offsets may be armed on the box",
     };
     format!("{name}: reads {} at {} ticks per second; {gate}{offsets}", sources.join(", "), config.gateway.tick_hz)
+}
+
+/// What the state of the machine will be inferred from; `None` where that shows with the first values only. Nothing is connected
+/// for it.
+fn state_basis(name: &str, config: &Config) -> Option<String> {
+    let mut channels = Vec::new();
+    for source in &config.sources {
+        // A stream listens as soon as it is opened.
+        if matches!(source.address.target(), Target::Waveform { .. }) {
+            return None;
+        }
+        let opened = adapters::open::open(&source.address, 0).ok()?;
+        channels.extend(opened.sources.iter().flat_map(|source| source.channels().to_vec()));
+    }
+    Some(format!("{name}: {}", StateBasis::of_channels(|id| channels.contains(&id))))
 }
 
 /// A page that others than this box can reach has no password.

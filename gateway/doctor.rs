@@ -94,6 +94,9 @@ fn milliseconds(since: Instant) -> f64 {
     (since.elapsed().as_secs_f64() * 1e4).round() / 10.0
 }
 
+/// A device that needs so many times the wanted period is told; one late answer of a busy network is not.
+const SLOW: f64 = 2.0;
+
 impl Report {
     /// The first look at a source: does it work at all?
     fn first(&mut self, source: &mut dyn Source, clock: &dyn Clock) -> bool {
@@ -116,11 +119,30 @@ impl Report {
         if let Err(error) = source.read(clock, &mut readings) {
             self.failed(&error);
         }
+        self.paced(source);
         let named = source.identity().into_iter().map(|(name, value)| Fact::text(name, value));
         let new = |fact: &Fact| self.identity.iter().all(|known| known.name != fact.name);
         let fresh: Vec<Fact> = named.chain(source.facts()).filter(new).collect();
         self.identity.extend(fresh);
         self.readings.extend(readings.into_iter().map(shown));
+    }
+
+    /// A device that answers too slowly for the period that is wanted.
+    fn paced(&mut self, source: &dyn Source) {
+        let (wanted_s, kept_s) = (source.period().as_secs_f64(), source.pace().as_secs_f64());
+        if kept_s > wanted_s * SLOW {
+            let name = source.name();
+            self.problems.push(Trouble {
+                what: format!(
+                    "{name} answers too slowly to be read every {wanted_s:.2} s; it will be read every {kept_s:.2} s, and its values \
+                     will count as fresh for {:.2} s",
+                    2.0 * kept_s
+                ),
+                next: "Nothing is lost by it. A quicker network board, a greater duty_pct= or a longer period_ms= in the \
+                       address changes it"
+                    .to_owned(),
+            });
+        }
     }
 
     fn failed(&mut self, error: &SourceError) {

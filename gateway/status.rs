@@ -68,6 +68,10 @@ pub struct StateStatus {
     /// Why it is unknown, where it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
+    /// What it was inferred from.
+    pub basis: &'static str,
+    /// What that means, in words.
+    pub basis_text: String,
     /// Can cutting be seen in the spindle power?
     pub visibility: &'static str,
     /// Where the no-load power comes from.

@@ -246,7 +246,10 @@ fn simulated(body: &str, keys: &mut Keys) -> Result<Target, String> {
         change_cut_pct: keys.number("change_cut_pct", 100.0, 10.0, 300.0),
         change_friction_pct: keys.number("change_friction_pct", 100.0, 10.0, 300.0),
         begun_s: keys.number("begun_s", 0.0, 0.0, 86_400.0),
-        ladder: keys.choice("ladder", &[("least", LadderRule::Least), ("product", LadderRule::Product)]),
+        ladder: keys.choice(
+            "ladder",
+            &[("least", LadderRule::Least), ("product", LadderRule::Product), ("replace", LadderRule::Replace)],
+        ),
     };
     match body.strip_prefix("//").unwrap_or(body) {
         "lathe" => Ok(Target::Simulated(target)),

@@ -43,6 +43,8 @@ pub struct FanucActuator {
     settle_ns: i64,
     heartbeat: u8,
     written: Option<(OverridePct, TimeNs)>,
+    /// What was in force before the first write; a direct write is taken back to it.
+    before: Option<OverridePct>,
     /// The dial that came in the same frame as the last override.
     beside: Option<(OverridePct, TimeNs)>,
 }
@@ -57,8 +59,8 @@ impl FanucActuator {
         let settle_ns = i64::try_from(options.settle.as_nanos()).unwrap_or(i64::MAX);
         let asking = options.request.map(|at| Asking::new(name, line.clone(), at, settle_ns));
         let (name, method, dial) = (name.to_owned(), options.write, options.dial);
-        let (heartbeat, written, beside) = (0, None, None);
-        let actuator = Self { name, line, path, method, dial, asking, settle_ns, heartbeat, written, beside };
+        let (heartbeat, written, before, beside) = (0, None, None, None);
+        let actuator = Self { name, line, path, method, dial, asking, settle_ns, heartbeat, written, before, beside };
         (method != WriteMethod::None).then_some(actuator)
     }
 
@@ -110,11 +112,26 @@ impl FanucActuator {
             WriteMethod::SecondOverride { area, at } => {
                 Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
             }
-            _ => return self.write_feed_override(clock, OverridePct::FULL),
+            // Where the ladder writes G012 in every scan this changes nothing; elsewhere it is where the dial was.
+            WriteMethod::Direct => self.wish(self.before.unwrap_or(OverridePct::FULL))?,
+            WriteMethod::Macro { .. } | WriteMethod::None => self.wish(OverridePct::FULL)?,
         };
         self.line.write(clock, &write)?;
         self.written = None;
         Ok(())
+    }
+
+    /// The byte that an earlier run may have left on, and what it holds then.
+    fn leftover(&self) -> Option<(Item, fn(i32) -> bool)> {
+        match self.method {
+            WriteMethod::Mailbox { area, at } => {
+                Some((Item::Pmc(Stretch::bytes(area, at, 1)), |byte| byte == i32::from(ENABLED)))
+            }
+            WriteMethod::SecondOverride { area, at } => {
+                Some((Item::Pmc(Stretch::bytes(area, at, 1)), |byte| byte != 0))
+            }
+            WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None => None,
+        }
     }
 
     /// What the way of writing itself says.
@@ -233,6 +250,9 @@ impl Actuator for FanucActuator {
         let items: Vec<Item> = [own].into_iter().chain(dial.into_iter().flat_map(|dial| [obeyed, dial])).collect();
         let asked = self.line.ask(clock, &items)?;
         let told = self.told(&asked, own)?;
+        if self.written.is_none() {
+            self.before = Some(told);
+        }
         self.beside = self.dial_of(&asked).ok().zip(Some(asked.ended_ns));
         match (self.dial, self.method) {
             (None, _) | (Some(_), WriteMethod::Direct | WriteMethod::None) => Ok(told),
@@ -271,6 +291,16 @@ impl Actuator for FanucActuator {
         let released = self.give_back(clock);
         let withdrawn = self.asking.as_mut().map_or(Ok(()), |asking| asking.withdraw(clock));
         released.and(withdrawn)
+    }
+
+    fn withdraw_leftover(&mut self, clock: &dyn Clock) -> Result<bool, SourceError> {
+        let Some((item, is_left)) = self.leftover() else { return Ok(false) };
+        let asked = self.line.ask(clock, &[item])?;
+        let left = self.bytes(&asked, item)?.first().copied().is_some_and(is_left);
+        if left {
+            self.give_back(clock)?;
+        }
+        Ok(left)
     }
 
     fn settles_within(&self) -> Duration {

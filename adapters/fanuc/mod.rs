@@ -60,6 +60,7 @@ pub mod line;
 pub mod native;
 pub mod open;
 pub mod opening;
+pub mod pace;
 pub mod poll;
 pub mod readings;
 pub mod request;

@@ -6,6 +6,7 @@ use super::feed_override;
 use super::item::Area;
 use super::line::{Connect, Line};
 use super::native::{Native, NativeSettings};
+use super::pace::SharedPace;
 use super::poll;
 use super::readings::Manner;
 use super::source::FanucSource;
@@ -62,9 +63,10 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
         power_diagnosis: options.power_diagnosis,
         dial: options.dial,
     };
+    let pace = SharedPace::new(options.duty_pct);
     let sources: Vec<Box<dyn Source>> = vec![
-        Box::new(FanucSource::fast(name, line.clone(), manner, options)),
-        Box::new(FanucSource::slow(name, line.clone(), manner, options)),
+        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace)),
+        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace)),
     ];
     let actuator = FanucActuator::new(name, line.clone(), path, options);
     let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);

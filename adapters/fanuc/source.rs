@@ -2,6 +2,7 @@
 
 use super::item::{Item, Question};
 use super::line::{Asked, Facts, Line};
+use super::pace::{GroupPace, SharedPace};
 use super::poll;
 use super::readings::{self, Manner};
 use crate::address::FanucOptions;
@@ -28,7 +29,7 @@ pub struct FanucSource {
     /// Each path with its channels at the places of [`readings::columns`]; the slow group has them in its order.
     paths: Vec<(Manner, Vec<Option<ChannelId>>)>,
     channels: Vec<ChannelId>,
-    period: Duration,
+    pace: GroupPace,
     facts: Option<Arc<Facts>>,
 }
 
@@ -36,7 +37,7 @@ impl FanucSource {
     /// What changes quickly: motion, loads, states, program. One frame per poll where it holds all paths, and another
     /// one while there is an alarm.
     #[must_use]
-    pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
+    pub fn fast(name: &str, line: Line, manner: Manner, options: &FanucOptions, shared: &SharedPace) -> Self {
         let power = manner.power_diagnosis;
         // Whatever its number, the path that is written to has the plain names.
         let own = readings::columns(None, power.map(|_| readings::POWER));
@@ -47,13 +48,13 @@ impl FanucSource {
         questions.extend(manner.dial.map(|dial| Item::Pmc(dial.stretch()).on(manner.path)));
         questions.extend(options.further.iter().flat_map(|path| poll::further(*path)));
         let channels = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten()).collect();
-        let (name, period) = (name.to_owned(), options.period);
-        Self { name, line, group: Group::Fast, questions, paths, channels, period, facts: None }
+        let (name, pace) = (name.to_owned(), shared.group(options.period));
+        Self { name, line, group: Group::Fast, questions, paths, channels, pace, facts: None }
     }
 
     /// What changes slowly and holds in between: parts, gear stage. Of the first path only.
     #[must_use]
-    pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions) -> Self {
+    pub fn slow(name: &str, line: Line, manner: Manner, options: &FanucOptions, shared: &SharedPace) -> Self {
         let joint = if name.contains('?') { '&' } else { '?' };
         let channels = readings::ids(readings::SLOW);
         Self {
@@ -63,7 +64,7 @@ impl FanucSource {
             questions: poll::slow(manner.path),
             paths: Vec::new(),
             channels,
-            period: options.slow,
+            pace: shared.group(options.slow),
             facts: None,
         }
     }
@@ -87,17 +88,23 @@ impl Source for FanucSource {
     }
 
     fn period(&self) -> Duration {
-        self.period
+        self.pace.wanted()
+    }
+
+    fn pace(&self) -> Duration {
+        self.pace.period()
     }
 
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let asked = self.line.ask_on(clock, &self.questions)?;
         self.facts = Some(asked.facts.clone());
         if self.group == Group::Slow {
+            self.pace.took(busy(&asked));
             readings::slow(&self.channels, &asked, out);
             return Ok(());
         }
         let alarms = self.alarms(clock, &asked)?;
+        self.pace.took(busy(&asked) + alarms.as_ref().map_or(Duration::ZERO, busy));
         for (manner, columns) in &self.paths {
             readings::fast(columns, &asked, alarms.as_ref(), *manner, out);
         }
@@ -105,11 +112,34 @@ impl Source for FanucSource {
     }
 
     fn facts(&self) -> Vec<Fact> {
+        let paced = paced(&self.pace, self.group);
         match (&self.facts, self.group) {
-            (Some(facts), Group::Fast) => identity(facts).into_iter().chain(experience(&self.line)).collect(),
-            _ => Vec::new(),
+            (Some(facts), Group::Fast) => {
+                identity(facts).into_iter().chain(experience(&self.line)).chain(paced).collect()
+            }
+            (Some(_), Group::Slow) => paced.collect(),
+            (None, _) => Vec::new(),
         }
     }
+}
+
+/// How long the control was busy with these questions.
+fn busy(asked: &Asked) -> Duration {
+    Duration::from_nanos((asked.ended_ns - asked.began_ns).max(0).unsigned_abs())
+}
+
+/// How long the control takes to answer a group, and the period that it can therefore keep.
+fn paced(pace: &GroupPace, group: Group) -> impl Iterator<Item = Fact> {
+    let word = match group {
+        Group::Fast => "fast",
+        Group::Slow => "slow",
+    };
+    let ms = |name: &str, time: Duration| {
+        Fact::number(format!("{word}_group_{name}_ms"), (time.as_secs_f64() * 1e4).round() / 10.0)
+    };
+    let (wanted, period) = (pace.wanted(), pace.period());
+    let answered = pace.busy().map(|busy| ms("answer", busy));
+    answered.into_iter().chain([ms("period", period), ms("period_wanted", wanted)])
 }
 
 /// Who answers.

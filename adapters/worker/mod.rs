@@ -2,7 +2,8 @@
 //!
 //! Vendor libraries block for seconds; nothing else waits for them. The thread sleeps to absolute times, skips the
 //! beats it missed and counts them, and fills a bounded queue from which the gateway takes what there is at each tick.
-//! A poll that fails is repeated at the next beat; from the second failure on, the pause grows from 1 s to 30 s. A
+//! The pace is the one that was wanted until the source says that the device keeps a slower one; from then on it is polled, and
+//! its values count as fresh, at that one. A poll that fails is repeated at the next beat; from the second failure on, the pause grows from 1 s to 30 s. A
 //! machine that is off is a normal state and asked again every two seconds.
 
 mod queue;
@@ -201,6 +202,7 @@ impl Poller {
             let ended_ns = poll.ended_ns;
             let error = poll.error.clone();
             locked(&self.shared.queue).put(poll);
+            self.follow_pace();
             locked(&self.shared.ledger).poll_over(due_ns, began_ns, ended_ns, error.as_ref());
             self.take_facts(ended_ns);
             if matches!(error, Some(SourceError::End { .. })) {
@@ -210,6 +212,13 @@ impl Poller {
             self.sleep_until(due_ns);
         }
         locked(&self.shared.ledger).stopped(self.clock.now_ns());
+    }
+
+    /// The device may keep a slower pace than was wanted.
+    fn follow_pace(&mut self) {
+        let wanted = self.settings.period.unwrap_or_else(|| self.source.period());
+        self.period = wanted.max(self.source.pace());
+        locked(&self.shared.ledger).paced(self.period);
     }
 
     fn take_facts(&mut self, now_ns: TimeNs) {

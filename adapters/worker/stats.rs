@@ -2,16 +2,21 @@
 
 use crate::clock::TimeNs;
 use crate::driver::{Fact, SourceError};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Percentiles are over at most this many polls.
 const WINDOW: usize = 512;
 
-/// The pace is looked at again after so many polls.
-const PACE_POLLS: u64 = 16;
+/// The pace that is kept follows from the last so many intervals. Of these one in ten may be longer: a single poll that hangs
+/// must not make old values count as fresh.
+const PACE_POLLS: usize = 32;
 
-/// A source is never taken for more than this many times slower than it promised.
-const SLOWER_AT_MOST: u32 = 5;
+/// A source is never taken for slower than this: what is older than two minutes is old, whatever the pace.
+const SLOWEST: Duration = Duration::from_secs(60);
+
+/// A pace that differs less than this from the one before is the same.
+const SAME_PACE: f64 = 0.1;
 
 /// What a source is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +71,8 @@ pub struct WorkerStats {
     pub state_since_ns: TimeNs,
     /// The pace it promised.
     pub period: Duration,
+    /// The pace it keeps at the moment: values older than two of these count as stale.
+    pub pace: Duration,
     /// The pace it keeps, from beginning to beginning of successful polls.
     pub period_kept: Spread,
     /// How late polls begin against their beat.
@@ -134,8 +141,13 @@ pub(super) struct Ledger {
     last_error: Option<SourceError>,
     last_error_since_ns: Option<TimeNs>,
     facts: Vec<Fact>,
+    /// At which it is polled now.
+    beat: Duration,
+    /// At which its values come, as was last told.
     pace: Duration,
     new_pace: Option<Duration>,
+    /// The last intervals, ns; the newest at the end.
+    latest: VecDeque<i64>,
 }
 
 impl Ledger {
@@ -156,9 +168,16 @@ impl Ledger {
             last_error: None,
             last_error_since_ns: None,
             facts: Vec::new(),
+            beat: period,
             pace: period,
             new_pace: None,
+            latest: VecDeque::with_capacity(PACE_POLLS),
         }
+    }
+
+    /// From now on it is polled at this pace.
+    pub(super) fn paced(&mut self, beat: Duration) {
+        self.beat = beat;
     }
 
     pub(super) fn poll_began(&mut self, began_ns: TimeNs) {
@@ -178,15 +197,17 @@ impl Ledger {
         self.round_trip.add(ended_ns - began_ns);
         if let Some(last_ns) = self.last_began_ns {
             self.intervals.add(began_ns - last_ns);
+            if self.latest.len() >= PACE_POLLS {
+                self.latest.pop_front();
+            }
+            self.latest.push_back(began_ns - last_ns);
         }
         self.last_began_ns = error.is_none().then_some(began_ns);
         if let Some(error) = error {
             self.failed(error, ended_ns);
         }
         self.enter(state_after(error), ended_ns);
-        if self.polls.is_multiple_of(PACE_POLLS) {
-            self.look_at_pace();
-        }
+        self.look_at_pace();
     }
 
     fn failed(&mut self, error: &SourceError, ended_ns: TimeNs) {
@@ -208,13 +229,21 @@ impl Ledger {
     }
 
     fn look_at_pace(&mut self) {
-        let kept = self.intervals.spread().p50;
-        let slower = kept > self.period * 6 / 5;
-        let pace = if slower { kept.min(self.period * SLOWER_AT_MOST) } else { self.period };
-        if pace.abs_diff(self.pace) > self.period / 10 {
+        let pace = self.beat.max(self.kept()).min(SLOWEST.max(self.period));
+        let differs = pace.abs_diff(self.pace).as_secs_f64() > SAME_PACE * self.pace.as_secs_f64();
+        if differs || (pace == self.period && pace != self.pace) {
             self.pace = pace;
             self.new_pace = Some(pace);
         }
+    }
+
+    /// The interval that nine in ten of the last ones do not exceed, where it is visibly longer than the beat.
+    fn kept(&self) -> Duration {
+        let mut sorted: Vec<i64> = self.latest.iter().copied().collect();
+        sorted.sort_unstable();
+        let rank = (sorted.len() * 9).div_ceil(10).saturating_sub(1);
+        let kept = sorted.get(rank).map_or(Duration::ZERO, |ns| Duration::from_nanos(ns.unsigned_abs()));
+        if kept > self.beat * 6 / 5 { kept } else { Duration::ZERO }
     }
 
     /// The pace the source keeps, if that has changed since it was last asked for.
@@ -241,6 +270,7 @@ impl Ledger {
             state: if stuck_ns.is_some() { WorkerState::Stuck } else { self.state },
             state_since_ns: stuck_ns.unwrap_or(self.state_since_ns),
             period: self.period,
+            pace: self.pace,
             period_kept: self.intervals.spread(),
             lateness: self.lateness.spread(),
             round_trip: self.round_trip.spread(),

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::log::LogFormat;
 use adapters::Axis;
+use adapters::address::{Target, WriteMethod};
 use adapters::channel::nearest;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
@@ -179,9 +180,34 @@ fn check_gate(reading: &mut Reading<'_>) {
             let (at, next) = (origin("mode"), format!("write source = ... under [gate]; there is {}", quoted(&names)));
             reading.problem(&at, "the gate may be armed, but `source` does not say what it writes to", next);
         }
-        Some(name) => check_source(reading, &names, &name, &origin("source")),
+        Some(name) => {
+            check_source(reading, &names, &name, &origin("source"));
+            if armed {
+                check_dial(reading, &name);
+            }
+        }
         None => {}
     }
+}
+
+/// A machine whose feed override may be written tells where its operator's dial stands: only then can nothing above it be
+/// asked for, and a ladder that replaces the dial be found out.
+fn check_dial(reading: &mut Reading<'_>, name: &str) {
+    let target = reading.sources.iter().find(|values| source_name(values).as_deref() == Some(name));
+    let Some(found) = target.and_then(|values| values.found.get("address")) else { return };
+    let address = as_text(found).and_then(|text| text.parse::<adapters::Address>().ok());
+    let origin = found.origin.clone();
+    if address.is_some_and(|address| lacks_dial(address.target())) {
+        let what = "the gate may be armed, but the address does not name the byte in which the operator's dial stands";
+        let next = "add dial=R907, or whichever byte the ladder copies the dial to (see the handbook, chapter gate)";
+        reading.problem(&origin, what, next);
+    }
+}
+
+/// With a second override or a macro variable G012 is the dial and counts whatever is written.
+fn lacks_dial(target: &Target) -> bool {
+    let Target::Fanuc { options, .. } = target else { return false };
+    options.dial.is_none() && matches!(options.write, WriteMethod::Mailbox { .. } | WriteMethod::Direct)
 }
 
 /// There is a source of this name.

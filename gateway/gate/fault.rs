@@ -2,8 +2,19 @@
 
 use super::arming::Disarmed;
 use adapters::units::OverridePct;
-use adapters::{Axis, SourceError};
+use adapters::{Axis, LadderRule, SourceError};
 use std::fmt;
+
+/// What the machine shows where something else was expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shown {
+    /// The override in force.
+    pub found: OverridePct,
+    /// The operator's dial, where it is known.
+    pub dial: Option<OverridePct>,
+    /// What the configuration says that the ladder makes of the two.
+    pub rule: LadderRule,
+}
 
 /// Why the machine is not written to any more. The gate is to be disarmed with [`Fault::disarmed`], and an alarm raised.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,8 +24,12 @@ pub enum Fault {
         /// Written last.
         asked: OverridePct,
         /// Read back.
-        found: OverridePct,
+        shown: Shown,
     },
+    /// The override was withdrawn and the dial is not in force again.
+    StillInForce(Shown),
+    /// The machine refuses that the override is withdrawn; it is tried again.
+    NotWithdrawn(SourceError),
     /// Writing or reading back failed.
     Line(SourceError),
     /// The control shows another offset than the one that was written.
@@ -43,9 +58,14 @@ impl Fault {
     pub fn disarmed(&self) -> Disarmed {
         match self {
             // A machine that answers and says no has been reached.
-            Self::ReadBack { .. } | Self::Line(SourceError::Refused { .. }) => Disarmed::ReadBack,
+            Self::ReadBack { .. }
+            | Self::StillInForce(_)
+            | Self::Line(SourceError::Refused { .. })
+            | Self::NotWithdrawn(SourceError::Refused { .. }) => Disarmed::ReadBack,
             Self::Offset { .. } | Self::OffsetLine(SourceError::Refused { .. }) => Disarmed::Offset,
-            Self::Line(_) | Self::OffsetLine(_) | Self::Late { .. } | Self::Gone => Disarmed::Line,
+            Self::Line(_) | Self::NotWithdrawn(_) | Self::OffsetLine(_) | Self::Late { .. } | Self::Gone => {
+                Disarmed::Line
+            }
         }
     }
 
@@ -53,7 +73,12 @@ impl Fault {
     #[must_use]
     pub fn zh(&self) -> &'static str {
         match self {
+            Self::ReadBack { asked, shown } if shown.replaces_dial(*asked) => {
+                "梯形图用网关倍率取代了面板倍率，闸门已解除；请让梯形图取面板与网关倍率的较小者"
+            }
             Self::ReadBack { .. } | Self::Line(_) => "写入的进给倍率未生效，闸门已解除；请检查梯形图与面板倍率",
+            Self::StillInForce(_) => "网关倍率已撤回，但面板倍率尚未恢复；请检查梯形图是否读取使能字节",
+            Self::NotWithdrawn(_) => "网关倍率无法撤回，正在重试；心跳停止后梯形图应恢复面板倍率",
             Self::Late { .. } => "心跳中断，梯形图可能已恢复面板倍率，闸门已解除；请检查网络与数控系统负载",
             Self::Gone => "写入线程已退出，闸门已解除；请重启网关",
             Self::Offset { .. } | Self::OffsetLine(_) => {
@@ -66,10 +91,19 @@ impl Fault {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::ReadBack { asked, found } => write!(
+            Self::ReadBack { asked, shown } => shown.told(*asked, f),
+            Self::StillInForce(Shown { found, dial, .. }) => {
+                let dial = dial.map_or_else(|| "the dial".to_owned(), |dial| format!("the dial at {dial}"));
+                write!(
+                    f,
+                    "the gateway's override was withdrawn, and {found} is in force instead of {dial}. Look whether the ladder \
+                     reads the enable byte, and who else writes the override"
+                )
+            }
+            Self::NotWithdrawn(error) => write!(
                 f,
-                "feed override {asked} was written and {found} is in force: the machine does not take it; the gate is disarmed. \
-                 Look whether the ladder passes the gateway's override on, and whether the dial limits it"
+                "the gateway's override could not be withdrawn; it is tried again until the machine takes it, and the ladder \
+                 has to fall back to the dial by itself because no sign of life is written any more. {error}"
             ),
             Self::Line(error) => write!(f, "the feed override could not be written; the gate is disarmed. {error}"),
             Self::Offset { axis, asked_um, found_um } => write!(
@@ -94,9 +128,62 @@ impl fmt::Display for Fault {
     }
 }
 
+impl Shown {
+    /// The override that was written is in force although the dial stands below it.
+    fn replaces_dial(&self, asked: OverridePct) -> bool {
+        let expected = self.dial.map(|dial| self.rule.combine(dial, asked));
+        self.found == asked && expected.is_some_and(|expected| expected != asked)
+    }
+
+    fn told(&self, asked: OverridePct, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { found, dial, rule } = *self;
+        let Some(dial) = dial else {
+            return write!(
+                f,
+                "feed override {asked} was written and {found} is in force: the machine does not take it; the gate is \
+                 disarmed. Look whether the ladder passes the gateway's override on, and whether the dial limits it"
+            );
+        };
+        let expected = rule.combine(dial, asked);
+        write!(
+            f,
+            "feed override {asked} was written with the dial at {dial}: {expected} should be in force and {found} is. "
+        )?;
+        f.write_str(if self.replaces_dial(asked) {
+            "The ladder lets the override take the place of the operator's dial; the gate is disarmed. Let the machine's maker \
+             take the lesser of the two (or their product, with above_dial = true under [gate])"
+        } else if found == dial {
+            "The ladder does not pass the override on; the gate is disarmed. Compare the address of the mailbox with the ladder"
+        } else {
+            "The gate is disarmed. Look what else writes the override, and whether the ladder's rule is the one under [gate] \
+             (above_dial)"
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_told_of_an_override_does_not_contradict_itself() {
+        let pct = |percent| OverridePct::new(percent).expect("not 255");
+        let told = |asked, found, dial: Option<u8>, rule| {
+            let shown = Shown { found: pct(found), dial: dial.map(pct), rule };
+            Fault::ReadBack { asked: pct(asked), shown }.to_string()
+        };
+        let replaced = told(71, 71, Some(70), LadderRule::Least);
+        assert!(
+            replaced.contains("71 % was written with the dial at 70 %: 70 % should be in force and 71 % is"),
+            "{replaced}"
+        );
+        assert!(replaced.contains("take the place of the operator's dial"), "{replaced}");
+        let ignored = told(60, 80, Some(80), LadderRule::Least);
+        assert!(ignored.contains("does not pass the override on") && ignored.contains("60 % should"), "{ignored}");
+        let other = told(60, 90, Some(80), LadderRule::Product);
+        assert!(other.contains("48 % should be in force and 90 % is") && other.contains("above_dial"), "{other}");
+        assert!(told(80, 100, None, LadderRule::Least).contains("80 % was written and 100 % is in force"));
+    }
 
     #[test]
     fn a_machine_that_says_no_has_been_reached() {

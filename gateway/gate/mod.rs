@@ -35,7 +35,7 @@ mod write;
 
 pub use arming::{ArmError, Armed, Disarmed};
 pub use ask::{Ask, AskOutcome};
-pub use fault::Fault;
+pub use fault::{Fault, Shown};
 pub use hold::Hold;
 pub use limit::Bound;
 pub use offset::{OffsetVerdict, Offsets};
@@ -44,6 +44,7 @@ pub use write::{Occasion, Reaction, Writer, Written};
 
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::units::OverridePct;
 use adapters::{ChannelId, Sample};
 use arming::Arming;
 use ask::Asks;
@@ -139,20 +140,29 @@ impl Gate {
         let (target_pct, bound) = limit::band(wanted_pct, self.limits.min_pct, self.limits.max_pct);
         let ceiling_pct = self.ceiling_pct(sample);
         let (target_pct, bound) = limit::below(ceiling_pct, target_pct, bound);
+        let dial_pct = self.lesser_dial_pct(sample);
         let outcome = match (hold, bound) {
             (Some(hold), _) => Outcome::Held(hold),
             (None, Some(Bound::NotPossible)) => Outcome::Refused,
             (None, Some(bound)) => Outcome::Limited(bound),
             (None, None) => Outcome::Permitted,
         };
-        let (target_pct, permitted) = if hold.is_some() {
+        let (target_pct, permitted, outcome) = if hold.is_some() {
             self.aim.reset();
-            (target_pct, self.slew.jump_to_full(at_ns))
+            (target_pct, self.slew.jump_to_full(at_ns), outcome)
         } else {
             let aim_pct = self.aim.take(target_pct, ceiling_pct);
-            (aim_pct, self.slew.approach(aim_pct, at_ns))
+            match dial_pct.filter(|dial_pct| wanted_pct.is_some() && aim_pct < 100.0 && *dial_pct <= aim_pct) {
+                Some(dial_pct) => (
+                    100.0,
+                    self.slew.jump_to_full(at_ns),
+                    Outcome::DialCounts(OverridePct::nearest(dial_pct).unwrap_or(OverridePct::FULL)),
+                ),
+                None => (aim_pct, self.slew.approach(aim_pct, at_ns), outcome),
+            }
         };
-        let slewing = hold.is_none() && bound.is_none() && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
+        let moves = hold.is_none() && bound.is_none() && !matches!(outcome, Outcome::DialCounts(_));
+        let slewing = moves && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { Outcome::Limited(Bound::Slew) } else { outcome };
         Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
@@ -214,6 +224,13 @@ impl Gate {
     /// Somebody has seen to what the ladder was asked for.
     pub fn acknowledge(&mut self) {
         self.asks.acknowledge();
+    }
+
+    /// The dial, where it is known and the ladder takes the lesser one of dial and override: at and below it there is nothing
+    /// to ask for.
+    fn lesser_dial_pct(&self, sample: &Sample) -> Option<f64> {
+        let dial = self.dial.filter(|_| !self.limits.above_dial)?;
+        self.interlocks.fresh(sample, dial)
     }
 
     /// What the ladder's rule and the operator's dial leave: a ladder that takes the lesser one of dial and override makes

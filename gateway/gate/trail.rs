@@ -18,6 +18,8 @@ const ROWS_PER_S: f64 = 10.0;
 const ROWS_AT_ONCE: f64 = 200.0;
 /// A script's words in the audit are cut at so many characters.
 const WORDS_MAX: usize = 200;
+/// What went wrong begins with the address of the source, and ends with what to do.
+const FAULT_MAX: usize = 600;
 
 /// What was last recorded of requests.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,7 +130,7 @@ impl Trail {
     /// Who asked for what this write came from; nobody when the machine was given back.
     fn author(&self, written: &Written) -> Author {
         let before = self.authors.iter().rev().find(|(at_ns, _)| *at_ns <= written.sample_ns);
-        let author = before.filter(|_| written.occasion != Occasion::Release);
+        let author = before.filter(|_| !matches!(written.occasion, Occasion::Release | Occasion::Leftover));
         author.map_or(Author::default(), |(_, author)| author.clone())
     }
 
@@ -162,7 +164,7 @@ impl Trail {
 /// Why it was written, and by whose words; or what went wrong.
 fn why(written: &Written, reason: &str) -> String {
     match &written.fault {
-        Some(fault) => words(&fault.to_string()),
+        Some(fault) => fault.to_string().chars().take(FAULT_MAX).collect(),
         None if reason.is_empty() => written.occasion.words().to_owned(),
         None => format!("{}: {reason}", written.occasion.words()),
     }
@@ -172,7 +174,7 @@ fn outcome(verdict: &Verdict) -> &'static str {
     match verdict.outcome {
         Outcome::Held(_) => "held",
         Outcome::Refused => "refused",
-        Outcome::Limited(_) => "limited",
+        Outcome::Limited(_) | Outcome::DialCounts(_) => "limited",
         Outcome::Permitted if verdict.armed => "permitted",
         Outcome::Permitted => "shadow",
     }

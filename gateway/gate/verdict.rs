@@ -16,6 +16,8 @@ pub enum Outcome {
     Held(Hold),
     /// Not a number from 0 to 254 %: back to 100 %.
     Refused,
+    /// The operator's dial is at or below what is asked for, and the ladder takes the lesser one: nothing is asked of it.
+    DialCounts(OverridePct),
 }
 
 /// The decision of one tick.
@@ -34,13 +36,19 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// Is the machine asked for anything? At 100 % the dial alone counts, and the enable is withdrawn.
+    #[must_use]
+    pub fn asks(&self) -> bool {
+        self.permitted != OverridePct::FULL
+    }
+
     /// The word in the history: `written`, `shadow`, `held`, `limited` or `refused`.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self.outcome {
             Outcome::Held(_) => "held",
             Outcome::Refused => "refused",
-            Outcome::Limited(_) => "limited",
+            Outcome::Limited(_) | Outcome::DialCounts(_) => "limited",
             Outcome::Permitted if self.armed => "written",
             Outcome::Permitted => "shadow",
         }
@@ -50,7 +58,15 @@ impl Verdict {
     #[must_use]
     pub fn reason(&self) -> String {
         match self.outcome {
+            Outcome::Permitted if self.armed && !self.asks() => {
+                "nothing is asked of the machine: the dial counts".to_owned()
+            }
             Outcome::Permitted if self.armed => "as asked for".to_owned(),
+            Outcome::DialCounts(dial) => {
+                format!(
+                    "the operator's dial at {dial} is not above it: nothing is asked of the machine, the dial counts"
+                )
+            }
             Outcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
             Outcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
             Outcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
@@ -64,7 +80,7 @@ impl Verdict {
             Outcome::Limited(Bound::NotPossible) | Outcome::Refused => {
                 "a feed override is a number from 0 to 254 %; back to 100 %".to_owned()
             }
-            Outcome::Held(hold) => format!("100 % is held: {hold}"),
+            Outcome::Held(hold) => format!("no override, the dial counts: {hold}"),
         }
     }
 }

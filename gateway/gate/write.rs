@@ -1,11 +1,16 @@
 //! Writing a verdict to the machine, reading it back, and giving the machine back to its operator.
 //!
+//! Something is written only while an override is asked for that the operator's dial does not make meaningless: the box says
+//! nothing at 100 %, and nothing at or above the dial where the ladder takes the lesser of the two. Then the enable byte is
+//! withdrawn and the dial counts, whatever the ladder makes of an override. A withdrawal that the machine refuses is repeated
+//! until it is taken, and what an earlier run left enabled is withdrawn at the first contact.
+//!
 //! An override is written when it has changed, at most once per `min_interval_s`, and again after `heartbeat_s` as the sign
 //! of life that the ladder waits for. What is in force is read back until it is what the ladder's rule makes of the dial and
 //! of what was written: the time of that is the step's reaction time. What is anything else when the machine has had its time
 //! to settle ends the arming.
 
-use super::fault::Fault;
+use super::fault::{Fault, Shown};
 use super::verdict::{Outcome, Verdict};
 use crate::config;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
@@ -22,6 +27,8 @@ pub enum Occasion {
     SignOfLife,
     /// The machine is given back to its dial.
     Release,
+    /// What an earlier run had left enabled is withdrawn.
+    Leftover,
 }
 
 impl Occasion {
@@ -32,6 +39,7 @@ impl Occasion {
             Self::Change => "the override was changed",
             Self::SignOfLife => "the sign of life",
             Self::Release => "the machine was given back to its dial",
+            Self::Leftover => "an override that an earlier run had left enabled was withdrawn",
         }
     }
 }
@@ -81,12 +89,29 @@ struct Pace {
     rule: LadderRule,
 }
 
+/// A withdrawal that the machine refused is tried again after this time.
+const WITHDRAW_AGAIN_NS: i64 = SECOND_NS / 2;
+/// The same while the machine is off or cannot be reached.
+const UNREACHED_AGAIN_NS: i64 = 5 * SECOND_NS;
+
 /// A change that has not been seen in force yet.
 #[derive(Debug, Clone, Copy)]
 struct Pending {
-    asked: OverridePct,
+    /// `None`: the dial has to be in force again.
+    asked: Option<OverridePct>,
     sample_ns: TimeNs,
     issued_ns: TimeNs,
+}
+
+/// The enable that has to be withdrawn and is not yet.
+#[derive(Debug, Clone, Copy)]
+struct Owed {
+    /// Of an earlier run: it is not known whether anything is enabled.
+    leftover: bool,
+    /// Not tried again before.
+    next_ns: TimeNs,
+    /// A refusal is told once.
+    told: bool,
 }
 
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
@@ -99,15 +124,19 @@ pub struct Writer<A> {
     /// Positions of the dial over the same time.
     dials: VecDeque<(TimeNs, OverridePct)>,
     dial_is_known: bool,
+    /// An override of ours is enabled.
     holding: bool,
+    owed: Option<Owed>,
     /// Something went wrong: nothing is written until a verdict that is not armed has been seen.
     failed: bool,
+    /// When the machine was last looked at before anything was enabled.
+    looked_ns: Option<TimeNs>,
     changed_ns: Option<TimeNs>,
     pending: Option<Pending>,
 }
 
 impl<A: Actuator> Writer<A> {
-    /// Nothing is written until a verdict says so.
+    /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
     pub fn new(actuator: A, limits: &config::Gate) -> Self {
         let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
@@ -120,7 +149,9 @@ impl<A: Actuator> Writer<A> {
             dials: VecDeque::new(),
             dial_is_known: false,
             holding: false,
+            owed: Some(Owed { leftover: true, next_ns: TimeNs::MIN, told: false }),
             failed: false,
+            looked_ns: None,
             changed_ns: None,
             pending: None,
         }
@@ -131,9 +162,9 @@ impl<A: Actuator> Writer<A> {
         &self.actuator
     }
 
-    /// Writes what an armed verdict permits, when it has changed or the sign of life is due. The first verdict that is
-    /// not armed any more gives the machine back to its dial. Anything else writes nothing; neither does an armed verdict
-    /// after a fault, until one that is not armed has been seen.
+    /// Writes what an armed verdict asks for, when it has changed or the sign of life is due. The first verdict that is not
+    /// armed any more, or asks for nothing, gives the machine back to its dial. Anything else writes nothing; neither does an
+    /// armed verdict after a fault, until one that is not armed has been seen.
     pub fn step(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<Written> {
         if !verdict.armed {
             self.failed = false;
@@ -142,17 +173,69 @@ impl<A: Actuator> Writer<A> {
         if self.failed {
             return None;
         }
+        let idle = !verdict.asks() || self.dial_is_below(verdict.permitted);
+        if idle || self.owed.is_some() {
+            let written = self.noted(|writer| writer.release(clock));
+            if idle || written.is_some() || self.owed.is_some() {
+                return written;
+            }
+        }
         let at_ns = clock.now_ns();
         let occasion = self.due(verdict, at_ns)?;
-        let written = match self.interrupted(at_ns, clock) {
-            None => self.write(occasion, verdict.permitted, verdict.at_ns, clock)?,
-            fault => {
-                let (asked, sample_ns) = (verdict.permitted, verdict.at_ns);
-                Written { at_ns, sample_ns, occasion, before: None, asked, after: None, fault }
-            }
+        let failed = |fault| {
+            let (asked, sample_ns) = (verdict.permitted, verdict.at_ns);
+            Written { at_ns, sample_ns, occasion, before: None, asked, after: None, fault: Some(fault) }
         };
+        let begins = if self.holding { Ok(true) } else { self.may_begin(verdict.permitted, clock) };
+        match (begins, self.interrupted(at_ns, clock)) {
+            (Ok(false), _) => None,
+            (Err(fault), _) | (Ok(true), Some(fault)) => self.noted(|_| Some(failed(fault))),
+            (Ok(true), None) => self.noted(|writer| writer.write(occasion, verdict.permitted, verdict.at_ns, clock)),
+        }
+    }
+
+    /// Nothing more is written after a fault.
+    fn noted(&mut self, act: impl FnOnce(&mut Self) -> Option<Written>) -> Option<Written> {
+        let written = act(self)?;
         self.failed = written.fault.is_some();
         Some(written)
+    }
+
+    /// The ladder takes the lesser one, and that is the dial: there is nothing to ask for. On a ladder that lets the override
+    /// replace the dial it would raise the feed above what the operator wants.
+    fn dial_is_below(&self, asked: OverridePct) -> bool {
+        let dial = self.dials.back().filter(|_| self.holding && self.dial_is_known);
+        self.pace.rule == LadderRule::Least && dial.is_some_and(|(_, dial)| *dial <= asked)
+    }
+
+    /// Looks at the machine before anything is enabled: while nothing is, the override in force is the dial.
+    fn may_begin(&mut self, asked: OverridePct, clock: &dyn Clock) -> Result<bool, Fault> {
+        let now_ns = clock.now_ns();
+        let soon = self.looked_ns.is_some_and(|at_ns| (0..self.pace.heartbeat_ns).contains(&(now_ns - at_ns)));
+        if soon {
+            return Ok(false);
+        }
+        self.looked_ns = Some(now_ns);
+        self.recent.clear();
+        self.dials.clear();
+        let found = match self.read(clock) {
+            Ok(found) => found,
+            Err(SourceError::Off { .. }) => return Ok(false),
+            Err(error) => return Err(Fault::Line(error)),
+        };
+        let dial = self.dials.back().map_or(found, |(_, dial)| if self.dial_is_known { *dial } else { found });
+        if self.pace.rule == LadderRule::Least && dial <= asked {
+            return Ok(false);
+        }
+        // What may be seen until the ladder has taken the first override: what it makes of the dial alone.
+        let neutral = match (self.dial_is_known, self.pace.rule) {
+            (true, LadderRule::Least) => OverridePct::GREATEST,
+            (true, _) => OverridePct::FULL,
+            (false, _) => found,
+        };
+        self.recent.push_back((now_ns, neutral));
+        self.looked_ns = None;
+        Ok(true)
     }
 
     /// Signs of life have failed for longer than the ladder waits, and it has taken the dial back: going on from there
@@ -176,20 +259,79 @@ impl<A: Actuator> Writer<A> {
         (silent_ns > patience_ns).then_some(Fault::Late { silent_ms: silent_ns / 1_000_000 })
     }
 
-    /// Gives the machine back to its dial, if it was being written to.
+    /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
     pub fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
-        let was_holding = std::mem::take(&mut self.holding);
-        let now_ns = clock.now_ns();
-        let written = was_holding.then(|| self.write(Occasion::Release, OverridePct::FULL, now_ns, clock)).flatten();
-        self.holding = false;
-        if was_holding {
-            self.begin_anew();
+        if std::mem::take(&mut self.holding) {
+            self.owed = Some(Owed { leftover: false, next_ns: TimeNs::MIN, told: false });
         }
-        written
+        let owed = self.owed.filter(|owed| owed.next_ns <= clock.now_ns())?;
+        self.withdraw(owed, clock)
+    }
+
+    /// An override of this run is enabled and could not be withdrawn yet.
+    #[must_use]
+    pub fn owes_withdrawal(&self) -> bool {
+        self.holding || self.owed.is_some_and(|owed| !owed.leftover)
+    }
+
+    fn withdraw(&mut self, owed: Owed, clock: &dyn Clock) -> Option<Written> {
+        let at_ns = clock.now_ns();
+        let before = self.recent.back().map(|(_, pct)| *pct);
+        let occasion = if owed.leftover { Occasion::Leftover } else { Occasion::Release };
+        let sent = match owed.leftover {
+            true => self.actuator.withdraw_leftover(clock),
+            false => self.actuator.release(clock).map(|()| true),
+        };
+        let written = |after, fault| {
+            let asked = OverridePct::FULL;
+            Some(Written { at_ns, sample_ns: at_ns, occasion, before, asked, after, fault })
+        };
+        match sent {
+            Ok(false) => {
+                self.owed = None;
+                None
+            }
+            Ok(true) => {
+                self.owed = None;
+                let (after, fault) = self.back_at_dial(at_ns, clock);
+                written(after, fault)
+            }
+            Err(error) => {
+                let refused = matches!(error, SourceError::Refused { .. });
+                let pause_ns = if refused { WITHDRAW_AGAIN_NS } else { UNREACHED_AGAIN_NS };
+                // A machine that is off has forgotten it, if its maker's ladder clears it; it is looked at when it is on again.
+                let quiet = owed.told || matches!(error, SourceError::Off { .. }) || (owed.leftover && !refused);
+                let next_ns = clock.now_ns().saturating_add(pause_ns);
+                self.owed = Some(Owed { next_ns, told: owed.told || !quiet, ..owed });
+                self.begin_anew();
+                if quiet { None } else { written(None, Some(Fault::NotWithdrawn(error))) }
+            }
+        }
+    }
+
+    /// What is in force right after a withdrawal. It is looked at again until it is the dial.
+    fn back_at_dial(&mut self, at_ns: TimeNs, clock: &dyn Clock) -> (Option<OverridePct>, Option<Fault>) {
+        let neutral = if self.pace.rule == LadderRule::Least { OverridePct::GREATEST } else { OverridePct::FULL };
+        self.recent.push_back((at_ns, neutral));
+        let found = self.read(clock);
+        let told = match found {
+            // Where the dial is not known, nobody can say what has to be in force.
+            Ok(found) if !self.dial_is_known => (Some(found), None),
+            Ok(found) => (Some(found), self.mismatch(OverridePct::FULL, found, at_ns)),
+            Err(SourceError::Off { .. }) => (None, None),
+            Err(error) => (None, Some(Fault::Line(error))),
+        };
+        let dial = self.dials.back().copied();
+        self.begin_anew();
+        if self.dial_is_known && told.1.is_none() {
+            self.dials.extend(dial);
+            self.pending = Some(Pending { asked: None, sample_ns: at_ns, issued_ns: at_ns });
+        }
+        told
     }
 
     fn begin_anew(&mut self) {
-        (self.pending, self.changed_ns, self.holding) = (None, None, false);
+        (self.pending, self.changed_ns, self.looked_ns, self.holding) = (None, None, None, false);
         self.recent.clear();
         self.dials.clear();
     }
@@ -220,16 +362,19 @@ impl<A: Actuator> Writer<A> {
             Err(error) => return self.give_up(Fault::Line(error)),
         };
         let now_ns = clock.now_ns();
-        if self.dials.iter().any(|(_, dial)| self.pace.rule.combine(*dial, pending.asked) == found) {
+        let makes = |dial| pending.asked.map_or(dial, |asked| self.pace.rule.combine(dial, asked));
+        if self.dials.iter().any(|(_, dial)| makes(*dial) == found) {
             self.pending = None;
             let Pending { asked, sample_ns, issued_ns } = pending;
-            return Some(Ok(Reaction { asked, found, sample_ns, issued_ns, seen_ns: now_ns }));
+            let seen = |asked| Ok(Reaction { asked, found, sample_ns, issued_ns, seen_ns: now_ns });
+            return asked.map(seen);
         }
         let over = now_ns - pending.issued_ns >= self.settle_ns;
-        let fault = if over {
-            Some(Fault::ReadBack { asked: pending.asked, found })
-        } else {
-            self.mismatch(pending.asked, found, now_ns)
+        let fault = match (pending.asked, over) {
+            (Some(asked), true) => Some(self.read_back(asked, found)),
+            (Some(asked), false) => self.mismatch(asked, found, now_ns),
+            (None, true) => Some(Fault::StillInForce(self.shown(found))),
+            (None, false) => None,
         };
         fault.and_then(|fault| self.give_up(fault))
     }
@@ -259,44 +404,34 @@ impl<A: Actuator> Writer<A> {
         clock: &dyn Clock,
     ) -> Option<Written> {
         let at_ns = clock.now_ns();
-        let before = self.before(at_ns, clock);
+        let first = !std::mem::replace(&mut self.holding, true);
+        let before = match (first, self.dials.back()) {
+            (true, Some((_, dial))) if self.dial_is_known => Some(*dial),
+            _ => self.recent.back().map(|(_, pct)| *pct),
+        };
         // The sign of life repeats what is written, also while another override waits for its interval.
         let asked = match self.recent.back() {
             Some((_, last)) if occasion == Occasion::SignOfLife => *last,
             _ => wanted,
         };
-        self.holding = true;
         self.recent.push_back((at_ns, asked));
-        let sent = match occasion {
-            Occasion::Release => self.actuator.release(clock),
-            _ => self.actuator.write_feed_override(clock, asked),
-        };
+        let sent = self.actuator.write_feed_override(clock, asked);
         if occasion == Occasion::Change {
             self.changed_ns = Some(at_ns);
-            self.pending = Some(Pending { asked, sample_ns, issued_ns: at_ns });
+            self.pending = Some(Pending { asked: Some(asked), sample_ns, issued_ns: at_ns });
         }
-        let late = self.late(at_ns, clock.now_ns()).filter(|_| occasion != Occasion::Release);
+        let late = self.late(at_ns, clock.now_ns());
         let (after, fault) = match sent.and_then(|()| self.read(clock)) {
             Ok(found) => (Some(found), self.mismatch(asked, found, at_ns).or(late)),
             Err(SourceError::Off { .. }) => {
                 self.begin_anew();
+                self.owed =
+                    Some(Owed { leftover: false, next_ns: at_ns.saturating_add(UNREACHED_AGAIN_NS), told: false });
                 return None;
             }
             Err(error) => (None, Some(Fault::Line(error))),
         };
         Some(Written { at_ns, sample_ns, occasion, before, asked, after, fault })
-    }
-
-    /// What is in force before the first write; later, what was written last.
-    fn before(&mut self, at_ns: TimeNs, clock: &dyn Clock) -> Option<OverridePct> {
-        if let Some((_, pct)) = self.recent.back() {
-            return Some(*pct);
-        }
-        let found = self.read(clock).ok()?;
-        // 100 % is what a ladder with a dial makes its dial of; without a known dial the override found is what may be seen.
-        let neutral = if self.dial_is_known { OverridePct::FULL } else { found };
-        self.recent.push_back((at_ns, neutral));
-        Some(found)
     }
 
     /// The override in force; notes the dial beside it.
@@ -306,7 +441,7 @@ impl<A: Actuator> Writer<A> {
         self.dial_is_known = dial.is_some();
         // A dial that nobody knows does not limit: what is written is what has to be in force.
         let dial = dial.unwrap_or(match self.pace.rule {
-            LadderRule::Least => OverridePct::GREATEST,
+            LadderRule::Least | LadderRule::Replace => OverridePct::GREATEST,
             LadderRule::Product => OverridePct::FULL,
         });
         let now_ns = clock.now_ns();
@@ -335,6 +470,15 @@ impl<A: Actuator> Writer<A> {
         let rule = self.pace.rule;
         let known =
             self.recent.iter().any(|(_, pct)| self.dials.iter().any(|(_, dial)| rule.combine(*dial, *pct) == found));
-        (!known).then_some(Fault::ReadBack { asked, found })
+        (!known).then(|| self.read_back(asked, found))
+    }
+
+    fn read_back(&self, asked: OverridePct, found: OverridePct) -> Fault {
+        Fault::ReadBack { asked, shown: self.shown(found) }
+    }
+
+    fn shown(&self, found: OverridePct) -> Shown {
+        let dial = self.dials.back().map(|(_, dial)| *dial).filter(|_| self.dial_is_known);
+        Shown { found, dial, rule: self.pace.rule }
     }
 }

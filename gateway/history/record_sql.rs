@@ -7,7 +7,8 @@ use super::record::{
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, Params, params};
 
-/// Longest interval that is spread over `state_hours`: beyond a year the clock was set, not the machine used.
+/// Longest interval that is spread over `state_hours`. One of more than a year began before the clock was set (a box
+/// without a battery wakes in 1970): its hours are nobody's, and are not counted.
 const SPREAD_HOURS_MAX: i64 = 9_000;
 const HOUR_NS: i64 = 3_600 * SECOND_NS;
 
@@ -90,7 +91,10 @@ fn spread(db: &Connection, state: &str, since_ns: TimeNs, until_ns: TimeNs) -> R
          ON CONFLICT DO UPDATE SET seconds = seconds + excluded.seconds",
     )?;
     let first = since_ns.div_euclid(HOUR_NS);
-    let last = until_ns.div_euclid(HOUR_NS).min(first + SPREAD_HOURS_MAX);
+    let last = until_ns.div_euclid(HOUR_NS);
+    if last - first > SPREAD_HOURS_MAX {
+        return Ok(());
+    }
     for hour in first..=last {
         let from_ns = since_ns.max(hour.saturating_mul(HOUR_NS));
         let to_ns = until_ns.min((hour + 1).saturating_mul(HOUR_NS));

@@ -9,6 +9,7 @@ use super::mailbox::{Delivery, Job, Mailbox};
 use super::options::{Options, WhenFull};
 use super::record_sql::close_state;
 use super::status::Shared;
+use adapters::clock::TimeNs;
 use rusqlite::Connection;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -202,17 +203,24 @@ impl Thread {
         }
     }
 
-    fn finish(self) {
+    fn finish(mut self) {
         if let Some(number) = self.pace.maintaining {
             self.mailbox.finish(number);
         }
         // A clean end ends the state that the machine was in; after a failure the next start does it.
         if let Some(newest_ns) = self.keeper.newest_ns() {
-            let _ = close_state(&self.db, newest_ns, "stop");
+            let _ = end_state(&mut self.db, newest_ns);
         }
         // What is committed is in the log already; a failing last checkpoint loses nothing.
         let _ = self.db.close();
     }
+}
+
+/// In one transaction: a state of some days is many rows, and each commit of its own would wait for the disk.
+fn end_state(db: &mut Connection, newest_ns: TimeNs) -> Result<(), rusqlite::Error> {
+    let ending = db.transaction()?;
+    close_state(&ending, newest_ns, "stop")?;
+    ending.commit()
 }
 
 fn degraded_text(error: &HistoryError) -> String {

@@ -14,13 +14,15 @@ const CONTROLLER: &str = "controller";
 #[derive(Debug, Clone, Default)]
 pub struct Journal {
     state: Option<State>,
-    since_ns: TimeNs,
+    /// When the state that is recorded began; before the first one, when the recording did.
+    since_ns: Option<TimeNs>,
     alarm: Option<(Arc<str>, TimeNs)>,
 }
 
 impl Journal {
     /// Gives every record that this tick makes to `keep`.
     pub fn step(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates, mut keep: impl FnMut(Record)) {
+        self.since_ns.get_or_insert(sample.at_ns);
         if self.state != Some(estimates.state) {
             keep(self.state_change(channels, sample, estimates).into());
         }
@@ -32,10 +34,11 @@ impl Journal {
         }
     }
 
-    /// The state began when the estimators say so, but never before the state that it ends.
+    /// The state began when the estimators say so, but never before the state that it ends, nor before the first sample.
     fn state_change(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) -> StateChange {
-        let at_ns = estimates.since_ns.clamp(self.since_ns, sample.at_ns.max(self.since_ns));
-        (self.state, self.since_ns) = (Some(estimates.state), at_ns);
+        let least_ns = self.since_ns.unwrap_or(sample.at_ns);
+        let at_ns = estimates.since_ns.clamp(least_ns, sample.at_ns.max(least_ns));
+        (self.state, self.since_ns) = (Some(estimates.state), Some(at_ns));
         let text = |channel| sample.text(channel).unwrap_or_default().to_owned();
         StateChange {
             at_ns,
@@ -84,10 +87,13 @@ mod tests {
     #[test]
     fn a_state_is_recorded_once_and_never_before_the_one_it_ends() {
         let mut journal = Journal::default();
-        assert_eq!(records(&mut journal, 10, State::Idle, None).len(), 1);
+        let first = records(&mut journal, 10, State::Idle, None);
+        assert!(matches!(&first[..], [Record::State(change)] if change.at_ns == 10), "no sample before it: {first:?}");
         assert!(records(&mut journal, 11, State::Idle, None).is_empty());
         let changed = records(&mut journal, 12, State::Cutting, None);
-        assert!(matches!(&changed[..], [Record::State(change)] if change.at_ns == 9), "{changed:?}");
+        assert!(matches!(&changed[..], [Record::State(change)] if change.at_ns == 10), "{changed:?}");
+        let changed = records(&mut journal, 20, State::Idle, None);
+        assert!(matches!(&changed[..], [Record::State(change)] if change.at_ns == 17), "{changed:?}");
     }
 
     #[test]

@@ -15,6 +15,7 @@ use crate::pipeline::Pipeline;
 use crate::status::{AlarmStatus, Problem};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
+use rules::estimators::StateBasis;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
@@ -64,7 +65,7 @@ impl Commands {
             self.keep(trail::started(gate.limits(), sample.at_ns), gate, health);
         }
         while let Ok(Posted { order, reply }) = self.orders.try_recv() {
-            let answer = self.order(&order, gate, sample.at_ns, health);
+            let answer = self.order(&order, gate, sample, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
         }
@@ -73,9 +74,10 @@ impl Commands {
         }
     }
 
-    fn order(&mut self, order: &control::Order, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
+    fn order(&mut self, order: &control::Order, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
+        let at_ns = sample.at_ns;
         match order {
-            control::Order::Arm { by, for_s } => self.arm(by, *for_s, gate, at_ns, health),
+            control::Order::Arm { by, for_s } => self.arm(by, *for_s, gate, sample, health),
             control::Order::Disarm { by } => {
                 let was = gate.armed().is_ok();
                 gate.disarm(Disarmed::Person);
@@ -97,7 +99,8 @@ impl Commands {
         }
     }
 
-    fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) -> Reply {
+    fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
+        let at_ns = sample.at_ns;
         let lasts = for_s.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO));
         let armed = match health.stores() {
             true => gate.arm(by, lasts, at_ns).cloned(),
@@ -108,7 +111,7 @@ impl Commands {
                 self.by = by.to_owned();
                 self.keep(trail::armed(&armed), gate, health);
                 self.clear_alarm(at_ns, health);
-                let text = told(&armed, &self.target, gate.limits());
+                let text = format!("{}; {}", told(&armed, &self.target, gate.limits()), StateBasis::of(sample));
                 health.event(at_ns, SOURCE, &Notice::new(Severity::Warning, "gate_armed", text.clone()));
                 Reply::done(text)
             }
@@ -190,7 +193,8 @@ impl Commands {
     fn heard(&mut self, said: Said, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         match said {
             Said::Written(written) => {
-                self.written = (written.occasion != Occasion::Release).then(|| f64::from(written.asked.percent()));
+                let asks = matches!(written.occasion, Occasion::Change | Occasion::SignOfLife);
+                self.written = asks.then(|| f64::from(written.asked.percent()));
                 self.trail.write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
                 self.trail.command(&written, &self.target).into_iter().for_each(|row| health.keep(row.into()));
                 written.fault.into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
@@ -222,6 +226,9 @@ impl Commands {
             health.keep(Alarm { at_ns, code, source, severity, en: en.clone(), zh }.into());
             Notice::new(Severity::Error, CODE, en.clone()).say();
             self.alarm = Some((at_ns, en));
+        } else {
+            // What follows from the first fault is told, and raises no alarm of its own.
+            health.event(at_ns, SOURCE, &Notice::new(Severity::Error, "gate_fault", en));
         }
     }
 

@@ -30,7 +30,29 @@ pub enum Feed {
     },
 }
 
+/// At which pace a source is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourcePace {
+    /// The address.
+    pub name: String,
+    /// The pace that was wanted.
+    pub wanted: Duration,
+    /// The pace that the device keeps at the moment.
+    pub kept: Duration,
+}
+
 impl Feed {
+    /// The pace of each source that has been read.
+    #[must_use]
+    pub fn paces(&self, now_ns: TimeNs) -> Vec<Option<SourcePace>> {
+        let Self::Threads { workers, .. } = self else { return Vec::new() };
+        let pace = |worker: &Worker| {
+            let WorkerStats { period, pace, polls, .. } = worker.stats(now_ns);
+            (polls > 1).then(|| SourcePace { name: worker.name().to_owned(), wanted: period, kept: pace })
+        };
+        workers.iter().map(pace).collect()
+    }
+
     /// Samples at the tick `now_ns` (minus the merge's delay). `false` when every source has come to its end.
     pub fn sample_into(&mut self, sample: &mut Sample, now_ns: TimeNs) -> bool {
         match self {

@@ -25,6 +25,10 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 const REST: Duration = Duration::from_millis(500);
 /// A controller that does not answer is not waited for at the end; the ladder falls back by itself.
 const LET_GO_WITHIN: Duration = Duration::from_secs(3);
+/// A withdrawal that the machine refuses is tried again for so long at the end.
+const WITHDRAW_WITHIN: Duration = Duration::from_millis(2500);
+/// Between two of these attempts.
+const WITHDRAW_PAUSE: Duration = Duration::from_millis(100);
 /// Why a request never reached the ladder.
 const NOT_HANDED_OVER: &str = "not handed over: the gate was disarmed before the controller had time for it, or it had none for \
                                ten seconds";
@@ -72,6 +76,10 @@ impl Holding {
 
     fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
         self.writer.as_mut()?.release(clock)
+    }
+
+    fn owes_withdrawal(&self) -> bool {
+        self.writer.as_ref().is_some_and(Writer::owes_withdrawal)
     }
 }
 
@@ -214,9 +222,17 @@ fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<S
         }
     }
     // Nobody listens any more, or it is over: the machine is given back.
-    let released = holding.release(clock);
-    if let Some(written) = released {
-        let _nobody = say.try_send(Said::Written(written));
+    let until = Instant::now() + WITHDRAW_WITHIN;
+    while holding.owes_withdrawal() {
+        if let Some(written) = holding.release(clock) {
+            let _nobody = say.try_send(Said::Written(written));
+        }
+        if Instant::now() >= until {
+            break;
+        }
+        if holding.owes_withdrawal() {
+            std::thread::sleep(WITHDRAW_PAUSE);
+        }
     }
 }
 

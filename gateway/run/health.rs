@@ -2,7 +2,7 @@
 //! remembered as an event, and is shown while it lasts.
 
 use super::clock::{BoxClock, ClockStep};
-use super::feed::Feed;
+use super::feed::{Feed, SourcePace};
 use super::keep::Kept;
 use super::save::Saver;
 use crate::alignment::{self, Alignment};
@@ -21,6 +21,8 @@ use tokio::sync::watch;
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// What the estimators have learned is saved about this often.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
+/// Another pace is told when it differs from the last one by this factor.
+const OTHER_PACE: f64 = 1.3;
 /// One day of machine time.
 const DAY_NS: i64 = 86_400 * SECOND_NS;
 
@@ -35,6 +37,8 @@ pub struct Health {
     port: watch::Receiver<Option<String>>,
     memory: PathBuf,
     sources: Vec<Option<String>>,
+    /// The pace of each source that was last told, s.
+    paces: Vec<Option<f64>>,
     looked: Option<Instant>,
     saved: Instant,
     saver: Saver,
@@ -64,6 +68,7 @@ impl Health {
             port,
             memory,
             sources: Vec::new(),
+            paces: Vec::new(),
             looked: None,
             saved: Instant::now(),
             saver: Saver::start(),
@@ -120,6 +125,7 @@ impl Health {
         self.stores = self.kept.stores();
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
+        self.look_at_paces(&feed.paces(now_ns), now_ns);
         let day = now_ns.div_euclid(DAY_NS);
         if self.day.replace(day).is_some_and(|before| before != day) {
             self.kept.maintain(now_ns);
@@ -160,6 +166,21 @@ impl Health {
                 _ => continue,
             };
             self.event(now_ns, &source.name, &notice);
+        }
+    }
+
+    /// A device that keeps another pace than was wanted, or than was last told.
+    fn look_at_paces(&mut self, paces: &[Option<SourcePace>], now_ns: TimeNs) {
+        self.paces.resize(paces.len(), None);
+        for (index, pace) in paces.iter().enumerate() {
+            let Some(pace) = pace else { continue };
+            let (wanted_s, kept_s) = (pace.wanted.as_secs_f64(), pace.kept.as_secs_f64());
+            let told_s = self.paces[index].unwrap_or(wanted_s);
+            if (kept_s / told_s).ln().abs() < OTHER_PACE.ln() {
+                continue;
+            }
+            self.paces[index] = Some(kept_s);
+            self.event(now_ns, &pace.name, &told_pace(pace));
         }
     }
 
@@ -212,6 +233,26 @@ impl Health {
         }
         problems
     }
+}
+
+/// What the pace of a source means for who reads its values.
+fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
+    let (wanted_s, kept_s) = (wanted.as_secs_f64(), kept.as_secs_f64());
+    if kept_s < wanted_s * OTHER_PACE {
+        return Notice::new(
+            Severity::Info,
+            "source_pace",
+            format!("{name} is read every {wanted_s:.2} s again, as wanted"),
+        );
+    }
+    let text = format!(
+        "{name} is read every {kept_s:.2} s instead of every {wanted_s:.2} s, because of the time that the device takes to answer; its \
+         values count as fresh for {:.2} s",
+        2.0 * kept_s
+    );
+    let detail =
+        "a fanuc:// address may take more of the control's time with duty_pct=, or be read less often with period_ms=";
+    Notice::new(Severity::Warning, "source_pace", text).detail(detail)
 }
 
 /// A notice as a row of the history.

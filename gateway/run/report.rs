@@ -69,6 +69,8 @@ pub fn state(pipeline: &Pipeline) -> StateStatus {
         seconds: seconds((estimates.at_ns - estimates.since_ns).max(0)),
         seconds_per_state: pipeline.tally().seconds_per_state(),
         why: estimates.unknown_because.map(|reason| reason.to_string()),
+        basis: estimates.basis.word(),
+        basis_text: estimates.basis.to_string(),
         visibility: estimates.visibility.word(),
         no_load_origin: estimates.no_load_origin.word(),
     }

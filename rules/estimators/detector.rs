@@ -12,11 +12,12 @@
 //! | idle | settled; no visible load, or the feed is off |
 //! | rapid | settled, feed on, rapid traverse |
 //! | cutting | settled, feed on, evidence for load against the no-load power; ends without feed or evidence |
-//! | unknown | an input is missing for longer than `dropout_hold_s`, inputs contradict each other, or the feed is on and no no-load power is known |
+//! | unknown | nothing measures the load and the feed is on, an input is missing for longer than `dropout_hold_s`, inputs contradict each other, or the feed is on and no no-load power is known |
 //!
 //! Settled means: the power lies at the known no-load power, or two windows agree and are stationary. A spindle that is
 //! already under load when the gateway starts settles only against a table; otherwise cutting is not claimed.
 
+use super::basis::StateBasis;
 use super::estimate::{NoEstimate, NoLoadOrigin};
 use super::evidence::Evidence;
 use super::signals::{Feed, Pace, seconds};
@@ -45,6 +46,9 @@ const CUT_LEVEL_WEIGHT: f64 = 0.2;
 
 /// However doubtful no-load power is, a power further from it, relative, has not settled for that reason alone.
 const WIDEST_BAND: f64 = 0.04;
+
+/// Later than every tick: a state begins with the first tick that is seen of it.
+const NOT_BEGUN: TimeNs = TimeNs::MAX;
 
 /// How the turning spindle got where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,6 +79,7 @@ pub(super) struct Verdict {
 #[serde(deny_unknown_fields)]
 pub(super) struct Detector {
     pub(super) state: State,
+    /// [`NOT_BEGUN`] until the first tick, and after a gap until the next one.
     pub(super) since_ns: TimeNs,
     phase: Phase,
     phase_since_ns: TimeNs,
@@ -93,7 +98,7 @@ impl Detector {
     pub(super) fn new() -> Self {
         Self {
             state: State::Unknown,
-            since_ns: 0,
+            since_ns: NOT_BEGUN,
             phase: Phase::Fresh,
             phase_since_ns: 0,
             evidence: Evidence::default(),
@@ -110,6 +115,7 @@ impl Detector {
         self.phase = Phase::Fresh;
         self.evidence.clear();
         self.missing_since_ns = None;
+        self.since_ns = NOT_BEGUN;
     }
 
     /// The speed or the gear stage changed.
@@ -122,9 +128,9 @@ impl Detector {
 
     /// Takes a tick and tells the state.
     pub(super) fn step(&mut self, tick: &Tick<'_>) -> Verdict {
-        let verdict = self.judge(tick);
-        // Time may have been set back.
+        // The first tick, or time has been set back.
         self.since_ns = self.since_ns.min(tick.inputs.at_ns);
+        let verdict = self.judge(tick);
         if verdict.state != self.state {
             self.state = verdict.state;
             self.since_ns = tick.inputs.at_ns;
@@ -200,7 +206,24 @@ impl Detector {
             None if self.phase == Phase::Settled => {}
             None => return self.pending(tick),
         }
-        if self.phase == Phase::Settled { self.loaded(tick) } else { self.settle(tick) }
+        match (tick.inputs.basis, self.phase) {
+            (StateBasis::Motion, _) => self.moving(tick),
+            (_, Phase::Settled) => self.loaded(tick),
+            _ => self.settle(tick),
+        }
+    }
+
+    /// A steady spindle whose load nobody measures.
+    fn moving(&mut self, tick: &Tick<'_>) -> Verdict {
+        if self.phase != Phase::Settled {
+            self.enter(Phase::Settled, tick.inputs.at_ns);
+            self.settled_speed = None;
+        }
+        match tick.feed() {
+            Feed::Off => verdict(State::Idle),
+            _ if tick.inputs.rapid => verdict(State::Rapid),
+            _ => unknown(NoEstimate::NoLoadMeasured),
+        }
     }
 
     fn pace(&self, tick: &Tick<'_>) -> Pace {
@@ -244,7 +267,8 @@ impl Detector {
         let fed = tick.feed() != Feed::Off;
         let settled_at_w = match tick.no_load {
             Ok(known) => {
-                let band_w = tick.ending_excess_w().unwrap_or(0.0).min(WIDEST_BAND * known.power_w);
+                let widest_w = (WIDEST_BAND * known.power_w).max(tick.signals.noise.resolution_w());
+                let band_w = tick.ending_excess_w().unwrap_or(0.0).min(widest_w);
                 let at_known = known.is_estimate() && (filtered_w - known.power_w).abs() <= band_w;
                 // A cut can be too rough to be stationary: under feed it is enough that the start-up no longer decays.
                 let above = filtered_w > known.power_w;

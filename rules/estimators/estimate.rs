@@ -1,5 +1,6 @@
 //! What one tick yields: every quantity with its uncertainty, or the reason why there is none.
 
+use super::basis::StateBasis;
 use super::state::State;
 use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId};
@@ -49,6 +50,8 @@ pub enum NoEstimate {
     },
     /// The load-loss coefficients contradict the measured power (negative discriminant).
     Imbalance,
+    /// Nothing measures the load of the spindle, so that cutting cannot be told from moving through the air.
+    NoLoadMeasured,
     /// No wear model is known for the tool, the material and the operation of this cut.
     NoModel,
     /// Speed, feed, depth or diameter of the cut are not known.
@@ -78,6 +81,7 @@ impl NoEstimate {
             Self::NotLearned => "not_learned",
             Self::Extrapolated { .. } => "extrapolated",
             Self::Imbalance => "imbalance",
+            Self::NoLoadMeasured => "no_load_measured",
             Self::NoModel => "no_model",
             Self::CutUnknown => "cut_unknown",
             Self::OutsideModel => "outside_model",
@@ -108,6 +112,10 @@ impl fmt::Display for NoEstimate {
                 "this speed is too far from those learned (noise gain {noise_gain:.1}); let the spindle run here without feed"
             ),
             Self::Imbalance => f.write_str("load-loss coefficients contradict the power; identify them again"),
+            Self::NoLoadMeasured => f.write_str(
+                "nothing measures the load of the spindle: with the feed on, cutting cannot be told from moving through the air; add \
+                 a power meter",
+            ),
             Self::NoModel => {
                 f.write_str("no wear model for this tool, material and operation; identify tool-wear makes one")
             }
@@ -187,6 +195,8 @@ pub struct Estimates {
     pub at_ns: TimeNs,
     /// What the machine is doing.
     pub state: State,
+    /// What the state was inferred from.
+    pub basis: StateBasis,
     /// Since when.
     pub since_ns: TimeNs,
     /// Does the spindle turn? Known also where the state is not; `None` without a speed.
@@ -224,6 +234,7 @@ impl Estimates {
         Self {
             at_ns,
             state: State::Unknown,
+            basis: StateBasis::default(),
             since_ns: at_ns,
             spindle_turns: None,
             unknown_because: Some(NoEstimate::NotYet),

@@ -1,5 +1,6 @@
 //! What the estimators need of a sample.
 
+use super::basis::StateBasis;
 use super::settings::{STAGES, Settings};
 use adapters::clock::TimeNs;
 use adapters::{Absence, ChannelId, Sample};
@@ -22,7 +23,9 @@ pub(super) type Input = Result<f64, Absence>;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Inputs {
     pub(super) at_ns: TimeNs,
-    /// Spindle power, W.
+    /// What `power` is.
+    pub(super) basis: StateBasis,
+    /// Spindle power, W; or what stands for it, in parts of [`StateBasis::stand_in`].
     pub(super) power: Input,
     /// Total power, W.
     pub(super) total: Input,
@@ -52,14 +55,18 @@ impl Channels {
     pub(super) fn read(&self, sample: &Sample, standby_w: Option<f64>, settings: &Settings) -> Inputs {
         let total = number(sample, self.total);
         let feed = number(sample, self.feed);
-        let power = match (number(sample, self.power), total, standby_w) {
-            (Err(Absence::NotProvided), Ok(total), Some(standby_w)) => Ok(total - standby_w),
+        let basis = StateBasis::of(sample);
+        let stand_in = basis.stand_in().map(|(name, parts)| (ChannelId::of(name), parts));
+        let power = match (number(sample, self.power), total, standby_w, stand_in) {
+            (_, _, _, Some((channel, parts))) => number(sample, channel).map(|value| value.abs() * parts),
+            (Err(Absence::NotProvided), Ok(total), Some(standby_w), None) => Ok(total - standby_w),
             (power, ..) => power,
         };
         let flagged = number(sample, self.rapid).is_ok_and(|rapid| rapid > 0.5);
         let fast = settings.rapid_feed_mm_min > 0.0 && feed.is_ok_and(|feed| feed > settings.rapid_feed_mm_min);
         Inputs {
             at_ns: sample.at_ns,
+            basis,
             power,
             total,
             speed: number(sample, self.speed),

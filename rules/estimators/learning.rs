@@ -31,6 +31,9 @@ const MIDDLE_HALF: f64 = 1.2;
 /// Two successive blocks of a settled spindle differ by less than this, relative.
 const AGREEMENT: f64 = 0.02;
 
+/// Standard deviation of a level that is rounded to whole steps, in steps.
+const ROUNDED: f64 = 0.289;
+
 /// Power under feed further below a measured no-load power than this, relative, says nothing about it.
 const FAR_BELOW: f64 = 0.15;
 
@@ -157,14 +160,18 @@ impl Block {
     fn observe(&mut self, power_w: f64, first: IdleTick, at_ns: TimeNs, noise: &Noise) -> Option<Observation> {
         let noise_w = noise.sd() * power_w;
         let settling_w = (self.blocks > 0).then(|| power_w - self.means_w[0]);
+        // Rounding does not average out of a level that stands still.
+        let rounding_w = ROUNDED * noise.resolution_w();
         let variance = MIDDLE_HALF * noise_w * noise_w / count(self.length)
+            + rounding_w * rounding_w
             + settling_w.map_or(0.0, |w| w * w / 2.0)
             + 1e-6 * power_w * power_w;
         self.means_w = [power_w, self.means_w[0], self.means_w[1]];
         self.blocks += 1;
         self.unbroken = if std::mem::take(&mut self.broken) { 0 } else { self.unbroken + 1 };
         let point = NoLoadPoint { stage: first.stage, speed_rpm: first.speed_rpm.abs(), power_w };
-        let confirmed = settling_w.is_some_and(|w| w.abs() <= AGREEMENT * power_w);
+        let agreement_w = (AGREEMENT * power_w).max(0.5 * noise.resolution_w());
+        let confirmed = settling_w.is_some_and(|w| w.abs() <= agreement_w);
         let seen = Observation { point, sd_w: variance.sqrt(), at_ns, confirmed, rapid: self.rapid };
         (power_w > 0.0).then_some(seen)
     }

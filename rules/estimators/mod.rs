@@ -8,6 +8,7 @@
 //! | `settings` | the one table of tolerances and lengths |
 //! | `state`, `estimate` | the words and numbers that come out |
 //! | `filter` | anti-pulse moving average |
+//! | `basis` | what stands for spindle power where nobody measures it |
 //! | `inputs`, `signals`, `noise` | what is needed of a sample, its recent past, how noisy it is |
 //! | `window` | has the power settled: two stationary windows that agree |
 //! | `evidence` | a small lasting step in noise |
@@ -22,6 +23,7 @@
 //! | `regression` | least squares with intervals, distributions, refusals |
 
 pub mod alignment;
+mod basis;
 mod bound;
 mod cutting;
 mod detector;
@@ -46,6 +48,7 @@ mod visibility;
 pub mod wear;
 mod window;
 
+pub use basis::StateBasis;
 pub use evidence::Evidence;
 pub use window::{Means, Window, stationary};
 

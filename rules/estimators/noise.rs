@@ -19,15 +19,43 @@ pub(super) struct Noise {
     seen: f64,
     slow: f64,
     last: [Option<f64>; 2],
+    /// Smallest difference that the measurement can show, W, and the level at which it was last seen.
+    #[serde(default)]
+    resolution_w: f64,
+    #[serde(default)]
+    level_w: f64,
 }
+
+/// Standard deviation of the rounding to whole steps, in steps: that of an even distribution.
+const ROUNDING_SD: f64 = 0.289;
 
 impl Noise {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { fast: settings.power_noise * settings.power_noise, seen: 4.0, slow: 0.0, last: [None; 2] }
+        Self {
+            fast: settings.power_noise * settings.power_noise,
+            seen: 4.0,
+            slow: 0.0,
+            last: [None; 2],
+            resolution_w: 0.0,
+            level_w: 0.0,
+        }
+    }
+
+    /// The measurement shows no smaller difference than this, W; 0 where noise is coarser.
+    pub(super) fn resolves(&mut self, resolution_w: f64) {
+        self.resolution_w = resolution_w;
+    }
+
+    /// See [`Noise::resolves`].
+    pub(super) fn resolution_w(&self) -> f64 {
+        self.resolution_w
     }
 
     /// Takes a power measured at a steady speed.
     pub(super) fn push(&mut self, power_w: f64, level_w: f64) {
+        if level_w > 0.0 {
+            self.level_w = level_w;
+        }
         let [second, third] = self.last;
         self.last = [Some(power_w), second];
         if let (Some(second), Some(third), true) = (second, third, level_w > 0.0) {
@@ -54,7 +82,16 @@ impl Noise {
 
     /// Standard deviation of one sample, relative.
     pub(super) fn sd(&self) -> f64 {
-        self.fast.max(self.slow).sqrt().max(1e-3)
+        self.fast.max(self.slow).sqrt().max(1e-3).max(self.rounding())
+    }
+
+    /// A level that is shown in whole steps does not seem to move at all, and is yet known to a part of a step only.
+    fn rounding(&self) -> f64 {
+        if self.resolution_w > 0.0 {
+            ROUNDING_SD * self.resolution_w / self.level_w.max(self.resolution_w)
+        } else {
+            0.0
+        }
     }
 
     /// Standard deviation of the level from block to block, relative.

@@ -22,6 +22,9 @@ const SETTLED_SPEED: f64 = 0.003;
 /// Speed differences below this are the resolution of the display, rpm.
 const SPEED_RESOLUTION_RPM: f64 = 3.0;
 
+/// Two levels that are shown in whole steps may be the same although they lie so many steps apart.
+const HALF_STEP: f64 = 0.5;
+
 /// What the steadiness of the speed is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pace {
@@ -99,6 +102,8 @@ impl Signals {
             self.worked_ns = None;
         }
         self.last_ns = Some(inputs.at_ns);
+        self.noise.resolves(inputs.basis.resolution());
+        self.window.resolves(inputs.basis.resolution());
         let stage = inputs.stage.unwrap_or(self.stage);
         let changed = std::mem::replace(&mut self.stage, stage) != stage;
         if changed {
@@ -205,7 +210,8 @@ impl Signals {
     /// How far the means of the two windows may lie apart, W: a third of what begins a cut, or the noise of the means.
     pub(super) fn agreement_w(&self, level_w: f64, settings: &Settings) -> f64 {
         let noise = 2.0 * self.noise.sd() * (2.0 / settings.window_samples).sqrt();
-        (settings.c2_on / 3.0).max(noise) * level_w.abs()
+        // What is shown in whole steps agrees within half a step.
+        ((settings.c2_on / 3.0).max(noise) * level_w.abs()).max(HALF_STEP * self.noise.resolution_w())
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the inputs of a tick say before any estimation.
 
+use super::basis::StateBasis;
 use super::estimate::NoEstimate;
 use super::inputs::Inputs;
 use super::no_load::NoLoad;
@@ -52,7 +53,10 @@ impl Tick<'_> {
             }
             Ok(_) if no_power => Situation::Missing(NoEstimate::Contradiction),
             Ok(_) => match (self.inputs.power, self.inputs.stage) {
-                (Err(absence), _) => missing("spindle_power_w", absence),
+                (Err(_), Ok(_)) if self.inputs.basis == StateBasis::Motion => Situation::Turning,
+                (Err(absence), _) => {
+                    missing(self.inputs.basis.stand_in().map_or("spindle_power_w", |it| it.0), absence)
+                }
                 (_, Err(absence)) => missing("gear_stage", absence),
                 _ => Situation::Turning,
             },
@@ -74,8 +78,12 @@ impl Tick<'_> {
 /// Excess over no-load power above which a load counts as visible, W: c2_on, or what noise and doubt demand.
 pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Settings) -> f64 {
     let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
-    (relative * no_load.power_w).max(no_load.sd_w)
+    (relative * no_load.power_w).max(no_load.sd_w).max(VISIBLE_STEPS * signals.noise.resolution_w())
 }
+
+/// No-load value and load are both rounded to whole steps, each by half a step at most: what is less than this many steps apart
+/// may be the same.
+const VISIBLE_STEPS: f64 = 1.2;
 
 fn missing(channel: &str, absence: Absence) -> Situation {
     let reason = |channel| NoEstimate::Input { channel, absence };

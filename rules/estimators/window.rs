@@ -14,6 +14,9 @@ use std::collections::VecDeque;
 pub struct Window {
     length: usize,
     values: VecDeque<f64>,
+    /// Smallest difference that the measurement can show, W.
+    #[serde(default)]
+    resolution_w: f64,
 }
 
 /// Mean powers of the older and the newer window, W.
@@ -38,7 +41,13 @@ impl Window {
     #[must_use]
     pub fn new(length: usize) -> Self {
         let length = length.max(2);
-        Self { length, values: VecDeque::with_capacity(2 * length) }
+        Self { length, values: VecDeque::with_capacity(2 * length), resolution_w: 0.0 }
+    }
+
+    /// The measurement shows no smaller difference than this, W: a power that goes from one step to the next and back is
+    /// stationary.
+    pub fn resolves(&mut self, resolution_w: f64) {
+        self.resolution_w = resolution_w;
     }
 
     /// Takes a filtered power; one that is not finite is ignored.
@@ -70,8 +79,18 @@ impl Window {
     pub fn stationary(&self, agreement_w: f64, settings: &Settings) -> Option<Means> {
         let means = self.means()?;
         let agree = (means.older_w - means.newer_w).abs() <= agreement_w;
-        let within = |from, mean| stationary(self.values.range(from..from + self.length).copied(), mean, settings);
+        let within = |from, mean| {
+            let values = || self.values.range(from..from + self.length).copied();
+            stationary(values(), mean, settings) || self.is_one_step(values(), mean)
+        };
         (agree && within(0, means.older_w) && within(self.length, means.newer_w)).then_some(means)
+    }
+
+    fn is_one_step(&self, values: impl Iterator<Item = f64>, mean_w: f64) -> bool {
+        let (least, greatest) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), value| {
+            (least.min(value), greatest.max(value))
+        });
+        mean_w > 0.0 && greatest - least <= self.resolution_w
     }
 
     /// Does the power still fall from the older to the newer window by more than `agreement_w`? `None` until both

@@ -38,6 +38,11 @@ fn settings(
 fn run(settings: SimulatedSettings, course_s: i64) -> (Vec<Judged>, Vec<Judged>) {
     let machine = Simulated::new("simulated://lathe", settings, 0);
     let sources: Vec<Box<dyn adapters::Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
+    course(&machine, sources, course_s)
+}
+
+/// Traces of the product and of the plain reading, from what these sources of the machine say.
+fn course(machine: &Simulated, sources: Vec<Box<dyn adapters::Pull>>, course_s: i64) -> (Vec<Judged>, Vec<Judged>) {
     let mut merge = Lockstep::new(sources, Delay::default());
     let (mut product, mut plain) = (Pipeline::new(Settings::default()), PlainReading::new());
     let mut sample = Sample::empty(0);
@@ -83,6 +88,56 @@ fn score(seeds: u64, course_s: i64) {
 #[test]
 fn simulated_machine_scored_on_two_seeds() {
     score(2, 1200);
+}
+
+/// Cuts in percent of the planned ones. Without any power meter: the controller's speed, feed and load meter, which shows whole
+/// percent of the rating.
+const LOADS: [(&str, f64, f64, CutLevel); 4] = [
+    ("load meter, planned cuts", 0.6, 0.0, CutLevel::Planned(1.0)),
+    ("load meter, half of them", 0.6, 0.0, CutLevel::Planned(0.5)),
+    ("load meter, slow start", 2.0, 0.0, CutLevel::Planned(1.0)),
+    ("load meter, dropouts", 0.6, 60.0, CutLevel::Planned(1.0)),
+];
+
+/// `cargo test --release --test estimators -- --ignored --nocapture without_a_power` prints 20 seeds. Per scenario: share of time right, of cutting seen, of other time called cutting; and the same with the meter.
+fn score_load_meter(seeds: u64, course_s: i64) -> Vec<(Score, Score)> {
+    header(&format!("simulated lathe without a power meter, {seeds} courses of {} min each", course_s / 60));
+    let mut scores = Vec::new();
+    for (name, tau_s, dropouts_per_h, cut) in LOADS {
+        let (mut without, mut with) = (Score::default(), Score::default());
+        for seed in first_seed(1)..first_seed(1) + seeds {
+            let mut settings = SimulatedSettings { seed, tau_s, cut, ..SimulatedSettings::default() };
+            settings.meter.dropouts_per_h = dropouts_per_h;
+            let machine = Simulated::new("simulated://lathe", settings, 0);
+            let sources: Vec<Box<dyn adapters::Pull>> = vec![Box::new(machine.controller())];
+            without.add(&load_only(course(&machine, sources, course_s).0));
+            with.add(&run(settings, course_s).0);
+        }
+        line(name, "load", &without);
+        line("", "power", &with);
+        scores.push((without, with));
+    }
+    scores
+}
+
+/// Power is never there in such a trace, which is no excuse.
+fn load_only(mut trace: Vec<Judged>) -> Vec<Judged> {
+    trace.iter_mut().for_each(|tick| tick.missing = false);
+    trace
+}
+
+#[test]
+fn without_a_power_meter_the_load_meter_tells_the_state() {
+    for (load, power) in score_load_meter(1, 1500) {
+        assert!(load.right() > 0.75 * power.right(), "{} against {}", load.right(), power.right());
+        assert!(load.cut_seen() > 0.7 && load.false_cut() < 0.1, "{} {}", load.cut_seen(), load.false_cut());
+    }
+}
+
+#[test]
+#[ignore = "20 seeds of every scenario: about a minute in release"]
+fn without_a_power_meter_on_twenty_seeds() {
+    score_load_meter(20, 2400);
 }
 
 #[test]

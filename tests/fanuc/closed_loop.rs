@@ -51,8 +51,11 @@ fn shown(address: &str) -> Shown {
 fn the_load_is_held_through_the_mailbox_of_a_served_machine() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
     let directory = tempfile::tempdir().expect("a directory");
-    let config =
-        configured(directory.path(), &format!("{}?write=mailbox&power_diagnosis=4902", serving.address), SCRIPT);
+    let config = configured(
+        directory.path(),
+        &format!("{}?write=mailbox&dial=R907&power_diagnosis=4902", serving.address),
+        SCRIPT,
+    );
     let (gateway, address) = started(&config);
     wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
     armed(&config);
@@ -101,8 +104,11 @@ fn the_dial_is_known_and_a_feed_hold_is_latched_by_the_ladder() {
 fn a_direct_write_is_not_held_and_ends_the_arming() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125"]);
     let directory = tempfile::tempdir().expect("a directory");
-    let config =
-        configured(directory.path(), &format!("{}?write=direct&power_diagnosis=4902", serving.address), SCRIPT);
+    let config = configured(
+        directory.path(),
+        &format!("{}?write=direct&dial=R907&power_diagnosis=4902", serving.address),
+        SCRIPT,
+    );
     let (gateway, address) = started(&config);
     wait_for("a decision", Duration::from_secs(60), || shown(&address).gate["permitted_pct"].is_number().then_some(()));
     armed(&config);

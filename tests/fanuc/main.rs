@@ -14,5 +14,6 @@ mod reading;
 mod round_trips;
 #[path = "../support/served.rs"]
 mod served;
+mod slow;
 mod support;
 mod vendor;

@@ -133,7 +133,7 @@ fn a_box_shows_the_second_turret_of_a_served_machine() {
 #[test]
 fn the_override_of_the_second_turret_is_written_and_the_first_stays() {
     let serving = Serving::start(&["--machine", "simulated://lathe?begun_s=125", "--paths", "2"]);
-    let address = format!("{}?paths=2,1&write=mailbox&mailbox=R920&power_diagnosis=4902", serving.address);
+    let address = format!("{}?paths=2,1&write=mailbox&mailbox=R920&dial=R927&power_diagnosis=4902", serving.address);
     let directory = tempfile::tempdir().expect("a directory");
     let script = "if has(rapid) && rapid == 0.0 { request_feed_override(60.0, \"gently\"); }";
     let source = format!("[[source]]\naddress = \"{address}\"\nname = \"lathe\"\n");

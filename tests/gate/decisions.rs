@@ -4,9 +4,9 @@ use super::cut::{Random, TICK_NS, asking, cases, cutting, id, limits, set_number
 use adapters::clock::{Clock, ManualClock, SECOND_NS};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
-use adapters::{Absence, Actuator, Sample, Slot, SourceError};
+use adapters::{Absence, Actuator, LadderRule, Sample, Slot, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, Verdict, Writer};
+use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, Shown, Verdict, Writer};
 use rules::script::{Host, ScriptFile, shipped};
 use std::path::Path;
 use std::time::Duration;
@@ -113,7 +113,7 @@ fn every_hold_gives_the_programmed_feed_at_once_and_says_why() {
         change(&mut sample, &mut estimates);
         let verdict = gate.decide(Some(&asking(60.0)), &sample, &estimates);
         assert_eq!((verdict.permitted.percent(), verdict.outcome), (100, Outcome::Held(hold)), "{what}");
-        assert!(verdict.reason().starts_with("100 % is held: ") && !hold.zh().is_empty());
+        assert!(verdict.reason().starts_with("no override, the dial counts: ") && !hold.zh().is_empty());
         assert_eq!(verdict.word(), "held");
     }
 }
@@ -233,6 +233,21 @@ fn never_above_the_operators_dial_unless_configured() {
     assert_eq!(decided(false, None), (100, Outcome::Limited(Bound::Dial)), "nobody knows the dial");
     assert_eq!(decided(false, Some(110.0)), (110, Outcome::Limited(Bound::Dial)));
     assert_eq!(decided(false, Some(60.0)), (100, Outcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
+    let asked_60 = |dial: f64| {
+        let mut gate = Gate::new(limits(GateMode::Armed));
+        let decide = |tick: i64| {
+            let (mut sample, estimates) = cutting(tick * TICK_NS);
+            set_number(&mut sample, "feed_override_dial_pct", dial);
+            gate.decide(Some(&asking(60.0)), &sample, &estimates)
+        };
+        (0..60).map(decide).last().map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
+    };
+    assert_eq!(
+        asked_60(60.0),
+        (100, Outcome::DialCounts(OverridePct::new(60).expect("not 255"))),
+        "nothing is asked that the dial does already"
+    );
+    assert_eq!(asked_60(61.0), (60, Outcome::Permitted));
     assert_eq!(decided(false, Some(120.0)), (115, Outcome::Permitted));
     assert_eq!(decided(true, Some(60.0)), (115, Outcome::Permitted), "the ladder multiplies: 69 %");
 }
@@ -271,7 +286,7 @@ fn an_armed_gate_writes_reads_back_and_gives_the_machine_back() {
     let faults = run(&mut gate, &mut writer, 0..30, 80.0);
     assert!(faults.iter().all(Option::is_none), "{faults:?}");
     let writes = writer.actuator().writes.clone();
-    assert_eq!(writes[..3], [100, 90, 80], "{writes:?}");
+    assert_eq!(writes[..3], [95, 85, 80], "nothing is written at 100 %: {writes:?}");
     assert!(writes.len() < 14, "unchanged, it is written only as a sign of life: {writes:?}");
     gate.disarm(Disarmed::Person);
     run(&mut gate, &mut writer, 30..40, 80.0);
@@ -284,18 +299,18 @@ fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
     let mut gate = armed_gate();
     let mut dial = writer(Machine { shown: Some((4, 37)), ..Machine::new() });
     let told: Vec<_> = run(&mut gate, &mut dial, 0..60, 80.0).into_iter().flatten().collect();
-    let mismatch = |asked| Fault::ReadBack {
-        asked: OverridePct::new(asked).expect("not 255"),
-        found: OverridePct::new(37).expect("not 255"),
+    let mismatch = |found| Fault::ReadBack {
+        asked: OverridePct::new(80).expect("not 255"),
+        shown: Shown { found: OverridePct::new(found).expect("not 255"), dial: None, rule: LadderRule::Least },
     };
-    assert_eq!(told, [mismatch(80), mismatch(100)], "once while holding, once when giving the machine back");
+    assert_eq!(told, [mismatch(37)], "once");
     assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));
 
     let mut gate = armed_gate();
     let mut lagging = writer(Machine { shown: Some((0, 100)), ..Machine::new() });
     let faults = run(&mut gate, &mut lagging, 0..60, 80.0);
     let mismatches: Vec<_> = faults.into_iter().flatten().collect();
-    assert_eq!(mismatches, [Fault::ReadBack { asked: OverridePct::new(80).expect("80"), found: OverridePct::FULL }]);
+    assert_eq!(mismatches, [mismatch(100)]);
     assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));
     assert_eq!(lagging.actuator().writes.last(), Some(&100), "the machine is given back");
     assert!(mismatches[0].to_string().contains("80 % was written and 100 % is in force"));

@@ -41,7 +41,7 @@ fn prepared(directory: &Path, server: &Server) -> PathBuf {
     std::fs::write(scripts.join("slow.rhai"), "request_feed_override(70, \"test\");").expect("a script");
     let config = directory.join("cnc-gateway.toml");
     let written = format!(
-        "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"fanuc://{}?write=mailbox\"\nname = \"lathe\"\n\
+        "[gateway]\ndata_dir = \"data\"\n[[source]]\naddress = \"fanuc://{}?write=mailbox&dial=R907\"\nname = \"lathe\"\n\
          [gate]\nmode = \"armed\"\nsource = \"lathe\"\nabove_dial = true\nstale_s = 2.0\n[http]\nlisten = \"127.0.0.1:0\"\n",
         server.address()
     );

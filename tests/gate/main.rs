@@ -4,6 +4,7 @@ mod audit;
 mod cut;
 mod day;
 mod decisions;
+mod idle;
 mod killed;
 mod late;
 mod latency;

@@ -34,21 +34,43 @@ fn the_shipped_constant_load_slows_a_heavy_cut_and_lets_go_afterwards() {
     assert_eq!(request(&mut host, 11.1, &cut[1..]), None, "without the load nothing is asked for");
 }
 
-#[test]
-fn the_shipped_tool_wear_tells_a_worn_edge_and_begins_anew_with_the_next() {
+/// Parts of 100 s: a light cut, a heavy one, and a second tool. From the fifth part on the first tool takes as much more as the
+/// argument says. Gives the alarms of tool wear with the part in which each changed.
+fn parts(count: u32, worn: f64) -> Vec<String> {
     let mut host = Host::new();
     host.load(&shipped()).expect("they compile");
-    let mut raised = Vec::new();
-    for tick in 0..3600 {
-        let at_s = f64::from(tick) / 10.0;
-        let power_w = if tick < 1200 { 1000.0 } else { 1000.0 + f64::from(tick - 1200) };
-        let mut sample = sample(at_s, &[]);
-        set_text(&mut sample, "tool", if tick < 3000 { "T1" } else { "T2" });
-        for change in &host.tick(&sample, &cutting(at_s, power_w)).alarms {
-            raised.push(format!("{}{}", if change.raised { '+' } else { '-' }, change.name));
+    let mut changes = Vec::new();
+    for tick in 0..count * 1000 {
+        let (at_s, part, in_part) = (f64::from(tick) / 10.0, tick / 1000, tick % 1000);
+        let (tool, power_w) = match in_part {
+            0..400 => ("T1", 300.0),
+            400..700 => ("T1", 2200.0),
+            _ => ("T2", 900.0),
+        };
+        let factor = if part >= 5 && tool == "T1" { worn } else { 1.0 };
+        let mut sample = sample(at_s, &[("feed_mm_min", 120.0), ("part_count", f64::from(part))]);
+        set_text(&mut sample, "tool", tool);
+        set_text(&mut sample, "program", "O1001");
+        for change in &host.tick(&sample, &cutting(at_s, factor * power_w)).alarms {
+            if change.name.starts_with("tool_w") {
+                changes.push(format!("{}{} in part {part}", if change.raised { '+' } else { '-' }, change.name));
+            }
         }
     }
-    assert_eq!(raised, ["+tool_wear", "+tool_worn", "-tool_wear", "-tool_worn"]);
+    changes
+}
+
+#[test]
+fn the_shipped_tool_wear_takes_no_heavy_cut_for_a_worn_edge() {
+    assert_eq!(parts(12, 1.0), [String::new(); 0]);
+    assert_eq!(parts(12, 1.15), [String::new(); 0], "a harder lot of material");
+}
+
+#[test]
+fn the_shipped_tool_wear_tells_a_worn_edge() {
+    // Parts 5, 6 and 7 are worn; it is told when the third of them is over.
+    assert_eq!(parts(9, 1.4), ["+tool_wear in part 8"]);
+    assert_eq!(parts(9, 1.8), ["+tool_wear in part 8", "+tool_worn in part 8"]);
 }
 
 #[test]

@@ -45,6 +45,8 @@ enum Rule {
     Least,
     /// One of the other.
     Product,
+    /// The gateway's while it is enabled: a ladder as it should not be, for trying what the box makes of it.
+    Replace,
 }
 
 /// Generations of controls.
@@ -75,6 +77,7 @@ fn control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>
     let rule = match arguments.ladder {
         Rule::Least => LadderRule::Least,
         Rule::Product => LadderRule::Product,
+        Rule::Replace => LadderRule::Replace,
     };
     let mut control = SimulatedControl::new(machine, clock, arguments.generation.version()).with_rule(rule);
     control.turn_dial(OverridePct::new(arguments.dial).unwrap_or(OverridePct::FULL));

@@ -1,0 +1,169 @@
+//! Which period each group of a control can keep, from how long the control takes to answer it.
+//!
+//! A control shares its processor between the machine and whoever asks. All groups together are given
+//! [`duty_pct`](crate::address::FanucOptions::duty_pct) of its time at most. A group whose answers take `b` seconds and which
+//! is asked every `W` seconds needs the share `b / W`. Where the shares do not fit, the slow groups are stretched first until
+//! together they take a quarter of the cap, and the first group gets what is left: its period is `b / share`. The periods are
+//! measured anew with every answer, so that a control that becomes slow under load is asked less often, and a quick one again
+//! at the period that was wanted.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Of the cap, this share is planned with; the rest is for writes and for answers that take longer than usual. With none
+/// left, a single late answer would delay every poll after it.
+const PLANNED: f64 = 0.9;
+
+/// The slow groups give way until they take this share of what is planned.
+const SLOW_SHARE: f64 = 0.25;
+
+/// A longer answer is believed by this share at once, a shorter one slowly: a period that is too short loses data, one that
+/// is too long only some resolution.
+const LONGER: f64 = 0.5;
+const SHORTER: f64 = 0.1;
+
+/// No group is asked less often than this, however slow the control is.
+const PERIOD_MAX: Duration = Duration::from_secs(60);
+
+/// One group.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    wanted_s: f64,
+    /// How long the control takes to answer it; `None` before the first answer.
+    busy_s: Option<f64>,
+}
+
+impl Group {
+    /// Share of the control's time that it takes at the period that is wanted.
+    fn share(&self) -> f64 {
+        self.busy_s.unwrap_or(0.0) / self.wanted_s
+    }
+}
+
+/// The groups of one control; clones are handles on the same ones.
+#[derive(Debug, Clone)]
+pub struct SharedPace {
+    groups: Arc<Mutex<Vec<Group>>>,
+    planned: f64,
+}
+
+/// One group among those of its control.
+#[derive(Debug, Clone)]
+pub struct GroupPace {
+    shared: SharedPace,
+    at: usize,
+}
+
+impl SharedPace {
+    /// The groups may take so many percent of the control's time together.
+    #[must_use]
+    pub fn new(duty_pct: u8) -> Self {
+        Self { groups: Arc::default(), planned: PLANNED * f64::from(duty_pct.clamp(1, 100)) / 100.0 }
+    }
+
+    /// Adds a group; the first one is the quick one.
+    #[must_use]
+    pub fn group(&self, wanted: Duration) -> GroupPace {
+        let mut groups = self.lock();
+        groups.push(Group { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None });
+        GroupPace { shared: self.clone(), at: groups.len() - 1 }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Group>> {
+        // Each group is complete whenever the lock is free.
+        self.groups.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl GroupPace {
+    /// The control took so long to answer this group.
+    pub fn took(&self, busy: Duration) {
+        let mut groups = self.shared.lock();
+        let Some(group) = groups.get_mut(self.at) else { return };
+        let busy_s = busy.as_secs_f64();
+        let known_s = group.busy_s.unwrap_or(busy_s);
+        let weight = if busy_s > known_s { LONGER } else { SHORTER };
+        group.busy_s = Some(known_s + weight * (busy_s - known_s));
+    }
+
+    /// How long the control takes to answer this group; `None` before the first answer.
+    #[must_use]
+    pub fn busy(&self) -> Option<Duration> {
+        self.shared.lock().get(self.at)?.busy_s.map(Duration::from_secs_f64)
+    }
+
+    /// The period that is wanted.
+    #[must_use]
+    pub fn wanted(&self) -> Duration {
+        self.shared.lock().get(self.at).map_or(PERIOD_MAX, |group| Duration::from_secs_f64(group.wanted_s))
+    }
+
+    /// The period that the control can keep; at least the one that is wanted.
+    #[must_use]
+    pub fn period(&self) -> Duration {
+        let groups = self.shared.lock();
+        let (Some(first), Some(own)) = (groups.first(), groups.get(self.at)) else { return PERIOD_MAX };
+        let planned = self.shared.planned;
+        let slow: f64 = groups.iter().skip(1).map(Group::share).sum();
+        // What the slow groups may take: what the first one leaves, and never less than their quarter.
+        let left = (planned - first.share()).max(SLOW_SHARE * planned);
+        let stretch = (slow / left).max(1.0);
+        let period_s = if self.at == 0 {
+            let share = planned - slow / stretch;
+            own.wanted_s.max(own.busy_s.unwrap_or(0.0) / share.max(1e-3))
+        } else {
+            own.wanted_s * stretch
+        };
+        Duration::from_secs_f64(period_s).min(PERIOD_MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paces(duty_pct: u8, fast_ms: u64, slow_ms: u64) -> (f64, f64) {
+        let shared = SharedPace::new(duty_pct);
+        let fast = shared.group(Duration::from_millis(100));
+        let slow = shared.group(Duration::from_secs(1));
+        fast.took(Duration::from_millis(fast_ms));
+        slow.took(Duration::from_millis(slow_ms));
+        (fast.period().as_secs_f64(), slow.period().as_secs_f64())
+    }
+
+    #[test]
+    fn a_quick_control_is_asked_as_was_wanted() {
+        assert_eq!(paces(50, 10, 5), (0.1, 1.0));
+    }
+
+    #[test]
+    fn a_slow_control_never_gives_more_than_its_duty() {
+        for duty_pct in [5, 25, 50, 100] {
+            for (fast_ms, slow_ms) in [(60, 30), (120, 120), (300, 300), (500, 40), (950, 250), (30, 500)] {
+                let (fast_s, slow_s) = paces(duty_pct, fast_ms, slow_ms);
+                let duty = fast_ms as f64 / 1000.0 / fast_s + slow_ms as f64 / 1000.0 / slow_s;
+                let planned = PLANNED * f64::from(duty_pct) / 100.0;
+                assert!(duty <= planned + 1e-9, "{duty_pct} % {fast_ms} {slow_ms}: {duty}");
+                let waits = fast_s > 0.1 || slow_s > 1.0;
+                assert!(
+                    !waits || duty > 0.99 * planned,
+                    "nothing is given away: {duty_pct} % {fast_ms} {slow_ms} {duty}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_longer_answer_counts_at_once_and_a_shorter_one_in_the_long_run() {
+        let shared = SharedPace::new(50);
+        let fast = shared.group(Duration::from_millis(100));
+        assert_eq!((fast.busy(), fast.period()), (None, Duration::from_millis(100)));
+        (0..4).for_each(|_| fast.took(Duration::from_millis(200)));
+        let slow = fast.period();
+        assert!(slow > Duration::from_millis(440), "{slow:?}");
+        fast.took(Duration::from_millis(5));
+        assert!(fast.period() > Duration::from_millis(380), "one quick answer says little");
+        (0..60).for_each(|_| fast.took(Duration::from_millis(5)));
+        assert_eq!(fast.period(), Duration::from_millis(100));
+    }
+}
