@@ -94,3 +94,24 @@ fn the_tables_are_printed() {
     assert!(text(&check(directory.path(), &["--vocabulary"])).contains("| `spindle_power_w` | W |"));
     assert!(text(&check(directory.path(), &["--vocabulary", "--language", "zh"])).contains("主轴驱动功率"));
 }
+
+/// What the state follows from is told before a machine is involved, and nothing is armed without a known dial.
+#[test]
+fn the_basis_of_the_state_and_a_missing_dial_are_told() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let told = |address: &str, gate: &str| {
+        let config = format!("[[source]]\naddress = \"{address}\"\nname = \"cnc\"\n{gate}");
+        fs::write(directory.path().join("cnc-gateway.toml"), config).expect("written");
+        let output = check(directory.path(), &["--config", "cnc-gateway.toml"]);
+        (output.status.code(), text(&output))
+    };
+    let armed = "[gate]\nmode = \"armed\"\nsource = \"cnc\"\n";
+    let (code, said) = told("fanuc://10.0.0.5", "");
+    assert!(code == Some(0) && said.contains("follows from the load meter of the spindle"), "{said}");
+    let (code, said) = told("fanuc://10.0.0.5?power_diagnosis=4902", "");
+    assert!(code == Some(0) && said.contains("follows from spindle power"), "{said}");
+    let (code, said) = told("fanuc://10.0.0.5?write=mailbox", armed);
+    assert!(code == Some(1) && said.contains("cnc-gateway.toml:2:") && said.contains("add dial=R907"), "{said}");
+    let (code, said) = told("fanuc://10.0.0.5?write=mailbox&dial=R907", armed);
+    assert_eq!(code, Some(0), "{said}");
+}

@@ -23,6 +23,22 @@ fn rows(database: &Path) -> u64 {
     info["samples"].as_u64().expect("a number")
 }
 
+/// The state of a controller whose spindle already turns is unknown at first, and no state is older than the first sample.
+#[test]
+fn the_first_state_begins_with_the_first_sample() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let config = directory.path().join("cnc-gateway.toml");
+    let source = "[[source]]\naddress = \"simulated://lathe?device=controller&begun_s=300\"\n";
+    fs::write(&config, format!("[gateway]\ndata_dir = \"data\"\n{source}[http]\nenabled = false\n")).expect("written");
+    let told = run(&["run", "--config", config.to_str().expect("a path"), "--speed", "max", "--for", "30"]);
+    assert!(told.status.success(), "{}", stderr(&told));
+    let sql = "SELECT count(*) AS n, min(since_ns) / 1e9 AS first_s, (SELECT count(*) FROM state_hours) AS hours FROM states";
+    let found = query(&directory.path().join("data/history.db"), &["--sql", sql]);
+    let row = &found["rows"][0];
+    let (first_s, hours) = (row["first_s"].as_f64().expect("a number"), row["hours"].as_u64().expect("a number"));
+    assert!(first_s > 1.7e9 && hours <= 16, "{found}");
+}
+
 #[test]
 fn an_hour_of_the_simulated_lathe_has_every_state() {
     let directory = tempfile::tempdir().expect("a directory");
