@@ -10,6 +10,8 @@
 //! of what was written: the time of that is the step's reaction time. What is anything else when the machine has had its time
 //! to settle ends the arming.
 
+mod withdraw;
+
 use super::fault::{Fault, Shown};
 use super::verdict::{Outcome, Verdict};
 use crate::config;
@@ -17,6 +19,7 @@ use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRequest, LadderRule, SourceError};
 use std::collections::VecDeque;
+use withdraw::Owed;
 
 /// Why the writer wrote.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,11 +92,6 @@ struct Pace {
     rule: LadderRule,
 }
 
-/// A withdrawal that the machine refused is tried again after this time.
-const WITHDRAW_AGAIN_NS: i64 = SECOND_NS / 2;
-/// The same while the machine is off or cannot be reached.
-const UNREACHED_AGAIN_NS: i64 = 5 * SECOND_NS;
-
 /// A change that has not been seen in force yet.
 #[derive(Debug, Clone, Copy)]
 struct Pending {
@@ -101,17 +99,6 @@ struct Pending {
     asked: Option<OverridePct>,
     sample_ns: TimeNs,
     issued_ns: TimeNs,
-}
-
-/// The enable that has to be withdrawn and is not yet.
-#[derive(Debug, Clone, Copy)]
-struct Owed {
-    /// Of an earlier run: it is not known whether anything is enabled.
-    leftover: bool,
-    /// Not tried again before.
-    next_ns: TimeNs,
-    /// A refusal is told once.
-    told: bool,
 }
 
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
@@ -149,7 +136,7 @@ impl<A: Actuator> Writer<A> {
             dials: VecDeque::new(),
             dial_is_known: false,
             holding: false,
-            owed: Some(Owed { leftover: true, next_ns: TimeNs::MIN, told: false }),
+            owed: Some(Owed::leftover()),
             failed: false,
             looked_ns: None,
             changed_ns: None,
@@ -259,77 +246,6 @@ impl<A: Actuator> Writer<A> {
         (silent_ns > patience_ns).then_some(Fault::Late { silent_ms: silent_ns / 1_000_000 })
     }
 
-    /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
-    pub fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
-        if std::mem::take(&mut self.holding) {
-            self.owed = Some(Owed { leftover: false, next_ns: TimeNs::MIN, told: false });
-        }
-        let owed = self.owed.filter(|owed| owed.next_ns <= clock.now_ns())?;
-        self.withdraw(owed, clock)
-    }
-
-    /// An override of this run is enabled and could not be withdrawn yet.
-    #[must_use]
-    pub fn owes_withdrawal(&self) -> bool {
-        self.holding || self.owed.is_some_and(|owed| !owed.leftover)
-    }
-
-    fn withdraw(&mut self, owed: Owed, clock: &dyn Clock) -> Option<Written> {
-        let at_ns = clock.now_ns();
-        let before = self.recent.back().map(|(_, pct)| *pct);
-        let occasion = if owed.leftover { Occasion::Leftover } else { Occasion::Release };
-        let sent = match owed.leftover {
-            true => self.actuator.withdraw_leftover(clock),
-            false => self.actuator.release(clock).map(|()| true),
-        };
-        let written = |after, fault| {
-            let asked = OverridePct::FULL;
-            Some(Written { at_ns, sample_ns: at_ns, occasion, before, asked, after, fault })
-        };
-        match sent {
-            Ok(false) => {
-                self.owed = None;
-                None
-            }
-            Ok(true) => {
-                self.owed = None;
-                let (after, fault) = self.back_at_dial(at_ns, clock);
-                written(after, fault)
-            }
-            Err(error) => {
-                let refused = matches!(error, SourceError::Refused { .. });
-                let pause_ns = if refused { WITHDRAW_AGAIN_NS } else { UNREACHED_AGAIN_NS };
-                // A machine that is off has forgotten it, if its maker's ladder clears it; it is looked at when it is on again.
-                let quiet = owed.told || matches!(error, SourceError::Off { .. }) || (owed.leftover && !refused);
-                let next_ns = clock.now_ns().saturating_add(pause_ns);
-                self.owed = Some(Owed { next_ns, told: owed.told || !quiet, ..owed });
-                self.begin_anew();
-                if quiet { None } else { written(None, Some(Fault::NotWithdrawn(error))) }
-            }
-        }
-    }
-
-    /// What is in force right after a withdrawal. It is looked at again until it is the dial.
-    fn back_at_dial(&mut self, at_ns: TimeNs, clock: &dyn Clock) -> (Option<OverridePct>, Option<Fault>) {
-        let neutral = if self.pace.rule == LadderRule::Least { OverridePct::GREATEST } else { OverridePct::FULL };
-        self.recent.push_back((at_ns, neutral));
-        let found = self.read(clock);
-        let told = match found {
-            // Where the dial is not known, nobody can say what has to be in force.
-            Ok(found) if !self.dial_is_known => (Some(found), None),
-            Ok(found) => (Some(found), self.mismatch(OverridePct::FULL, found, at_ns)),
-            Err(SourceError::Off { .. }) => (None, None),
-            Err(error) => (None, Some(Fault::Line(error))),
-        };
-        let dial = self.dials.back().copied();
-        self.begin_anew();
-        if self.dial_is_known && told.1.is_none() {
-            self.dials.extend(dial);
-            self.pending = Some(Pending { asked: None, sample_ns: at_ns, issued_ns: at_ns });
-        }
-        told
-    }
-
     fn begin_anew(&mut self) {
         (self.pending, self.changed_ns, self.looked_ns, self.holding) = (None, None, None, false);
         self.recent.clear();
@@ -425,8 +341,7 @@ impl<A: Actuator> Writer<A> {
             Ok(found) => (Some(found), self.mismatch(asked, found, at_ns).or(late)),
             Err(SourceError::Off { .. }) => {
                 self.begin_anew();
-                self.owed =
-                    Some(Owed { leftover: false, next_ns: at_ns.saturating_add(UNREACHED_AGAIN_NS), told: false });
+                self.owed = Some(Owed::unreached(at_ns));
                 return None;
             }
             Err(error) => (None, Some(Fault::Line(error))),

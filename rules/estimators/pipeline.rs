@@ -1,6 +1,7 @@
 //! From a sample to estimates.
 
-use super::basis::StateBasis;
+mod stand_in;
+
 use super::cutting::balance;
 use super::detector::{Detector, Verdict};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
@@ -45,7 +46,7 @@ struct Memory {
     /// The level right after a start with the axes already moving.
     upper_bound: Option<NoLoadPoint>,
     standby_w: Option<f64>,
-    /// What the no-load powers were learned from, as the word of a [`StateBasis`]; empty before the first sample.
+    /// What the no-load powers were learned from, as the word of a [`StateBasis`](super::StateBasis); empty before the first sample.
     #[serde(default)]
     basis: String,
 }
@@ -100,27 +101,6 @@ impl Pipeline {
         self.follow(&inputs, filtered_w, no_load, &verdict);
         self.estimates = self.estimate(&inputs, filtered_w, no_load, &verdict);
         &self.estimates
-    }
-
-    /// No-load powers that were learned from something else are in another unit. A basis is also one that was stored before there
-    /// were several: spindle power.
-    fn follow_basis(&mut self, basis: StateBasis) {
-        // Nothing is learned from motion alone.
-        if self.memory.basis == basis.word() || basis == StateBasis::Motion {
-            return;
-        }
-        let before = std::mem::replace(&mut self.memory.basis, basis.word().to_owned());
-        let was_in_watts =
-            StateBasis::ALL.into_iter().find(|known| known.word() == before).is_none_or(StateBasis::in_watts);
-        if was_in_watts && basis.in_watts() {
-            return;
-        }
-        let no_load_table = if basis.in_watts() { self.settings.no_load_table.clone() } else { Vec::new() };
-        self.memory.no_load = NoLoadTable::new(&Settings { no_load_table, ..self.settings.clone() });
-        self.memory.upper_bound = None;
-        self.memory.signals.forget();
-        self.memory.learner.forget();
-        self.memory.detector.interrupt();
     }
 
     /// No-load power at the speed of this tick: learned; or else an upper bound at this very speed; or else a rough idea,
@@ -273,19 +253,6 @@ impl Pipeline {
             gear_stage: u8::try_from(self.memory.signals.stage()).unwrap_or(0),
         };
         if inputs.basis.in_watts() { estimates } else { self.without_watts(estimates) }
-    }
-
-    /// What stands for power tells the state, and nothing in watts.
-    fn without_watts(&self, estimates: Estimates) -> Estimates {
-        let none = Err(self.input(self.channels.power, adapters::Absence::NotProvided));
-        Estimates {
-            filtered_power_w: none,
-            no_load_power_w: none,
-            cutting_power_w: none,
-            load_loss_w: none,
-            visible_cutting_power_w: none,
-            ..estimates
-        }
     }
 
     /// Why the table gives no estimate at this speed.

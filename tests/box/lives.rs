@@ -32,7 +32,8 @@ fn the_first_state_begins_with_the_first_sample() {
     fs::write(&config, format!("[gateway]\ndata_dir = \"data\"\n{source}[http]\nenabled = false\n")).expect("written");
     let told = run(&["run", "--config", config.to_str().expect("a path"), "--speed", "max", "--for", "30"]);
     assert!(told.status.success(), "{}", stderr(&told));
-    let sql = "SELECT count(*) AS n, min(since_ns) / 1e9 AS first_s, (SELECT count(*) FROM state_hours) AS hours FROM states";
+    let sql =
+        "SELECT count(*) AS n, min(since_ns) / 1e9 AS first_s, (SELECT count(*) FROM state_hours) AS hours FROM states";
     let found = query(&directory.path().join("data/history.db"), &["--sql", sql]);
     let row = &found["rows"][0];
     let (first_s, hours) = (row["first_s"].as_f64().expect("a number"), row["hours"].as_u64().expect("a number"));

@@ -1,0 +1,44 @@
+//! What is different where something else stands for spindle power; see [`StateBasis`].
+
+use super::Pipeline;
+use crate::estimators::basis::StateBasis;
+use crate::estimators::estimate::Estimates;
+use crate::estimators::no_load::NoLoadTable;
+use crate::estimators::settings::Settings;
+use adapters::Absence;
+
+impl Pipeline {
+    /// No-load powers that were learned from something else are in another unit. A basis is also one that was stored before there
+    /// were several: spindle power.
+    pub(super) fn follow_basis(&mut self, basis: StateBasis) {
+        // Nothing is learned from motion alone.
+        if self.memory.basis == basis.word() || basis == StateBasis::Motion {
+            return;
+        }
+        let before = std::mem::replace(&mut self.memory.basis, basis.word().to_owned());
+        let was_in_watts =
+            StateBasis::ALL.into_iter().find(|known| known.word() == before).is_none_or(StateBasis::in_watts);
+        if was_in_watts && basis.in_watts() {
+            return;
+        }
+        let no_load_table = if basis.in_watts() { self.settings.no_load_table.clone() } else { Vec::new() };
+        self.memory.no_load = NoLoadTable::new(&Settings { no_load_table, ..self.settings.clone() });
+        self.memory.upper_bound = None;
+        self.memory.signals.forget();
+        self.memory.learner.forget();
+        self.memory.detector.interrupt();
+    }
+
+    /// What stands for power tells the state, and nothing in watts.
+    pub(super) fn without_watts(&self, estimates: Estimates) -> Estimates {
+        let none = Err(self.input(self.channels.power, Absence::NotProvided));
+        Estimates {
+            filtered_power_w: none,
+            no_load_power_w: none,
+            cutting_power_w: none,
+            load_loss_w: none,
+            visible_cutting_power_w: none,
+            ..estimates
+        }
+    }
+}
