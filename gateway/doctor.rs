@@ -66,11 +66,23 @@ pub fn examine(text: &str) -> Result<Report, String> {
     begin(text, &SystemClock::new()).map(|(report, _)| report)
 }
 
+/// The same of an address that has been read, with the channels that a configuration adds to it.
+///
+/// # Errors
+/// It cannot be opened, in words.
+pub fn examine_address(address: &Address) -> Result<Report, String> {
+    begin_at(address, &SystemClock::new()).map(|(report, _)| report)
+}
+
 /// Examines an address and leaves open what works.
 fn begin(text: &str, clock: &SystemClock) -> Result<(Report, Vec<Box<dyn Source>>), String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
+    begin_at(&address, clock)
+}
+
+fn begin_at(address: &Address, clock: &SystemClock) -> Result<(Report, Vec<Box<dyn Source>>), String> {
     let began = Instant::now();
-    let opened = opened(&address, clock.now_ns()).map_err(|error| error.to_string())?;
+    let opened = opened(address, clock.now_ns()).map_err(|error| error.to_string())?;
     let mut report = Report {
         address: address.text().to_owned(),
         reachable: false,

@@ -1,18 +1,23 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::config;
 use crate::doctor::{self, Report};
 use crate::sinks::{self, SinkAddress};
+use adapters::Address;
 use adapters::driver::FactValue;
 use clap::Args;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
-    /// The address, as in the configuration, for example fanuc://10.0.0.5:8193.
+    /// The address, as in the configuration, for example fanuc://10.0.0.5:8193; with --config the name of a source.
     address: String,
+    /// Look the source up in this configuration, by its name or address, and read its own channels too.
+    #[arg(long, value_name = "FILE", conflicts_with = "compare")]
+    config: Option<PathBuf>,
     /// Read a FANUC controller through this library of the vendor's too, and list where the two differ.
     #[arg(long, value_name = "LIBRARY")]
     compare: Option<PathBuf>,
@@ -28,7 +33,11 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> CommandResult {
         return sink(arguments);
     }
     let Some(library) = &arguments.compare else {
-        let report = doctor::examine(&arguments.address).map_err(unusable)?;
+        let report = match &arguments.config {
+            Some(file) => doctor::examine_address(&configured(file, &arguments.address)?),
+            None => doctor::examine(&arguments.address),
+        };
+        let report = report.map_err(unusable)?;
         if arguments.json {
             print_json(&report.json())
         } else {
@@ -58,6 +67,20 @@ fn sink(arguments: &DoctorArguments) -> CommandResult {
         print(&found.text(&address));
     }
     Ok(outcome(found.error.is_none()))
+}
+
+/// The address of the source of this name in a configuration.
+fn configured(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
+    let config = config::load(Some(file), []).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })?;
+    let found = config.sources.iter().find(|source| source.name == wanted || source.address.text() == wanted);
+    found.map(|source| source.address.clone()).ok_or_else(|| {
+        let names: Vec<&str> = config.sources.iter().map(|source| source.name.as_str()).collect();
+        let next = format!("its sources are {}", names.join(", "));
+        CannotRun::new(format!("{} has no source {wanted}", file.display()), next)
+    })
 }
 
 fn outcome(well: bool) -> Outcome {

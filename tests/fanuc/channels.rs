@@ -203,8 +203,11 @@ fn a_box_stores_own_channels_of_every_kind() {
     for part in ["124.456", "-77", "3000"] {
         assert!(last.contains(part), "{part}: {last}");
     }
-    let (_, report) = doctor(&[&address]);
+    let (_, report) = doctor(&[&address, "--config", path_text(&config)]);
     let readings = report["readings"].as_array().expect("a list");
-    let shown = readings.iter().find(|row| row["channel"] == "c1_axis_position_deg").expect("doctor shows it");
-    assert_eq!((shown["value"].as_f64(), shown["unit"].as_str()), (Some(4.02), Some("°")));
+    for (name, wanted, unit) in [("c1_axis_position_deg", 4.02, "°"), ("own_dword_bar", 124.456, "bar")] {
+        let shown = readings.iter().find(|row| row["channel"] == name).expect("doctor shows it");
+        assert!((shown["value"].as_f64().expect("a number") - wanted).abs() < 1e-6, "{shown}");
+        assert_eq!(shown["unit"].as_str(), Some(unit));
+    }
 }

@@ -12,9 +12,9 @@ const G_CODE_LEN: usize = 12;
 const G_CODES_MAX: i16 = 40;
 /// `OPMSG3`: number, type, length, text of 256 bytes.
 const MESSAGE_LEN: usize = 262;
-/// Head and record of `ODBAHIS`.
+/// Head and record of `ODBAHIS`, as the library fills it in.
 const HISTORY_HEAD_LEN: usize = 8;
-const HISTORY_LEN: usize = 46;
+const HISTORY_LEN: usize = 48;
 /// At most so many remembered alarms at a time.
 const HISTORY_MAX: u16 = 10;
 
@@ -54,7 +54,7 @@ impl Session {
             Item::AlarmHistory(first, last) => {
                 let last = last.min(first.saturating_add(HISTORY_MAX - 1));
                 let count = usize::from(last.saturating_sub(first)) + 1;
-                let length = HISTORY_HEAD_LEN + 48 * count;
+                let length = HISTORY_HEAD_LEN + HISTORY_LEN * count;
                 let asked = u16::try_from(length).unwrap_or(u16::MAX);
                 let bytes = filled(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
                 let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN);
