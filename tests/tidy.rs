@@ -274,7 +274,8 @@ fn the_test_map_lists_every_ignored_test_and_no_other() {
     let tests: Vec<String> = ignored().iter().map(|test| row(&test.path, &test.name)).collect();
     let unlisted = tests.iter().filter(|row| !map.contains(row.as_str())).cloned();
     none(unlisted.collect(), "ignored, and not in gateway/handbook/tests.md");
-    let listed = map.lines().filter(|line| line.contains(".rs` | `"));
+    let by_hand = map.split("## What runs by hand").nth(1).expect("the chapter has this part");
+    let listed = by_hand.lines().filter(|line| line.contains(".rs` | `"));
     let gone = listed.filter(|line| !tests.iter().any(|row| line.starts_with(row.as_str()))).map(str::to_owned);
     none(gone.collect(), "in gateway/handbook/tests.md, and no longer ignored");
 }

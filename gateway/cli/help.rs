@@ -33,6 +33,8 @@ fn list() -> String {
 
 fn of_command(name: &str) -> Option<String> {
     let mut arguments = Arguments::command();
+    // The usage of a command then begins with the name of the program.
+    arguments.build();
     let command = arguments.find_subcommand_mut(name).filter(|command| !command.is_hide_set())?;
     Some(command.render_long_help().to_string())
 }

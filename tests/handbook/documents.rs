@@ -46,8 +46,7 @@ impl Document {
     /// Every code block, in order.
     pub(crate) fn blocks(&self) -> Vec<Block> {
         let (mut blocks, mut fenced) = (Vec::<Block>::new(), None::<Block>);
-        let mut before_is_code = false;
-        let mut before_is_empty = true;
+        let (mut before_is_code, mut empty) = (false, 1);
         for (index, line) in self.text.lines().enumerate() {
             let inner = line.trim_start();
             if let Some(language) = inner.strip_prefix("```") {
@@ -61,17 +60,21 @@ impl Document {
                 before_is_code = false;
             } else if let Some(block) = &mut fenced {
                 block.lines.push(line.to_owned());
-            } else if line.starts_with("    ") && (before_is_code || before_is_empty) {
+            } else if line.starts_with("    ") && (before_is_code || empty > 0) {
                 let text = line.get(4..).unwrap_or_default().to_owned();
                 match blocks.last_mut().filter(|_| before_is_code) {
-                    Some(block) => block.lines.push(text),
+                    Some(block) => {
+                        // An empty line does not end an indented block.
+                        block.lines.extend(std::iter::repeat_n(String::new(), empty));
+                        block.lines.push(text);
+                    }
                     None => blocks.push(Block { language: String::new(), line: index + 1, lines: vec![text] }),
                 }
                 before_is_code = true;
-            } else {
+            } else if !inner.is_empty() {
                 before_is_code = false;
             }
-            before_is_empty = inner.is_empty();
+            empty = if inner.is_empty() { empty + 1 } else { 0 };
         }
         blocks
     }
@@ -98,14 +101,14 @@ impl Document {
 
 #[test]
 fn code_is_found_in_a_document() {
-    let text = "# T\n\n    a b\n    c\n\ntext `x y` and [l](f.md)\n```toml\nk = 1\n```\n";
+    let text = "# T\n\n    a b\n\n    c\n\ntext `x y` and [l](f.md)\n```toml\nk = 1\n```\n";
     let document = Document { name: String::new(), path: PathBuf::new(), text: text.to_owned() };
     let block = |language: &str, line, lines: &[&str]| Block {
         language: language.to_owned(),
         line,
         lines: lines.iter().map(|line| (*line).to_owned()).collect(),
     };
-    assert_eq!(document.blocks(), [block("", 3, &["a b", "c"]), block("toml", 8, &["k = 1"])]);
-    assert_eq!(document.spans(), [(6, "x y".to_owned())]);
+    assert_eq!(document.blocks(), [block("", 3, &["a b", "", "c"]), block("toml", 9, &["k = 1"])]);
+    assert_eq!(document.spans(), [(7, "x y".to_owned())]);
     assert_eq!(document.links(), ["f.md"]);
 }

@@ -53,6 +53,28 @@ fn links_lead_to_files_that_are_there() {
     assert!(broken.is_empty(), "links to nothing:\n  {}", broken.join("\n  "));
 }
 
+/// Files that a document names by their whole path; `NAME` and the like stand for a name of the reader's.
+fn named_files(text: &str) -> Vec<&str> {
+    let of_a_path = |letter: char| letter.is_ascii_alphanumeric() || "/_.".contains(letter);
+    let rooms = ["adapters/", "gateway/", "rules/", "tests/"];
+    let whole = |word: &&str| rooms.iter().any(|room| word.starts_with(room)) && word.ends_with(".rs");
+    let own = |word: &str| word.split(['/', '.']).any(|part| ["NAME", "SUBJECT"].contains(&part));
+    text.split(|letter| !of_a_path(letter)).filter(whole).filter(|word| !own(word)).collect()
+}
+
+#[test]
+fn files_that_are_named_are_there() {
+    let (mut gone, mut seen) = (Vec::new(), 0);
+    for document in documents() {
+        let named = named_files(&document.text);
+        seen += named.len();
+        let missing = named.into_iter().filter(|file| !root().join(file).exists());
+        gone.extend(missing.map(|file| format!("{}: {file}", document.name)));
+    }
+    assert!(gone.is_empty(), "named, and not there:\n  {}", gone.join("\n  "));
+    assert!(seen > 60, "only {seen} files were found");
+}
+
 #[test]
 fn the_readme_is_one_page() {
     let readme = documents().into_iter().find(|document| document.name == "README.md").expect("there is one");
