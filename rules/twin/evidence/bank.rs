@@ -35,7 +35,16 @@ pub(super) struct Family {
 impl Family {
     /// A family of this kind of either sign.
     pub(super) const fn of(kind: &'static str) -> Self {
-        Self { kind: Cow::Borrowed(kind), sign: 0.0, channels: &[], widens: true, ln_rarity: 0.0, at_edges: false, is_contained: false, covers: true }
+        Self {
+            kind: Cow::Borrowed(kind),
+            sign: 0.0,
+            channels: &[],
+            widens: true,
+            ln_rarity: 0.0,
+            at_edges: false,
+            is_contained: false,
+            covers: true,
+        }
     }
 
     /// Its contribution has this sign.
@@ -297,7 +306,6 @@ fn largest_of(inputs: &Inputs<'_>, column: &[f64]) -> Option<f64> {
 /// Root mean square over the rows where a column acts: so that the prior deviation means the size there.
 fn acting_size(inputs: &Inputs<'_>, column: &[f64]) -> Option<f64> {
     let largest = largest_of(inputs, column)?;
-    let acting: Vec<f64> =
-        inputs.taken(false).map(|row| column[row]).filter(|x| x.abs() > ACTING * largest).collect();
+    let acting: Vec<f64> = inputs.taken(false).map(|row| column[row]).filter(|x| x.abs() > ACTING * largest).collect();
     Some(crate::statistics::rms(&acting).max(f64::MIN_POSITIVE))
 }

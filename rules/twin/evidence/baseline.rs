@@ -26,8 +26,6 @@ pub(super) struct Baseline {
     pub(super) simulated: Vec<f64>,
     /// Change of the output with each free parameter, row by row.
     pub(super) tangents: Vec<Vec<f64>>,
-    /// The free parameters.
-    pub(super) free: Vec<Free>,
 }
 
 /// Refits the parts over some rows; the scene keeps load and simulated output of the refitted model. `None` when a part
@@ -46,14 +44,15 @@ pub(super) fn refit(scene: &mut Scene, parts: &[Part], rows: &[usize]) -> Option
         error = here;
         let columns: Vec<Vec<f64>> = tangents.iter().map(|t| rows.iter().map(|row| t[*row]).collect()).collect();
         let sizes: Vec<f64> = columns.iter().map(|column| rms(column) + 1e-30).collect();
-        let scaled = columns.iter().zip(&sizes).map(|(c, size)| c.iter().map(|x| x / size).collect()).collect::<Vec<_>>();
+        let scaled =
+            columns.iter().zip(&sizes).map(|(c, size)| c.iter().map(|x| x / size).collect()).collect::<Vec<_>>();
         let step = least_squares(&scaled, &left).coefficients;
         let step: Vec<f64> = step.iter().zip(&sizes).map(|(step, size)| step / size).collect();
         advance(scene, &mut parts, &free, &step, rows, error)?;
     }
     let (simulated, tangents) = tangents(scene, &parts, &free)?;
     simulate(&parts, scene)?;
-    Some(Baseline { parts, simulated, tangents, free })
+    Some(Baseline { parts, simulated, tangents })
 }
 
 /// Goes the step, or as much of it as makes the error smaller.

@@ -55,7 +55,11 @@ impl Ground {
     /// Nothing taken out yet.
     pub(super) fn state(&self) -> State<'_> {
         let size = self.gram.nrows();
-        State { ground: self, reach: Array2::zeros((size, 0)), left: self.gram[[size - 1, size - 1]].max(f64::MIN_POSITIVE) }
+        State {
+            ground: self,
+            reach: Array2::zeros((size, 0)),
+            left: self.gram[[size - 1, size - 1]].max(f64::MIN_POSITIVE),
+        }
     }
 
     /// The part that holds some variants only.

@@ -67,8 +67,8 @@ impl<'a> Inner<'a> {
         Self { comparison, inputs, tall, parts, grams, ridge, members: places, fixed: fixed.len() }
     }
 
-    /// Gain of these members over those, in deviations of it.
-    pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> f64 {
+    /// Gain of these members over those: in deviations of it, and in squares.
+    pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> (f64, f64) {
         let whole = self.grams.iter().skip(1).fold(self.grams[0].clone(), |sum, gram| sum + gram);
         let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
         let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
@@ -79,14 +79,18 @@ impl<'a> Inner<'a> {
                 let line = self.tall.row(*at);
                 let output = line[line.len() - 1];
                 let error = |w: &Array1<f64>| (output - line.slice(s![..line.len() - 1]).dot(w)).powi(2);
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of rows")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a share of a count of rows"
+                )]
                 let number = (count(self.comparison.rows[*at]) / stretch) as usize;
                 *gained.entry(number).or_default() += error(&before) - error(&after);
             }
         }
         let sum: f64 = gained.values().sum();
         let squares: f64 = gained.values().map(|x| x * x).sum();
-        sum / (squares.sqrt() + 1e-30)
+        (sum / (squares.sqrt() + 1e-30), sum)
     }
 
     /// Posterior means of some members, zero for the others; a run that is left out has no level.

@@ -115,7 +115,11 @@ impl<'a> Naming<'a> {
         single.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = single.first()?;
         let one = Claim { share: best.0, laws: vec![(best.1, best.2.clone())] };
-        if one.share >= THRESHOLDS.name_share {
+        // Levels of a group are few: two laws that hold in some of its members claim them by chance.
+        let levels = parts
+            .iter()
+            .any(|(variant, _)| self.bank.variants[*variant].drawn().is_some_and(|drawn| drawn.shape == "levels"));
+        if one.share >= THRESHOLDS.name_share || levels {
             return Some(one);
         }
         let pair = self.pair(metric, &along, square, &single);
@@ -194,7 +198,12 @@ impl<'a> Naming<'a> {
     }
 
     /// Inner products of a whitened full contribution with every column, and its square, the baseline projected out.
-    pub(super) fn products(&self, comparison: &Comparison<'_>, gram: &Gram, contribution: &[f64]) -> (Array1<f64>, f64) {
+    pub(super) fn products(
+        &self,
+        comparison: &Comparison<'_>,
+        gram: &Gram,
+        contribution: &[f64],
+    ) -> (Array1<f64>, f64) {
         let white = Array1::from(comparison.whitened(contribution, gram.noise));
         let tall = comparison.whole(gram.noise, |_| true);
         let mut along = tall.t().dot(&white);

@@ -43,11 +43,12 @@ impl Told<'_, '_> {
         let (parts, fit) = self.textbook();
         let missing = self.missing(&fits, &parts, fit.as_ref());
         let alternatives = self.alternatives();
-        let model = fit.as_ref().map_or_else(|| self.case.model.clone(), |fit| Model {
-            parts: fit.parts.clone(),
-            ..self.case.model.clone()
-        });
-        let shift = if missing.is_empty() { Vec::new() } else { fit.as_ref().map_or_else(Vec::new, |f| self.shifts(f)) };
+        let model = fit.as_ref().map_or_else(
+            || self.case.model.clone(),
+            |fit| Model { parts: fit.parts.clone(), ..self.case.model.clone() },
+        );
+        let shift =
+            if missing.is_empty() { Vec::new() } else { fit.as_ref().map_or_else(Vec::new, |f| self.shifts(f)) };
         let mut diagnosis = Diagnosis {
             output: self.case.model.output.clone(),
             unit: unit_of(&self.case.model.output).to_owned(),
@@ -275,7 +276,12 @@ impl Told<'_, '_> {
 }
 
 /// A candidate with these values of its linear parameters, within what is possible.
-fn with_values(effect: &'static dyn Effect, form: &crate::physics::Form, names: &[&'static str], values: &[f64]) -> Part {
+fn with_values(
+    effect: &'static dyn Effect,
+    form: &crate::physics::Form,
+    names: &[&'static str],
+    values: &[f64],
+) -> Part {
     let mut part = Part::candidate(effect, form, names);
     for (name, value) in names.iter().zip(values) {
         if let Some(parameter) = part.parameters.iter_mut().find(|p| p.name == *name && !p.fixed) {

@@ -11,8 +11,12 @@ const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["
 const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
 const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
 const GAIN: Family = Family::of("sensor_gain").wide();
-const TAPER: Family =
-    Family::of("depth_taper").at_edges().through(&["axis_position_mm", "z_axis_position_mm", "position", "pass_progress"]);
+const TAPER: Family = Family::of("depth_taper").at_edges().through(&[
+    "axis_position_mm",
+    "z_axis_position_mm",
+    "position",
+    "pass_progress",
+]);
 const ENTRY: Family = Family::of("entry_exit").beside_catalogue().rare(-0.5).at_edges();
 const THINNING: Family = Family::of("chip_thinning").beside_catalogue().signed(1.0).through(&["depth_of_cut_mm"]);
 const THINNING_WIDTH: Family = Family::of("chip_thinning").beside_catalogue().rare(-0.5);
@@ -65,8 +69,8 @@ fn over_speed(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
         let bent = inputs.column(|row| cut[row] * (over(row).powi(2) - spread * spread) * inputs.cutting(row));
         bank.of(SOFTENING, "").columns(inputs, [(linear, 1.0), (bent, 0.3)]);
     }
-    for (centre, width) in [(25.0, 10.0), (35.0, 12.0), (45.0, 15.0)] {
-        let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width as f64).powi(2)).exp());
+    for (centre, width) in [(25.0_f64, 10.0_f64), (35.0, 12.0), (45.0, 15.0)] {
+        let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width).powi(2)).exp());
         bank.of(BUILT_UP, centre).column(inputs, law);
     }
 }
@@ -116,9 +120,8 @@ fn legendre(u: f64) -> [f64; 3] {
 }
 
 fn through_a_pass(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
-    let order = |u: &dyn Fn(usize) -> f64, k: usize| {
-        inputs.column(|row| cut[row] * inputs.cutting(row) * legendre(u(row))[k])
-    };
+    let order =
+        |u: &dyn Fn(usize) -> f64, k: usize| inputs.column(|row| cut[row] * inputs.cutting(row) * legendre(u(row))[k]);
     let along = |row: usize| inputs.progress[row];
     let columns = [(order(&along, 0), 1.0), (order(&along, 1), 0.5), (order(&along, 2), 0.35)];
     bank.of(TAPER, "progress").columns(inputs, columns);
@@ -134,9 +137,7 @@ fn through_a_pass(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
     }
     for tau_s in [0.5, 1.0, 2.0, 4.0].into_iter().filter(|tau_s| *tau_s >= 0.5 * inputs.period_s) {
         let fading = |since: &[f64]| {
-            inputs.column(|row| {
-                cut[row] * inputs.cutting(row) * (-(since[row] + 0.5 * inputs.period_s) / tau_s).exp()
-            })
+            inputs.column(|row| cut[row] * inputs.cutting(row) * (-(since[row] + 0.5 * inputs.period_s) / tau_s).exp())
         };
         let columns = [(fading(&inputs.since_s), 1.0), (fading(&inputs.to_end_s), 1.0)];
         bank.of(ENTRY, tau_s).columns(inputs, columns);

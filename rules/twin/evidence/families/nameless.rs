@@ -57,8 +57,12 @@ pub(super) fn add(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
         for carrier in &carriers {
             let drawn = |shape: &'static str| Drawn { over: channel.name.clone(), times: carrier.name, shape };
             let cuts = carrier.name == "cut" || carrier.name == "engaged";
-            let alone = inputs.engaged.is_some() && (cut_only || channel.name == "tool_age" || channel.name == "feed_mm_min");
-            if fine.len() > BUMPS + 1 && (carrier.name == "1" || cuts) && !(carrier.name == "engaged" && inputs.knows_cut) {
+            let alone =
+                inputs.engaged.is_some() && (cut_only || channel.name == "tool_age" || channel.name == "feed_mm_min");
+            if fine.len() > BUMPS + 1
+                && (carrier.name == "1" || cuts)
+                && !(carrier.name == "engaged" && inputs.knows_cut)
+            {
                 add_curve(inputs, bank, drawn("fine bumps"), &fine, carrier);
             }
             let slow = channel.name == "time" || channel.name.contains("temperature");
@@ -95,14 +99,16 @@ fn carriers(inputs: &Inputs<'_>) -> Vec<Carrier> {
         all.push(Carrier { name: "cut", values: cut.clone() });
     }
     if let Some(velocity) = inputs.velocity.as_ref().filter(|_| is_drive(inputs)) {
-        all.push(Carrier { name: "direction", values: velocity.iter().map(|v| if *v == 0.0 { 0.0 } else { v.signum() }).collect() });
+        all.push(Carrier {
+            name: "direction",
+            values: velocity.iter().map(|v| if *v == 0.0 { 0.0 } else { v.signum() }).collect(),
+        });
     }
     if let Some(speed) = inputs.speed.as_ref().filter(|_| inputs.kind != OutputKind::Displacement) {
         all.push(Carrier { name: "speed", values: speed.clone() });
     }
     for carrier in &mut all {
-        let acting: Vec<f64> =
-            inputs.taken(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
+        let acting: Vec<f64> = inputs.taken(false).map(|row| carrier.values[row]).filter(|x| x.abs() > 1e-9).collect();
         let size = crate::statistics::rms(&acting).max(f64::MIN_POSITIVE);
         carrier.values.iter_mut().for_each(|x| *x /= size);
     }
@@ -158,7 +164,11 @@ fn bumps(inputs: &Inputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Ve
     let at = |share: f64| {
         let place = share * crate::statistics::count(last);
         let low = place.floor();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count lies within it")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a count lies within it"
+        )]
         let index = low as usize;
         sorted[index] + (place - low) * (sorted[(index + 1).min(last)] - sorted[index])
     };

@@ -144,7 +144,10 @@ impl Spindle<'_> {
             if let (Some(low), Some(high)) = (known.first(), known.last())
                 && low < high
             {
-                return vec![("recorded".to_owned(), self.inputs.column(|row| f64::from(u8::from(stage[row] == *low))))];
+                return vec![(
+                    "recorded".to_owned(),
+                    self.inputs.column(|row| f64::from(u8::from(stage[row] == *low))),
+                )];
             }
         }
         self.speeds_between().into_iter().map(|limit| (format!("{limit:.0} rpm"), below(limit))).collect()
@@ -158,7 +161,9 @@ impl Spindle<'_> {
         } else {
             let mut all: Vec<f64> = self.inputs.taken(false).map(|row| self.rpm[row]).collect();
             all.retain(|n| *n > 0.02 * self.top_rpm);
-            (0..12).filter_map(|k| crate::statistics::quantile(all.iter().copied(), 0.12 + 0.069 * f64::from(k))).collect()
+            (0..12)
+                .filter_map(|k| crate::statistics::quantile(all.iter().copied(), 0.12 + 0.069 * f64::from(k)))
+                .collect()
         };
         between.dedup_by(|b, a| *b - *a < least);
         let size = between.len();
