@@ -26,8 +26,6 @@ pub(super) struct Baseline {
     pub(super) simulated: Vec<f64>,
     /// Change of the output with each free parameter, row by row.
     pub(super) tangents: Vec<Vec<f64>>,
-    /// The free parameters.
-    pub(super) free: Vec<Free>,
 }
 
 /// Refits the parts over some rows; the scene keeps load and simulated output of the refitted model. `None` when a part
@@ -54,7 +52,7 @@ pub(super) fn refit(scene: &mut Scene, parts: &[Part], rows: &[usize]) -> Option
     }
     let (simulated, tangents) = tangents(scene, &parts, &free)?;
     simulate(&parts, scene)?;
-    Some(Baseline { parts, simulated, tangents, free })
+    Some(Baseline { parts, simulated, tangents })
 }
 
 /// Goes the step, or as much of it as makes the error smaller.

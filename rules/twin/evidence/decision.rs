@@ -1,6 +1,22 @@
 //! The one rule by which something is reported, and the table of its thresholds.
+//!
+//! Something is reported when nothing is improbable, when it lowers the error of fitted units that took no part in its
+//! sizes, and when the held-out error falls. It has a name when a law makes its curve; the name stands alone when it holds
+//! most of the probability and no other law makes the same curve.
+//!
+//! | threshold | source | cost of being wrong | noticed by |
+//! |---|---|---|---|
+//! | `nothing_max` | odds of 7 to 1 against nothing; priors of -4.6 and -6.2 nats a name and a curve pay for the search | higher: false reports; lower: silence about weak effects | recordings with nothing hidden |
+//! | `inner_gain` | less than one deviation of a paired sum: it only refuses what does not carry over at all | higher: silence; lower: forms that fit one unit only | recordings with nothing hidden, real placebos |
+//! | `alone` | the second name holds at most 15 % | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |
+//! | `name_share` | a tenth of a curve is noise at usual sizes, another tenth is form | higher: `unknown` for known laws; lower: names for unlisted physics | laws left out of the catalogue |
+//! | `pair_more`, `pair_gain` | two laws with five columns make 12 % of a smooth curve by chance | lower: pairs of names for one unlisted law | the same |
+//! | `class_nats` | odds of 7 to 1 | higher: classes everywhere; lower: one of a class told as sure | concealed classes |
+//! | `unknown_share` | a third of the energy without a name is more than a form error of 15 % in three directions | higher: names beside unknown physics | unlisted beside listed effects |
+//! | `name_energy`, `size_noise`, `size_output` | below what a user would act on: a class 0.5 meter is wrong by as much | higher: lost small effects; lower: clutter | concealed pairs |
+//! | `looked_at`, `beside` | odds of 400 and 33 to 1 | higher: long lists of names; lower: the truth missing from a class | concealed classes |
 
-/// Every threshold of the decision. Each says where it comes from, what it costs to be wrong and which test notices.
+/// Every threshold of the decision; units and meaning beside each, source and cost in the table above.
 pub(super) struct Thresholds {
     /// Greatest probability of "nothing" with which something is reported.
     pub(super) nothing_max: f64,

@@ -91,20 +91,10 @@ impl<'a> Comparison<'a> {
         self.fixed.len()
     }
 
-    /// Number of the output's column.
-    pub(super) fn last(&self) -> usize {
-        self.fixed.len() + self.bank.columns.len()
-    }
-
     /// Columns of a variant.
     pub(super) fn columns(&self, variant: usize) -> Range<usize> {
         let of = &self.bank.variants[variant].columns;
         self.first() + of.start..self.first() + of.end
-    }
-
-    /// Levels of the runs.
-    pub(super) fn levels(&self) -> Range<usize> {
-        self.tangents..self.fixed.len()
     }
 
     /// Tangents of the baseline, levels of the runs and the output, as they stand in the Gram matrix.

@@ -79,9 +79,9 @@ pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], noi
     if changes < CHANGES_MIN {
         return None;
     }
-    // When something changes has to be told change by change: what that costs no path can save.
+    // When something changes has to be told change by change, ln C(rows, changes): what that costs no path can save.
     let rows = count(inputs.taken(false).count());
-    let told = -count(changes) * (rows / count(changes)).ln();
+    let told = -count(changes) * ((rows / count(changes)).ln() + 1.0);
     let ln = chain.evidence(&on, levels).min(told) + SEQUENCE;
     chain.follow(&mut on, levels);
     Some(Sequence { on, changes, ln })
@@ -215,16 +215,16 @@ impl Chain<'_> {
         let usual = crate::statistics::mean(&fitted);
         let (stay, turn) = (1.0 - levels.change, levels.change);
         let mut share = usual;
-        for row in 0..self.inputs.rows {
+        for (row, on) in on.iter_mut().enumerate() {
             if self.inputs.fitted[row] {
-                share = on[row];
+                share = *on;
                 continue;
             }
             if self.memory[row] == 0.0 && (row == 0 || self.inputs.block[row] != self.inputs.block[row - 1]) {
                 share = usual;
             }
             let expected = share * stay + (1.0 - share) * turn;
-            on[row] = f64::from(u8::from(expected > 0.5));
+            *on = f64::from(u8::from(expected > 0.5));
             if !self.inputs.comparable[row] {
                 continue;
             }

@@ -67,8 +67,8 @@ impl<'a> Inner<'a> {
         Self { comparison, inputs, tall, parts, grams, ridge, members: places, fixed: fixed.len() }
     }
 
-    /// Gain of these members over those, in deviations of it.
-    pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> f64 {
+    /// Gain of these members over those: in deviations of it, and in squares.
+    pub(super) fn gain(&self, with: &[usize], without: &[usize]) -> (f64, f64) {
         let whole = self.grams.iter().skip(1).fold(self.grams[0].clone(), |sum, gram| sum + gram);
         let stretch = (PAIRED_S / self.inputs.period_s).round().max(PAIRED_ROWS);
         let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
@@ -90,7 +90,7 @@ impl<'a> Inner<'a> {
         }
         let sum: f64 = gained.values().sum();
         let squares: f64 = gained.values().map(|x| x * x).sum();
-        sum / (squares.sqrt() + 1e-30)
+        (sum / (squares.sqrt() + 1e-30), sum)
     }
 
     /// Posterior means of some members, zero for the others; a run that is left out has no level.

@@ -1,6 +1,6 @@
 //! What the families see: the inputs of a recording by the part they play, and which rows are fitted.
 
-use crate::physics::drive::{is_axis_output, is_signed, rate};
+use crate::physics::drive::{is_axis_output, rate};
 use crate::physics::{OutputKind, Role, Scene};
 use crate::statistics::{count, median};
 use crate::twin::frame::Unit;
@@ -26,8 +26,6 @@ pub(super) struct Inputs<'a> {
     pub(super) run: Vec<usize>,
     /// Unit of hold-out of each row.
     pub(super) unit: Vec<usize>,
-    /// Units that are held out.
-    pub(super) held: BTreeSet<usize>,
     /// Rows with a recorded output and every input of the model.
     pub(super) comparable: Vec<bool>,
     /// Comparable rows that are fitted.
@@ -74,8 +72,6 @@ pub(super) struct Inputs<'a> {
     pub(super) kind: OutputKind,
     /// Does the output belong to a feed drive?
     pub(super) is_axis: bool,
-    /// Does it change its sign with the direction?
-    pub(super) is_signed: bool,
 }
 
 impl<'a> Inputs<'a> {
@@ -99,7 +95,6 @@ impl<'a> Inputs<'a> {
             block: blocks(&clock_s, scene.period_s(), &unit),
             run,
             unit,
-            held: held.clone(),
             simulated: scene.simulated().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
             in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| e.iter().map(|e| *e > 0.5).collect()),
             speed: own(Role::Speed).map(|n| n.iter().map(|n| n.abs()).collect()),
@@ -125,7 +120,6 @@ impl<'a> Inputs<'a> {
             to_end_s: vec![1e9; rows],
             kind: scene.output_kind(),
             is_axis: is_axis_output(scene),
-            is_signed: is_signed(scene),
             engaged,
             clock_s,
             comparable,

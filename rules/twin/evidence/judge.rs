@@ -78,29 +78,28 @@ impl Judge<'_> {
                 continue;
             }
             let information = 2.0 * (group.ln - nothing);
-            return match self.not_withdrawn(self.less(group.best, &kept)) {
-                Some(best) => self.named(&best, &groups, information, debug),
-                None => self.nothing(format!("{debug}; withdrawn: the held-out error does not fall")),
+            let Some(best) = self.not_withdrawn(self.less(group.best, &kept)) else {
+                return self.nothing(format!("{debug}; withdrawn: the held-out error does not fall"));
             };
+            let mut answer = self.named(&best, &groups, information, debug);
+            if best.members.len() < kept.len() && answer.verdict == Verdict::Explained {
+                // What explained most did not carry over: what is left of it has no sure name.
+                answer.debug.push_str("; withdrawn in part");
+                answer.leave_unnamed(&groups, best.ln);
+            }
+            return answer;
         }
         self.nothing(format!("{debug}; inner parts gain nothing"))
     }
 
-    /// The members that carry over to fitted units which took no part in their sizes, and what they gain there together:
-    /// as long as one does not, the one that costs most goes.
+    /// The members that carry over to fitted units which took no part in their sizes, and what they gain there together.
     fn carried_over(&self, of: &Explanation) -> (Vec<usize>, f64) {
         let inner = Inner::new(self.inputs, self.comparison, &self.settings[of.noise], &of.members);
-        let mut kept: Vec<usize> = (0..of.members.len()).collect();
-        while kept.len() > 1 {
-            let without = |member: usize| kept.iter().copied().filter(|other| *other != member).collect::<Vec<_>>();
-            let gains = kept.iter().map(|member| (inner.gain(&kept, &without(*member)), *member));
-            let Some((gain, worst)) = gains.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-            if gain > 0.0 {
-                break;
-            }
-            kept = without(worst);
-        }
-        let gain = inner.gain(&kept, &[]);
+        let all: Vec<usize> = (0..of.members.len()).collect();
+        let without = |gone: usize| all.iter().copied().filter(|member| *member != gone).collect::<Vec<_>>();
+        let costs = |member: &usize| inner.gain(&all, &without(*member)).0 <= 0.0;
+        let kept = if all.iter().any(costs) { best_of(&inner, &all) } else { all };
+        let gain = inner.gain(&kept, &[]).0;
         (kept, gain)
     }
 
@@ -431,4 +430,12 @@ pub(super) fn sum_of(all: &[Named], rows: usize) -> Vec<f64> {
         sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
     }
     sum
+}
+
+/// Of all sets of members the one that gains most in units that took no part in its sizes.
+fn best_of(inner: &Inner<'_>, all: &[usize]) -> Vec<usize> {
+    let sets = (1_usize..1 << all.len())
+        .map(|bits| all.iter().copied().filter(|member| bits >> member & 1 == 1).collect::<Vec<_>>());
+    let gained = sets.map(|set| (inner.gain(&set, &[]).1, set));
+    gained.max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(Vec::new, |(_, set)| set)
 }

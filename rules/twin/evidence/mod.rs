@@ -188,12 +188,12 @@ fn is_same(inputs: &Inputs<'_>, a: &[f64], b: &[f64]) -> bool {
     let rows: Vec<usize> = inputs.taken(false).collect();
     let equal = rows.iter().filter(|row| (a[**row] - b[**row]).abs() < 0.5).count();
     let share = crate::statistics::count(equal) / crate::statistics::count(rows.len().max(1));
-    share > SAME_SEQUENCE || share < 1.0 - SAME_SEQUENCE
+    !(1.0 - SAME_SEQUENCE..=SAME_SEQUENCE).contains(&share)
 }
 
 /// A sequence as a consumer, as an event in the cut, and as a regime of the coolant.
 fn add_sequence(inputs: &Inputs<'_>, second: &mut Second, sequence: hidden::Sequence, number: usize) {
-    let label = format!("hidden, {} changes", sequence.changes);
+    let label = format!("hidden, {} changes, {:.0} nats", sequence.changes, sequence.ln);
     let named = |kind: &'static str| Owner::Named(Family::of(kind).wide());
     second.add(inputs, named("auxiliary_switch"), label.clone(), sequence.on.clone(), sequence.ln);
     let cuts = inputs.taken(false).filter(|row| inputs.in_cut[*row]).count();
@@ -208,3 +208,6 @@ fn add_sequence(inputs: &Inputs<'_>, second: &mut Second, sequence: hidden::Sequ
         second.add(inputs, named("coolant_regime"), label, regime, sequence.ln - 1.0);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -115,7 +115,11 @@ impl<'a> Naming<'a> {
         single.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = single.first()?;
         let one = Claim { share: best.0, laws: vec![(best.1, best.2.clone())] };
-        if one.share >= THRESHOLDS.name_share {
+        // Levels of a group are few: two laws that hold in some of its members claim them by chance.
+        let levels = parts
+            .iter()
+            .any(|(variant, _)| self.bank.variants[*variant].drawn().is_some_and(|drawn| drawn.shape == "levels"));
+        if one.share >= THRESHOLDS.name_share || levels {
             return Some(one);
         }
         let pair = self.pair(metric, &along, square, &single);

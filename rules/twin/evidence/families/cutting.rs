@@ -69,8 +69,8 @@ fn over_speed(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
         let bent = inputs.column(|row| cut[row] * (over(row).powi(2) - spread * spread) * inputs.cutting(row));
         bank.of(SOFTENING, "").columns(inputs, [(linear, 1.0), (bent, 0.3)]);
     }
-    for (centre, width) in [(25.0, 10.0), (35.0, 12.0), (45.0, 15.0)] {
-        let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width as f64).powi(2)).exp());
+    for (centre, width) in [(25.0_f64, 10.0_f64), (35.0, 12.0), (45.0, 15.0)] {
+        let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width).powi(2)).exp());
         bank.of(BUILT_UP, centre).column(inputs, law);
     }
 }

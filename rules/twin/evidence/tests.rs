@@ -1,0 +1,65 @@
+//! The engine from end to end, on a slide whose simulation knows mass and viscous friction only.
+
+use super::diagnose;
+use crate::twin::diagnosis::Verdict;
+use crate::twin::{Diagnosis, parse_model};
+use adapters::recording::read_csv;
+use std::fmt::Write;
+
+const MODEL: &str = "schema = \"model/1\"\noutput = \"force_n\"\n[[effect]]\nkind = \"linear\"\n\
+                     columns = { acceleration_m_s2 = 90.0, velocity_m_s = 200.0, one = 0.0 }\n\
+                     [roles]\nvelocity = \"velocity_m_s\"\nacceleration = \"acceleration_m_s2\"\n";
+const RUNS: u32 = 8;
+const ROWS: u32 = 250;
+
+/// Eight runs of a slide that goes to and fro at changing speeds, with dry friction of this level and a noise of 2 N.
+fn recorded(level_n: f64) -> String {
+    let mut text = String::from("time_s,run,velocity_m_s,acceleration_m_s2,force_n\n");
+    let mut state = 12_345_u64;
+    let mut noise = || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += f64::from(u32::try_from(state >> 33).unwrap_or(0)) / f64::from(1_u32 << 31);
+        }
+        2.0 * (sum - 6.0)
+    };
+    for row in 0..RUNS * ROWS {
+        let t = f64::from(row) * 0.01;
+        let (slow, fast) = (1.3 * t, 4.1 * t);
+        let velocity = 0.1 * slow.sin() + 0.04 * fast.sin();
+        let acceleration = 0.13 * slow.cos() + 0.164 * fast.cos();
+        let force = 95.0 * acceleration + 215.0 * velocity + level_n * (velocity / 0.001).tanh() + noise();
+        writeln!(text, "{t},{},{velocity},{acceleration},{force}", row / ROWS).expect("a string takes it");
+    }
+    text
+}
+
+fn diagnosed(level_n: f64) -> Diagnosis {
+    let recording = read_csv(recorded(level_n).as_bytes(), "t.csv").expect("readable").recording;
+    diagnose(&recording, &parse_model(MODEL).expect("fine")).expect("usable")
+}
+
+#[test]
+fn dry_friction_is_named_with_its_level_and_the_held_out_error_falls() {
+    let found = diagnosed(20.0);
+    assert_eq!(found.verdict, Verdict::Explained, "{}", found.debug);
+    assert_eq!(found.missing[0].effect, "dry_friction");
+    let level = found.missing[0].parameters.iter().find(|parameter| parameter.name == "level").expect("its level");
+    assert!((level.value - 20.0).abs() < 1.0, "{level:?}");
+    let share = found.fit.expect("fitted").held_out_share().expect("held out");
+    assert!(share < 0.3, "{share}");
+}
+
+#[test]
+fn nothing_is_reported_where_nothing_is_missing() {
+    let found = diagnosed(0.0);
+    assert_eq!(found.verdict, Verdict::NoMismatch, "{}", found.debug);
+    assert!(found.missing.is_empty());
+}
+
+#[test]
+fn the_same_recording_gives_the_same_answer() {
+    let (one, other) = (diagnosed(3.0), diagnosed(3.0));
+    assert_eq!((one.rows, one.missing, one.summary), (other.rows, other.missing, other.summary));
+}
