@@ -32,9 +32,11 @@ impl Journal {
         }
     }
 
-    /// The state began when the estimators say so, but never before the state that it ends.
+    /// The state began when the estimators say so, but never before the state that it ends. Where they do not know yet, at 0,
+    /// it began with this sample: otherwise the history would hold a state that has lasted since 1970.
     fn state_change(&mut self, channels: &Channels, sample: &Sample, estimates: &Estimates) -> StateChange {
-        let at_ns = estimates.since_ns.clamp(self.since_ns, sample.at_ns.max(self.since_ns));
+        let said_ns = if estimates.since_ns == 0 { sample.at_ns } else { estimates.since_ns };
+        let at_ns = said_ns.clamp(self.since_ns, sample.at_ns.max(self.since_ns));
         (self.state, self.since_ns) = (Some(estimates.state), at_ns);
         let text = |channel| sample.text(channel).unwrap_or_default().to_owned();
         StateChange {
@@ -88,6 +90,13 @@ mod tests {
         assert!(records(&mut journal, 11, State::Idle, None).is_empty());
         let changed = records(&mut journal, 12, State::Cutting, None);
         assert!(matches!(&changed[..], [Record::State(change)] if change.at_ns == 9), "{changed:?}");
+    }
+
+    #[test]
+    fn a_state_of_which_the_beginning_is_not_known_begins_with_the_sample() {
+        // 3 is what the estimates of this test subtract: they say 0, which is "not known".
+        let first = records(&mut Journal::default(), 3, State::Unknown, None);
+        assert!(matches!(&first[..], [Record::State(change)] if change.at_ns == 3), "{first:?}");
     }
 
     #[test]
