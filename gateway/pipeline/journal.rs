@@ -97,6 +97,13 @@ mod tests {
     }
 
     #[test]
+    fn a_state_of_which_the_beginning_is_not_known_begins_with_the_sample() {
+        // 3 is what the estimates of this test subtract: they say 0, which is "not known".
+        let first = records(&mut Journal::default(), 3, State::Unknown, None);
+        assert!(matches!(&first[..], [Record::State(change)] if change.at_ns == 3), "{first:?}");
+    }
+
+    #[test]
     fn the_controllers_alarm_is_raised_and_cleared_and_survives_silence() {
         let mut journal = Journal::default();
         records(&mut journal, 10, State::Idle, Some(""));
