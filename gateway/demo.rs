@@ -64,7 +64,8 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
         replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;
-        replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, ended_s)?).map_err(words)?;
+        // The state that the estimators remember would otherwise seem to have lasted since then.
+        replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, (now_ns / SECOND_NS) as f64)?).map_err(words)?;
         replace(&model, MODEL).map_err(words)?;
     }
     let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);

@@ -121,13 +121,14 @@ function show(element, found, context) {
 
 function feedCard(context) {
   const force = make("span", "value", "–", { "data-quantity": "feed_override_pct" });
+  const percent = make("span", "unit", "%");
   const armed = make("p", "armed-words", " ");
   const facts = ["dial", "asked", "let_through", "in_force"];
   const cells = Object.fromEntries(facts.map((key) => [key, make("dd", "", "–")]));
   const list = make("dl", "facts", facts.map((key) => make("div", "", [make("dt", "", t(`override_${key}`)), cells[key]])));
   const why = make("p", "note why", " ");
   const actions = make("div", "buttons");
-  const section = make("section", "card feed ages", [make("h2", "", t("short_feed_override_pct")), make("div", "feed-body", [make("p", "reading", [force, make("span", "unit", "%")]), list]), armed, why, actions]);
+  const section = make("section", "card feed ages", [make("h2", "", t("short_feed_override_pct")), make("div", "feed-body", [make("p", "reading", [force, percent]), list]), armed, why, actions]);
   const back = make("button", "danger", t("back_to_dial"), { type: "button", hidden: true, onclick: () => disarm(back, context) });
   const arm = make("button", "", t("arm"), { type: "button", hidden: true, onclick: () => armDialog(context) });
   actions.append(arm, back);
@@ -136,6 +137,7 @@ function feedCard(context) {
     const gate = status.gate;
     const found = context.quantity("feed_override_pct");
     show(force, found, context);
+    say(percent, found && !found.missing ? "%" : "");
     const dial = context.quantity("feed_override_dial_pct");
     say(cells.dial, dial && !dial.missing ? pct(dial.value) : "–");
     say(cells.asked, pct(gate.wanted_pct));
