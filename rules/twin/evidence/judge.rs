@@ -380,7 +380,7 @@ impl Judge<'_> {
     fn debug(&self, groups: &[Group<'_>]) -> String {
         let member = |(variant, size): &(usize, usize)| {
             let of = &self.second.bank.variants[*variant];
-            format!("{} [{}] {}", of.kind().unwrap_or("?"), of.label, super::evidence::SIZES[*size])
+            format!("{} [{}] {}", of.kind().unwrap_or("?"), of.label, super::marginal::SIZES[*size])
         };
         let of = |group: &Group<'_>| {
             let members: Vec<String> = group.best.members.iter().map(member).collect();

@@ -87,7 +87,7 @@ mod tests {
     fn the_innovations_of_an_impulse_follow_the_recursion() {
         let noise = Noise::of(0.7, 0.8);
         let mut column = vec![0.0, 1.0, 0.0];
-        noise.whiten(&mut column, &[0..3]);
+        noise.whiten(&mut column, std::slice::from_ref(&(0..3)));
         let deviation = noise.variance.sqrt();
         assert!((column[1] - 1.0 / deviation).abs() < 1e-12);
         assert!((column[2] - (-0.8 - noise.theta) / deviation).abs() < 1e-12);
