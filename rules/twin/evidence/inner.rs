@@ -4,9 +4,9 @@
 //! drown what is there. Only fitted units are asked; those that are held out stay out of it.
 
 use super::algebra::{Factor, add_gram, mirror};
-use super::evidence::SIZES;
 use super::gram::Comparison;
 use super::inputs::Inputs;
+use super::marginal::SIZES;
 use super::posterior::Setting;
 use crate::statistics::count;
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};

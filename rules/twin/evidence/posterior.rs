@@ -1,7 +1,7 @@
 //! The posterior: sets of the second stage summed over the likely noises, and by what they say.
 
-use super::evidence::{Ground, Saturated, ln_sum};
 use super::gram::{Comparison, Gram};
+use super::marginal::{Ground, Saturated, ln_sum};
 use super::naming::{Claim, Naming};
 use super::search::{Found, Members, Search};
 use super::second::Second;

@@ -1,8 +1,8 @@
 //! The search: sets of variants by their evidence, a few at a time, up to three together.
 
 use super::bank::Bank;
-use super::evidence::{Ground, State};
 use super::gram::Comparison;
+use super::marginal::{Ground, State};
 use std::collections::BTreeMap;
 
 /// Prior of a named kind, shared by its variants, and of a nameless curve.

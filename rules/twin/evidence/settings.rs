@@ -1,8 +1,8 @@
 //! Which settings of the noise are likely: those that the empty or the saturated model makes likely are summed out.
 
-use super::evidence::Saturated;
 use super::gram::{Comparison, Gram};
 use super::inputs::Inputs;
+use super::marginal::Saturated;
 use super::noise::Noise;
 
 /// Nameless curves that stand for everything that may be there.
