@@ -1,6 +1,5 @@
 //! From explanations to an answer: what is reported, with which names, and what it contributes where.
 
-use super::bank::Since;
 use super::decision::THRESHOLDS;
 use super::gram::Comparison;
 use super::inner::Inner;
@@ -8,7 +7,7 @@ use super::inputs::Inputs;
 use super::naming::Naming;
 use super::posterior::{Explanation, Group, Setting, grouped};
 use super::second::Second;
-use crate::statistics::{count, rms};
+use crate::statistics::count;
 use crate::twin::diagnosis::Verdict;
 use std::collections::BTreeMap;
 
@@ -16,8 +15,6 @@ use std::collections::BTreeMap;
 pub(super) const UNKNOWN: &str = "unknown";
 /// Groups that are looked at.
 const GROUPS: usize = 8;
-/// Squared deviations gained from which a step is taken to have begun in a held-out run.
-const BEGUN: f64 = 12.0;
 
 /// Everything a judgement reads.
 pub(super) struct Judge<'a> {
@@ -57,7 +54,7 @@ pub(super) struct Answer {
 }
 
 /// A contribution under a name.
-type Named = (String, Vec<f64>);
+pub(super) type Named = (String, Vec<f64>);
 
 impl Judge<'_> {
     /// The answer.
@@ -260,121 +257,6 @@ impl Judge<'_> {
         }
         class.sort();
         class
-    }
-
-    /// The output with what an explanation adds, and each name's contribution.
-    pub(super) fn contributions(&self, of: &Explanation) -> (Vec<f64>, Vec<Named>) {
-        let setting = &self.settings[of.noise];
-        let solved = self.comparison.solve(&setting.gram.whole, setting.saturated.variance, &of.members);
-        let mut after = self.inputs.simulated.clone();
-        for (index, w) in solved.tangents.iter().enumerate() {
-            let tangent = self.comparison.tangent(index);
-            after.iter_mut().zip(tangent).for_each(|(sum, x)| *sum += w * x);
-        }
-        let mut all: Vec<Named> = Vec::new();
-        let mut put = |name: String, x: Vec<f64>| match all.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, sum)) => sum.iter_mut().zip(&x).for_each(|(sum, x)| *sum += x),
-            None => all.push((name, x)),
-        };
-        let mut steps = Vec::new();
-        let mut shared: Vec<(usize, Vec<f64>)> = Vec::new();
-        for (at, (variant, _)) in of.members.iter().enumerate() {
-            let variant = &self.second.bank.variants[*variant];
-            let x = self.second.bank.contribution(variant, &solved.members[at]);
-            match (variant.kind(), &of.claims[at]) {
-                (Some(kind), _) => {
-                    if let Some(Since::Run(run)) = variant.since {
-                        steps.push((kind.to_owned(), run));
-                    }
-                    put(kind.to_owned(), x);
-                }
-                (None, None) => put(UNKNOWN.to_owned(), x),
-                (None, Some(_)) => shared.push((at, x)),
-            }
-        }
-        self.put_claimed(of, shared, &mut put);
-        after = self.sum_with(after, &all);
-        for (kind, run) in steps {
-            self.begin_earlier(&kind, run, &mut after, &mut all);
-        }
-        (after, all)
-    }
-
-    fn sum_with(&self, mut after: Vec<f64>, all: &[Named]) -> Vec<f64> {
-        for (_, x) in all {
-            after.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
-        }
-        after
-    }
-
-    /// A claimed curve goes to its names by the regression; what that leaves of it goes to the larger.
-    fn put_claimed(&self, of: &Explanation, shared: Vec<(usize, Vec<f64>)>, put: &mut impl FnMut(String, Vec<f64>)) {
-        let mut done: Vec<usize> = Vec::new();
-        for (at, _) in &shared {
-            let Some(claim) = of.claims[*at].as_ref().filter(|_| !done.contains(at)) else { continue };
-            // Curves that were claimed together are split together.
-            let same = |other: &usize| of.claims[*other].as_ref().is_some_and(|c| c.laws == claim.laws);
-            let together: Vec<&(usize, Vec<f64>)> = shared.iter().filter(|(other, _)| same(other)).collect();
-            let mut left = vec![0.0; self.inputs.rows];
-            for (other, x) in together {
-                done.push(*other);
-                left.iter_mut().zip(x).for_each(|(sum, x)| *sum += x);
-            }
-            let parts: Vec<Vec<f64>> = claim.laws.iter().map(|law| self.naming.contribution(law)).collect();
-            for part in &parts {
-                left.iter_mut().zip(part).for_each(|(left, x)| *left -= x);
-            }
-            let largest = (0..parts.len()).max_by(|a, b| rms(&parts[*a]).total_cmp(&rms(&parts[*b])));
-            for (number, mut part) in parts.into_iter().enumerate() {
-                if Some(number) == largest {
-                    part.iter_mut().zip(&left).for_each(|(sum, x)| *sum += x);
-                }
-                put(self.naming.kind(claim.laws[number].0).unwrap_or_default(), part);
-            }
-        }
-    }
-
-    /// A level that begins with a run may have begun in the held-out runs before it: their own earlier rows tell.
-    fn begin_earlier(&self, kind: &str, run: usize, after: &mut [f64], all: &mut [Named]) {
-        let inputs = self.inputs;
-        let law = if kind == "hardness_batch" { inputs.cut.as_ref() } else { Some(&inputs.simulated) };
-        let (Some(law), Some((_, own))) = (law, all.iter_mut().find(|(name, _)| name == kind)) else { return };
-        let later = || (0..inputs.rows).filter(|row| inputs.run[*row] >= run);
-        let height = later().map(|row| own[row]).sum::<f64>() / (later().map(|row| law[row]).sum::<f64>() + 1e-30);
-        for earlier in (0..run).rev() {
-            let rows = inputs.scene.runs()[earlier].clone();
-            if rows.clone().any(|row| inputs.fitted[row]) {
-                break;
-            }
-            let mut gained = 0.0;
-            for row in rows {
-                let step = height * law[row];
-                let before = after[row];
-                if gained > BEGUN {
-                    own[row] += step;
-                    after[row] += step;
-                }
-                if inputs.comparable[row] {
-                    let error = self.recorded[row] - before;
-                    gained += (error * error - (error - step).powi(2)) / self.ordinary.powi(2);
-                }
-            }
-        }
-    }
-
-    /// What the baseline cannot imitate of a contribution.
-    pub(super) fn remaining(&self, x: &[f64]) -> Vec<f64> {
-        let rows: Vec<usize> = self.inputs.taken(false).collect();
-        let sizes: Vec<f64> = self.tangents.iter().map(|t| rms(t) + 1e-30).collect();
-        let scaled = self.tangents.iter().zip(&sizes);
-        let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();
-        let wanted: Vec<f64> = rows.iter().map(|row| x[*row]).collect();
-        let w = crate::twin::linear::least_squares(&columns, &wanted).coefficients;
-        let mut left = x.to_vec();
-        for ((tangent, size), w) in self.tangents.iter().zip(&sizes).zip(&w) {
-            left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);
-        }
-        left
     }
 
     fn debug(&self, groups: &[Group<'_>]) -> String {

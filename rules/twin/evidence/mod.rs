@@ -2,8 +2,8 @@
 //!
 //! 1. The model is refitted by plain least squares; from then on the simulation stands still (`baseline.rs`).
 //! 2. Every family of laws, named by the catalogue or nameless, is columns in one bank (`bank.rs`, `families/`).
-//! 3. One Gram matrix for each likely noise, kept for each inner part of the fitted rows (`gram.rs`, `noise.rs`).
-//! 4. The evidence of a set of variants is a Schur complement of it, all sizes summed out (`evidence.rs`, `search.rs`),
+//! 3. One Gram matrix for each likely noise, a Schur complement away from every hypothesis (`gram.rs`, `noise.rs`).
+//! 4. The evidence of a set of variants is a Schur complement of it, all sizes summed out (`marginal.rs`, `search.rs`),
 //!    first for the forms as they are, then for the leading ones with their form widened (`second.rs`).
 //! 5. A nameless curve that is the curve of a named law gets its name (`naming.rs`).
 //! 6. One rule decides what is reported (`decision.rs`, `judge.rs`): improbable that there is nothing, better on inner
@@ -13,6 +13,7 @@
 mod algebra;
 mod bank;
 mod baseline;
+mod contributions;
 mod decision;
 mod families;
 mod gram;
