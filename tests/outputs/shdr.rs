@@ -31,7 +31,7 @@ fn agent(devices: &Path, port: u16, seconds: f64) -> Option<Json> {
 fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
     let port = free_port();
     let mut sending = Sending::fast(&format!("shdr://127.0.0.1:{port}"));
-    sending.wait_sink("listening", |sink| sink["state"] == "connected" && sink["delivered"].as_u64() > Some(10));
+    sending.wait_sink("listening", |sink| sink["state"] == "connected" && sink["delivered"].as_u64() > Some(400));
     let devices = sending.devices();
     let Some(agent) = agent(&devices, port, 4.0) else { return };
     sending.stop();
