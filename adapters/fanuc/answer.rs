@@ -77,7 +77,7 @@ impl SpeedUnit {
 
     /// Its number in the library.
     #[must_use]
-    pub fn library_number(self) -> i16 {
+    pub fn number_in_library(self) -> i16 {
         match self {
             Self::Unknown(number) => number,
             known => Self::ALL.iter().find(|(unit, _)| *unit == known).map_or(0, |(_, number)| *number),
@@ -98,7 +98,7 @@ impl SpeedUnit {
     pub fn newer_number(self) -> i16 {
         match self {
             Self::Unknown(number) => number,
-            known => known.library_number() + Self::WIRE_OFFSET,
+            known => known.number_in_library() + Self::WIRE_OFFSET,
         }
     }
 

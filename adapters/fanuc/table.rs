@@ -64,7 +64,7 @@ pub struct Row {
     /// Its answer.
     pub answer: &'static str,
     /// Calls of the vendor's library that send it.
-    pub library: &'static str,
+    pub calls: &'static str,
     /// Where it is known from.
     pub known: Known,
 }
@@ -87,7 +87,7 @@ macro_rules! table {
             era: Era::$era,
             arguments: $arguments,
             answer: $answer,
-            library: $library,
+            calls: $library,
             known: Known::$known,
         },)*];
     };
@@ -171,7 +171,7 @@ pub fn markdown() -> String {
             row.era.word(),
             row.arguments,
             row.answer,
-            row.library,
+            row.calls,
             row.known.word()
         )
     };

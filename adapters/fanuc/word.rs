@@ -82,7 +82,7 @@ impl Word {
 
     /// Its number in the vendor's library.
     #[must_use]
-    pub fn library_number(self) -> Option<i16> {
+    pub fn number_in_library(self) -> Option<i16> {
         Self::ALL.iter().find(|(word, _)| *word == self).and_then(|(_, number)| *number)
     }
 
@@ -105,7 +105,7 @@ mod tests {
         // By hand from the reference: cnc_modal(103), (106), (107), (108) and (109) ask for 5, 11, 21, 22 and 20.
         let asked = [(Word::F, 5, 103), (Word::M, 11, 106), (Word::S, 21, 107), (Word::T, 22, 108), (Word::R, 20, 109)];
         for (word, wire, library) in asked {
-            assert_eq!((word.number(), word.library_number()), (wire, Some(library)), "{word:?}");
+            assert_eq!((word.number(), word.number_in_library()), (wire, Some(library)), "{word:?}");
         }
         assert_eq!(Word::of_number(29), None);
     }

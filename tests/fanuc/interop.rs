@@ -310,7 +310,7 @@ fn interop_units_as_the_vendors_library_and_our_child_with_it_read_them() {
                 let told = ask_library(&library, &server, &[&call]).remove(0);
                 assert_eq!(
                     told["numbers"],
-                    json!([case.shown.0, case.shown.1, case.library]),
+                    json!([case.shown.0, case.shown.1, case.in_library]),
                     "{version} {:?}",
                     case.unit
                 );

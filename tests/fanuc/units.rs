@@ -18,7 +18,7 @@ use std::net::TcpStream;
 pub(crate) struct Case {
     pub(crate) unit: SpeedUnit,
     /// `SPEEDELM.unit` of the FOCAS2 manual.
-    pub(crate) library: i16,
+    pub(crate) in_library: i16,
     /// Number on the wire of a newer control: the library takes 3 off.
     newer: u8,
     /// On the wire of an older control: only inches are told apart.
@@ -30,10 +30,10 @@ pub(crate) struct Case {
 
 /// By hand: 47.25 in/min x 25.4 = 1200.15; 0.25 mm/rev x 1000 rpm = 250; 0.01 in/rev x 25.4 x 1000 rpm = 254.
 pub(crate) const CASES: [Case; 4] = [
-    Case { unit: SpeedUnit::MmMin, library: 0, newer: 3, older: 0, shown: (1200, 0), mm_min: 1200.0 },
-    Case { unit: SpeedUnit::InchMin, library: 1, newer: 4, older: 1, shown: (4725, 2), mm_min: 1200.15 },
-    Case { unit: SpeedUnit::MmRev, library: 3, newer: 6, older: 0, shown: (25, 2), mm_min: 250.0 },
-    Case { unit: SpeedUnit::InchRev, library: 4, newer: 7, older: 1, shown: (10, 3), mm_min: 254.0 },
+    Case { unit: SpeedUnit::MmMin, in_library: 0, newer: 3, older: 0, shown: (1200, 0), mm_min: 1200.0 },
+    Case { unit: SpeedUnit::InchMin, in_library: 1, newer: 4, older: 1, shown: (4725, 2), mm_min: 1200.15 },
+    Case { unit: SpeedUnit::MmRev, in_library: 3, newer: 6, older: 0, shown: (25, 2), mm_min: 250.0 },
+    Case { unit: SpeedUnit::InchRev, in_library: 4, newer: 7, older: 1, shown: (10, 3), mm_min: 254.0 },
 ];
 
 /// The control of a case: 1000 rpm, and X at 50.8 mm or 2 inches.
@@ -139,7 +139,7 @@ fn through_the_vendors_way_the_unit_and_the_decimals_count() {
             let mut settings = settings(&library);
             let group = i32::from(matches!(case.unit, SpeedUnit::MmRev | SpeedUnit::InchRev));
             let (data, places) = case.shown;
-            let feed = format!("{data} {places} {} {group} {}", case.library, i32::from(inch));
+            let feed = format!("{data} {places} {} {group} {}", case.in_library, i32::from(inch));
             settings.environment.push(("FAKE_LIBRARY_FEED".to_owned(), feed));
             let mut opened = opened_in(settings, "fanuc://fake");
             let readings = poll(opened.sources[0].as_mut()).expect("answers");

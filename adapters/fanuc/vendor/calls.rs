@@ -198,7 +198,7 @@ impl Session {
     }
 
     fn modal(&self, word: Word) -> ItemResult {
-        let number = word.library_number().ok_or(ItemError::NotOffered)?;
+        let number = word.number_in_library().ok_or(ItemError::NotOffered)?;
         let bytes = filled(LONG_LEN, |out| self.functions.cnc_modal(self.handle, number, 0, out))?;
         let [first, second] = bytes.array(8);
         Ok(Answer::Modal { value: bytes.i32(4), flags: [first, second] })
