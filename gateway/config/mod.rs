@@ -10,6 +10,7 @@ mod channel_keys;
 mod channels;
 mod check_value;
 pub mod keys;
+mod keys_of_gate;
 mod keys_of_outputs;
 mod outputs;
 mod problem;

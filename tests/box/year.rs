@@ -219,7 +219,7 @@ fn ten_clients(address: &str) {
 
 /// `cargo test --release --test box a_year -- --ignored --nocapture`
 #[test]
-#[ignore = "takes minutes and gigabytes"]
+#[ignore = "30 minutes: a year of history is made and drawn, in release; takes gigabytes"]
 fn a_year_is_drawn_at_once() {
     let directory = tempfile::tempdir().expect("a directory");
     let database = std::env::var_os("CNC_GATEWAY_YEAR").map_or(directory.path().join("year.db"), PathBuf::from);

@@ -135,7 +135,7 @@ fn without_a_power_meter_the_load_meter_tells_the_state() {
 }
 
 #[test]
-#[ignore = "20 seeds of every scenario: about a minute in release"]
+#[ignore = "1 minute: states without a power meter on 20 seeds of every scenario, in release"]
 fn without_a_power_meter_on_twenty_seeds() {
     score_load_meter(20, 2400);
 }

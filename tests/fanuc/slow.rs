@@ -123,7 +123,7 @@ fn a_slow_control_gives_no_stale_sample() {
 }
 
 #[test]
-#[ignore = "six delays and six call times, 20 s each: four minutes"]
+#[ignore = "4 minutes: stale share of slow controls, six delays and six call times"]
 fn slow_controls_in_full() {
     for delay_ms in [0, 60, 120, 200, 300, 500] {
         told(&format!("native, {delay_ms} ms per frame"), &native(delay_ms, 20.0));

@@ -244,7 +244,7 @@ fn what_is_enabled_is_withdrawn_at_a_stop_after_a_kill_and_after_a_refused_write
 
 /// `cargo test --test gate withdrawn -- --include-ignored --nocapture` prints the figures of both ladders.
 #[test]
-#[ignore = "half a minute more: the same on a ladder that takes the lesser one"]
+#[ignore = "30 seconds: stop, kill and refused write on a ladder that takes the lesser"]
 fn what_is_enabled_is_withdrawn_on_a_ladder_that_takes_the_lesser() {
     withdrawn(LadderRule::Least);
 }

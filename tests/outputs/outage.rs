@@ -35,7 +35,7 @@ fn sample(tick: i64, channels: &[ChannelId], state: &mut u64) -> Sample {
 }
 
 #[test]
-#[ignore = "minutes: a figure for the handbook"]
+#[ignore = "5 minutes: an outage fits into the outbox and is made up for"]
 fn an_outage_fits_and_is_made_up_for_without_delaying_live_data() {
     let hours: f64 = std::env::var("OUTAGE_H").ok().and_then(|hours| hours.parse().ok()).unwrap_or(2.0);
     let channels: Vec<ChannelId> =
