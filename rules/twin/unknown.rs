@@ -22,6 +22,7 @@ use super::scan::{Bank, Score, likeliest, price};
 use super::search::{Found, Hypothesis, P_MAX};
 use super::size::BEYOND_DOUBT_INFORMATION;
 use crate::physics::Role;
+use adapters::channel::ChannelId;
 
 /// What an empirical form must explain on top, as a share of what is named, before the name is withdrawn.
 const UNKNOWN_SHARE: f64 = 0.12;
@@ -85,18 +86,6 @@ pub(super) fn margin(form: &Design, named: f64) -> f64 {
         Body::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
         _ => (BETTER_SHARE * named).max(BETTER_INFORMATION),
     }
-}
-
-/// The cause without a name as one beside the names, where few names explain nearly as much as it does: no machine follows
-/// a law to the letter, and a free form always explains the rest.
-fn named_nearly_as_well(unknown: &Unknown, found: &Found, designs: &[Design]) -> Option<Nameless> {
-    let best = &found.best;
-    let few = (1..=NAMES_MAX).contains(&best.members.len());
-    if !few || unknown.excluded.is_some() || best.information < NAMED_SHARE * unknown.information {
-        return None;
-    }
-    let instead_of = designs[best.members[0]].kind.clone();
-    Some(Nameless { instead_of, delta_ic: (best.information - unknown.information).max(0.0) })
 }
 
 /// Is it a friction over something, of which a friction that is the same everywhere is part?
@@ -181,14 +170,15 @@ impl Case<'_> {
         let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
         let withdrawn = Withdrawn { leading, excluded: excluded.as_deref(), unnamed: false };
         let unknown = self.unknown(base, found, &yardsticks, withdrawn, seed);
-        let beside = unknown.as_ref().and_then(|unknown| named_nearly_as_well(unknown, found, designs));
+        let mut beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
         if unknown.is_some() && beside.is_none() {
             return Doubt { unknown, nameless: None };
         }
         self.drop_minor(base, found, designs, &yardsticks, outdone);
         if beside.is_none() && found.leaves_much_unnamed() {
             let unknown = self.unknown(base, found, &yardsticks, Withdrawn { unnamed: true, ..withdrawn }, seed);
-            if unknown.is_some() {
+            beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
+            if unknown.is_some() && beside.is_none() {
                 return Doubt { unknown, nameless: None };
             }
         }
@@ -196,6 +186,25 @@ impl Case<'_> {
         let first = found.best.members.first().filter(|_| excluded.is_some());
         let named = first.map(|member| Nameless { instead_of: designs[*member].kind.clone(), delta_ic: 0.0 });
         Doubt { unknown: None, nameless: nameless.or(named).or(beside) }
+    }
+
+    /// The cause without a name as one beside the names, where few names explain nearly as much as it does: no machine
+    /// follows a law to the letter, and a free form always explains the rest. Not where it lies over a column of the user's
+    /// own, which no law of the catalogue could follow.
+    fn named_nearly_as_well(&self, unknown: &Unknown, found: &Found, designs: &[Design]) -> Option<Nameless> {
+        let best = &found.best;
+        let few = (1..=NAMES_MAX).contains(&best.members.len());
+        let own_column = unknown.fit.parts[self.parts.len()..].iter().any(|part| match &part.body {
+            Body::Empirical(form) => {
+                self.scene.column(&form.channel).is_some() && ChannelId::of(&form.channel).is_none()
+            }
+            _ => false,
+        });
+        if !few || own_column || unknown.excluded.is_some() || best.information < NAMED_SHARE * unknown.information {
+            return None;
+        }
+        let instead_of = designs[best.members[0]].kind.clone();
+        Some(Nameless { instead_of, delta_ic: (best.information - unknown.information).max(0.0) })
     }
 
     /// Every empirical form worth trying.

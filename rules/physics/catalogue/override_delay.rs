@@ -94,7 +94,13 @@ fn feed_in_the_cut(scene: &Scene) -> Option<Vec<f64>> {
     for pass in scene.passes() {
         let start = scene.runs().iter().find(|run| run.contains(&pass.start)).map_or(0, |run| run.start);
         let engaged = scene.role(Role::Engaged)?;
-        let approach = (start..pass.start).rev().take_while(|row| engaged[*row] <= 0.5).collect::<Vec<_>>();
+        // The way in and what lies before it, up to where the tool leaves the pass before.
+        let mut idle = false;
+        let is_before = |row: &usize| {
+            idle |= engaged[*row] <= 0.0;
+            engaged[*row] <= if idle { 0.0 } else { 0.5 }
+        };
+        let approach = (start..pass.start).rev().take_while(is_before).collect::<Vec<_>>();
         let first = feed[pass.start];
         approach.into_iter().for_each(|row| feed[row] = first);
     }
