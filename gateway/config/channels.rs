@@ -66,7 +66,7 @@ mod tests {
 
     fn read(channel: &str) -> Result<Config, Vec<Problem>> {
         let text = format!("[[source]]\naddress = \"fanuc://cnc\"\n[[source.channel]]\n{channel}");
-        parse("test.toml", &text, Path::new("."), &[])
+        parse("test.toml", &text, Path::new("."), [])
     }
 
     fn refused(channel: &str) -> String {
@@ -95,7 +95,7 @@ mod tests {
         assert!(refused("name = \"w_bar\"\nread = \"macro 500\"\ncolour = 1\n").contains("no key `colour`"));
         let text =
             "[[source]]\naddress = \"simulated://lathe\"\n[[source.channel]]\nname = \"v_bar\"\nread = \"macro 1\"\n";
-        let told = parse("test.toml", text, Path::new("."), &[]).expect_err("refused");
+        let told = parse("test.toml", text, Path::new("."), []).expect_err("refused");
         assert!(format!("{}", told[0]).contains("only fanuc://"), "{}", told[0]);
     }
 }
