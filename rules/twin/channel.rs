@@ -228,7 +228,7 @@ mod tests {
                 Shape::Peak(900.0, 80.0),
                 Shape::Fading(3.0),
                 Shape::Wave(7.0, 3),
-                Shape::Shots { every: 6.0, from: 2.3, over: 1.7, among: 3 },
+                Shape::RecurringPulses { every: 6.0, from: 2.3, over: 1.7, among: 3 },
             ]
         };
         for (name, shape) in channels.iter().flat_map(|name| shapes().into_iter().map(move |shape| (name, shape))) {

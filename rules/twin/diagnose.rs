@@ -3,6 +3,7 @@
 use super::bind::bind;
 use super::designs::{Design, designs};
 use super::diagnosis::{Diagnosis, Quality, Verdict};
+use super::edge_weights::SeenForm;
 use super::excerpt;
 use super::fit::{Data, Fit, fit};
 use super::frame::{FOLDS, Frame, Unit, group_size, held_out, units};
@@ -13,7 +14,6 @@ use super::outcome::{Answer, Outcome};
 use super::quality::{Fault, clean};
 use super::scan::Bank;
 use super::search::{Found, Hypothesis, Search};
-use super::veil::SeenForm;
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median, robust_deviation};
@@ -150,7 +150,7 @@ impl<'a> Case<'a> {
             return verdicts::cannot_tell(self, "a model that can be fitted to this recording".to_owned());
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
-        let base = self.unveil(base);
+        let base = self.weigh_edges(base);
         let answer = self.answer(&base, seed);
         self.show_hidden(&base);
         let outcome = Outcome::new(self, answer).confirmed(self);

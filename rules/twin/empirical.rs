@@ -1,7 +1,7 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
 //! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed, something
-//! that fades through each pass, a wave (`periodic`), or shots that come again and again (`shots`); by itself, in the
+//! that fades through each pass, a wave (`periodic`), or shots that come again and again (`recurring_pulses`); by itself, in the
 //! cut only, or in proportion to the removal rate or the speed. It is the yardstick for "something real remains that no
 //! candidate explains".
 
@@ -50,7 +50,7 @@ pub enum Shape {
     /// A wave of this period, one of so many that can be told apart.
     Wave(f64, usize),
     /// A jump at one value and again after every interval, each of which fades.
-    Shots {
+    RecurringPulses {
         /// From one to the next.
         every: f64,
         /// The first.
@@ -105,17 +105,17 @@ impl Empirical {
                 let turns = self.scale / period;
                 vec![Shape::Wave(self.scale / (turns + step), among), Shape::Wave(self.scale / (turns - step), among)]
             }
-            Shape::Shots { every, from, over, among } => {
-                let shots = |every: f64, from: f64, over: f64| Shape::Shots { every, from, over, among };
+            Shape::RecurringPulses { every, from, over, among } => {
+                let pulses = |every: f64, from: f64, over: f64| Shape::RecurringPulses { every, from, over, among };
                 // An interval is known by where the last shot stands.
                 let (place, interval) = (step * over, step * over * every / self.scale);
                 vec![
-                    shots(every, (from + place).rem_euclid(every), over),
-                    shots(every, (from - place).rem_euclid(every), over),
-                    shots(every + interval, from, over),
-                    shots(every - interval, from, over),
-                    shots(every, from, up * over),
-                    shots(every, from, down * over),
+                    pulses(every, (from + place).rem_euclid(every), over),
+                    pulses(every, (from - place).rem_euclid(every), over),
+                    pulses(every + interval, from, over),
+                    pulses(every - interval, from, over),
+                    pulses(every, from, up * over),
+                    pulses(every, from, down * over),
                 ]
             }
         };
@@ -147,7 +147,7 @@ impl Empirical {
                 let (cosine, sine) = (column(&|x| (turns * x).cos()), column(&|x| (turns * x).sin()));
                 return Some(vec![("cosine".to_owned(), cosine), ("sine".to_owned(), sine)]);
             }
-            Shape::Shots { every, from, over, .. } => {
+            Shape::RecurringPulses { every, from, over, .. } => {
                 let (from, every, over) = (along(*from), every / self.scale, over / self.scale);
                 let since = |x: f64| (x - from).rem_euclid(every);
                 return Some(vec![("level".to_owned(), column(&|x| (-since(x) / over).exp()))]);
@@ -188,7 +188,7 @@ impl Empirical {
             Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
             Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
             Shape::Wave(period, _) => format!("wave over {} with a period of {period:.4}", self.channel),
-            Shape::Shots { every, from, over, .. } => {
+            Shape::RecurringPulses { every, from, over, .. } => {
                 format!("exp(-(({} - {from:.4}) mod {every:.4}) / {over:.4})", self.channel)
             }
         };
@@ -233,7 +233,7 @@ impl Empirical {
                 let turns = TAU * self.scale / period;
                 return format!("cosine * cos({turns:?} * {x}) + sine * sin({turns:?} * {x})");
             }
-            Shape::Shots { every, from, over, .. } => {
+            Shape::RecurringPulses { every, from, over, .. } => {
                 // The remainder of what is negative is negative.
                 let (from, every, over) = (along(*from), every / self.scale, over / self.scale);
                 return format!("level * exp(-(((({x} - {from:?}) % {every:?}) + {every:?}) % {every:?}) / {over:?})");
@@ -279,11 +279,11 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
     let chosen = match form.shape {
         Shape::Bent(_) => 0,
         Shape::Peak(..) => 2,
-        Shape::Shots { .. } => 3,
+        Shape::RecurringPulses { .. } => 3,
         Shape::Above(_) | Shape::Below(_) | Shape::Fading(_) | Shape::Wave(..) => 1,
     };
     let among = match form.shape {
-        Shape::Wave(_, among) | Shape::Shots { among, .. } => among,
+        Shape::Wave(_, among) | Shape::RecurringPulses { among, .. } => among,
         _ => 1,
     };
     let parameters = columns.iter().map(|(name, _)| Parameter {

@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::noise::Arma;
 use super::offered::empirical_channels;
 use super::periodic::{waves_in_time, waves_of_friction};
-use super::shots::shots;
+use super::recurring_pulses::recurring_pulses;
 use crate::physics::{OutputKind, Scene};
 use crate::statistics::count;
 
@@ -39,13 +39,13 @@ pub(super) fn event_designs(scene: &Scene, frame: &Frame, from: &Fit) -> Vec<Des
     let noises = [from.noise, LESS_MEMORY];
     let again = noises.into_iter().flat_map(|noise| waves_in_time(scene, frame, &from.residual, noise));
     let tight = noises.into_iter().flat_map(|noise| waves_of_friction(scene, frame, &from.residual, noise));
-    let shots = noises.into_iter().flat_map(|noise| shots(scene, frame, &from.residual, noise));
+    let pulses = noises.into_iter().flat_map(|noise| recurring_pulses(scene, frame, &from.residual, noise));
     let forms = once(scene)
         .into_iter()
         .chain(at_a_place(scene))
         .chain(again)
         .chain(tight)
-        .chain(shots)
+        .chain(pulses)
         .chain(after_changes(scene))
         .chain(lagging(scene));
     forms.filter_map(|form| as_design(form, scene, frame)).collect()

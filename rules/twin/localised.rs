@@ -138,12 +138,12 @@ impl Case<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::twin::vessel;
+    use crate::twin::overflowing_tank;
 
     #[test]
     fn what_happens_beyond_a_level_is_located_there() {
         let level = |row: u32| 6.0 + 4.0 * (f64::from(row) / 61.0).sin();
-        let (recording, found) = vessel::diagnosed(1500, level, |level| 4.0 * (level - 9.4).max(0.0));
+        let (recording, found) = overflowing_tank::diagnosed(1500, level, |level| 4.0 * (level - 9.4).max(0.0));
         assert_eq!((found.verdict.word(), found.missing[0].effect.as_str()), ("unexplained", "unknown"));
         let level = found.rows.effects[0].1.iter().zip(recording.numbers("level_v").expect("recorded").iter());
         let acts: Vec<f64> = level.filter(|(effect, _)| effect.abs() > 0.02).filter_map(|(_, level)| level).collect();

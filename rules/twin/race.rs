@@ -1,8 +1,8 @@
 //! Which sequence of on and off is the likeliest, and how likely each is by now: Viterbi's race and the forward recursion
 //! over state and age of a spell, in which every survivor carries its own innovation.
 
-use super::carried::{Cheapest, Mixture};
 use super::latent::Switching;
+use super::path_state::{Cheapest, Mixture};
 use super::rhythm::Rhythm;
 
 /// One row as it looks with the consumer off and on, and what it weighs.

@@ -7,9 +7,9 @@
 //! likeliest (the forward sum); each edge is then late or not as the likeliest sequence has it (Viterbi), and what that
 //! choice explains beyond the sum is its price. Where the output ramps over several rows a delay is what it is in the mean.
 
-use super::carried::{Cheapest, Mixture};
 use super::frame::Frame;
 use super::noise::Arma;
+use super::path_state::{Cheapest, Mixture};
 use crate::statistics::count;
 use std::ops::{Range, RangeInclusive};
 

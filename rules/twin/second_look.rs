@@ -37,13 +37,13 @@ impl Case<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::twin::vessel;
+    use crate::twin::overflowing_tank;
 
     /// Of a vessel in twelve runs; in every fourth of them, which are held out first, it is fuller, and spills.
     fn verdict(spills: f64) -> (&'static str, Vec<String>) {
         let full = |row: u32| if row / 150 % 4 == 3 { 3.0 } else { 0.0 };
         let level = |row: u32| 5.0 + full(row) + 2.0 * (f64::from(row) / 61.0).sin();
-        let (_, found) = vessel::diagnosed(1800, level, |level| spills * (level - 7.5).max(0.0));
+        let (_, found) = overflowing_tank::diagnosed(1800, level, |level| spills * (level - 7.5).max(0.0));
         (found.verdict.word(), found.fit.expect("fitted").held_out_runs)
     }
 

@@ -16,8 +16,8 @@ use super::gate::p_value;
 use super::localised::end_designs;
 use super::model::{Body, simulate};
 use super::offered::{empirical_designs, products};
-use super::outdone::LEADING_SHARE;
 use super::periodic::waves;
+use super::replaceable::LEADING_SHARE;
 use super::scan::{Bank, Score, likeliest, price};
 use super::search::{Found, Hypothesis, P_MAX};
 use super::size::BEYOND_DOUBT_INFORMATION;
@@ -165,8 +165,8 @@ impl Case<'_> {
         let bank = Bank::new(&forms, &frame);
         let of_base = bank.scan(base, self.ln_rows(base));
         let yardsticks = Yardsticks { bank, of_base };
-        let outdone = self.outdone(base, &found.best, designs, &yardsticks);
-        let leading = outdone.iter().any(|outdone| outdone.share >= LEADING_SHARE);
+        let replaceable = self.replaceable(base, &found.best, designs, &yardsticks);
+        let leading = replaceable.iter().any(|replaceable| replaceable.share >= LEADING_SHARE);
         let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
         let withdrawn = Withdrawn { leading, excluded: excluded.as_deref(), unnamed: false };
         let unknown = self.unknown(base, found, &yardsticks, withdrawn, seed);
@@ -174,7 +174,7 @@ impl Case<'_> {
         if unknown.is_some() && beside.is_none() {
             return Doubt { unknown, nameless: None };
         }
-        self.drop_minor(base, found, designs, &yardsticks, outdone);
+        self.drop_minor(base, found, designs, &yardsticks, replaceable);
         if beside.is_none() && found.leaves_much_unnamed() {
             let unknown = self.unknown(base, found, &yardsticks, Withdrawn { unnamed: true, ..withdrawn }, seed);
             beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));

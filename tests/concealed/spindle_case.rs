@@ -143,12 +143,12 @@ impl Wish {
             .collect();
         let moments = moments(self.process, &record, &clean);
         let mut spoiled = spoil(self.noise, &moments, sd, &mut dice("noise"));
-        let mut unrest = dice("unrest");
+        let mut extra_noise = dice("unrest");
         for (value, &i) in spoiled.values.iter_mut().zip(&rows) {
-            *value = value.map(|v| v + day.jitter_w[i] * unrest.normal());
+            *value = value.map(|v| v + day.jitter_w[i] * extra_noise.normal());
         }
         if laws.iter().any(|law| law.entry.name == "saturation") {
-            clip(&mut spoiled.values, &clean, sd, &mut unrest);
+            clip(&mut spoiled.values, &clean, sd, &mut extra_noise);
         }
         let style = Style::draw(self, &mut dice("style"));
         let mut table = table(self, &style, stage, &record, &spoiled.values);

@@ -23,7 +23,7 @@ const CLEAR: f64 = 1.5;
 /// Share of how bins differ that the law must explain.
 const EXPLAINED_MIN: f64 = 0.5;
 /// Rows are taken to be at most this many times more restless than the middle.
-const RESTLESS_MAX: f64 = 12.0;
+const NOISE_RATIO_MAX: f64 = 12.0;
 /// The same for quieter: no law is as true as a quiet meter could show.
 const QUIET_MAX: f64 = 2.0;
 
@@ -50,7 +50,7 @@ fn quiet_under_load(frame: &Frame, load: &[f64], residual: &[f64]) -> Option<Vec
     let law = Law::of(&bins)?;
     let quiet: Vec<f64> = load.iter().map(|load| law.variance(*load).sqrt().recip()).collect();
     let middle = median(quiet.clone())?;
-    Some(quiet.iter().map(|x| (x / middle).clamp(1.0 / RESTLESS_MAX, QUIET_MAX)).collect())
+    Some(quiet.iter().map(|x| (x / middle).clamp(1.0 / NOISE_RATIO_MAX, QUIET_MAX)).collect())
 }
 
 /// Neighbours under about the same load.

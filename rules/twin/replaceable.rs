@@ -19,7 +19,7 @@ const MINOR_SHARE: f64 = 0.25;
 
 /// A member in whose place a form without a name explains clearly more.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Outdone {
+pub(super) struct Replaceable {
     /// Which member.
     position: usize,
     /// What it adds, as a share of all that is named.
@@ -28,13 +28,13 @@ pub(super) struct Outdone {
 
 impl Case<'_> {
     /// The members that are outdone; none of a name that stands alone, which is weighed as a whole.
-    pub(super) fn outdone(
+    pub(super) fn replaceable(
         &mut self,
         base: &Fit,
         best: &Hypothesis,
         designs: &[Design],
         forms: &Yardsticks<'_>,
-    ) -> Vec<Outdone> {
+    ) -> Vec<Replaceable> {
         // Where a feed drive tells how each tool wears, wear and settling have been asked for one beside the other.
         if best.members.len() < 2 || self.frame.levels.is_some() {
             return Vec::new();
@@ -50,7 +50,7 @@ impl Case<'_> {
         best: &Hypothesis,
         designs: &[Design],
         forms: &Yardsticks<'_>,
-    ) -> Option<Outdone> {
+    ) -> Option<Replaceable> {
         // A constant is part of every line: what bends beside it is something else.
         if designs[best.members[position]].kind == "offset" || best.is_exceeded(position, designs) {
             return None;
@@ -63,15 +63,15 @@ impl Case<'_> {
             |fit: &Fit, design: &Design| 2.0 * (fit.log_likelihood - rest.log_likelihood) - price(design, ln_rows);
         let own = gained(&best.fit, &designs[best.members[position]]);
         let its = gained(&form.fit, &form.design);
-        let outdone = its > own + margin(&form.design, own) && !self.is_another_shape(&form.design, best);
+        let replaceable = its > own + margin(&form.design, own) && !self.is_another_shape(&form.design, best);
         let share = own / best.information;
-        if outdone && share >= LEADING_SHARE {
+        if replaceable && share >= LEADING_SHARE {
             // A leader that explains as much beside the form as without it is another thing than the form.
             let both = self.with_form(&best.fit, &form.design)?.fit;
             let beside = 2.0 * (both.log_likelihood - form.fit.log_likelihood);
-            return (beside < STANDS_SHARE * own).then_some(Outdone { position, share });
+            return (beside < STANDS_SHARE * own).then_some(Replaceable { position, share });
         }
-        outdone.then_some(Outdone { position, share })
+        replaceable.then_some(Replaceable { position, share })
     }
 
     /// Drops the members that add little and are outdone, one after the other.
@@ -81,18 +81,18 @@ impl Case<'_> {
         found: &mut Found,
         designs: &[Design],
         forms: &Yardsticks<'_>,
-        mut outdone: Vec<Outdone>,
+        mut replaceable: Vec<Replaceable>,
     ) {
-        let least = |outdone: Vec<Outdone>| {
-            let minor = outdone.into_iter().filter(|outdone| outdone.share < MINOR_SHARE);
+        let least = |replaceable: Vec<Replaceable>| {
+            let minor = replaceable.into_iter().filter(|replaceable| replaceable.share < MINOR_SHARE);
             minor.min_by(|a, b| a.share.total_cmp(&b.share))
         };
-        while let Some(Outdone { position, .. }) = least(outdone) {
+        while let Some(Replaceable { position, .. }) = least(replaceable) {
             let paid = price(&designs[found.best.members[position]], self.ln_rows(base));
             let Some(less) = self.without(&found.best, position) else { return };
             found.best = Hypothesis { information: less.information + paid, ..less };
             found.p_values.remove(position.min(found.p_values.len() - 1));
-            outdone = self.outdone(base, &found.best, designs, forms);
+            replaceable = self.replaceable(base, &found.best, designs, forms);
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::statistics::{count, robust_deviation};
 /// Intervals are at least so many sampling periods long.
 const ROWS_MIN: f64 = 15.0;
 /// Shots that the whole time must hold, at least.
-const SHOTS_MIN: f64 = 5.0;
+const PULSES_MIN: f64 = 5.0;
 /// Width of a place in the interval, in sampling periods.
 const PLACE_ROWS: f64 = 2.0;
 /// Deviations at which an innovation is cut off: one stray row is no shot.
@@ -28,7 +28,7 @@ const OVER_ROWS: [f64; 4] = [4.0, 12.0, 36.0, 108.0];
 
 /// The shots that stand out of this residual, per group, of this noise: fading at several paces, always there or in
 /// proportion to the speed.
-pub(super) fn shots(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
+pub(super) fn recurring_pulses(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
     let clock_s = frame.reduce(scene.clock_s());
     let whole_s = scene.clock_s().last().copied().unwrap_or(0.0);
     let Some(found) = fold(&clock_s, &cut_off(frame.whiten(residual, noise)), scene.period_s(), whole_s) else {
@@ -36,7 +36,7 @@ pub(super) fn shots(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma)
     };
     let form = |rows: f64, factor: Factor| Empirical {
         channel: TIME.to_owned(),
-        shape: Shape::Shots {
+        shape: Shape::RecurringPulses {
             every: found.every_s,
             from: found.from_s,
             over: rows * scene.period_s(),
@@ -67,7 +67,7 @@ struct Folded {
 /// The interval and the place in it at which innovations agree most; `None` where none stand out.
 fn fold(clock_s: &[f64], innovations: &[f64], period_s: f64, whole_s: f64) -> Option<Folded> {
     let width_s = PLACE_ROWS * period_s;
-    let (shortest_s, longest_s) = (ROWS_MIN * period_s, whole_s / SHOTS_MIN);
+    let (shortest_s, longest_s) = (ROWS_MIN * period_s, whole_s / PULSES_MIN);
     // From one interval to the next the last shot moves by half a place.
     let steps = 2.0 * whole_s / width_s;
     let places = steps * (longest_s - shortest_s) / width_s;
@@ -86,7 +86,7 @@ fn fold(clock_s: &[f64], innovations: &[f64], period_s: f64, whole_s: f64) -> Op
             let sum = &mut sums[place.min(places - 1)];
             *sum = (sum.0 + e, sum.1 + 1.0);
         }
-        for (place, (sum, rows)) in sums.iter().enumerate().filter(|(_, sum)| sum.1 >= SHOTS_MIN) {
+        for (place, (sum, rows)) in sums.iter().enumerate().filter(|(_, sum)| sum.1 >= PULSES_MIN) {
             let agree = sum.abs() / rows.sqrt();
             if agree > best.0 {
                 best = (agree, every_s, every_s * count(place) / count(places));
@@ -131,8 +131,8 @@ mod tests {
     fn the_interval_of_a_lubricator_is_found() {
         for (seed, every_s, from_s) in [(1, 61.7, 20.0), (2, 137.3, 5.0), (3, 240.0, 100.0)] {
             let (scene, frame, residual) = oiled(6.0, every_s, from_s, seed);
-            let found = shots(&scene, &frame, &residual, MEMORY);
-            let Some(Shape::Shots { every, from, .. }) = found.first().map(|form| form.shape.clone()) else {
+            let found = recurring_pulses(&scene, &frame, &residual, MEMORY);
+            let Some(Shape::RecurringPulses { every, from, .. }) = found.first().map(|form| form.shape.clone()) else {
                 panic!("nothing of {every_s}")
             };
             // By where the last of them stands.
@@ -146,7 +146,7 @@ mod tests {
     fn noise_alone_has_no_interval() {
         let found = (10..20).filter(|seed| {
             let (scene, frame, residual) = oiled(0.0, 100.0, 0.0, *seed);
-            !shots(&scene, &frame, &residual, MEMORY).is_empty()
+            !recurring_pulses(&scene, &frame, &residual, MEMORY).is_empty()
         });
         assert!(found.count() <= 2, "five deviations among some thousand places");
     }

@@ -17,7 +17,7 @@ use crate::physics::{Effect, Form};
 use crate::statistics::robust_deviation;
 
 /// Outlandish rows below which it makes no difference that they weigh little.
-const VEILED_MIN: usize = 5;
+const OUTLYING_ROWS_MIN: usize = 5;
 /// Effects fitted in full after the scan.
 const FITTED: usize = 6;
 /// Rounds of which edges are late and the fit beside them.
@@ -40,9 +40,9 @@ fn priced(fit: &Fit) -> f64 {
 
 impl Case<'_> {
     /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
-    pub(super) fn unveil(&mut self, base: Fit) -> Fit {
+    pub(super) fn weigh_edges(&mut self, base: Fit) -> Fit {
         let veiled = self.frame.heavy();
-        if veiled < VEILED_MIN {
+        if veiled < OUTLYING_ROWS_MIN {
             return base;
         }
         let weighed = self.frame.clone();
