@@ -1,7 +1,7 @@
 //! From the gate's verdict to the machine, and from the machine's answer to the history: orders of a person, the audit, the
 //! hand that writes, the alarm when it has to let go.
 
-use super::hand::{Hand, Said};
+use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;
 use super::report::milliseconds;
 use super::seen::Seen;
@@ -27,7 +27,7 @@ const ROWS_AT_ONCE_MAX: usize = 32;
 
 /// See the [module](self).
 pub struct Commands {
-    hand: Hand,
+    actuator_worker: ActuatorWorker,
     shifting: Shifting,
     /// Name of the source that is written to.
     target: String,
@@ -47,9 +47,9 @@ pub struct Commands {
 impl Commands {
     /// Writes through this hand to the source of this name.
     #[must_use]
-    pub fn new(hand: Hand, shifting: Shifting, target: String, inbox: Inbox) -> Self {
+    pub fn new(actuator_worker: ActuatorWorker, shifting: Shifting, target: String, inbox: Inbox) -> Self {
         Self {
-            hand,
+            actuator_worker,
             shifting,
             target,
             inbox,
@@ -79,7 +79,7 @@ impl Commands {
         }
         if let Some(verdict) = pipeline.verdict().copied() {
             let mut said = Vec::new();
-            self.hand.step(&Verdict { armed: false, ..verdict }, &[], now_ns, |it| said.push(it));
+            self.actuator_worker.step(&Verdict { armed: false, ..verdict }, &[], now_ns, |it| said.push(it));
             self.hear(said, sample, pipeline.gate_mut(), health);
         }
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
@@ -190,8 +190,8 @@ impl Commands {
         }
         verdict.armed &= gate.armed().is_ok();
         let mut said = Vec::new();
-        self.hand.step(&verdict, &sent, now_ns, |it| said.push(it));
-        self.hand.listen(|it| said.push(it));
+        self.actuator_worker.step(&verdict, &sent, now_ns, |it| said.push(it));
+        self.actuator_worker.listen(|it| said.push(it));
         self.hear(said, sample, gate, health);
         self.shift(pipeline, sample, now_ns, health);
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
@@ -206,7 +206,7 @@ impl Commands {
         rows.into_iter().for_each(|row| self.keep(row, gate, health));
         let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).chain(looks).collect();
         let mut said = Vec::new();
-        self.hand.shift(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
+        self.actuator_worker.shift(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
         self.hear(said, sample, gate, health);
     }
 
@@ -224,29 +224,29 @@ impl Commands {
         gate.limits().offset.source.clone().unwrap_or_else(|| self.target.clone())
     }
 
-    fn hear(&mut self, said: Vec<Said>, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+    fn hear(&mut self, said: Vec<ActuatorReport>, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         said.into_iter().for_each(|it| self.heard(it, sample, gate, health));
     }
 
-    fn heard(&mut self, said: Said, sample: &Sample, gate: &mut Gate, health: &mut Health) {
+    fn heard(&mut self, said: ActuatorReport, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         match said {
-            Said::Written(written) => {
+            ActuatorReport::Written(written) => {
                 let asks = matches!(written.occasion, Occasion::Change | Occasion::SignOfLife);
                 self.written = asks.then(|| f64::from(written.asked.percent()));
                 self.trail.write(&written).into_iter().for_each(|row| self.keep(row, gate, health));
                 self.trail.command(&written, &self.target).into_iter().for_each(|row| health.keep(row.into()));
                 written.fault.into_iter().for_each(|fault| self.fail(&fault, sample.at_ns, gate, health));
             }
-            Said::Seen(reaction) => {
+            ActuatorReport::Seen(reaction) => {
                 self.keep(trail::reaction(&reaction), gate, health);
                 let [program, block, tool] =
                     self.place.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
                 health.keep(ReactionTime { program, block, tool, ..trail::times(&reaction) }.into());
             }
-            Said::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
-            Said::Moved(moved) => self.moved(&moved, sample, gate, health),
-            Said::Withdrawn(order) => gate.offsets_mut().withdrawn(order),
-            Said::Asked(ask, failed) => {
+            ActuatorReport::Fault(fault) => self.fail(&fault, sample.at_ns, gate, health),
+            ActuatorReport::Moved(moved) => self.moved(&moved, sample, gate, health),
+            ActuatorReport::Withdrawn(order) => gate.offsets_mut().withdrawn(order),
+            ActuatorReport::Asked(ask, failed) => {
                 self.keep(trail::asked(&ask, AskOutcome::Sent, failed.as_deref(), sample.at_ns), gate, health);
                 if let Some(failed) = failed {
                     health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Error, "ask_failed", failed));
@@ -290,8 +290,8 @@ impl Commands {
     /// Gives the machine back and ends.
     pub fn close(&mut self, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         let mut said = Vec::new();
-        self.hand.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
-        self.hand.close(|it| said.push(it));
+        self.actuator_worker.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
+        self.actuator_worker.close(|it| said.push(it));
         self.hear(said, sample, gate, health);
     }
 

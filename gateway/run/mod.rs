@@ -1,11 +1,10 @@
 //! `run`: one machine, live. The tick has a thread of its own, so has every source; tokio only serves.
 
+pub mod actuator_worker;
 pub mod clock;
 pub mod command;
 pub mod deadline;
-mod desk;
 pub mod feed;
-pub mod hand;
 pub mod health;
 pub mod keep;
 pub mod open;
@@ -20,6 +19,7 @@ pub mod seen;
 pub mod shifting;
 pub mod tick;
 pub mod twin;
+mod verdict_mailbox;
 pub mod wear;
 
 use crate::access::{self, Access};
@@ -34,12 +34,12 @@ use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
 use ::rules::estimators;
+use actuator_worker::{ActuatorWorker, Tools};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::{Actuator, OffsetSink};
 use clock::BoxClock;
 use command::Commands;
 use deadline::{RUN_MAX, RunLimit};
-use hand::{Hand, Tools};
 use health::Health;
 use keep::Kept;
 use open::{MachineSpeed, Sources, Way};
@@ -222,7 +222,7 @@ fn commands(
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();
     if limits.greatest_mode() != GateMode::Armed {
-        return Ok(Commands::new(Hand::None, Shifting::idle(data_dir), target, inbox));
+        return Ok(Commands::new(ActuatorWorker::None, Shifting::idle(data_dir), target, inbox));
     }
     let (actuator, sink) = tools(limits, &mut ways)?;
     let (shifting, offsets) = match sink {
@@ -230,12 +230,12 @@ fn commands(
         None => (Shifting::idle(data_dir), None),
     };
     let tools = Tools { actuator, offsets };
-    let hand = match plan.speed {
-        MachineSpeed::Real => Hand::start(tools, limits, clock.clone(), open::period(&plan.config))
+    let actuator_worker = match plan.speed {
+        MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::period(&plan.config))
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,
-        MachineSpeed::Times(_) | MachineSpeed::Max => Hand::inline(tools, limits),
+        MachineSpeed::Times(_) | MachineSpeed::Max => ActuatorWorker::inline(tools, limits),
     };
-    Ok(Commands::new(hand, shifting, target, inbox))
+    Ok(Commands::new(actuator_worker, shifting, target, inbox))
 }
 
 /// What may be written, and nothing else.

@@ -48,7 +48,7 @@ impl Pace {
 
     /// From now on lies in wait for each tick: for a machine that is written to, by a thread of real-time priority. One of
     /// ordinary priority would be passed over for it when it is needed.
-    pub fn lie_in_wait(&mut self) {
+    pub fn wake_early(&mut self) {
         let lead_ns = i64::try_from(LEAD.as_nanos()).unwrap_or(0);
         if let Beat::Clock(_, early_ns) = &mut self.beat
             && self.period_ns >= i64::try_from(LEAD_PERIOD_MIN.as_nanos()).unwrap_or(0)

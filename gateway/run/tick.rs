@@ -101,7 +101,7 @@ impl Ticker {
             let granted = priority::ask();
             granted.tell();
             if granted == Granted::RealTime && self.pipeline.gate().limits().greatest_mode() == GateMode::Armed {
-                self.pace.lie_in_wait();
+                self.pace.wake_early();
             }
         }
         self.wake.here();

@@ -8,7 +8,7 @@ use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
 use gateway::config::GateMode;
 use gateway::gate::offset::{Account, Book, Order};
 use gateway::gate::{Ask, Disarmed, Fault, Gate, Outcome, Verdict, Writer, trail};
-use gateway::run::hand::{Hand, Said, Tools};
+use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
@@ -99,30 +99,30 @@ fn verdict(pct: u8, armed: bool) -> Verdict {
 }
 
 /// A hand of its own thread, holding this controller.
-fn hand(controller: &Controller, directory: &tempfile::TempDir) -> Hand {
+fn actuator_worker(controller: &Controller, directory: &tempfile::TempDir) -> ActuatorWorker {
     let book = Book::open(directory.path(), "test").expect("readable");
     let offsets = Some(Account::new(Box::new(controller.clone()), book));
     let tools = Tools { actuator: Some(Box::new(controller.clone())), offsets };
-    Hand::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
+    ActuatorWorker::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
         .expect("a thread")
 }
 
 /// A hand whose controller has begun to write 90 % and does not come back from it.
-fn stuck(directory: &tempfile::TempDir) -> (Controller, Hand) {
+fn stuck(directory: &tempfile::TempDir) -> (Controller, ActuatorWorker) {
     let controller = Controller::default();
-    let mut hand = hand(&controller, directory);
+    let mut actuator_worker = actuator_worker(&controller, directory);
     controller.set(|state| state.stuck = true);
-    lay(&mut hand, &verdict(90, true), &[]);
+    lay(&mut actuator_worker, &verdict(90, true), &[]);
     std::thread::sleep(Duration::from_millis(100));
-    (controller, hand)
+    (controller, actuator_worker)
 }
 
 /// Listens until something of this kind is told.
-fn told<T>(hand: &mut Hand, mut of: impl FnMut(Said) -> Option<T>) -> T {
+fn told<T>(actuator_worker: &mut ActuatorWorker, mut of: impl FnMut(ActuatorReport) -> Option<T>) -> T {
     let until = Instant::now() + Duration::from_secs(20);
     loop {
         let mut found = None;
-        hand.listen(|said| found = found.take().or_else(|| of(said)));
+        actuator_worker.listen(|said| found = found.take().or_else(|| of(said)));
         if let Some(found) = found {
             return found;
         }
@@ -131,9 +131,9 @@ fn told<T>(hand: &mut Hand, mut of: impl FnMut(Said) -> Option<T>) -> T {
     }
 }
 
-fn lay(hand: &mut Hand, verdict: &Verdict, asks: &[Ask]) -> Vec<Said> {
+fn lay(actuator_worker: &mut ActuatorWorker, verdict: &Verdict, asks: &[Ask]) -> Vec<ActuatorReport> {
     let mut said = Vec::new();
-    hand.step(verdict, asks, 0, |it| said.push(it));
+    actuator_worker.step(verdict, asks, 0, |it| said.push(it));
     said
 }
 
@@ -194,42 +194,42 @@ fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
 #[test]
 fn what_waits_for_a_slow_controller_goes_nowhere_once_the_gate_is_disarmed() {
     let directory = tempfile::tempdir().expect("a directory");
-    let (controller, mut hand) = stuck(&directory);
+    let (controller, mut actuator_worker) = stuck(&directory);
     let stop = Ask { request: LadderRequest::Stop, reason: "worn".into(), script: "a.rhai".into(), version: 1 };
-    lay(&mut hand, &verdict(80, true), &[stop]);
-    hand.shift(&[SHIFT], true, 0, |_| {});
+    lay(&mut actuator_worker, &verdict(80, true), &[stop]);
+    actuator_worker.shift(&[SHIFT], true, 0, |_| {});
     // Disarmed, by a person or because the time is over, while all that waits.
-    let said = lay(&mut hand, &verdict(100, false), &[]);
-    assert!(matches!(&said[..], [Said::Asked(_, Some(why))] if why.contains("disarmed")), "{said:?}");
+    let said = lay(&mut actuator_worker, &verdict(100, false), &[]);
+    assert!(matches!(&said[..], [ActuatorReport::Asked(_, Some(why))] if why.contains("disarmed")), "{said:?}");
     let mut withdrawn = Vec::new();
-    hand.shift(&[], false, 0, |said| withdrawn.push(format!("{said:?}")));
+    actuator_worker.shift(&[], false, 0, |said| withdrawn.push(format!("{said:?}")));
     assert!(withdrawn.len() == 1 && withdrawn[0].contains("Withdrawn"), "{withdrawn:?}");
     controller.set(|state| state.stuck = false);
-    hand.close(|_| {});
+    actuator_worker.close(|_| {});
     assert_eq!(controller.log(), ["90", "100"], "what was under way, and the way back to the dial");
 }
 
 #[test]
 fn what_has_waited_too_long_goes_nowhere_either() {
     let directory = tempfile::tempdir().expect("a directory");
-    let (controller, mut hand) = stuck(&directory);
-    lay(&mut hand, &verdict(80, true), &[]);
-    hand.shift(&[SHIFT], true, 0, |_| {});
+    let (controller, mut actuator_worker) = stuck(&directory);
+    lay(&mut actuator_worker, &verdict(80, true), &[]);
+    actuator_worker.shift(&[SHIFT], true, 0, |_| {});
     // The tick hangs from now on, and the controller for two seconds more.
     std::thread::sleep(Duration::from_millis(2300));
     controller.set(|state| state.stuck = false);
     let (mut fault, mut withdrawn) = (None, None);
-    told(&mut hand, |said| {
+    told(&mut actuator_worker, |said| {
         match said {
-            Said::Written(written) => fault = fault.take().or(written.fault),
-            Said::Withdrawn(order) => withdrawn = Some(order),
+            ActuatorReport::Written(written) => fault = fault.take().or(written.fault),
+            ActuatorReport::Withdrawn(order) => withdrawn = Some(order),
             _ => {}
         }
         (fault.is_some() && withdrawn.is_some()).then_some(())
     });
     assert!(matches!(fault, Some(Fault::Late { silent_ms }) if silent_ms >= 2000), "{fault:?}");
     assert_eq!(withdrawn, Some(SHIFT));
-    hand.close(|_| {});
+    actuator_worker.close(|_| {});
     assert_eq!(controller.log(), ["90", "100"], "neither the old verdict nor the old order");
 }
 
@@ -237,11 +237,11 @@ fn what_has_waited_too_long_goes_nowhere_either() {
 fn a_thread_that_dies_is_noticed() {
     let directory = tempfile::tempdir().expect("a directory");
     let controller = Controller::default();
-    let mut hand = hand(&controller, &directory);
+    let mut actuator_worker = actuator_worker(&controller, &directory);
     controller.set(|state| state.panics = true);
-    lay(&mut hand, &verdict(90, true), &[]);
-    let fault = told(&mut hand, |said| match said {
-        Said::Fault(fault) => Some(fault),
+    lay(&mut actuator_worker, &verdict(90, true), &[]);
+    let fault = told(&mut actuator_worker, |said| match said {
+        ActuatorReport::Fault(fault) => Some(fault),
         _ => None,
     });
     assert_eq!((fault.disarmed(), &fault), (Disarmed::Line, &Fault::Gone));

@@ -8,7 +8,7 @@ use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Account, Book, Moved, Order};
 use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
 use gateway::pipeline::{NoStore, Pipeline};
-use gateway::run::hand::{Hand, Said, Tools};
+use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use rules::estimators;
 use rules::script::{Host, ScriptFile};
 use std::path::Path;
@@ -42,7 +42,7 @@ pub(crate) struct Bench {
     pub(crate) machine: Simulated,
     lockstep: Lockstep,
     pub(crate) pipeline: Pipeline,
-    hand: Hand,
+    actuator_worker: ActuatorWorker,
     sample: Sample,
     now_ns: TimeNs,
     /// Time between two ticks.
@@ -86,7 +86,7 @@ impl Bench {
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
-            hand: Hand::inline(Tools { actuator: Some(actuator), offsets: Some(offsets) }, limits),
+            actuator_worker: ActuatorWorker::inline(Tools { actuator: Some(actuator), offsets: Some(offsets) }, limits),
             _directory: directory,
             machine,
             sample: Sample::empty(0),
@@ -114,29 +114,29 @@ impl Bench {
         let judged = gate.ask(&asks, &self.sample).into_iter();
         let sent: Vec<Ask> = judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
         let mut said = Vec::new();
-        self.hand.step(&verdict, &sent, self.now_ns, |it| said.push(it));
+        self.actuator_worker.step(&verdict, &sent, self.now_ns, |it| said.push(it));
         let orders: Vec<Order> = self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
         let gate = self.pipeline.gate_mut();
-        self.hand.shift(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
+        self.actuator_worker.shift(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
         for it in said {
             let fault = match it {
-                Said::Written(written) => written.fault,
-                Said::Fault(fault) => Some(fault),
-                Said::Seen(reaction) => {
+                ActuatorReport::Written(written) => written.fault,
+                ActuatorReport::Fault(fault) => Some(fault),
+                ActuatorReport::Seen(reaction) => {
                     self.reactions.push(reaction);
                     None
                 }
-                Said::Moved(moved) => {
+                ActuatorReport::Moved(moved) => {
                     gate.offsets_mut().answered(&moved);
                     let fault = moved.fault();
                     self.moves.push(*moved);
                     fault
                 }
-                Said::Withdrawn(order) => {
+                ActuatorReport::Withdrawn(order) => {
                     gate.offsets_mut().withdrawn(order);
                     None
                 }
-                Said::Asked(_, failed) => {
+                ActuatorReport::Asked(_, failed) => {
                     self.faults.extend(failed);
                     None
                 }

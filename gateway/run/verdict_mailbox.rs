@@ -24,10 +24,10 @@ const ASK_LASTS: Duration = Duration::from_secs(10);
 /// After this time a program may have begun.
 const ORDER_LASTS: Duration = Duration::from_secs(2);
 /// A verdict that is so late is waited for asleep.
-const LIE_IN_WAIT: Duration = Duration::from_micros(900);
+const SPIN_AFTER_DUE: Duration = Duration::from_micros(900);
 
 #[derive(Debug, Default)]
-struct Paper {
+struct Pending {
     verdict: Option<(Instant, Verdict)>,
     asks: Waiting<Ask>,
     orders: Waiting<Order>,
@@ -48,8 +48,8 @@ fn queue<T: Clone>(waiting: &mut Waiting<T>, most: usize, new: &[T]) -> Vec<T> {
 
 /// See the [module](self).
 #[derive(Debug, Default)]
-pub(super) struct Desk {
-    paper: Mutex<Paper>,
+pub(super) struct VerdictMailbox {
+    pending: Mutex<Pending>,
     arrived: Condvar,
     /// Grows with everything that is laid down.
     laid: AtomicU64,
@@ -57,7 +57,7 @@ pub(super) struct Desk {
     period: Option<Duration>,
 }
 
-impl Desk {
+impl VerdictMailbox {
     /// Verdicts come at this period.
     pub(super) fn new(period: Duration) -> Self {
         Self { period: Some(period).filter(|period| *period >= LEAD_PERIOD_MIN), ..Self::default() }
@@ -68,39 +68,39 @@ impl Desk {
         self.arrived.notify_one();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Paper> {
+    fn lock(&self) -> MutexGuard<'_, Pending> {
         // A paper is complete whenever the lock is free.
-        self.paper.lock().unwrap_or_else(PoisonError::into_inner)
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The newest verdict, and requests to the ladder. Gives those that will not be handed over: there is no room, or the
     /// arming has ended.
-    pub(super) fn lay_down(&self, verdict: &Verdict, asks: &[Ask]) -> Vec<Ask> {
-        let mut paper = self.lock();
+    pub(super) fn post_verdict(&self, verdict: &Verdict, asks: &[Ask]) -> Vec<Ask> {
+        let mut pending = self.lock();
         let now = Instant::now();
-        paper.verdict = Some((now, *verdict));
-        paper.armed_at = verdict.armed.then_some(now);
+        pending.verdict = Some((now, *verdict));
+        pending.armed_at = verdict.armed.then_some(now);
         let mut refused = Vec::new();
         if !verdict.armed {
-            refused.extend(paper.asks.drain(..).map(|(_, ask)| ask));
+            refused.extend(pending.asks.drain(..).map(|(_, ask)| ask));
         }
-        refused.extend(queue(&mut paper.asks, ASKS_MAX, asks));
-        drop(paper);
+        refused.extend(queue(&mut pending.asks, ASKS_MAX, asks));
+        drop(pending);
         self.told();
         refused
     }
 
     /// Orders to shift axes. Gives those that will not be carried out: there is no room, or the arming has ended.
     pub(super) fn order(&self, orders: &[Order], armed: bool) -> Vec<Order> {
-        let mut paper = self.lock();
+        let mut pending = self.lock();
         let mut withdrawn = Vec::new();
         if !armed {
             let is_step = |order: &Order| matches!(order, Order::Shift { .. });
-            withdrawn.extend(paper.orders.iter().map(|(_, order)| *order).filter(is_step));
-            paper.orders.retain(|(_, order)| !is_step(order));
+            withdrawn.extend(pending.orders.iter().map(|(_, order)| *order).filter(is_step));
+            pending.orders.retain(|(_, order)| !is_step(order));
         }
-        withdrawn.extend(queue(&mut paper.orders, ORDERS_MAX, orders));
-        drop(paper);
+        withdrawn.extend(queue(&mut pending.orders, ORDERS_MAX, orders));
+        drop(pending);
         if !orders.is_empty() {
             self.told();
         }
@@ -116,26 +116,26 @@ impl Desk {
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
     /// `awake`, it lies in wait for the next verdict that is due.
     pub(super) fn take(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
-        let empty = |paper: &mut Paper| paper.verdict.is_none() && paper.orders.is_empty() && !paper.closing;
-        let paper = self.lock();
-        let due = self.period.filter(|_| awake).zip(paper.armed_at).map(|(period, at)| at + period);
+        let empty = |pending: &mut Pending| pending.verdict.is_none() && pending.orders.is_empty() && !pending.closing;
+        let pending = self.lock();
+        let due = self.period.filter(|_| awake).zip(pending.armed_at).map(|(period, at)| at + period);
         let laid = self.laid.load(Ordering::Acquire);
         let asleep = due.map_or(limit, |due| due.saturating_duration_since(Instant::now() + LEAD).min(limit));
-        let waited = self.arrived.wait_timeout_while(paper, asleep, empty);
-        let mut paper = waited.unwrap_or_else(PoisonError::into_inner).0;
-        if let Some(due) = due.filter(|_| asleep < limit && empty(&mut paper)) {
-            drop(paper);
-            self.lie_in_wait(laid, due + LIE_IN_WAIT);
+        let waited = self.arrived.wait_timeout_while(pending, asleep, empty);
+        let mut pending = waited.unwrap_or_else(PoisonError::into_inner).0;
+        if let Some(due) = due.filter(|_| asleep < limit && empty(&mut pending)) {
+            drop(pending);
+            self.spin_until(laid, due + SPIN_AFTER_DUE);
             let waited = self.arrived.wait_timeout_while(self.lock(), limit - asleep, empty);
-            paper = waited.unwrap_or_else(PoisonError::into_inner).0;
+            pending = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
         let fresh = |(laid, verdict): &(Instant, Verdict)| !verdict.armed || laid.elapsed() <= VERDICT_LASTS;
-        let fresh = paper.verdict.take().filter(fresh);
-        (fresh.map(|(_, verdict)| verdict), paper.closing)
+        let fresh = pending.verdict.take().filter(fresh);
+        (fresh.map(|(_, verdict)| verdict), pending.closing)
     }
 
     /// Awake until something is laid down, or it has become too late for it.
-    fn lie_in_wait(&self, laid: u64, until: Instant) {
+    fn spin_until(&self, laid: u64, until: Instant) {
         while self.laid.load(Ordering::Acquire) == laid && Instant::now() < until {
             // The tick may go on meanwhile, on a box with one processor.
             std::thread::yield_now();

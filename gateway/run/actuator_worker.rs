@@ -5,8 +5,8 @@
 //! What waits while the controller takes its time is judged again when its turn comes: a verdict, a request or an order that
 //! has grown old, or whose arming has ended meanwhile, goes nowhere, and the tick is told.
 
-use super::desk::Desk;
 use super::priority::{self, Granted};
+use super::verdict_mailbox::VerdictMailbox;
 use crate::config;
 use crate::gate::offset::{Account, Moved, Order};
 use crate::gate::{Ask, Fault, Reaction, Verdict, Writer, Written};
@@ -18,7 +18,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// What is told but not yet listened to; beyond that the hand lets go.
-const SAID_MAX: usize = 1024;
+const REPORTS_MAX: usize = 1024;
 /// While a change has not been seen in force it is looked for this often.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Without a verdict for this long the hand looks whether it shall end.
@@ -30,12 +30,12 @@ const WITHDRAW_WITHIN: Duration = Duration::from_millis(2500);
 /// Between two of these attempts.
 const WITHDRAW_PAUSE: Duration = Duration::from_millis(100);
 /// Why a request never reached the ladder.
-const NOT_HANDED_OVER: &str = "not handed over: the gate was disarmed before the controller had time for it, or it had none for \
+const NOT_PASSED_ON: &str = "not handed over: the gate was disarmed before the controller had time for it, or it had none for \
                                ten seconds";
 
 /// What the hand tells.
 #[derive(Debug)]
-pub enum Said {
+pub enum ActuatorReport {
     /// It wrote.
     Written(Written),
     /// A change was seen in force.
@@ -60,12 +60,12 @@ pub struct Tools {
 }
 
 /// The same with the account of what was written.
-pub struct Holding {
+pub struct Writers {
     writer: Option<AnyWriter>,
     offsets: Option<Account>,
 }
 
-impl Holding {
+impl Writers {
     fn of(tools: Tools, limits: &config::Gate) -> Self {
         Self { writer: tools.actuator.map(|actuator| Writer::new(actuator, limits)), offsets: tools.offsets }
     }
@@ -86,16 +86,16 @@ impl Holding {
 type AnyWriter = Writer<Box<dyn Actuator>>;
 
 /// See the [module](self).
-pub enum Hand {
+pub enum ActuatorWorker {
     /// Nothing can be written: the default.
     None,
     /// A machine in accelerated time: written at the tick, on the machine's clock.
-    Inline(Box<Holding>, ManualClock),
+    Inline(Box<Writers>, ManualClock),
     /// A thread.
     Thread(Remote),
 }
 
-impl Hand {
+impl ActuatorWorker {
     /// On a thread, by this clock, with a verdict at every such period.
     ///
     /// # Errors
@@ -106,70 +106,72 @@ impl Hand {
         clock: Arc<dyn Clock>,
         period: Duration,
     ) -> std::io::Result<Self> {
-        let holding = Holding::of(tools, limits);
-        let desk = Arc::new(Desk::new(period));
-        let (say, said) = sync_channel(SAID_MAX);
-        let of_thread = desk.clone();
+        let writers = Writers::of(tools, limits);
+        let mailbox = Arc::new(VerdictMailbox::new(period));
+        let (say, said) = sync_channel(REPORTS_MAX);
+        let of_thread = mailbox.clone();
         let thread = std::thread::Builder::new()
             .name("gate".to_owned())
-            .spawn(move || work(holding, &of_thread, &*clock, &say))?;
-        Ok(Self::Thread(Remote { desk, said, thread: Some(thread) }))
+            .spawn(move || work(writers, &of_thread, &*clock, &say))?;
+        Ok(Self::Thread(Remote { mailbox, said, thread: Some(thread) }))
     }
 
     /// At the tick, for accelerated time.
     #[must_use]
     pub fn inline(tools: Tools, limits: &config::Gate) -> Self {
-        Self::Inline(Box::new(Holding::of(tools, limits)), ManualClock::default())
+        Self::Inline(Box::new(Writers::of(tools, limits)), ManualClock::default())
     }
 
-    /// Hands over what was decided at `now_ns`. What is told about it comes with [`Hand::listen`].
-    pub fn step(&mut self, verdict: &Verdict, asks: &[Ask], now_ns: TimeNs, mut tell: impl FnMut(Said)) {
+    /// Hands over what was decided at `now_ns`. What is told about it comes with [`ActuatorWorker::listen`].
+    pub fn step(&mut self, verdict: &Verdict, asks: &[Ask], now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
         match self {
             Self::None => {}
-            Self::Inline(holding, clock) => {
+            Self::Inline(writers, clock) => {
                 clock.set(now_ns);
-                asks.iter().for_each(|it| ask(holding, it, clock, &mut tell));
-                write(holding, Some(verdict), clock, &mut tell);
+                asks.iter().for_each(|it| ask(writers, it, clock, &mut tell));
+                write(writers, Some(verdict), clock, &mut tell);
             }
             Self::Thread(remote) => {
-                let refused = remote.desk.lay_down(verdict, asks);
-                refused.into_iter().for_each(|it| tell(Said::Asked(it, Some(NOT_HANDED_OVER.to_owned()))));
+                let refused = remote.mailbox.post_verdict(verdict, asks);
+                refused.into_iter().for_each(|it| tell(ActuatorReport::Asked(it, Some(NOT_PASSED_ON.to_owned()))));
             }
         }
     }
 
-    /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`Hand::listen`].
-    pub fn shift(&mut self, orders: &[Order], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(Said)) {
+    /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`ActuatorWorker::listen`].
+    pub fn shift(&mut self, orders: &[Order], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
         match self {
             Self::None => {}
-            Self::Inline(holding, clock) => {
+            Self::Inline(writers, clock) => {
                 clock.set(now_ns);
-                orders.iter().for_each(|order| shift(holding, *order, clock, &mut tell));
+                orders.iter().for_each(|order| shift(writers, *order, clock, &mut tell));
             }
             Self::Thread(remote) => {
-                let withdrawn = remote.desk.order(orders, armed);
-                withdrawn.into_iter().for_each(|order| tell(Said::Withdrawn(order)));
+                let withdrawn = remote.mailbox.order(orders, armed);
+                withdrawn.into_iter().for_each(|order| tell(ActuatorReport::Withdrawn(order)));
             }
         }
     }
 
     /// What the hand has told since; also that it is not there any more.
-    pub fn listen(&mut self, mut tell: impl FnMut(Said)) {
+    pub fn listen(&mut self, mut tell: impl FnMut(ActuatorReport)) {
         let Self::Thread(remote) = self else { return };
         loop {
             match remote.said.try_recv() {
                 Ok(said) => tell(said),
                 Err(TryRecvError::Empty) => return,
-                Err(TryRecvError::Disconnected) => return tell(Said::Fault(Fault::Gone)),
+                Err(TryRecvError::Disconnected) => return tell(ActuatorReport::Fault(Fault::Gone)),
             }
         }
     }
 
     /// Gives the machine back and ends.
-    pub fn close(&mut self, mut tell: impl FnMut(Said)) {
+    pub fn close(&mut self, mut tell: impl FnMut(ActuatorReport)) {
         match self {
             Self::None => {}
-            Self::Inline(holding, clock) => holding.release(clock).into_iter().for_each(|it| tell(Said::Written(it))),
+            Self::Inline(writers, clock) => {
+                writers.release(clock).into_iter().for_each(|it| tell(ActuatorReport::Written(it)))
+            }
             Self::Thread(remote) => remote.close(&mut tell),
         }
     }
@@ -177,14 +179,14 @@ impl Hand {
 
 /// The tick's end of the thread.
 pub struct Remote {
-    desk: Arc<Desk>,
-    said: Receiver<Said>,
+    mailbox: Arc<VerdictMailbox>,
+    said: Receiver<ActuatorReport>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Remote {
-    fn close(&mut self, tell: &mut dyn FnMut(Said)) {
-        self.desk.close();
+    fn close(&mut self, tell: &mut dyn FnMut(ActuatorReport)) {
+        self.mailbox.close();
         let until = Instant::now() + LET_GO_WITHIN;
         // The sender goes with the thread.
         while let Ok(said) = self.said.recv_timeout(until.saturating_duration_since(Instant::now())) {
@@ -197,24 +199,24 @@ impl Remote {
     }
 }
 
-fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<Said>) {
+fn work(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: &SyncSender<ActuatorReport>) {
     // The tick tells what is granted; it is the same for both.
     let awake = priority::ask() == Granted::RealTime;
     let mut heard = true;
     while heard {
-        let (verdict, closing) = desk.take(if holding.is_waiting() { LOOK_EVERY } else { REST }, awake);
+        let (verdict, closing) = mailbox.take(if writers.is_waiting() { LOOK_EVERY } else { REST }, awake);
         let mut tell = |said| heard &= say.try_send(said).is_ok();
-        while let Some((it, in_time)) = desk.next_ask() {
+        while let Some((it, in_time)) = mailbox.next_ask() {
             match in_time {
-                true => ask(&mut holding, &it, clock, &mut tell),
-                false => tell(Said::Asked(it, Some(NOT_HANDED_OVER.to_owned()))),
+                true => ask(&mut writers, &it, clock, &mut tell),
+                false => tell(ActuatorReport::Asked(it, Some(NOT_PASSED_ON.to_owned()))),
             }
         }
-        write(&mut holding, verdict.as_ref(), clock, &mut tell);
-        while let Some((order, in_time)) = desk.next_order() {
+        write(&mut writers, verdict.as_ref(), clock, &mut tell);
+        while let Some((order, in_time)) = mailbox.next_order() {
             match in_time {
-                true => shift(&mut holding, order, clock, &mut tell),
-                false => tell(Said::Withdrawn(order)),
+                true => shift(&mut writers, order, clock, &mut tell),
+                false => tell(ActuatorReport::Withdrawn(order)),
             }
         }
         if closing {
@@ -223,38 +225,38 @@ fn work(mut holding: Holding, desk: &Desk, clock: &dyn Clock, say: &SyncSender<S
     }
     // Nobody listens any more, or it is over: the machine is given back.
     let until = Instant::now() + WITHDRAW_WITHIN;
-    while holding.owes_withdrawal() {
-        if let Some(written) = holding.release(clock) {
-            let _nobody = say.try_send(Said::Written(written));
+    while writers.owes_withdrawal() {
+        if let Some(written) = writers.release(clock) {
+            let _nobody = say.try_send(ActuatorReport::Written(written));
         }
         if Instant::now() >= until {
             break;
         }
-        if holding.owes_withdrawal() {
+        if writers.owes_withdrawal() {
             std::thread::sleep(WITHDRAW_PAUSE);
         }
     }
 }
 
-fn ask(holding: &mut Holding, ask: &Ask, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
-    let Some(writer) = &mut holding.writer else { return };
+fn ask(writers: &mut Writers, ask: &Ask, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+    let Some(writer) = &mut writers.writer else { return };
     let failed = writer.ask(ask.request, clock).err().map(|error| error.to_string());
-    tell(Said::Asked(ask.clone(), failed));
+    tell(ActuatorReport::Asked(ask.clone(), failed));
 }
 
-fn write(holding: &mut Holding, verdict: Option<&Verdict>, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
-    let Some(writer) = &mut holding.writer else { return };
+fn write(writers: &mut Writers, verdict: Option<&Verdict>, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+    let Some(writer) = &mut writers.writer else { return };
     if let Some(written) = verdict.and_then(|verdict| writer.step(verdict, clock)) {
-        tell(Said::Written(written));
+        tell(ActuatorReport::Written(written));
     }
     match writer.look(clock) {
         None => {}
-        Some(Ok(reaction)) => tell(Said::Seen(reaction)),
-        Some(Err(fault)) => tell(Said::Fault(fault)),
+        Some(Ok(reaction)) => tell(ActuatorReport::Seen(reaction)),
+        Some(Err(fault)) => tell(ActuatorReport::Fault(fault)),
     }
 }
 
-fn shift(holding: &mut Holding, order: Order, clock: &dyn Clock, tell: &mut dyn FnMut(Said)) {
-    let Some(offsets) = &mut holding.offsets else { return };
-    tell(Said::Moved(Box::new(offsets.carry_out(order, clock))));
+fn shift(writers: &mut Writers, order: Order, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+    let Some(offsets) = &mut writers.offsets else { return };
+    tell(ActuatorReport::Moved(Box::new(offsets.carry_out(order, clock))));
 }
