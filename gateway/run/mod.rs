@@ -50,7 +50,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
-use tick::{Identity, Ticker, Wishes};
+use tick::{Identity, RunFlags, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use twin::Twin;
@@ -97,15 +97,15 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
         .map_err(|error| CannotRun::new(format!("no threads to serve with: {error}"), ""))?;
     let listener = runtime.block_on(listen(&plan))?;
     let certificate = certificate(&plan)?;
-    let wishes = Arc::new(Wishes::default());
+    let run_flags = Arc::new(RunFlags::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
-    let (ticker, live) = ticker(&plan, &wishes, port, inbox, outputs.as_ref())?;
+    let (ticker, live) = ticker(&plan, &run_flags, port, inbox, outputs.as_ref())?;
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, (listener, certificate), live, &wishes, (report, post), outputs.as_ref()));
+    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, (report, post), outputs.as_ref()));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -141,7 +141,7 @@ async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
 
 fn ticker(
     plan: &Plan,
-    wishes: &Arc<Wishes>,
+    run_flags: &Arc<RunFlags>,
     port: watch::Receiver<Option<String>>,
     inbox: Inbox,
     outputs: Option<&Outputs>,
@@ -183,7 +183,7 @@ fn ticker(
     }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
-    let wishes = wishes.clone();
+    let run_flags = run_flags.clone();
     let operations = config.operations.path.as_deref().map(Operations::begin);
     let wear = Wear::of(config);
     Ok((
@@ -200,7 +200,7 @@ fn ticker(
             sinks: outputs.map(|outputs| outputs.board.clone()).unwrap_or_default(),
             scripts: watched,
             health,
-            wishes,
+            run_flags,
             wake,
             publish,
             stop_after_ns,
@@ -287,7 +287,7 @@ async fn serve(
     plan: &Plan,
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
-    wishes: &Arc<Wishes>,
+    run_flags: &Arc<RunFlags>,
     (report, post): (watch::Sender<Option<String>>, control::Post),
     outputs: Option<&Outputs>,
 ) {
@@ -307,14 +307,14 @@ async fn serve(
         _ => None,
     };
     tokio::select! {
-        () = obey(wishes) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
+        () = obey(run_flags) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
         () = until_closed(live) => {}
     }
     // What the sinks have delivered is noted by the last commit of the history.
     if let Some(sinks) = sinks {
         sinks.stop().await;
     }
-    wishes.stop.store(true, Ordering::SeqCst);
+    run_flags.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {
         server.stop().await;
     }
@@ -349,7 +349,7 @@ async fn follow(access: Arc<Access>) {
 }
 
 /// Returns when a signal says stop.
-async fn obey(wishes: &Wishes) {
+async fn obey(run_flags: &RunFlags) {
     let mut signals = match Signals::listen() {
         Ok(signals) => signals,
         Err(error) => {
@@ -361,7 +361,7 @@ async fn obey(wishes: &Wishes) {
     loop {
         match signals.next().await {
             Request::Stop => return,
-            Request::Reload => wishes.reload.store(true, Ordering::SeqCst),
+            Request::Reload => run_flags.reload.store(true, Ordering::SeqCst),
         }
     }
 }

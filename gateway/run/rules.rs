@@ -1,7 +1,7 @@
 //! The scripts of a running box: delivered at the first start, loaded, watched, reloaded.
 
 use super::health::{Health, SCRIPTS_MEMORY};
-use super::tick::Wishes;
+use super::tick::RunFlags;
 use crate::config::Config;
 use crate::in_charge;
 use crate::log::{Notice, Severity};
@@ -104,10 +104,10 @@ impl Watched {
         &mut self,
         pipeline: &mut Pipeline,
         health: &mut Health,
-        wishes: &Wishes,
+        run_flags: &RunFlags,
         (now_ns, at_ns): (TimeNs, TimeNs),
     ) {
-        self.take(pipeline, health, wishes, now_ns);
+        self.take(pipeline, health, run_flags, now_ns);
         let host = pipeline.scripts();
         if self.told_of.replace(host.generation()) != Some(host.generation()) {
             // By the time of the sample, which is that of the alarms.
@@ -115,12 +115,12 @@ impl Watched {
         }
     }
 
-    fn take(&mut self, pipeline: &mut Pipeline, health: &mut Health, wishes: &Wishes, now_ns: TimeNs) {
+    fn take(&mut self, pipeline: &mut Pipeline, health: &mut Health, run_flags: &RunFlags, now_ns: TimeNs) {
         for notice in self.told.drain(..) {
             health.event(now_ns, "scripts", &notice);
         }
         let Some(reloader) = &self.reloader else { return };
-        if wishes.reload.swap(false, Ordering::SeqCst) {
+        if run_flags.reload.swap(false, Ordering::SeqCst) {
             reloader.ask();
         }
         let notice = match reloader.step(pipeline.scripts_mut()) {

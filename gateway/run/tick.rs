@@ -34,7 +34,7 @@ const ORDERS_BETWEEN_MAX: u32 = 32;
 
 /// What the rest of the process asks of the tick.
 #[derive(Debug, Default)]
-pub struct Wishes {
+pub struct RunFlags {
     /// Finish this tick and end.
     pub stop: AtomicBool,
     /// Read scripts again.
@@ -81,7 +81,7 @@ pub struct Ticker {
     /// Store, sources, clock: what may fail while the box goes on.
     pub health: Health,
     /// What the rest of the process wants.
-    pub wishes: Arc<Wishes>,
+    pub run_flags: Arc<RunFlags>,
     /// How somebody who orders wakes this thread.
     pub wake: Wake,
     /// Where the status goes.
@@ -111,7 +111,7 @@ impl Ticker {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.complete(&mut sample, now_ns);
-            self.scripts.step(&mut self.pipeline, &mut self.health, &self.wishes, (now_ns, sample.at_ns));
+            self.scripts.step(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
             let inferred = *self.pipeline.infer(&sample);
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
@@ -143,14 +143,14 @@ impl Ticker {
             twin.save(&self.health);
         }
         self.health.close(&self.pipeline, sample.at_ns);
-        self.wishes.stop.store(true, Ordering::SeqCst);
+        self.run_flags.stop.store(true, Ordering::SeqCst);
     }
 
     /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
     fn next_tick(&mut self, sample: &Sample, last_ns: Option<TimeNs>) -> Option<TimeNs> {
-        let Self { pace, wake, wishes, commands, pipeline, health, .. } = self;
+        let Self { pace, wake, run_flags, commands, pipeline, health, .. } = self;
         let mut left = ORDERS_BETWEEN_MAX;
-        pace.next_tick_or(&wishes.stop, wake, || {
+        pace.next_tick_or(&run_flags.stop, wake, || {
             // Before the first tick there is nothing to order about.
             let Some(last_ns) = last_ns.filter(|_| left > 0) else { return };
             left -= 1;
@@ -172,7 +172,7 @@ impl Ticker {
     /// The recipe fills in what the sources do not deliver.
     fn complete(&mut self, sample: &mut Sample, now_ns: TimeNs) {
         let Some(operations) = &mut self.operations else { return };
-        let reload = self.wishes.reload.load(Ordering::SeqCst);
+        let reload = self.run_flags.reload.load(Ordering::SeqCst);
         operations.step(sample, reload, |notice| self.health.event(now_ns, SOURCE, notice));
     }
 

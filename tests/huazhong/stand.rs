@@ -5,7 +5,7 @@ use adapters::address::Address;
 use adapters::clock::{Clock, SystemClock};
 use adapters::mqtt::Options;
 use adapters::nclink::connection::{Connection, Link};
-use adapters::nclink::device::{Device, Said};
+use adapters::nclink::device::{Device, DeviceEvent};
 use adapters::nclink::{NcLinkSource, open};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::{Reading, Source};
@@ -34,7 +34,7 @@ impl Served {
         let mut device = Device::new(SERIAL, machine, clock.clone());
         let thread = std::thread::spawn(move || {
             device.run(&Options::new("127.0.0.1", port, "device"), &stopping, |said| {
-                if said == Said::Connected {
+                if said == DeviceEvent::Connected {
                     up.fetch_add(1, Ordering::SeqCst);
                 }
             });

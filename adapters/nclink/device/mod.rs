@@ -44,7 +44,7 @@ const LOOK: Duration = Duration::from_millis(50);
 
 /// What a device tells the one who runs it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Said {
+pub enum DeviceEvent {
     /// It is at the broker, and answers.
     Connected,
     /// The broker cannot be used; it goes on trying.
@@ -76,14 +76,14 @@ impl Device {
     }
 
     /// Serves until `stop` is set. Tells when it comes to the broker and when it loses it.
-    pub fn run(&mut self, broker: &Options, stop: &AtomicBool, mut tell: impl FnMut(Said)) {
+    pub fn run(&mut self, broker: &Options, stop: &AtomicBool, mut tell: impl FnMut(DeviceEvent)) {
         let mut failing = false;
         while !stop.load(Ordering::SeqCst) {
-            let outcome = self.serve(broker, stop, || tell(Said::Connected));
+            let outcome = self.serve(broker, stop, || tell(DeviceEvent::Connected));
             let Err(error) = outcome else { return };
             // An attempt that fails like the one before is not told again.
             if !(failing && matches!(error, MqttError::Unreachable { .. })) {
-                tell(Said::Failed(error.clone()));
+                tell(DeviceEvent::Failed(error.clone()));
             }
             failing = matches!(error, MqttError::Unreachable { .. });
             pause(stop);

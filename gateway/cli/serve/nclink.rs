@@ -3,7 +3,7 @@
 use super::{Common, Running, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
 use adapters::mqtt::Options;
-use adapters::nclink::device::{Device, MAILBOX, OFFSETS, Said};
+use adapters::nclink::device::{Device, DeviceEvent, MAILBOX, OFFSETS};
 use clap::Args;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -59,11 +59,11 @@ fn broker(text: &str) -> Result<Options, CannotRun> {
     Ok(Options::new(host, port, "cnc-gateway-device"))
 }
 
-fn line(name: &str, said: &Said) -> String {
+fn line(name: &str, said: &DeviceEvent) -> String {
     match said {
-        Said::Connected => {
+        DeviceEvent::Connected => {
             format!("serving {name} (mailbox for the feed override: {MAILBOX}, for offsets: {OFFSETS})\n")
         }
-        Said::Failed(error) => format!("not served: {error}; dialling again every second\n"),
+        DeviceEvent::Failed(error) => format!("not served: {error}; dialling again every second\n"),
     }
 }
