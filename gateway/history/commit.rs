@@ -2,7 +2,7 @@
 
 use super::block::Block;
 use super::error::{Doing, HistoryError};
-use super::keeper::{Keeper, Segment};
+use super::minute_buffer::{MinuteBuffer, Segment};
 use super::outbox::Gatherer;
 use super::record_sql;
 use super::{pyramid, tail};
@@ -55,75 +55,77 @@ impl TailSlots {
     }
 }
 
-/// Makes the oldest of what is in `keeper` durable, or changes nothing. False when blocks are left; with the last of
+/// Makes the oldest of what is in `minute_buffer` durable, or changes nothing. False when blocks are left; with the last of
 /// them go, if `with_tail`, the rows of the running minute. Records go with their rows: what a kill leaves behind is the
 /// history up to one moment, with everything before it and nothing after it.
 pub(crate) fn commit(
     db: &mut Connection,
-    keeper: &mut Keeper,
+    minute_buffer: &mut MinuteBuffer,
     slots: &mut TailSlots,
     outbox: &mut Option<Gatherer>,
     origin: &str,
     with_tail: bool,
 ) -> Result<bool, HistoryError> {
     let writing = db.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).doing("beginning a commit")?;
-    keeper.segments.iter().try_for_each(|segment| insert_segment(&writing, segment, origin))?;
-    let blocks = keeper.blocks.len().min(BLOCKS_MAX);
-    keeper.blocks.iter().take(blocks).try_for_each(|block| insert_block(&writing, block))?;
-    let last = blocks == keeper.blocks.len();
+    minute_buffer.segments.iter().try_for_each(|segment| insert_segment(&writing, segment, origin))?;
+    let blocks = minute_buffer.blocks.len().min(BLOCKS_MAX);
+    minute_buffer.blocks.iter().take(blocks).try_for_each(|block| insert_block(&writing, block))?;
+    let last = blocks == minute_buffer.blocks.len();
     let mut replaced = slots.clone();
     if last && with_tail {
-        put_tail(&writing, keeper, &mut replaced)?;
+        put_tail(&writing, minute_buffer, &mut replaced)?;
     }
-    let end_row = rows_end(keeper, blocks, with_tail);
-    let records = keeper.records_through(end_row);
-    let mut storing = keeper.records.iter().take(records);
+    let end_row = rows_end(minute_buffer, blocks, with_tail);
+    let records = minute_buffer.records_through(end_row);
+    let mut storing = minute_buffer.records.iter().take(records);
     storing.try_for_each(|posted| record_sql::store(&writing, &posted.record)).doing("storing a record")?;
-    let items = outbox
-        .as_ref()
-        .map(|outbox| outbox.put(&writing, keeper.records.iter().take(records), keeper.opened_row, end_row));
+    let items = outbox.as_ref().map(|outbox| {
+        outbox.put(&writing, minute_buffer.records.iter().take(records), minute_buffer.opened_row, end_row)
+    });
     let items = items.transpose()?;
     writing.commit().doing("making samples durable")?;
     if let (Some(outbox), Some(items)) = (outbox, items) {
-        outbox.committed(items, &keeper.reasons);
+        outbox.committed(items, &minute_buffer.reasons);
     }
-    keeper.segments.clear();
-    keeper.blocks.drain(..blocks);
+    minute_buffer.segments.clear();
+    minute_buffer.blocks.drain(..blocks);
     *slots = replaced;
-    keeper.forget_records(records);
+    minute_buffer.forget_records(records);
     if last && with_tail {
-        keeper.in_tail = keeper.open.len();
+        minute_buffer.in_tail = minute_buffer.open.len();
     }
     Ok(last)
 }
 
 /// Number of the row after the last one that a commit of the first `blocks` blocks makes durable.
-fn rows_end(keeper: &Keeper, blocks: usize, with_tail: bool) -> i64 {
-    match keeper.blocks.get(blocks) {
+fn rows_end(minute_buffer: &MinuteBuffer, blocks: usize, with_tail: bool) -> i64 {
+    match minute_buffer.blocks.get(blocks) {
         Some(left) => left.first_row,
-        None if with_tail => keeper.next_row,
-        None => keeper.open_row() + keeper.in_tail as i64,
+        None if with_tail => minute_buffer.next_row,
+        None => minute_buffer.open_row() + minute_buffer.in_tail as i64,
     }
 }
 
 /// Writes the rows that the crash tail lacks, over its oldest entries where those are not needed any more.
-fn put_tail(db: &Connection, keeper: &Keeper, slots: &mut TailSlots) -> Result<(), HistoryError> {
-    let mut from = keeper.in_tail;
-    let mut count = keeper.open.len() - from;
-    while from < keeper.open.len() {
-        count = count.min(keeper.open.len() - from);
-        let body = tail::to_text(&keeper.open, from..from + count, &keeper.series, &keeper.reasons);
+fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots) -> Result<(), HistoryError> {
+    let mut from = minute_buffer.in_tail;
+    let mut count = minute_buffer.open.len() - from;
+    while from < minute_buffer.open.len() {
+        count = count.min(minute_buffer.open.len() - from);
+        let body =
+            tail::to_text(&minute_buffer.open, from..from + count, &minute_buffer.series, &minute_buffer.reasons);
         if body.len() > ENTRY_BYTES && count > 1 {
             count = (count * ENTRY_BYTES / body.len()).clamp(1, count - 1);
             continue;
         }
-        let slot = slots.take_spare(keeper.open_row(), keeper.next_row).unwrap_or_else(|| slots.new_slot());
+        let slot =
+            slots.take_spare(minute_buffer.open_row(), minute_buffer.next_row).unwrap_or_else(|| slots.new_slot());
         let padded = body.len().next_multiple_of(ENTRY_STEP);
-        insert_tail(db, keeper, slot, from..from + count, &format!("{body:padded$}"))?;
+        insert_tail(db, minute_buffer, slot, from..from + count, &format!("{body:padded$}"))?;
         from += count;
-        slots.used.push_back(Entry { slot, end_row: keeper.open_row() + from as i64 });
+        slots.used.push_back(Entry { slot, end_row: minute_buffer.open_row() + from as i64 });
     }
-    while let Some(slot) = slots.take_spare(keeper.open_row(), keeper.next_row) {
+    while let Some(slot) = slots.take_spare(minute_buffer.open_row(), minute_buffer.next_row) {
         db.prepare_cached("DELETE FROM tail WHERE slot = ?1")
             .and_then(|mut delete| delete.execute([slot]))
             .doing("shortening the crash tail")?;
@@ -168,7 +170,7 @@ pub(crate) fn put_block(db: &Connection, block: &Block) -> Result<(), rusqlite::
 
 fn insert_tail(
     db: &Connection,
-    keeper: &Keeper,
+    minute_buffer: &MinuteBuffer,
     slot: i64,
     rows: Range<usize>,
     body: &str,
@@ -180,11 +182,11 @@ fn insert_tail(
     .and_then(|mut insert| {
         insert.execute(params![
             slot,
-            keeper.segment,
-            keeper.open_row() + rows.start as i64,
+            minute_buffer.segment,
+            minute_buffer.open_row() + rows.start as i64,
             rows.len() as i64,
-            keeper.open.at_ns[rows.start],
-            keeper.open.at_ns[rows.end - 1],
+            minute_buffer.open.at_ns[rows.start],
+            minute_buffer.open.at_ns[rows.end - 1],
             body
         ])
     })

@@ -38,7 +38,7 @@
 //! What other systems are sent is numbered and kept beside the samples until every sink has delivered it: see [`Outbox`].
 //!
 //! # Who does what
-//! `mailbox` takes in, `keeper` gathers and seals, `commit` makes durable, `house` keeps order, all on `thread`;
+//! `mailbox` takes in, `minute_buffer` gathers and seals, `commit` makes durable, `maintenance` keeps order, all on `thread`;
 //! [`Reader`] answers on connections of its own: `walk` goes through a range, `query`, `overview`, `list`, `sql` and
 //! `export` ask.
 
@@ -49,12 +49,12 @@ mod compact;
 mod error;
 mod export;
 mod ffi;
-mod house;
 mod info;
-mod keeper;
 mod list;
 mod lock;
 mod mailbox;
+mod maintenance;
+mod minute_buffer;
 mod options;
 mod outbox;
 mod overview;

@@ -3,7 +3,7 @@
 use super::block::{Encoder, LEVEL_FRESH};
 use super::commit::insert_block;
 use super::error::{Doing, HistoryError};
-use super::keeper::End;
+use super::minute_buffer::End;
 use super::reason::Reasons;
 use super::record::{Event, Record};
 use super::record_sql::{close_state, store};

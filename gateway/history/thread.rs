@@ -3,9 +3,9 @@
 
 use super::commit::{TailSlots, commit};
 use super::error::HistoryError;
-use super::house::House;
-use super::keeper::Keeper;
 use super::mailbox::{Delivery, Job, Mailbox};
+use super::maintenance::Maintenance;
+use super::minute_buffer::MinuteBuffer;
 use super::options::{Options, WhenFull};
 use super::outbox::Gatherer;
 use super::record_sql::close_state;
@@ -25,10 +25,10 @@ const LAST_ATTEMPTS: usize = 8;
 
 pub(crate) struct Thread {
     pub(crate) db: Connection,
-    pub(crate) keeper: Keeper,
+    pub(crate) minute_buffer: MinuteBuffer,
     pub(crate) outbox: Option<Gatherer>,
     pub(crate) slots: TailSlots,
-    pub(crate) house: House,
+    pub(crate) maintenance: Maintenance,
     pub(crate) mailbox: Arc<Mailbox>,
     pub(crate) shared: Arc<Shared>,
     pub(crate) options: Options,
@@ -78,27 +78,32 @@ impl Thread {
 
     /// While nothing becomes durable, a recording waits and a live machine goes on.
     fn takes_rows(&self) -> bool {
-        !(self.keeper.is_full() && self.options.when_full == WhenFull::Wait)
+        !(self.minute_buffer.is_full() && self.options.when_full == WhenFull::Wait)
     }
 
     fn take(&mut self, rows_too: bool) -> Delivery {
         let until_commit = self.pace.next_commit.saturating_duration_since(Instant::now());
-        let limit = if self.house.is_busy() { Duration::ZERO } else { until_commit };
+        let limit = if self.maintenance.is_busy() { Duration::ZERO } else { until_commit };
         // A flush promises everything before it, so it cannot come before its rows.
         let job_too = rows_too && self.pace.flushing.is_none() && self.pace.maintaining.is_none();
         self.mailbox.take(limit, rows_too, job_too)
     }
 
     fn accept(&mut self, delivery: Delivery) {
-        self.keeper.reasons = delivery.reasons;
-        self.keeper.records.extend(delivery.records);
+        self.minute_buffer.reasons = delivery.reasons;
+        self.minute_buffer.records.extend(delivery.records);
         for batch in delivery.batches {
             if let Some(outbox) = &mut self.outbox {
-                outbox.gather(&batch, self.keeper.next_row, &self.keeper.series, &self.keeper.reasons);
+                outbox.gather(
+                    &batch,
+                    self.minute_buffer.next_row,
+                    &self.minute_buffer.series,
+                    &self.minute_buffer.reasons,
+                );
             }
-            self.keeper.ingest(&batch);
+            self.minute_buffer.ingest(&batch);
             self.mailbox.recycle(batch);
-            if self.keeper.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
+            if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.pace.failures == 0 {
                 // The next regular commit adds what the running minute has by then.
                 self.commit(false);
             }
@@ -107,7 +112,7 @@ impl Thread {
             Some((number, Job::Flush)) => self.pace.flushing = Some(number),
             Some((number, Job::Maintain(now_ns))) => {
                 self.pace.maintaining = Some(number);
-                self.house.begin(now_ns);
+                self.maintenance.begin(now_ns);
             }
             None => {}
         }
@@ -148,16 +153,16 @@ impl Thread {
                 self.shared.degraded(&degraded_text(&error));
             }
         }
-        self.shared.lost.store(self.keeper.lost_rows, Ordering::Relaxed);
-        self.mailbox.hold_records(self.keeper.records.len());
+        self.shared.lost.store(self.minute_buffer.lost_rows, Ordering::Relaxed);
+        self.mailbox.hold_records(self.minute_buffer.records.len());
     }
 
     /// One commit; on a full disk a second one after making room.
     fn attempt(&mut self, with_tail: bool) -> Result<(), HistoryError> {
         match self.commit_all(with_tail) {
             Err(error) if error.is_full() => {
-                let waiting: u64 = self.keeper.blocks.iter().map(|block| block.bytes() as u64).sum();
-                self.house.make_room(&mut self.db, 2 * waiting + 65_536)?;
+                let waiting: u64 = self.minute_buffer.blocks.iter().map(|block| block.bytes() as u64).sum();
+                self.maintenance.make_room(&mut self.db, 2 * waiting + 65_536)?;
                 self.commit_all(with_tail)
             }
             done => done,
@@ -165,49 +170,49 @@ impl Thread {
     }
 
     fn commit_all(&mut self, with_tail: bool) -> Result<(), HistoryError> {
-        let Self { db, keeper, slots, outbox, options, .. } = self;
-        while !commit(db, keeper, slots, outbox, &options.origin, with_tail)? {}
+        let Self { db, minute_buffer, slots, outbox, options, .. } = self;
+        while !commit(db, minute_buffer, slots, outbox, &options.origin, with_tail)? {}
         Ok(())
     }
 
     /// Is there anything that a commit would make durable?
     fn is_dirty(&self) -> bool {
-        self.keeper.is_dirty() || self.outbox.as_ref().is_some_and(Gatherer::is_dirty)
+        self.minute_buffer.is_dirty() || self.outbox.as_ref().is_some_and(Gatherer::is_dirty)
     }
 
     fn acknowledge(&mut self) {
-        let (through_ns, next_row) = self.keeper.durable();
+        let (through_ns, next_row) = self.minute_buffer.durable();
         if let Some(through_ns) = through_ns {
             self.shared.acknowledged_ns.store(through_ns, Ordering::Release);
         }
-        let rows = u64::try_from(next_row - self.keeper.opened_row).unwrap_or(0);
-        self.shared.rows.store(rows.saturating_sub(self.keeper.lost_rows), Ordering::Relaxed);
-        self.shared.acknowledged_record.store(self.keeper.durable_ticket, Ordering::Release);
+        let rows = u64::try_from(next_row - self.minute_buffer.opened_row).unwrap_or(0);
+        self.shared.rows.store(rows.saturating_sub(self.minute_buffer.lost_rows), Ordering::Relaxed);
+        self.shared.acknowledged_record.store(self.minute_buffer.durable_ticket, Ordering::Release);
         if let Some(number) = self.pace.flushing.take() {
             self.mailbox.finish(number);
         }
     }
 
     fn tidy(&mut self) {
-        match self.house.after_commit(&mut self.db) {
+        match self.maintenance.after_commit(&mut self.db) {
             Ok(used) => self.shared.bytes.store(used, Ordering::Relaxed),
             Err(error) => self.shared.degraded(&degraded_text(&error)),
         }
-        self.shared.retired.store(self.house.retired, Ordering::Relaxed);
-        self.shared.short_of_room.store(self.house.is_short(), Ordering::Relaxed);
+        self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
+        self.shared.short_of_room.store(self.maintenance.is_short(), Ordering::Relaxed);
     }
 
     fn maintain(&mut self) {
-        if !self.house.is_busy() {
+        if !self.maintenance.is_busy() {
             return;
         }
-        let more = self.house.step(&mut self.db).unwrap_or_else(|error| {
+        let more = self.maintenance.step(&mut self.db).unwrap_or_else(|error| {
             // Maintenance can wait; what is being recorded cannot.
             self.shared.degraded(&degraded_text(&error));
-            self.house.abandon();
+            self.maintenance.abandon();
             false
         });
-        self.shared.retired.store(self.house.retired, Ordering::Relaxed);
+        self.shared.retired.store(self.maintenance.retired, Ordering::Relaxed);
         if let Some(number) = self.pace.maintaining.take_if(|_| !more) {
             self.mailbox.finish(number);
         }
@@ -218,7 +223,7 @@ impl Thread {
             self.mailbox.finish(number);
         }
         // A clean end ends the state that the machine was in; after a failure the next start does it.
-        if let Some(newest_ns) = self.keeper.newest_ns() {
+        if let Some(newest_ns) = self.minute_buffer.newest_ns() {
             let _ = end_state(&mut self.db, newest_ns);
         }
         if let Some(outbox) = &self.outbox {

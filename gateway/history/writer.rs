@@ -2,10 +2,10 @@
 
 use super::commit::TailSlots;
 use super::error::{HistoryError, at};
-use super::house::House;
-use super::keeper::Keeper;
 use super::lock::Lock;
 use super::mailbox::{Job, Mailbox};
+use super::maintenance::Maintenance;
+use super::minute_buffer::MinuteBuffer;
 use super::options::{ExtraValue, Options};
 use super::outbox::Gatherer;
 use super::record::Record;
@@ -55,13 +55,13 @@ impl Writer {
         let outbox = options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(Shared::default());
-        let house = House::new(path, options.retention, options.reserve_bytes);
-        house.bound_log(&db)?;
+        let maintenance = Maintenance::new(path, options.retention, options.reserve_bytes);
+        maintenance.bound_log(&db)?;
         let thread = Thread {
-            keeper: Keeper::new(series, end)?,
+            minute_buffer: MinuteBuffer::new(series, end)?,
             outbox,
             slots: TailSlots::load(&db)?,
-            house,
+            maintenance,
             db,
             mailbox: mailbox.clone(),
             shared: shared.clone(),

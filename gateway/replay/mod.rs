@@ -8,7 +8,7 @@ mod resume;
 mod summary;
 
 pub use motion::Motion;
-pub use summary::{FileSummary, Kept, Summary};
+pub use summary::{FileSummary, StoredRows, Summary};
 
 use crate::cli::CannotRun;
 use crate::config;
@@ -102,7 +102,7 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
         counts.add(&of_file);
         next_ns = last_ns + (UNKNOWN_PAUSE_S * 1e9) as i64;
     }
-    let kept = plan.history.as_ref().map(|path| Kept::of(path, &counts));
+    let kept = plan.history.as_ref().map(|path| StoredRows::of(path, &counts));
     Ok(Summary {
         files,
         counts,

@@ -80,7 +80,7 @@ impl FileSummary {
 
 /// Where the rows went.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Kept {
+pub struct StoredRows {
     /// The history.
     pub path: PathBuf,
     /// Rows stored now.
@@ -89,7 +89,7 @@ pub struct Kept {
     pub already: u64,
 }
 
-impl Kept {
+impl StoredRows {
     pub(super) fn of(path: &Path, counts: &Counts) -> Self {
         Self { path: path.to_owned(), stored: counts.stored, already: counts.rows - counts.stored }
     }
@@ -103,7 +103,7 @@ pub struct Summary {
     /// Sums over all of them.
     pub counts: Counts,
     /// Where the rows went.
-    pub kept: Option<Kept>,
+    pub kept: Option<StoredRows>,
     /// Machine time in each state, s.
     pub seconds_per_state: Vec<(&'static str, f64)>,
     /// Parts finished.
@@ -178,7 +178,7 @@ impl fmt::Display for Summary {
             writeln!(f, "what the machine itself calls its motion, and the states of these rows:")?;
         }
         words.iter().take(WORDS_SHOWN).try_for_each(|line| writeln!(f, "  {line}"))?;
-        if let Some(Kept { path, stored, already }) = &self.kept {
+        if let Some(StoredRows { path, stored, already }) = &self.kept {
             writeln!(f, "{}: {stored} rows stored, {already} were there already", path.display())?;
         }
         Ok(())

@@ -3,7 +3,7 @@
 
 use super::clock::{BoxClock, ClockStep};
 use super::feed::{Feed, SourcePace};
-use super::keep::Kept;
+use super::history_store::HistoryStore;
 use super::save::Saver;
 use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
@@ -31,7 +31,7 @@ pub(super) const SCRIPTS_MEMORY: &str = "scripts.json";
 
 /// See the [module](self).
 pub struct Health {
-    kept: Kept,
+    history_store: HistoryStore,
     clock: Option<Arc<BoxClock>>,
     behind_ns: i64,
     port: watch::Receiver<Option<String>>,
@@ -55,14 +55,14 @@ impl Health {
     /// file for what the estimators have learned.
     #[must_use]
     pub fn new(
-        kept: Kept,
+        history_store: HistoryStore,
         clock: Option<Arc<BoxClock>>,
         port: watch::Receiver<Option<String>>,
         memory: PathBuf,
     ) -> Self {
-        let stores = kept.stores();
+        let stores = history_store.stores();
         Self {
-            kept,
+            history_store,
             clock,
             behind_ns: 0,
             port,
@@ -82,17 +82,17 @@ impl Health {
     /// Remembers and tells that something happened.
     pub fn event(&mut self, at_ns: TimeNs, source: &str, notice: &Notice) {
         notice.say();
-        self.kept.record(stored(at_ns, source, notice).into());
+        self.history_store.record(stored(at_ns, source, notice).into());
     }
 
     /// Remembers a record that is no event.
     pub fn keep(&mut self, record: Record) {
-        self.kept.record(record);
+        self.history_store.record(record);
     }
 
     /// Hands in a row of the audit; false when it will not be stored.
     pub fn audit(&mut self, row: Audit) -> bool {
-        self.kept.audit(row)
+        self.history_store.audit(row)
     }
 
     /// Does the history take anything at the moment?
@@ -121,14 +121,14 @@ impl Health {
             return;
         }
         self.looked = Some(Instant::now());
-        self.kept.look();
-        self.stores = self.kept.stores();
+        self.history_store.look();
+        self.stores = self.history_store.stores();
         self.look_at_clock(now_ns);
         self.look_at_sources(feed, now_ns);
         self.look_at_paces(&feed.paces(now_ns), now_ns);
         let day = now_ns.div_euclid(DAY_NS);
         if self.day.replace(day).is_some_and(|before| before != day) {
-            self.kept.maintain(now_ns);
+            self.history_store.maintain(now_ns);
         }
         if self.saved.elapsed() >= SAVE_EVERY {
             self.save(pipeline);
@@ -174,7 +174,7 @@ impl Health {
         self.paces.resize(paces.len(), None);
         for (index, pace) in paces.iter().enumerate() {
             let Some(pace) = pace else { continue };
-            let (wanted_s, kept_s) = (pace.wanted.as_secs_f64(), pace.kept.as_secs_f64());
+            let (wanted_s, kept_s) = (pace.wanted.as_secs_f64(), pace.history_store.as_secs_f64());
             let told_s = self.paces[index].unwrap_or(wanted_s);
             if (kept_s / told_s).ln().abs() < OTHER_PACE.ln() {
                 continue;
@@ -203,14 +203,14 @@ impl Health {
     pub fn close(&mut self, pipeline: &Pipeline, at_ns: TimeNs) {
         self.save(pipeline);
         self.saver.close();
-        self.kept.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
-        self.kept.close();
+        self.history_store.record(stored(at_ns, "gateway", &Notice::new(Severity::Info, "stopped", "stopped")).into());
+        self.history_store.close();
     }
 
     /// The store.
     #[must_use]
     pub fn history_status(&self) -> HistoryStatus {
-        self.kept.status()
+        self.history_store.status()
     }
 
     /// What does not work, of the store too.
@@ -236,8 +236,8 @@ impl Health {
 }
 
 /// What the pace of a source means for who reads its values.
-fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
-    let (wanted_s, kept_s) = (wanted.as_secs_f64(), kept.as_secs_f64());
+fn told_pace(SourcePace { name, wanted, history_store }: &SourcePace) -> Notice {
+    let (wanted_s, kept_s) = (wanted.as_secs_f64(), history_store.as_secs_f64());
     if kept_s < wanted_s * OTHER_PACE {
         return Notice::new(
             Severity::Info,
@@ -275,10 +275,10 @@ fn span(ns: i64) -> String {
 impl Store for Health {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         let beside: &[ExtraValue<'_>] = self.beside.as_ref().map_or(&[], |beside| beside);
-        self.kept.sample(sample, &[extras, &self.lags, beside].concat());
+        self.history_store.sample(sample, &[extras, &self.lags, beside].concat());
     }
 
     fn record(&mut self, record: Record) {
-        self.kept.record(record);
+        self.history_store.record(record);
     }
 }

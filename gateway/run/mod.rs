@@ -6,7 +6,7 @@ pub mod command;
 pub mod deadline;
 pub mod feed;
 pub mod health;
-pub mod keep;
+pub mod history_store;
 pub mod open;
 pub mod outputs;
 pub mod pace;
@@ -41,7 +41,7 @@ use clock::BoxClock;
 use command::Commands;
 use deadline::{RUN_MAX, RunLimit};
 use health::Health;
-use keep::Kept;
+use history_store::HistoryStore;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use shifting::Shifting;
@@ -158,10 +158,11 @@ fn ticker(
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let beside = [pipeline.series(), alignment::series(), beside].concat();
     let outbox = outputs.map(|outputs| outputs.outbox.clone());
-    let kept = Kept::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
+    let history_store =
+        HistoryStore::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
     let own = Arc::new(BoxClock::new());
     let clock: Arc<dyn Clock> = own.clone();
-    let start_ns = start_ns(plan, &kept, clock.now_ns());
+    let start_ns = start_ns(plan, &history_store, clock.now_ns());
     let opened = open::sources(config, plan.speed, &clock, start_ns);
     let Sources { feed, pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
@@ -177,7 +178,7 @@ fn ticker(
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
     let own = (plan.speed == MachineSpeed::Real).then_some(own);
-    let mut health = Health::new(kept, own, port, memory);
+    let mut health = Health::new(history_store, own, port, memory);
     if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
         health.beside(twin.values());
     }
@@ -259,8 +260,8 @@ fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Ends, CannotRun> {
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.
-fn start_ns(plan: &Plan, kept: &Kept, now_ns: TimeNs) -> TimeNs {
-    let Some(newest_ns) = kept.newest_ns().filter(|newest_ns| *newest_ns >= now_ns) else { return now_ns };
+fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs {
+    let Some(newest_ns) = history_store.newest_ns().filter(|newest_ns| *newest_ns >= now_ns) else { return now_ns };
     if plan.speed == MachineSpeed::Real {
         let text = "the history holds samples from the future (an accelerated run, or a clock that was wrong); \
                     new ones are stored with the time of this clock";

@@ -1,7 +1,7 @@
 //! What every stream of spindle current gives, whoever sends it: filter, feature, raw samples around what is remarkable.
 
 use super::chain::{Chain, Sums};
-use super::keep::Keeper;
+use super::excerpt_writer::ExcerptWriter;
 use adapters::address::WaveformKeep;
 use adapters::driver::Fact;
 use adapters::waveform::{Block, Header, Intake};
@@ -10,7 +10,7 @@ use adapters::{Absence, ChannelId, Reading, SourceError};
 /// Blocks in, one reading of `spindle_current_a` out whenever it is asked for.
 pub(super) struct Features {
     chain: Option<Chain>,
-    keeper: Option<Keeper>,
+    excerpt_writer: Option<ExcerptWriter>,
     channels: Vec<ChannelId>,
     sums: Sums,
     clipped: bool,
@@ -21,7 +21,7 @@ impl Features {
     pub(super) fn new(keep: Option<&WaveformKeep>) -> Self {
         Self {
             chain: None,
-            keeper: keep.map(|keep| Keeper::new(&keep.directory, keep.above_a)),
+            excerpt_writer: keep.map(|keep| ExcerptWriter::new(&keep.directory, keep.above_a)),
             channels: ChannelId::of("spindle_current_a").into_iter().collect(),
             sums: Sums::default(),
             clipped: false,
@@ -48,8 +48,8 @@ impl Features {
         let Some(chain) = &mut self.chain else { return Ok(()) };
         self.clipped |= block.clipped > 0;
         let feature_a = chain.push(block, &mut self.sums);
-        if let Some(keeper) = &mut self.keeper {
-            keeper.push(header, block, feature_a);
+        if let Some(excerpt_writer) = &mut self.excerpt_writer {
+            excerpt_writer.push(header, block, feature_a);
         }
         Ok(())
     }
@@ -88,7 +88,9 @@ impl Features {
         if let Some(unbalance) = self.chain.as_ref().and_then(Chain::unbalance) {
             facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
         }
-        facts.extend(self.keeper.as_ref().map(|keeper| count("waveform_files_kept", keeper.written())));
+        facts.extend(
+            self.excerpt_writer.as_ref().map(|excerpt_writer| count("waveform_files_kept", excerpt_writer.written())),
+        );
         facts
     }
 }

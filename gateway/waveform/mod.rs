@@ -15,8 +15,8 @@
 //! anew; a poll with clipped samples has no value, because its value would be too low.
 
 mod chain;
+mod excerpt_writer;
 mod features;
-mod keep;
 mod sampled;
 
 pub use sampled::ControllerSamples;

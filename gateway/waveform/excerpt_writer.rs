@@ -16,7 +16,7 @@ const FILES_MAX: usize = 50;
 /// A block that is kept, of all blocks together, in samples.
 const SAMPLES_MAX: usize = 2_000_000;
 
-pub(super) struct Keeper {
+pub(super) struct ExcerptWriter {
     directory: PathBuf,
     above_a: f64,
     blocks: VecDeque<Block>,
@@ -28,7 +28,7 @@ pub(super) struct Keeper {
     written: u64,
 }
 
-impl Keeper {
+impl ExcerptWriter {
     pub(super) fn new(directory: &Path, above_a: f64) -> Self {
         let (blocks, directory) = (VecDeque::new(), directory.to_owned());
         Self { directory, above_a, blocks, samples: 0, due_ns: None, over: false, written: 0 }
@@ -117,13 +117,13 @@ mod tests {
     fn a_high_current_leaves_one_file_with_what_was_before_and_behind() {
         let directory = tempfile::tempdir().expect("a directory");
         let header = Header::currents(1000.0, &["u"], 0.01, 32767);
-        let mut keeper = Keeper::new(directory.path(), 20.0);
+        let mut excerpt_writer = ExcerptWriter::new(directory.path(), 20.0);
         for k in 0_i64..1000 {
             let block = Block { first_ns: k * 20_000_000, gap: 0, clipped: 0, raw: vec![100; 20] };
             let high = (500..520).contains(&k);
-            keeper.push(&header, &block, Some(if high { 30.0 } else { 5.0 }));
+            excerpt_writer.push(&header, &block, Some(if high { 30.0 } else { 5.0 }));
         }
-        assert_eq!(keeper.written(), 1);
+        assert_eq!(excerpt_writer.written(), 1);
         let file = std::fs::read_dir(directory.path()).expect("there").next().expect("one").expect("readable").path();
         let text = std::fs::read_to_string(file).expect("text");
         let rows = text.lines().count() - 1;

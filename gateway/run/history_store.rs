@@ -29,7 +29,7 @@ const SHORT: &str = "The disk is all but full: each new sample takes the place o
 
 /// The history, open or not.
 #[derive(Debug)]
-pub struct Kept {
+pub struct HistoryStore {
     path: PathBuf,
     options: Options,
     writer: Option<Writer>,
@@ -46,7 +46,7 @@ pub struct Kept {
     told: Option<String>,
 }
 
-impl Kept {
+impl HistoryStore {
     /// Opens the history of the configuration, or goes on without it where the disk does not let it. `beside` is stored
     /// beside the channels, `outbox` is what leaves the box.
     ///
@@ -57,7 +57,7 @@ impl Kept {
         beside: Vec<ExtraSeries>,
         outbox: Option<Outbox>,
     ) -> Result<Self, HistoryError> {
-        let mut kept = Self {
+        let mut history_store = Self {
             path: config.path.clone(),
             options: options(config, beside, outbox),
             writer: None,
@@ -70,12 +70,12 @@ impl Kept {
             lost: 0,
             told: None,
         };
-        match kept.try_open() {
+        match history_store.try_open() {
             Ok(()) => {}
             Err(error) if foreign(&error) => return Err(error),
-            Err(error) => kept.put_off(&error),
+            Err(error) => history_store.put_off(&error),
         }
-        Ok(kept)
+        Ok(history_store)
     }
 
     fn try_open(&mut self) -> Result<(), HistoryError> {
@@ -198,7 +198,7 @@ impl Kept {
     }
 }
 
-impl Store for Kept {
+impl Store for HistoryStore {
     fn sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
         self.first_ns.get_or_insert(sample.at_ns);
         self.last_ns = sample.at_ns;

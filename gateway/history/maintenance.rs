@@ -24,7 +24,7 @@ const VACUUM_PAGES: u32 = 256;
 
 /// The housekeeper of one history.
 #[derive(Debug)]
-pub(crate) struct House {
+pub(crate) struct Maintenance {
     path: PathBuf,
     retention: Retention,
     reserve: Reserve,
@@ -44,7 +44,7 @@ enum Task {
     Shrink,
 }
 
-impl House {
+impl Maintenance {
     pub(crate) fn new(path: &Path, retention: Retention, reserve_bytes: u64) -> Self {
         let mut reserve = Reserve::beside(path, reserve_bytes);
         reserve.keep();

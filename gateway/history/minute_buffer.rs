@@ -34,7 +34,7 @@ pub(crate) struct End {
 }
 
 /// Rows and records that are not durable yet.
-pub(crate) struct Keeper {
+pub(crate) struct MinuteBuffer {
     pub(crate) series: Vec<Series>,
     pub(crate) reasons: Reasons,
     encoder: Encoder,
@@ -60,7 +60,7 @@ pub(crate) struct Keeper {
     pub(crate) lost_rows: u64,
 }
 
-impl Keeper {
+impl MinuteBuffer {
     pub(crate) fn new(series: Vec<Series>, end: End) -> Result<Self, HistoryError> {
         let encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
         let open = Rows::of(&series);
