@@ -1,6 +1,7 @@
 //! The box: clock, tokio, configuration, tick loop, gate, history, outputs, web page, command line.
 
 pub mod access;
+pub mod active_scripts;
 pub mod alignment;
 pub mod backtest;
 pub mod bench;
@@ -16,7 +17,6 @@ pub mod gate;
 pub mod handbook;
 pub mod history;
 pub mod http;
-pub mod in_charge;
 pub mod log;
 pub mod moment;
 pub mod operations;

@@ -5,8 +5,8 @@
 //! against what was raised, as far as the scripts that raised it are the running ones.
 
 use super::compare::{Kind, Spell};
+use crate::active_scripts::{self, Versions};
 use crate::history::{AlarmEntry, Event, HistoryError, Reader, Span};
-use crate::in_charge::{self, Versions};
 use adapters::clock::TimeNs;
 use rules::script::{Level, SCRIPT_STOPPED, ScriptSet};
 use std::collections::BTreeMap;
@@ -70,9 +70,9 @@ struct Timeline(Vec<(TimeNs, Versions)>);
 
 impl Timeline {
     fn read(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs) -> Result<Self, HistoryError> {
-        let before = reader.events_of(in_charge::KIND, Span::between(TimeNs::MIN, from_ns, 1))?;
-        let within = reader.events_of(in_charge::KIND, Span::between(from_ns, to_ns, READ_MAX))?;
-        let versions = |event: Event| Some((event.at_ns, in_charge::versions(&event)?));
+        let before = reader.events_of(active_scripts::KIND, Span::between(TimeNs::MIN, from_ns, 1))?;
+        let within = reader.events_of(active_scripts::KIND, Span::between(from_ns, to_ns, READ_MAX))?;
+        let versions = |event: Event| Some((event.at_ns, active_scripts::versions(&event)?));
         Ok(Self(before.into_iter().chain(within).filter_map(versions).collect()))
     }
 

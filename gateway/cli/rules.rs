@@ -2,10 +2,10 @@
 
 use super::effects::Lang;
 use super::{CannotRun, CommandResult, Outcome, print, print_json, refused};
+use crate::active_scripts;
 use crate::backtest::{Plan, backtest};
 use crate::config::{self, Config};
 use crate::history::Reader;
-use crate::in_charge;
 use crate::moment;
 use crate::reload::{read_directory, read_file};
 use ::rules::script::{self, Problem, ScriptFile, ScriptSet, TrialResult};
@@ -234,7 +234,7 @@ fn instant(text: &str, newest_ns: i64) -> Result<i64, CannotRun> {
 fn running(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
     let files = match &arguments.running {
         Some(directory) => read_directory(directory).map_err(refused)?,
-        None => in_charge::kept(&config.gateway.data_dir).unwrap_or_else(script::shipped),
+        None => active_scripts::kept(&config.gateway.data_dir).unwrap_or_else(script::shipped),
     };
     script::compile(&files).map_err(refused)
 }

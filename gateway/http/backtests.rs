@@ -7,9 +7,9 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::{named, on_disk, with};
 use crate::access::Role;
+use crate::active_scripts;
 use crate::backtest::{Plan, backtest};
 use crate::history::Reader;
-use crate::in_charge;
 use crate::moment;
 use axum::Json;
 use axum::extract::{Path, State};
@@ -127,7 +127,7 @@ fn plan(shared: &Shared, name: &str, asked: &Asked) -> Result<Plan, ApiProblem> 
     let bad = |what: String| ApiProblem::request(format!("since: {what}"), "write 24h, 7d or 90m");
     let from_ns = moment::parse(&format!("-{}", asked.since), newest_ns).map_err(bad)?;
     let files = on_disk(shared)?;
-    let running = in_charge::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
+    let running = active_scripts::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
     Ok(Plan {
         history: shared.history.clone(),
         from_ns,

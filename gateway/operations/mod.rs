@@ -33,7 +33,7 @@ pub struct Loaded {
 pub struct Operations {
     path: PathBuf,
     completion: Completion,
-    in_charge: Option<Loaded>,
+    active: Option<Loaded>,
     refused: Vec<Problem>,
     watcher: Option<Lookout<Found>>,
     told: Vec<Notice>,
@@ -48,7 +48,7 @@ impl Operations {
         let mut operations = Self {
             path: path.to_owned(),
             completion: Completion::new(),
-            in_charge: None,
+            active: None,
             refused: Vec::new(),
             watcher: None,
             told: Vec::new(),
@@ -73,7 +73,7 @@ impl Operations {
                 let text = format!("{}: {count} operations are in force, version {version}", self.path.display());
                 self.told.push(Notice::new(Severity::Info, "recipe_in_force", text).detail(loaded.text.clone()));
                 self.refused.clear();
-                self.in_charge = Some(loaded);
+                self.active = Some(loaded);
             }
             Err(problems) => {
                 let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
@@ -86,7 +86,7 @@ impl Operations {
     }
 
     fn consequence(&self) -> String {
-        match &self.in_charge {
+        match &self.active {
             Some(loaded) => format!("version {} stays in force", loaded.recipe.version()),
             None => "depth of cut and diameter stay unknown".to_owned(),
         }
@@ -104,7 +104,7 @@ impl Operations {
             }
         }
         self.told.drain(..).for_each(|notice| tell(&notice));
-        if let Some(loaded) = &self.in_charge {
+        if let Some(loaded) = &self.active {
             let lookup = self.completion.apply(&loaded.recipe, sample);
             remember(&mut self.in_force, lookup);
         }
@@ -113,7 +113,7 @@ impl Operations {
     /// What the page shows.
     #[must_use]
     pub fn status(&self) -> status::OperationsStatus {
-        let recipe = self.in_charge.as_ref().map(|loaded| &loaded.recipe);
+        let recipe = self.active.as_ref().map(|loaded| &loaded.recipe);
         let lines: Vec<String> = self.refused.iter().map(ToString::to_string).collect();
         status::OperationsStatus {
             path: self.path.display().to_string(),

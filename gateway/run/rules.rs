@@ -2,8 +2,8 @@
 
 use super::health::{Health, SCRIPTS_MEMORY};
 use super::tick::RunFlags;
+use crate::active_scripts;
 use crate::config::Config;
-use crate::in_charge;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
@@ -29,7 +29,7 @@ pub fn load(config: &Config) -> (Host, Watched) {
     }
     if directory.is_dir() {
         if let Err(problems) = load_now(directory, &mut host) {
-            let last = in_charge::last(&config.gateway.data_dir).and_then(Result::ok);
+            let last = active_scripts::last(&config.gateway.data_dir).and_then(Result::ok);
             let consequence = match load_rest(directory, last, &problems, &mut host) {
                 Fallback::Last(count) => format!("the {count} that were in charge before are in charge again"),
                 Fallback::Others(1) => "the other script is in charge".to_owned(),
@@ -82,7 +82,7 @@ pub struct Watched {
 impl Watched {
     /// Remembers the texts in charge, for a start at which the directory holds something broken and for backtests.
     fn keep(&self, host: &Host) {
-        if let Err(error) = in_charge::keep(&self.data_dir, host.files()) {
+        if let Err(error) = active_scripts::keep(&self.data_dir, host.files()) {
             tracing::warn!("the scripts in charge could not be kept in {}: {error}", self.data_dir.display());
         }
     }
@@ -111,7 +111,7 @@ impl Watched {
         let host = pipeline.scripts();
         if self.told_of.replace(host.generation()) != Some(host.generation()) {
             // By the time of the sample, which is that of the alarms.
-            health.keep(in_charge::event(host, at_ns).into());
+            health.keep(active_scripts::event(host, at_ns).into());
         }
     }
 
@@ -127,7 +127,7 @@ impl Watched {
             None => return,
             Some(Ok(count)) => {
                 self.failed.clear();
-                health.put(&in_charge::path(&self.data_dir), in_charge::text(pipeline.scripts().files()));
+                health.put(&active_scripts::path(&self.data_dir), active_scripts::text(pipeline.scripts().files()));
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }

@@ -50,7 +50,7 @@ struct Due {
 }
 
 /// The model in charge.
-struct InCharge {
+struct ActiveModel {
     live: Live,
     loaded: Loaded,
 }
@@ -59,7 +59,7 @@ struct InCharge {
 pub struct Twin {
     places: Places,
     memory: PathBuf,
-    in_charge: Option<InCharge>,
+    active: Option<ActiveModel>,
     /// Unit and end of the name of the stored series; they stay while the box runs.
     suffix: String,
     stored: bool,
@@ -90,7 +90,7 @@ impl Twin {
         let mut twin = Self {
             places,
             memory: data_dir.join("twin.json"),
-            in_charge: None,
+            active: None,
             suffix: String::new(),
             stored: false,
             worker: None,
@@ -105,7 +105,7 @@ impl Twin {
             raised: false,
         };
         twin.begin();
-        twin.stored = twin.in_charge.is_some();
+        twin.stored = twin.active.is_some();
         Some(twin)
     }
 
@@ -141,12 +141,11 @@ impl Twin {
         self.told.push(Notice::new(Severity::Info, "twin_model", text));
         self.problem = None;
         self.new = (!same).then(|| loaded.clone());
-        self.in_charge = Some(InCharge { live: Live::new(loaded.model.clone(), memory), loaded });
+        self.active = Some(ActiveModel { live: Live::new(loaded.model.clone(), memory), loaded });
     }
 
     fn refuse(&mut self, problem: String) {
-        let consequence =
-            if self.in_charge.is_some() { "the one before stays in charge" } else { "nothing is compared" };
+        let consequence = if self.active.is_some() { "the one before stays in charge" } else { "nothing is compared" };
         let text = format!("the model cannot be used, {consequence}:\n  {}", problem.replace('\n', "\n  "));
         self.told.push(Notice::new(Severity::Warning, "twin_refused", text));
         self.problem = Some(problem);
@@ -155,7 +154,7 @@ impl Twin {
     /// What is stored beside the channels.
     #[must_use]
     pub fn series(&self) -> Vec<ExtraSeries> {
-        let Some(InCharge { loaded, .. }) = &self.in_charge else { return Vec::new() };
+        let Some(ActiveModel { loaded, .. }) = &self.active else { return Vec::new() };
         let unit = unit_of(&loaded.model.output);
         let series = |name: &str, en, zh| ExtraSeries::number(&format!("{name}_{}", self.suffix), unit, en, zh);
         vec![
@@ -168,8 +167,8 @@ impl Twin {
     #[must_use]
     pub fn values(&self) -> [ExtraValue<'static>; 2] {
         let same_unit = |loaded: &Loaded| loaded.model.output.ends_with(&self.suffix);
-        let compared = match &self.in_charge {
-            Some(InCharge { live, loaded }) if same_unit(loaded) => live.compared(),
+        let compared = match &self.active {
+            Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
             _ => Compared::none(live::NoTwin::NotYet),
         };
         [compared.expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
@@ -188,7 +187,7 @@ impl Twin {
         if !std::mem::replace(&mut self.raised, true) {
             self.mismatches().iter().for_each(|mismatch| self.raise(mismatch, health, now_ns));
         }
-        let Some(InCharge { live, .. }) = &mut self.in_charge else { return };
+        let Some(ActiveModel { live, .. }) = &mut self.active else { return };
         let noticed = live.step(sample, pipeline.estimates().state);
         match noticed {
             None => {}
@@ -210,13 +209,13 @@ impl Twin {
     }
 
     fn quantity(&self) -> (&'static str, &'static str) {
-        let output = self.in_charge.as_ref().map_or("", |in_charge| in_charge.loaded.model.output.as_str());
+        let output = self.active.as_ref().map_or("", |active| active.loaded.model.output.as_str());
         let channel = ChannelId::of(output).map(|id| id.channel());
         channel.map_or(("the output", "输出"), |channel| (channel.en, channel.zh))
     }
 
     fn unit(&self) -> &'static str {
-        self.in_charge.as_ref().map_or("", |in_charge| unit_of(&in_charge.loaded.model.output))
+        self.active.as_ref().map_or("", |active| unit_of(&active.loaded.model.output))
     }
 
     fn differs(&mut self, mismatch: &Mismatch, health: &mut Health, now_ns: TimeNs) {
@@ -248,14 +247,14 @@ impl Twin {
     }
 
     fn mismatches(&self) -> Vec<Mismatch> {
-        let stages = self.in_charge.iter().flat_map(|in_charge| in_charge.live.stages());
+        let stages = self.active.iter().flat_map(|active| active.live.stages());
         let differing = |(_, stage)| if let Stage::Differing(mismatch) = stage { Some(mismatch) } else { None };
         stages.filter_map(differing).collect()
     }
 
     fn ask_when_due(&mut self, now_ns: TimeNs, health: &mut Health) {
         let Some(Due { from_ns, .. }) = self.due.filter(|due| now_ns >= due.at_ns && !self.diagnosing) else { return };
-        let (Some(worker), Some(InCharge { loaded, .. })) = (&self.worker, &self.in_charge) else { return };
+        let (Some(worker), Some(ActiveModel { loaded, .. })) = (&self.worker, &self.active) else { return };
         if worker.ask(Request { model: loaded.model.clone(), from_ns, to_ns: now_ns }) {
             (self.begun_ns, self.diagnosing) = (Some(now_ns), true);
             let text = "a diagnosis of the difference between machine and simulation has begun in the background";
@@ -291,7 +290,7 @@ impl Twin {
             let code = code(mismatch.regime);
             health.keep(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());
         }
-        let memory = self.in_charge.take().map(|before| before.live.memory()).unwrap_or_default();
+        let memory = self.active.take().map(|before| before.live.memory()).unwrap_or_default();
         self.put_in_charge(loaded, Remembered { toml: String::new(), memory, due: None });
         self.save(health);
     }
@@ -299,7 +298,7 @@ impl Twin {
     /// Saves what was learned, beside the tick: a slow disk delays neither it nor the sign of life at the machine.
     pub fn save(&mut self, health: &Health) {
         self.saved = Instant::now();
-        let Some(InCharge { live, loaded }) = &self.in_charge else { return };
+        let Some(ActiveModel { live, loaded }) = &self.active else { return };
         let remembered = Remembered { toml: loaded.toml.clone(), memory: live.memory(), due: self.due };
         match serde_json::to_string(&remembered) {
             Ok(text) => health.put(&self.memory, text),

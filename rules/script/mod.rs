@@ -24,7 +24,7 @@
 //! | `api` | everything of it as a document |
 //! | `compile`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
 //! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
-//! | `timers`, `kept` | what a script remembers |
+//! | `timers`, `script_memory` | what a script remembers |
 //! | `trials` | given and expected, written in the script file itself |
 //! | `decision`, `status`, `problem` | what comes out |
 //! | `shipped` | the scripts that come with the gateway |
@@ -42,11 +42,11 @@ mod fields;
 pub mod functions;
 mod handlers;
 mod host;
-mod kept;
 mod notes;
 mod outcomes;
 mod problem;
 mod running;
+mod script_memory;
 mod settings;
 mod shipped;
 mod slot;

@@ -8,10 +8,10 @@ use super::decision::{
 };
 use super::engine::{OPERATIONS_MAX, Shared};
 use super::events::Event;
-use super::kept::Kept;
 use super::notes::NoteLimit;
 use super::problem;
 use super::running::Running;
+use super::script_memory::ScriptMemory;
 use super::status::{Condition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill, has_absent, scope_of, why_absent};
@@ -44,7 +44,7 @@ pub(super) struct Outputs<'a> {
 /// The version before, with what it remembered when it was replaced.
 struct Previous {
     script: Arc<Script>,
-    kept: Kept,
+    script_memory: ScriptMemory,
 }
 
 /// One script in charge.
@@ -76,21 +76,21 @@ impl Slot {
     /// `before` is what stood under this file name until now, `remembered` what the file had in an earlier process.
     pub(super) fn install(script: Arc<Script>, before: Option<Self>, remembered: Option<&Value>) -> Self {
         match before {
-            Some(before) if before.script.version == script.version && before.condition.in_charge() => before,
+            Some(before) if before.script.version == script.version && before.condition.is_active() => before,
             Some(before) => {
-                let kept = before.kept();
+                let script_memory = before.script_memory();
                 let proven = before.good_since_ns.is_some() && !before.condition.suspended();
-                let standing = Previous { script: before.script, kept: kept.clone() };
+                let standing = Previous { script: before.script, script_memory: script_memory.clone() };
                 let previous = if proven { Some(standing) } else { before.previous };
                 let previous = previous.filter(|previous| previous.script.version != script.version);
-                Self::fresh(script, previous, kept)
+                Self::fresh(script, previous, script_memory)
             }
-            None => Self::fresh(script, None, remembered.map(Kept::restore).unwrap_or_default()),
+            None => Self::fresh(script, None, remembered.map(ScriptMemory::restore).unwrap_or_default()),
         }
     }
 
-    fn fresh(script: Arc<Script>, previous: Option<Previous>, kept: Kept) -> Self {
-        let scope = scope_of(&script, kept.memory);
+    fn fresh(script: Arc<Script>, previous: Option<Previous>, script_memory: ScriptMemory) -> Self {
+        let scope = scope_of(&script, script_memory.memory);
         Self {
             base: scope.len(),
             scope,
@@ -98,7 +98,7 @@ impl Slot {
             values: vec![None; script.channels.len()],
             script,
             previous,
-            timers: kept.timers,
+            timers: script_memory.timers,
             condition: Condition::Running,
             request: None,
             reason: (ImmutableString::new(), Arc::from("")),
@@ -113,13 +113,13 @@ impl Slot {
         }
     }
 
-    fn kept(&self) -> Kept {
-        Kept { memory: self.scope.get_value("memory").unwrap_or_default(), timers: self.timers.clone() }
+    fn script_memory(&self) -> ScriptMemory {
+        ScriptMemory { memory: self.scope.get_value("memory").unwrap_or_default(), timers: self.timers.clone() }
     }
 
     /// What outlives the process.
     pub(super) fn snapshot(&self) -> Value {
-        self.kept().snapshot()
+        self.script_memory().snapshot()
     }
 
     pub(super) fn file(&self) -> &str {
@@ -371,8 +371,9 @@ impl Slot {
         let en = format!("{problem}; {next} until the file is changed");
         let zh = format!("脚本已停止：{problem}");
         let replaced = previous.is_some();
-        if let Some(Previous { script, kept }) = previous {
-            *self = Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, kept) };
+        if let Some(Previous { script, script_memory }) = previous {
+            *self =
+                Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, script_memory) };
         } else {
             self.condition = Condition::Suspended(Some(problem.clone()));
         }

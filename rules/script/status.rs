@@ -38,7 +38,7 @@ impl Condition {
         }
     }
 
-    pub(super) fn in_charge(&self) -> bool {
+    pub(super) fn is_active(&self) -> bool {
         matches!(self, Self::Running | Self::Waiting(_))
     }
 
@@ -79,6 +79,6 @@ impl Status {
     /// Is everything in charge that the user wrote?
     #[must_use]
     pub fn well(&self) -> bool {
-        self.refused.is_empty() && self.scripts.iter().all(|script| script.condition.in_charge())
+        self.refused.is_empty() && self.scripts.iter().all(|script| script.condition.is_active())
     }
 }

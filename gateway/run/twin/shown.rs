@@ -40,20 +40,20 @@ impl Twin {
     /// For the status document.
     #[must_use]
     pub fn status(&self) -> TwinStatus {
-        let in_charge = self.in_charge.as_ref();
-        let compared = in_charge.map_or(Compared::none(live::NoTwin::NotYet), |in_charge| in_charge.live.compared());
-        let why = in_charge.and_then(|in_charge| in_charge.live.why().map(str::to_owned));
+        let active = self.active.as_ref();
+        let compared = active.map_or(Compared::none(live::NoTwin::NotYet), |active| active.live.compared());
+        let why = active.and_then(|active| active.live.why().map(str::to_owned));
         let reason = compared.residual.err();
         TwinStatus {
-            model: in_charge.map(|in_charge| in_charge.loaded.model.name.clone()).unwrap_or_default(),
+            model: active.map(|active| active.loaded.model.name.clone()).unwrap_or_default(),
             file: self.places.model.display().to_string(),
-            output: in_charge.map(|in_charge| in_charge.loaded.model.output.clone()).unwrap_or_default(),
+            output: active.map(|active| active.loaded.model.output.clone()).unwrap_or_default(),
             unit: self.unit(),
             twin_expected: compared.expected.ok(),
             twin_residual: compared.residual.ok(),
             missing: reason.map(live::NoTwin::word),
             why: reason.map(|reason| why.unwrap_or_else(|| reason.to_string())),
-            regimes: in_charge.map_or_else(Vec::new, |in_charge| self.regimes(&in_charge.live)),
+            regimes: active.map_or_else(Vec::new, |active| self.regimes(&active.live)),
             diagnosing_since_ms: self.begun_ns.filter(|_| self.diagnosing).map(|ns| ns.div_euclid(1_000_000)),
             diagnosis: self.finished.as_ref().map(|finished| self.diagnosis(finished)),
             problem: self.problem.clone(),

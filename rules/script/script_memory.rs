@@ -6,12 +6,12 @@ use serde_json::Value;
 
 /// See the [module](self).
 #[derive(Debug, Default, Clone)]
-pub(super) struct Kept {
+pub(super) struct ScriptMemory {
     pub(super) memory: Map,
     pub(super) timers: Timers,
 }
 
-impl Kept {
+impl ScriptMemory {
     /// What outlives the process.
     pub(super) fn snapshot(&self) -> Value {
         let mut snapshot = self.timers.snapshot();
