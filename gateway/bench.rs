@@ -205,11 +205,11 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Fig
     bench.run("merge", |sample| {
         std::hint::black_box(sample);
     });
-    let mut inferring = estimators::Pipeline::new(estimators::Settings::default());
+    let mut inferring = estimators::Inference::new(estimators::Settings::default());
     bench.run("estimators", |sample| {
         std::hint::black_box(inferring.infer(sample));
     });
-    let (mut inferring, mut host) = (estimators::Pipeline::new(estimators::Settings::default()), host()?);
+    let (mut inferring, mut host) = (estimators::Inference::new(estimators::Settings::default()), host()?);
     bench.run("scripts", |sample| {
         let estimates = *inferring.infer(sample);
         std::hint::black_box(host.tick(sample, &estimates));
@@ -235,7 +235,7 @@ fn host() -> Result<Host, BenchError> {
 
 fn pipeline() -> Result<Pipeline, BenchError> {
     let config = config::load(None, []).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
-    let fresh = estimators::Pipeline::new(estimators::Settings::default());
+    let fresh = estimators::Inference::new(estimators::Settings::default());
     Ok(Pipeline::new(fresh, host()?, Gate::new(config.gate)))
 }
 

@@ -333,7 +333,7 @@ pub struct Status {
     pub acknowledged: Vec<Acknowledged>,
     /// The simulation beside the machine, where a model is configured.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub twin: Option<crate::twin::status::TwinStatus>,
+    pub twin: Option<crate::diagnosis::status::TwinStatus>,
     /// Finished parts since the start.
     pub parts: u64,
     /// The way of an override to the machine.

@@ -22,7 +22,7 @@ const BATCHES_MAX: usize = 3;
 
 /// Scripts with estimators of their own, or with somebody else's.
 struct Runner {
-    estimators: Option<estimators::Pipeline>,
+    estimators: Option<estimators::Inference>,
     host: Host,
     generation: u64,
 }
@@ -31,7 +31,7 @@ impl Runner {
     fn new(set: ScriptSet, infers: bool) -> Self {
         let mut host = Host::new();
         host.install(set);
-        let estimators = infers.then(|| estimators::Pipeline::new(host.settings().clone()));
+        let estimators = infers.then(|| estimators::Inference::new(host.settings().clone()));
         Self { estimators, generation: host.generation(), host }
     }
 

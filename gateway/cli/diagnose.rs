@@ -1,7 +1,7 @@
 //! `cnc-gateway diagnose`: where model and recordings differ, which physics was left out, the model with it.
 
 use super::{CannotRun, CommandResult, Outcome};
-use crate::twin::{Given, Outputs, read_hypotheses, read_model, read_recordings};
+use crate::diagnosis::{Given, Outputs, read_hypotheses, read_model, read_recordings};
 use clap::Args;
 use rules::physics::explain::Language;
 use rules::twin::{self, Diagnosis, Model};

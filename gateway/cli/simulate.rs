@@ -2,7 +2,7 @@
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandResult, Outcome};
-use crate::twin::{execute, put, read_model, read_recordings, simulation};
+use crate::diagnosis::{execute, put, read_model, read_recordings, simulation};
 use adapters::address::{Address, Target};
 use adapters::simulated::SimulatedSettings;
 use clap::Args;

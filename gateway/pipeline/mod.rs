@@ -48,7 +48,7 @@ impl Store for NoStore {
 /// Everything between the merge and the store.
 pub struct Pipeline {
     channels: Channels,
-    estimators: estimators::Pipeline,
+    estimators: estimators::Inference,
     estimates: Estimates,
     scripts: Host,
     /// Channels of the scripts' own that are stored.
@@ -66,7 +66,7 @@ pub struct Pipeline {
 impl Pipeline {
     /// A pipeline that has seen nothing. The settings of the estimators are those of the scripts.
     #[must_use]
-    pub fn new(mut estimators: estimators::Pipeline, scripts: Host, gate: Gate) -> Self {
+    pub fn new(mut estimators: estimators::Inference, scripts: Host, gate: Gate) -> Self {
         estimators.reconfigure(scripts.settings().clone());
         Self {
             channels: Channels::new(),
@@ -194,7 +194,7 @@ impl Pipeline {
 
     /// The estimators, for what they have learned.
     #[must_use]
-    pub fn estimators(&self) -> &estimators::Pipeline {
+    pub fn estimators(&self) -> &estimators::Inference {
         &self.estimators
     }
 

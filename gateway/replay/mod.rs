@@ -81,7 +81,7 @@ impl Store for Sink {
 /// A file that cannot be read, or a history that cannot be written.
 pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary, CannotRun> {
     let began = Instant::now();
-    let fresh = estimators::Pipeline::new(estimators::Settings::default());
+    let fresh = estimators::Inference::new(estimators::Settings::default());
     let mut pipeline = Pipeline::new(fresh, scripts, Gate::new(gate));
     let mut files = Vec::new();
     let mut counts = Counts::default();

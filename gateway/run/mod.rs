@@ -7,6 +7,7 @@ pub mod deadline;
 pub mod feed;
 pub mod health;
 pub mod history_store;
+pub mod live_twin;
 pub mod open;
 pub mod outputs;
 pub mod pace;
@@ -18,7 +19,6 @@ pub mod save;
 pub mod seen;
 pub mod shifting;
 pub mod tick;
-pub mod twin;
 mod verdict_mailbox;
 pub mod wear;
 
@@ -42,6 +42,7 @@ use command::Commands;
 use deadline::{RUN_MAX, RunLimit};
 use health::Health;
 use history_store::HistoryStore;
+use live_twin::Twin;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use shifting::Shifting;
@@ -53,7 +54,6 @@ use std::time::Duration;
 use tick::{Identity, RunFlags, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
-use twin::Twin;
 use wear::Wear;
 
 /// Questions about the history, hashes of tokens and the like, at the same time.
@@ -272,12 +272,12 @@ fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs
 }
 
 /// The estimators, with what they had learned before.
-fn estimators(memory: &Path) -> estimators::Pipeline {
+fn estimators(memory: &Path) -> estimators::Inference {
     let settings = estimators::Settings::default();
-    let fresh = || estimators::Pipeline::new(settings.clone());
+    let fresh = || estimators::Inference::new(settings.clone());
     let Ok(text) = std::fs::read_to_string(memory) else { return fresh() };
     let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
-    estimators::Pipeline::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
+    estimators::Inference::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
         Notice::new(Severity::Warning, "nothing_learned", error.to_string()).say();
         fresh()
     })

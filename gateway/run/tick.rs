@@ -3,11 +3,11 @@
 use super::command::Commands;
 use super::feed::Feed;
 use super::health::Health;
+use super::live_twin::Twin;
 use super::pace::Pace;
 use super::priority::{self, Granted};
 use super::report;
 use super::rules::Watched;
-use super::twin::Twin;
 use super::wear::Wear;
 use crate::config::GateMode;
 use crate::control::Wake;

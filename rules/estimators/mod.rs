@@ -1,6 +1,6 @@
 //! What is inferred: machine state, no-load power, cutting power, load loss, and what is too small to be seen.
 //!
-//! [`Pipeline::infer`] takes one [`adapters::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
+//! [`Inference::infer`] takes one [`adapters::Sample`] per tick and yields [`Estimates`]. Every tolerance and length is a
 //! row of [`SETTINGS`]. Nothing here reads a clock: time is that of the sample.
 //!
 //! | file | what |
@@ -30,12 +30,12 @@ mod detector;
 mod estimate;
 mod evidence;
 mod filter;
+mod inference;
 mod inputs;
 mod interpolation;
 mod learning;
 mod no_load;
 mod noise;
-mod pipeline;
 pub mod power_separation;
 pub mod regression;
 mod settings;
@@ -55,9 +55,9 @@ pub use window::{Means, Window, stationary};
 pub use cutting::{Balance, balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
+pub use inference::{Inference, RestoreError};
 pub use interpolation::{lagrange, noise_gain, triple};
 pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
-pub use pipeline::{Pipeline, RestoreError};
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};
 pub use state::State;
 pub use visibility::{VisibilityTally, VisibilityVerdict};

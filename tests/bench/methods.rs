@@ -10,7 +10,7 @@ use rules::estimators::spindle_current::{
     Cubic, CurveAtDepth, Design, Family, FeatureKind, PhaseFeature, Span, ThreePhase,
 };
 use rules::estimators::thermal::{Path, Predictor, Term, ThermalLaw};
-use rules::estimators::{Pipeline, Settings, balance};
+use rules::estimators::{Inference, Settings, balance};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
@@ -105,7 +105,7 @@ fn thermal(criterion: &mut Criterion) {
 
 /// The whole pipeline of estimators on one sample: state, no-load power, cutting power, load loss, visibility.
 fn estimators(criterion: &mut Criterion) {
-    let mut pipeline = Pipeline::new(Settings::default());
+    let mut pipeline = Inference::new(Settings::default());
     let channels = ["spindle_speed_rpm", "spindle_power_w", "total_power_w", "feed_mm_min"]
         .map(|name| ChannelId::of(name).expect("in the table"));
     let mut sample = Sample::empty(0);

@@ -2,7 +2,7 @@
 
 use adapters::clock::SECOND_NS;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
-use rules::estimators::{Estimates, Pipeline, Settings, State};
+use rules::estimators::{Estimates, Inference, Settings, State};
 
 /// The inputs of a tick. `None` is an absence with the reason of [`Bed::reason`].
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +32,7 @@ impl Now {
 }
 
 pub(crate) struct Bed {
-    pub(crate) pipeline: Pipeline,
+    pub(crate) pipeline: Inference,
     pub(crate) reason: Absence,
     /// Channels the machine does not have.
     pub(crate) lacks: Vec<&'static str>,
@@ -42,7 +42,7 @@ pub(crate) struct Bed {
 
 impl Bed {
     pub(crate) fn new(settings: Settings) -> Self {
-        Self { pipeline: Pipeline::new(settings), reason: Absence::Timeout, lacks: vec![], at_ns: 0, tick: 0 }
+        Self { pipeline: Inference::new(settings), reason: Absence::Timeout, lacks: vec![], at_ns: 0, tick: 0 }
     }
 
     pub(crate) fn sample(&mut self, now: Now) -> Sample {

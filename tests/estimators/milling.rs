@@ -5,7 +5,7 @@ use adapters::Sample;
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{Recording, read_path};
 use adapters::replay::Replay;
-use rules::estimators::{Estimates, Pipeline, Settings, State, VisibilityTally, VisibilityVerdict};
+use rules::estimators::{Estimates, Inference, Settings, State, VisibilityTally, VisibilityVerdict};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ fn recording() -> Option<Recording> {
 fn replay(recording: &Recording) -> Vec<Estimates> {
     let mut merge =
         Lockstep::new(vec![Box::new(Replay::new("milling", recording, 0))], Delay::Fixed(Default::default()));
-    let mut pipeline = Pipeline::new(Settings::default());
+    let mut pipeline = Inference::new(Settings::default());
     let mut sample = Sample::empty(0);
     let mut estimates = Vec::new();
     while let Some(now_ns) = merge.next_ns() {

@@ -3,7 +3,7 @@
 use crate::bed::{Bed, Now};
 use adapters::Absence;
 use proptest::prelude::*;
-use rules::estimators::{Estimates, Pipeline, Settings};
+use rules::estimators::{Estimates, Inference, Settings};
 
 fn number() -> impl Strategy<Value = Option<f64>> {
     prop_oneof![
@@ -84,7 +84,7 @@ proptest! {
         }
         let text = bed.pipeline.snapshot().to_string();
         let value = serde_json::from_str(&text).expect("a snapshot is JSON");
-        let mut restored = Pipeline::restore(settings, value).expect("its own snapshot");
+        let mut restored = Inference::restore(settings, value).expect("its own snapshot");
         for (now, ticks, pause_s) in after {
             bed.pause(pause_s);
             for _ in 0..ticks {

@@ -7,7 +7,7 @@ use crate::scoring::{Judged, Score};
 use adapters::clock::SECOND_NS;
 use adapters::merge::{Delay, Lockstep};
 use adapters::{ChannelId, Sample};
-use rules::estimators::{Pipeline, Settings};
+use rules::estimators::{Inference, Settings};
 use std::sync::Arc;
 
 /// Courses per scenario.
@@ -33,7 +33,7 @@ fn run(scenario: &Scenario, seed: u64) -> (Vec<Judged>, Vec<Judged>) {
     let course = Arc::new(Course::run(scenario, seed));
     let sources = sources(&course, Disturbance::default(), scenario.dropouts, seed);
     let mut merge = Lockstep::new(sources, Delay::default());
-    let (mut product, mut plain) = (Pipeline::new(Settings::default()), PlainReading::new());
+    let (mut product, mut plain) = (Inference::new(Settings::default()), PlainReading::new());
     let mut sample = Sample::empty(0);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));

@@ -12,7 +12,7 @@ use adapters::clock::SECOND_NS;
 use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{CutLevel, Simulated, SimulatedSettings};
 use adapters::{ChannelId, Sample};
-use rules::estimators::{Pipeline, Settings, State};
+use rules::estimators::{Inference, Settings, State};
 
 const SCENARIOS: [(&str, f64, f64, bool, f64); 8] = [
     ("fast start, heavy cuts", 0.3, 0.8, false, 0.0),
@@ -44,7 +44,7 @@ fn run(settings: SimulatedSettings, course_s: i64) -> (Vec<Judged>, Vec<Judged>)
 /// Traces of the product and of the plain reading, from what these sources of the machine say.
 fn course(machine: &Simulated, sources: Vec<Box<dyn adapters::Pull>>, course_s: i64) -> (Vec<Judged>, Vec<Judged>) {
     let mut merge = Lockstep::new(sources, Delay::default());
-    let (mut product, mut plain) = (Pipeline::new(Settings::default()), PlainReading::new());
+    let (mut product, mut plain) = (Inference::new(Settings::default()), PlainReading::new());
     let mut sample = Sample::empty(0);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));

@@ -2,7 +2,7 @@
 
 use crate::bed::{Bed, Now};
 use adapters::Absence;
-use rules::estimators::{NoEstimate, NoLoadOrigin, Pipeline, Settings, State, Visibility};
+use rules::estimators::{Inference, NoEstimate, NoLoadOrigin, Settings, State, Visibility};
 
 const IDLE: f64 = 500.0;
 
@@ -90,11 +90,11 @@ fn a_restart_with_a_snapshot_goes_on_where_it_stopped() {
     bed.hold(cut(), 3.0);
     let text = bed.pipeline.snapshot().to_string();
     let value = serde_json::from_str(&text).expect("a snapshot is JSON");
-    bed.pipeline = Pipeline::restore(Settings::default(), value).expect("its own snapshot");
+    bed.pipeline = Inference::restore(Settings::default(), value).expect("its own snapshot");
     assert_eq!(bed.hold(cut(), 3.0).0, [State::Cutting]);
     bed.pause(600.0);
     assert_eq!(bed.hold(cut(), 5.0).0, [State::Unknown, State::Idle, State::Cutting]);
-    assert!(Pipeline::restore(Settings::default(), serde_json::json!({"version": 1})).is_err());
+    assert!(Inference::restore(Settings::default(), serde_json::json!({"version": 1})).is_err());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::{Coverage, LONG, SHORT};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
 use adapters::simulated::ExperimentCut;
-use gateway::twin::execute;
+use gateway::diagnosis::execute;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;

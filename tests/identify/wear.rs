@@ -7,7 +7,7 @@ use crate::{Coverage, LONG, SHORT};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use adapters::simulated::{ExperimentCut, ExperimentStep};
-use gateway::twin::execute;
+use gateway::diagnosis::execute;
 use rules::estimators::wear::{
     Array, Columns, Conditions, Cut, FACTORS, Fitted, Levels, WearModel, WearOptions, estimate_wear, fit_physical,
     gather, identify_tool_wear, plan, threshold,

@@ -82,7 +82,7 @@ impl Bench {
         let directory = tempfile::tempdir().expect("a directory");
         let book = Book::open(directory.path(), "simulated://lathe").expect("none yet");
         let offsets = Account::new(Box::new(machine.offsets()), book);
-        let estimators = estimators::Pipeline::new(estimators::Settings::default());
+        let estimators = estimators::Inference::new(estimators::Settings::default());
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),

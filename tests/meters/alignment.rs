@@ -6,7 +6,7 @@ use adapters::clock::{Clock, ManualClock};
 use adapters::{ChannelId, Sample};
 use gateway::alignment::AlignmentStatus;
 use gateway::run::open::{MachineSpeed, sources};
-use rules::estimators::{Pipeline, Settings};
+use rules::estimators::{Inference, Settings};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ fn outcome(text: &str, machine_s: i64) -> Outcome {
     let config = gateway::config::parse("alignment.toml", text, Path::new("/nowhere"), []).expect("a configuration");
     let clock: Arc<dyn Clock> = Arc::new(ManualClock::at(0));
     let mut opened = sources(&config, MachineSpeed::Max, &clock, 1_000_000_000_000).expect("opens");
-    let mut estimators = Pipeline::new(Settings::default());
+    let mut estimators = Inference::new(Settings::default());
     let (mut sample, stop) = (Sample::empty(0), AtomicBool::new(false));
     let power = ChannelId::of("spindle_power_w").expect("a channel");
     let mut outcome = Outcome { status: Vec::new(), errors_w: Vec::new(), fingerprint: 0, notices: Vec::new() };

@@ -11,7 +11,7 @@ mod tool_wear;
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::twin::{put, read_recordings};
+use crate::diagnosis::{put, read_recordings};
 use adapters::Recording;
 use clap::{Args, Subcommand};
 use rules::estimators::regression::Refusal;

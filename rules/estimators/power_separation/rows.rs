@@ -1,7 +1,7 @@
 //! A recording through the estimators, row by row.
 
 use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
-use crate::estimators::{Pipeline, Settings, State};
+use crate::estimators::{Inference, Settings, State};
 use adapters::clock::SECOND_NS;
 use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
 
@@ -42,7 +42,7 @@ pub(super) fn rows(recording: &Recording) -> Result<Vec<Row>, Refusal> {
     // A pause is several periods of this recording, whatever its pace.
     let gap_s = (3.0 * period_s).max(2.0);
     settings.set("gap_s", gap_s).map_err(|error| Refusal::new(RefusalKind::OutOfRange, error.to_string(), ""))?;
-    let mut pipeline = Pipeline::new(settings);
+    let mut pipeline = Inference::new(settings);
     let runs = recording.runs();
     let mut rows = Vec::with_capacity(recording.rows());
     let mut shift_s = 0.0;

@@ -2,7 +2,7 @@
 
 use super::ToolWearArguments;
 use crate::cli::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::twin::put;
+use crate::diagnosis::put;
 use clap::Args;
 use rules::estimators::wear::{Array, Design, FACTORS, Factor, Levels, plan};
 use serde_json::{Value, json};

@@ -29,7 +29,7 @@ pub struct RestoreError(#[from] serde_json::Error);
 
 /// Everything the estimators remember between ticks. No allocation per tick, except when a new speed is learned.
 #[derive(Debug, Clone)]
-pub struct Pipeline {
+pub struct Inference {
     settings: Settings,
     channels: Channels,
     memory: Memory,
@@ -65,7 +65,7 @@ impl Memory {
     }
 }
 
-impl Pipeline {
+impl Inference {
     /// A pipeline that knows nothing but its settings. Where settings contradict each other (see
     /// [`Settings::contradictions`]) the stricter one holds.
     #[must_use]
@@ -370,7 +370,7 @@ impl Pipeline {
         self.memory.upper_bound = None;
     }
 
-    /// Everything remembered, to be stored and given to [`Pipeline::restore`] after a restart.
+    /// Everything remembered, to be stored and given to [`Inference::restore`] after a restart.
     #[must_use]
     pub fn snapshot(&self) -> serde_json::Value {
         serde_json::to_value(&self.memory).unwrap_or(serde_json::Value::Null)

@@ -1,10 +1,10 @@
 //! The twin in the status document: differences that stand, what is compared, what was found.
 
 use super::{Twin, code};
+use crate::diagnosis::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
+use crate::diagnosis::words;
+use crate::diagnosis::worker::Finished;
 use crate::status::AlarmStatus;
-use crate::twin::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
-use crate::twin::words;
-use crate::twin::worker::Finished;
 use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
 
 impl Twin {

@@ -5,11 +5,11 @@ mod shown;
 
 use super::health::Health;
 use crate::config::Config;
+use crate::diagnosis::words;
+use crate::diagnosis::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::twin::words;
-use crate::twin::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};

@@ -1,13 +1,13 @@
 //! What is different where something else stands for spindle power; see [`StateBasis`].
 
-use super::Pipeline;
+use super::Inference;
 use crate::estimators::basis::StateBasis;
 use crate::estimators::estimate::Estimates;
 use crate::estimators::no_load::NoLoadTable;
 use crate::estimators::settings::Settings;
 use adapters::Absence;
 
-impl Pipeline {
+impl Inference {
     /// No-load powers that were learned from something else are in another unit. A basis is also one that was stored before there
     /// were several: spindle power.
     pub(super) fn follow_basis(&mut self, basis: StateBasis) {
