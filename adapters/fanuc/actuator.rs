@@ -19,7 +19,7 @@ use super::asking::Asking;
 use super::dial::Dial;
 use super::feed_override;
 use super::item::{Area, Item, Stretch, Write};
-use super::line::{Asked, Line};
+use super::line::{Asked, FanucLine};
 use super::poll::signal;
 use super::server::ladder::ENABLED;
 use crate::address::{FanucOptions, WriteMethod};
@@ -38,7 +38,7 @@ type IsLeftOn = fn(i32) -> bool;
 /// The way to the feed override of one path.
 pub struct FanucActuator {
     name: String,
-    line: Line,
+    line: FanucLine,
     path: u8,
     method: WriteMethod,
     dial: Option<Dial>,
@@ -58,7 +58,7 @@ const BESIDE_NS: i64 = 100_000_000;
 impl FanucActuator {
     /// `None` when the address names no way of writing.
     #[must_use]
-    pub fn new(name: &str, line: Line, path: u8, options: &FanucOptions) -> Option<Self> {
+    pub fn new(name: &str, line: FanucLine, path: u8, options: &FanucOptions) -> Option<Self> {
         let settle_ns = i64::try_from(options.settle.as_nanos()).unwrap_or(i64::MAX);
         let asking = options.request.map(|at| Asking::new(name, line.clone(), at, settle_ns));
         let (name, method, dial) = (name.to_owned(), options.write, options.dial);

@@ -6,7 +6,7 @@
 
 use super::answer::Answer;
 use super::item::{Area, Item, Stretch, Write};
-use super::line::Line;
+use super::line::FanucLine;
 use super::server::ladder::request_bit;
 use crate::clock::Clock;
 use crate::driver::{LadderRequest, SEE_DOCTOR, SourceError};
@@ -17,7 +17,7 @@ const LOOKS: u8 = 3;
 /// The way to the ladder's requests.
 pub(super) struct Asking {
     name: String,
-    line: Line,
+    line: FanucLine,
     at: (Area, u16),
     settle_ns: i64,
     /// May a bit of ours still be on?
@@ -26,7 +26,7 @@ pub(super) struct Asking {
 
 impl Asking {
     /// `at` is the gateway's byte; the ladder's is the next one.
-    pub(super) fn new(name: &str, line: Line, at: (Area, u16), settle_ns: i64) -> Self {
+    pub(super) fn new(name: &str, line: FanucLine, at: (Area, u16), settle_ns: i64) -> Self {
         Self { name: name.to_owned(), line, at, settle_ns, is_on: false }
     }
 

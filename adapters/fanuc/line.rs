@@ -55,7 +55,7 @@ struct Inner {
 
 /// A handle on the connection; clones are handles on the same one.
 #[derive(Clone)]
-pub struct Line {
+pub struct FanucLine {
     inner: Arc<Mutex<Inner>>,
 }
 
@@ -91,7 +91,7 @@ impl Asked {
     }
 }
 
-impl Line {
+impl FanucLine {
     /// A line that is opened when it is first needed. `name` is the address; of `paths` the first is written to and
     /// the others are read besides.
     #[must_use]
@@ -117,7 +117,7 @@ impl Line {
         act(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Asks for all items of the line's own path; see [`Line::ask_on`].
+    /// Asks for all items of the line's own path; see [`FanucLine::ask_on`].
     ///
     /// # Errors
     /// As there.

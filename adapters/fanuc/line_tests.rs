@@ -6,7 +6,7 @@ use super::code::ReturnCode;
 use super::facts::INCH_MACHINE;
 use super::focas::{Focas, FocasError};
 use super::item::{Item, Question, Stretch, Write};
-use super::line::{Connect, Line};
+use super::line::{Connect, FanucLine};
 use super::opening::{Generation, Opening};
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::driver::SourceError;
@@ -83,7 +83,7 @@ impl Clock for Standing {
     }
 }
 
-fn line(duty_pct: u8) -> (Line, Arc<Told>, Standing) {
+fn line(duty_pct: u8) -> (FanucLine, Arc<Told>, Standing) {
     let told = Arc::new(Told::default());
     let own = told.clone();
     let opening = Opening {
@@ -99,7 +99,11 @@ fn line(duty_pct: u8) -> (Line, Arc<Told>, Standing) {
         Some(error) => Err(error),
         None => Ok(Box::new(Mock(own.clone(), opening))),
     });
-    (Line::new("fanuc://mock", connect, (1, Vec::new()), AllowList::default(), duty_pct), told.clone(), Standing(told))
+    (
+        FanucLine::new("fanuc://mock", connect, (1, Vec::new()), AllowList::default(), duty_pct),
+        told.clone(),
+        Standing(told),
+    )
 }
 
 fn refused(code: i16) -> ItemResult {

@@ -5,7 +5,7 @@ use super::allow::{AllowList, Allowed};
 use super::extra;
 use super::feed_override;
 use super::item::Area;
-use super::line::{Connect, Line};
+use super::line::{Connect, FanucLine};
 use super::native::{Native, NativeSettings};
 use super::own::Pace;
 use super::pace::SharedPace;
@@ -28,7 +28,7 @@ pub struct OpenedFanuc {
     /// The way to the external work offsets, where the address allows `EXT`.
     pub offsets: Option<Box<dyn OffsetSink>>,
     /// The connection they share.
-    pub line: Line,
+    pub line: FanucLine,
     /// Why further channels could not be added; none of them is read then.
     pub refused: Option<String>,
 }
@@ -60,7 +60,7 @@ pub fn vendor(name: &str, library: &Path, at: &Endpoint, path: u8, options: &Fan
 /// Opens a controller through any way of talking to it.
 #[must_use]
 pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) -> OpenedFanuc {
-    let line = Line::new(name, connect, (path, options.further.clone()), allowed(options, path), options.duty_pct);
+    let line = FanucLine::new(name, connect, (path, options.further.clone()), allowed(options, path), options.duty_pct);
     let manner = Manner {
         path,
         second_override: matches!(options.write, WriteMethod::SecondOverride { .. }),

@@ -4,7 +4,7 @@ use super::details;
 use super::extra::Extra;
 use super::facts::Facts;
 use super::item::{Item, Question};
-use super::line::{Asked, Line};
+use super::line::{Asked, FanucLine};
 use super::pace::{GroupPace, SharedPace};
 use super::poll;
 use super::readings::{self, Manner};
@@ -26,7 +26,7 @@ enum Group {
 /// One group of a controller, of all paths that are read.
 pub struct FanucSource {
     name: String,
-    line: Line,
+    line: FanucLine,
     group: Group,
     questions: Vec<Question>,
     /// Each path with its channels at the places of [`readings::columns`]; the slow group has them in its order.
@@ -46,7 +46,7 @@ impl FanucSource {
     #[must_use]
     pub fn fast(
         name: &str,
-        line: Line,
+        line: FanucLine,
         manner: Manner,
         options: &FanucOptions,
         shared: &SharedPace,
@@ -72,7 +72,7 @@ impl FanucSource {
     #[must_use]
     pub fn slow(
         name: &str,
-        line: Line,
+        line: FanucLine,
         manner: Manner,
         options: &FanucOptions,
         shared: &SharedPace,
@@ -215,7 +215,7 @@ fn identity(facts: &Facts, own: u8) -> Vec<Fact> {
 }
 
 /// How the line has been doing.
-fn experience(line: &Line) -> Vec<Fact> {
+fn experience(line: &FanucLine) -> Vec<Fact> {
     #[expect(clippy::cast_precision_loss, reason = "a count that is shown")]
     let count = |name, count: u64| Fact::number(name, count as f64);
     let (counts, unsupported) = (line.counts(), line.unsupported().len());

@@ -1,7 +1,7 @@
 //! Writing to a served simulated control over a real socket: every way of writing, the ladder that fights, the offset.
 
 use super::item::Area;
-use super::line::Line;
+use super::line::FanucLine;
 use super::open::{OpenedFanuc, native};
 use super::server::{Controller, Served, Server, ServerSettings, SimulatedControl};
 use super::work_offset::ExternalOffsets;
@@ -207,7 +207,7 @@ fn a_mailbox_that_no_ladder_reads_is_not_held() {
     assert!(error.contains("no ladder reads the mailbox"), "{error}");
 }
 
-fn line(server: &Server, keys: &str) -> Line {
+fn line(server: &Server, keys: &str) -> FanucLine {
     opened(server, keys).line
 }
 

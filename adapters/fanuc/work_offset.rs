@@ -8,7 +8,7 @@
 
 use super::answer::{Answer, Status};
 use super::item::{Item, Write};
-use super::line::{Asked, Line};
+use super::line::{Asked, FanucLine};
 use crate::clock::Clock;
 use crate::driver::{SEE_DOCTOR, SourceError};
 use crate::offset::{Axis, OffsetSink};
@@ -16,7 +16,7 @@ use crate::offset::{Axis, OffsetSink};
 /// The external offsets of the axes that the control names with the letters X, Y and Z.
 pub struct ExternalOffsets {
     name: String,
-    line: Line,
+    line: FanucLine,
     /// Numbers from 1, once known.
     numbers: [Option<i16>; Axis::ALL.len()],
 }
@@ -24,7 +24,7 @@ pub struct ExternalOffsets {
 impl ExternalOffsets {
     /// Of the axes of this line's path. The address must allow `EXT`.
     #[must_use]
-    pub fn new(name: &str, line: Line) -> Self {
+    pub fn new(name: &str, line: FanucLine) -> Self {
         Self { name: name.to_owned(), line, numbers: Default::default() }
     }
 

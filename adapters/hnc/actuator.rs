@@ -2,7 +2,7 @@
 
 use super::decode::number;
 use super::item::{channel, flag};
-use super::line::Line;
+use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{Actuator, LadderRequest, SourceError};
 use crate::nclink::mailbox::{Letter, Mailbox, Register};
@@ -10,7 +10,7 @@ use crate::units::OverridePct;
 
 /// Posts letters for the ladder; see [`mailbox`](crate::nclink::mailbox).
 pub struct HncActuator {
-    line: Line,
+    line: HncLine,
     mailbox: Mailbox,
     last: Letter,
 }
@@ -18,7 +18,7 @@ pub struct HncActuator {
 impl HncActuator {
     /// A mailbox that begins at this register.
     #[must_use]
-    pub fn new(line: Line, first: Register) -> Self {
+    pub fn new(line: HncLine, first: Register) -> Self {
         Self { line, mailbox: Mailbox::new(first), last: Letter::Release }
     }
 }

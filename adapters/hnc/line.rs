@@ -58,12 +58,12 @@ struct Inner {
 
 /// A handle on the child; clones are handles on the same one.
 #[derive(Clone)]
-pub struct Line {
+pub struct HncLine {
     inner: Arc<Mutex<Inner>>,
     name: String,
 }
 
-impl Line {
+impl HncLine {
     /// Nothing is started before the first question.
     #[must_use]
     pub fn new(settings: HncSettings) -> Self {
@@ -105,7 +105,7 @@ impl Line {
         }
     }
 
-    /// Reads one item; see [`Line::read_each`].
+    /// Reads one item; see [`HncLine::read_each`].
     ///
     /// # Errors
     /// As there.

@@ -9,7 +9,7 @@
 use super::answer::{Answer, ItemError, ItemResult};
 use super::decode::{text, whole};
 use super::item::{self, Item, Width, axis, channel, flag, register_type};
-use super::line::Line;
+use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{SEE_DOCTOR, SourceError};
 use crate::nclink::mailbox::Register;
@@ -28,7 +28,7 @@ fn at_rest(state: &[ItemResult]) -> Option<bool> {
 }
 
 /// The registers of the ladder.
-pub(super) struct HncRegisters(pub(super) Line);
+pub(super) struct HncRegisters(pub(super) HncLine);
 
 impl Registers for HncRegisters {
     fn name(&self) -> &str {
@@ -53,7 +53,7 @@ impl Registers for HncRegisters {
 
 /// The channel's external zero offsets.
 pub(super) struct ZeroOffsets {
-    line: Line,
+    line: HncLine,
     /// What a count is, µm.
     unit_um: f64,
     /// Logical axes, once known.
@@ -61,7 +61,7 @@ pub(super) struct ZeroOffsets {
 }
 
 impl ZeroOffsets {
-    pub(super) fn new(line: Line, unit_um: f64) -> Self {
+    pub(super) fn new(line: HncLine, unit_um: f64) -> Self {
         Self { line, unit_um, numbers: Default::default() }
     }
 

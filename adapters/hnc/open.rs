@@ -1,7 +1,7 @@
 //! From an address to a source and, where a mailbox is named, an actuator.
 
 use super::actuator::HncActuator;
-use super::line::{HncSettings, Line};
+use super::line::{HncLine, HncSettings};
 use super::offsets::{HncRegisters, ZeroOffsets};
 use super::source::HncSource;
 use crate::address::{Address, HncNetTarget, HncOffset};
@@ -24,7 +24,7 @@ pub fn open(address: &Address, target: &HncNetTarget) -> Opened {
 /// The same; whole blocks of the controller's sampling go to `sink`.
 #[must_use]
 pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<BlockSink>) -> Opened {
-    let line = Line::new(HncSettings {
+    let line = HncLine::new(HncSettings {
         name: address.text().to_owned(),
         vendor_library: target.vendor_library.clone(),
         at: target.at.clone(),
@@ -46,7 +46,7 @@ pub fn open_sampled(address: &Address, target: &HncNetTarget, sink: Option<Block
 
 /// The way to the offsets that the address names.
 #[must_use]
-pub fn offsets(line: &Line, how: HncOffset) -> Box<dyn OffsetSink> {
+pub fn offsets(line: &HncLine, how: HncOffset) -> Box<dyn OffsetSink> {
     match how {
         HncOffset::Registers(first) => Box::new(LadderOffsets::new(HncRegisters(line.clone()), first)),
         HncOffset::Zero { unit_um } => Box::new(ZeroOffsets::new(line.clone(), unit_um)),

@@ -3,7 +3,7 @@
 //! The first channel always is the system's counter of milliseconds (F register of the system, word 149). By it a missing
 //! millisecond is counted, and a library that gives the same values twice is seen through.
 
-use crate::nclink::sample::{Block, Column};
+use crate::nclink::sample::{Column, SampleBlock};
 use serde::{Deserialize, Serialize};
 
 /// Sampling channels of V1.
@@ -103,10 +103,10 @@ impl Sampling {
     }
 
     /// The columns as blocks without gaps. `now_ms` is when they were fetched: the newest value is at most that old.
-    pub fn blocks(&mut self, columns: &Columns, now_ms: i64) -> Vec<Block> {
+    pub fn blocks(&mut self, columns: &Columns, now_ms: i64) -> Vec<SampleBlock> {
         let Some((counter, values)) = columns.values.split_first() else { return Vec::new() };
         let rows = values.iter().map(Vec::len).chain([counter.len()]).min().unwrap_or(0);
-        let mut blocks: Vec<Block> = Vec::new();
+        let mut blocks: Vec<SampleBlock> = Vec::new();
         for row in 0..rows {
             // The register has 16 bits.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low half is meant")]
@@ -143,10 +143,10 @@ impl Sampling {
         }
     }
 
-    fn empty(&self, begin_ms: i64) -> Block {
+    fn empty(&self, begin_ms: i64) -> SampleBlock {
         let column = |path: &String| Column { path: path.clone(), values: Vec::new(), step_ms: 1.0, word: None };
         let columns = self.names.iter().map(column).collect();
-        Block { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns }
+        SampleBlock { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns }
     }
 }
 

@@ -3,12 +3,12 @@
 use super::answer::{ItemError, ItemResult};
 use super::decode::{Answers, alarms, number, text, whole};
 use super::item::{self, Item, Width, axis, channel, flag, real};
-use super::line::{Alive, Line};
+use super::line::{Alive, HncLine};
 use super::sampling::{Sampled, Sampling};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError};
-use crate::nclink::sample::Block;
+use crate::nclink::sample::SampleBlock;
 use crate::nclink::{BlockSink, last_part};
 use crate::reading::{Absence, Reading, Stamp};
 use std::collections::HashMap;
@@ -72,7 +72,7 @@ impl Answers for Poll {
 
 /// Reads a controller through the vendor's library.
 pub struct HncSource {
-    line: Line,
+    line: HncLine,
     period: Duration,
     channels: Vec<ChannelId>,
     layout: Layout,
@@ -84,7 +84,7 @@ pub struct HncSource {
 impl HncSource {
     /// A source on this line. With `sample` it also runs the controller's sampling channels.
     #[must_use]
-    pub fn new(line: Line, period: Duration, sample: bool) -> Self {
+    pub fn new(line: HncLine, period: Duration, sample: bool) -> Self {
         let sampling = sample.then(Sampling::default);
         Self {
             line,
@@ -200,7 +200,7 @@ impl HncSource {
     fn take_samples(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         let Some(sampling) = &mut self.sampling else { return Ok(()) };
         let columns = self.line.sampled()?;
-        let blocks: Vec<Block> = sampling.blocks(&columns, clock.now_ns().div_euclid(1_000_000));
+        let blocks: Vec<SampleBlock> = sampling.blocks(&columns, clock.now_ns().div_euclid(1_000_000));
         if let Some(sink) = &mut self.sink {
             let arrived = Instant::now();
             blocks.iter().for_each(|block| sink(block, arrived));

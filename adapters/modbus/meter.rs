@@ -2,7 +2,7 @@
 
 use super::line::{Fault, Line};
 use super::number::Format;
-use super::pdu::{Block, NoRegisters};
+use super::pdu::{NoRegisters, RegisterBlock};
 use super::plan::Plan;
 use super::profile::{Profile, Quantity, Register, find};
 use super::refresh::Refresh;
@@ -165,7 +165,7 @@ impl ModbusMeter {
     }
 }
 
-fn ask(line: &mut dyn Line, clock: &dyn Clock, unit: u8, block: &Block) -> Result<(Vec<u16>, Stamp), Fault> {
+fn ask(line: &mut dyn Line, clock: &dyn Clock, unit: u8, block: &RegisterBlock) -> Result<(Vec<u16>, Stamp), Fault> {
     let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
     match block.registers(&answer.pdu) {
         Ok(registers) => Ok((registers, answer.stamp)),

@@ -27,7 +27,7 @@ impl Table {
 
 /// A run of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Block {
+pub struct RegisterBlock {
     /// Of which table.
     pub table: Table,
     /// Protocol address of the first one, counted from 0.
@@ -36,7 +36,7 @@ pub struct Block {
     pub count: u16,
 }
 
-impl Block {
+impl RegisterBlock {
     /// The request for it.
     #[must_use]
     pub fn request(&self) -> [u8; 5] {
@@ -105,7 +105,7 @@ pub fn exception(code: u8) -> (&'static str, &'static str) {
 ///
 /// # Errors
 /// The exception code to answer with.
-pub fn understood(request: &[u8]) -> Result<Block, u8> {
+pub fn understood(request: &[u8]) -> Result<RegisterBlock, u8> {
     let table = match request.first() {
         Some(3) => Table::Holding,
         Some(4) => Table::Input,
@@ -114,7 +114,7 @@ pub fn understood(request: &[u8]) -> Result<Block, u8> {
     let [_, a, b, c, d] = *request else { return Err(3) };
     let (start, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
     let fits = (1..=REGISTERS_MAX).contains(&count);
-    if fits { Ok(Block { table, start, count }) } else { Err(3) }
+    if fits { Ok(RegisterBlock { table, start, count }) } else { Err(3) }
 }
 
 /// The answer that carries these registers (at most 125).
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn the_example_of_the_specification() {
         // 6.3: registers 108 to 110 hold 02 2B, 00 00, 00 64.
-        let block = Block { table: Table::Holding, start: 0x6B, count: 3 };
+        let block = RegisterBlock { table: Table::Holding, start: 0x6B, count: 3 };
         assert_eq!(block.request(), [0x03, 0x00, 0x6B, 0x00, 0x03]);
         let bytes = [0x03, 0x06, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64];
         assert_eq!(block.registers(&bytes), Ok(vec![0x022B, 0x0000, 0x0064]));
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn an_exception_and_an_answer_to_something_else_are_no_registers() {
-        let block = Block { table: Table::Input, start: 0, count: 2 };
+        let block = RegisterBlock { table: Table::Input, start: 0, count: 2 };
         assert_eq!(block.registers(&[0x84, 2]), Err(NoRegisters::Refused(2)));
         assert_eq!(block.registers(&[0x83, 2]), Err(NoRegisters::Other(2)));
         assert_eq!(block.registers(&[4, 2, 0, 0]), Err(NoRegisters::Other(4)));
@@ -160,7 +160,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn no_answer_makes_it_panic(bytes in proptest::collection::vec(0_u8.., 0..300), count in 1_u16..126) {
-            let _ = Block { table: Table::Input, start: 0, count }.registers(&bytes);
+            let _ = RegisterBlock { table: Table::Input, start: 0, count }.registers(&bytes);
             let _ = understood(&bytes);
         }
     }

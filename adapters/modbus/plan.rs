@@ -1,6 +1,6 @@
 //! The fewest blocks that hold every register of a profile, and what they take on the wire.
 
-use super::pdu::Block;
+use super::pdu::RegisterBlock;
 use super::profile::{Profile, Register};
 use crate::address::SerialTarget;
 use crate::serial;
@@ -18,7 +18,7 @@ const ANSWER_AROUND: usize = 5;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
     /// In the order of their addresses; no two overlap.
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<RegisterBlock>,
 }
 
 impl Plan {
@@ -42,13 +42,14 @@ impl Plan {
             return Err(format!("{} requests per poll; at most {BLOCKS_MAX}, so make it two profiles", joined.len()));
         }
         let word = |number: u32| u16::try_from(number).unwrap_or(u16::MAX);
-        let block = |(from, to): (u32, u32)| Block { table: profile.table, start: word(from), count: word(to - from) };
+        let block =
+            |(from, to): (u32, u32)| RegisterBlock { table: profile.table, start: word(from), count: word(to - from) };
         Ok(Self { blocks: joined.into_iter().map(block).collect() })
     }
 
     /// In which block a register stands, and how many registers into it.
     pub(super) fn place(&self, register: &Register) -> Option<(usize, usize)> {
-        let holds = |block: &Block| {
+        let holds = |block: &RegisterBlock| {
             register.address >= block.start
                 && register.address - block.start + register.format.registers() <= block.count
         };

@@ -7,7 +7,7 @@
 //!
 //! Limits: 16 connections, a minute of silence on each.
 
-use super::pdu::{self, Block};
+use super::pdu::{self, RegisterBlock};
 use super::profile::{Profile, Quantity};
 use super::tcp::{frame, header};
 use crate::clock::Clock;
@@ -157,7 +157,7 @@ impl Served {
     }
 
     /// `None`: not all of these registers exist.
-    fn registers(&self, block: &Block, values: &MeterValues, spindle: bool) -> Option<Vec<u16>> {
+    fn registers(&self, block: &RegisterBlock, values: &MeterValues, spindle: bool) -> Option<Vec<u16>> {
         let registers = &self.profile.registers;
         let first = registers.iter().map(|register| usize::from(register.address)).min()?;
         let end = |address: u16, count: u16| usize::from(address) + usize::from(count);

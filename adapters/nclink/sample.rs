@@ -22,7 +22,7 @@ pub struct Column {
 
 /// What one message holds. Value `k` of a column was true at `begin_ms + k * step_ms` of the column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Block {
+pub struct SampleBlock {
     /// Name of the sample channel.
     pub channel: String,
     /// Time of the first value on the device's clock, ms since 1970.
@@ -35,7 +35,7 @@ pub struct Block {
     pub columns: Vec<Column>,
 }
 
-impl Block {
+impl SampleBlock {
     /// Reads a message of the channel named in its topic; what it leaves out is taken from the model.
     ///
     /// # Errors
@@ -121,7 +121,7 @@ mod tests {
     fn the_recorded_message_is_read() {
         let message = json!({"@id": "m1", "paths": ["/STATUS"], "id": "s9", "beginTime": "1700000000000",
             "data": [{"data": [1, 2]}], "interval": 1000, "uploadInterval": 2000});
-        let block = Block::parse(&message, "s9", &model()).expect("sense");
+        let block = SampleBlock::parse(&message, "s9", &model()).expect("sense");
         assert_eq!((block.begin_ms, block.interval_ms, block.instants), (1_700_000_000_000, 1000.0, 2));
         assert_eq!(block.columns[0].path, "STATUS");
         assert_eq!(block.columns[0].values, [Some(1.0), Some(2.0)]);
@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn what_is_left_out_comes_from_the_model() {
         let message = json!({"beginTime": 5, "data": [{"data": [1, 2, 3, 4]}, {"data": [[], [], [], []]}]});
-        let block = Block::parse(&message, "s1", &model()).expect("sense");
+        let block = SampleBlock::parse(&message, "s1", &model()).expect("sense");
         assert_eq!((block.channel.as_str(), block.interval_ms), ("s1", 1.0));
         assert_eq!(
             block.columns[1],
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn several_values_in_one_instant_lie_closer() {
         let message = json!({"beginTime": "5", "data": [{"data": [[1, 2], [3, 4]]}, {"data": ["O10.nc", "O10.nc"]}]});
-        let block = Block::parse(&message, "s1", &model()).expect("sense");
+        let block = SampleBlock::parse(&message, "s1", &model()).expect("sense");
         assert_eq!((block.instants, block.columns[0].step_ms), (2, 0.5));
         assert_eq!(block.columns[0].values.len(), 4);
         assert_eq!(block.columns[1].word.as_deref(), Some("O10.nc"));
@@ -150,11 +150,11 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_in_words() {
-        let said = |message: Value| Block::parse(&message, "s1", &model()).expect_err("refused");
+        let said = |message: Value| SampleBlock::parse(&message, "s1", &model()).expect_err("refused");
         assert!(said(json!({"data": []})).contains("beginTime"));
         assert!(said(json!({"beginTime": "noon", "data": []})).contains("noon"));
         assert!(said(json!({"beginTime": 1, "data": [{"data": [1]}]})).contains("1 columns and names for 2"));
         let other = json!({"id": "sx", "beginTime": 1, "data": []});
-        assert!(Block::parse(&other, "sx", &model()).expect_err("refused").contains("interval"));
+        assert!(SampleBlock::parse(&other, "sx", &model()).expect_err("refused").contains("interval"));
     }
 }

@@ -4,7 +4,7 @@ use super::connection::{Connection, Link, Unasked};
 use super::map::{self, Layout, Plan};
 use super::message::Answer;
 use super::model::Model;
-use super::sample::Block;
+use super::sample::SampleBlock;
 use super::topic::Subject;
 use super::track::Track;
 use crate::address::NcLinkTarget;
@@ -15,7 +15,7 @@ use crate::reading::{Reading, Stamp};
 use std::time::{Duration, Instant};
 
 /// Takes whole blocks of a sample channel, with the moment of their arrival.
-pub type BlockSink = Box<dyn FnMut(&Block, Instant) + Send>;
+pub type BlockSink = Box<dyn FnMut(&SampleBlock, Instant) + Send>;
 
 /// Reads a device at the pace of its address. Connects at the first poll, and anew after the line broke.
 pub struct NcLinkSource {
@@ -89,7 +89,7 @@ impl NcLinkSource {
 
     fn take(&mut self, message: &Unasked, model: &Model) {
         match message.subject {
-            Subject::Sample => match Block::parse(&message.message, &message.tail, model) {
+            Subject::Sample => match SampleBlock::parse(&message.message, &message.tail, model) {
                 Ok(block) => {
                     self.track.block(&block);
                     if let Some(sink) = &mut self.sink {

@@ -1,7 +1,7 @@
 //! What sample channels and events have brought: how much, and whether a millisecond is missing.
 
 use super::decode;
-use super::sample::Block;
+use super::sample::SampleBlock;
 use crate::driver::Fact;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -94,7 +94,7 @@ impl Track {
         self.events.push(text.chars().take(200).collect());
     }
 
-    pub(super) fn block(&mut self, block: &Block) {
+    pub(super) fn block(&mut self, block: &SampleBlock) {
         if self.channels.len() >= CHANNELS_MAX && !self.channels.contains_key(&block.channel) {
             return self.nonsense(format!("more than {CHANNELS_MAX} sample channels"));
         }
@@ -109,7 +109,7 @@ impl ChannelTrack {
         clippy::cast_sign_loss,
         reason = "a positive count; milliseconds since 1970 fit a double"
     )]
-    fn block(&mut self, block: &Block) {
+    fn block(&mut self, block: &SampleBlock) {
         let begin_ms = block.begin_ms as f64;
         if let Some(expected_ms) = self.expected_ms {
             // Half an interval is the rounding of the device's own milliseconds.
@@ -131,8 +131,8 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn block(begin_ms: i64, instants: usize) -> Block {
-        Block { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants, columns: Vec::new() }
+    fn block(begin_ms: i64, instants: usize) -> SampleBlock {
+        SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants, columns: Vec::new() }
     }
 
     #[test]

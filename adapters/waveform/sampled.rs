@@ -42,7 +42,7 @@ impl SampledCurrent {
     }
 
     /// The current out of a block of the controller's that arrived at `arrived_ns`, in pieces without a gap.
-    pub fn take(&mut self, block: &sample::Block, arrived_ns: TimeNs) -> Vec<Block> {
+    pub fn take(&mut self, block: &sample::SampleBlock, arrived_ns: TimeNs) -> Vec<Block> {
         let wanted = |column: &&Column| column.step_ms > 0.0 && self.is_current(&column.path);
         let Some(column) = block.columns.iter().find(wanted) else { return Vec::new() };
         let header = self.header_of(1e3 / column.step_ms);
@@ -107,10 +107,10 @@ impl SampledCurrent {
 mod tests {
     use super::*;
 
-    fn block(begin_ms: i64, values: &[Option<f64>]) -> sample::Block {
+    fn block(begin_ms: i64, values: &[Option<f64>]) -> sample::SampleBlock {
         let column = |path: &str| Column { path: path.to_owned(), values: values.to_vec(), step_ms: 1.0, word: None };
         let columns = vec![column("AXIS@0/MOTOR/CURRENT"), column("AXIS@5/MOTOR/CURRENT")];
-        sample::Block { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants: values.len(), columns }
+        sample::SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants: values.len(), columns }
     }
 
     #[test]

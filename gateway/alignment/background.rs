@@ -19,7 +19,7 @@ pub enum Patience {
 /// What is found.
 pub(super) type Found = Result<Lag, NotIdentifiable>;
 
-struct Line {
+struct BackgroundThread {
     ask: SyncSender<Vec<Transient>>,
     answers: Receiver<Found>,
 }
@@ -27,7 +27,7 @@ struct Line {
 /// See the [module](self).
 pub(super) struct Background {
     patience: Patience,
-    line: Option<Line>,
+    line: Option<BackgroundThread>,
     /// For which pair, and when the answer is due.
     asked: Option<(usize, TimeNs)>,
 }
@@ -73,7 +73,7 @@ impl Background {
 }
 
 /// The thread ends when nobody asks any more.
-fn start() -> Option<Line> {
+fn start() -> Option<BackgroundThread> {
     let (ask, asked) = sync_channel::<Vec<Transient>>(1);
     let (answer, answers) = sync_channel(1);
     let estimate = move || {
@@ -84,5 +84,5 @@ fn start() -> Option<Line> {
         }
     };
     std::thread::Builder::new().name("align".to_owned()).spawn(estimate).ok()?;
-    Some(Line { ask, answers })
+    Some(BackgroundThread { ask, answers })
 }

@@ -53,24 +53,24 @@ pub struct Trail {
     told: Option<Told>,
     /// Who has asked since when, the newest at the end.
     authors: VecDeque<(TimeNs, Author)>,
-    pace: Pace,
+    pace: RowRate,
 }
 
 /// How many rows of requests there may be.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct RowRate {
     tokens: f64,
     at_ns: TimeNs,
     left_out: u64,
 }
 
-impl Default for Pace {
+impl Default for RowRate {
     fn default() -> Self {
         Self { tokens: ROWS_AT_ONCE, at_ns: 0, left_out: 0 }
     }
 }
 
-impl Pace {
+impl RowRate {
     /// May there be a row now? Then the text says how many before it were left out.
     pub(super) fn may_tell(&mut self, at_ns: TimeNs) -> Option<String> {
         let elapsed_s = (at_ns - self.at_ns).max(0) as f64 / SECOND_NS as f64;

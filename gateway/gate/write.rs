@@ -86,7 +86,7 @@ const HEARTBEATS_PATIENCE: i64 = 3;
 
 /// How the writer keeps its pace, from `[gate]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Pace {
+struct WriteSchedule {
     interval_ns: i64,
     heartbeat_ns: i64,
     rule: LadderRule,
@@ -104,7 +104,7 @@ struct Pending {
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
 pub struct Writer<A> {
     actuator: A,
-    pace: Pace,
+    pace: WriteSchedule,
     settle_ns: i64,
     /// What was written while the machine settles, the newest at the end; before the first write, what was in force.
     recent: VecDeque<(TimeNs, OverridePct)>,
@@ -130,7 +130,7 @@ impl<A: Actuator> Writer<A> {
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
         Self {
             actuator,
-            pace: Pace { interval_ns: ns(limits.min_interval), heartbeat_ns: ns(limits.heartbeat), rule },
+            pace: WriteSchedule { interval_ns: ns(limits.min_interval), heartbeat_ns: ns(limits.heartbeat), rule },
             settle_ns,
             recent: VecDeque::new(),
             dials: VecDeque::new(),

@@ -32,19 +32,19 @@ pub(crate) struct Thread {
     pub(crate) mailbox: Arc<Mailbox>,
     pub(crate) shared: Arc<Shared>,
     pub(crate) options: Options,
-    pub(crate) pace: Pace,
+    pub(crate) pace: CommitSchedule,
 }
 
 /// When to commit, and what is being waited for.
 #[derive(Debug)]
-pub(crate) struct Pace {
+pub(crate) struct CommitSchedule {
     next_commit: Instant,
     failures: usize,
     flushing: Option<u64>,
     maintaining: Option<u64>,
 }
 
-impl Default for Pace {
+impl Default for CommitSchedule {
     fn default() -> Self {
         Self { next_commit: Instant::now(), failures: 0, flushing: None, maintaining: None }
     }

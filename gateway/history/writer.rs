@@ -13,7 +13,7 @@ use super::recover::recover;
 use super::schema;
 use super::series::stored_series;
 use super::status::{Shared, Status};
-use super::thread::{Pace, Thread};
+use super::thread::{CommitSchedule, Thread};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use std::path::{Path, PathBuf};
@@ -66,7 +66,7 @@ impl Writer {
             mailbox: mailbox.clone(),
             shared: shared.clone(),
             options,
-            pace: Pace::default(),
+            pace: CommitSchedule::default(),
         };
         let thread = std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(at(path))?;
         Ok(Self { path: path.to_owned(), mailbox, shared, thread: Some(thread), _lock: lock })

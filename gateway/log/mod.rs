@@ -122,9 +122,9 @@ pub fn say_to_operator_alone(text: &str) {
 
 /// One event of the engineer's log on its way to the outlet.
 #[derive(Debug, Default)]
-struct Line(Vec<u8>);
+struct LogLine(Vec<u8>);
 
-impl Write for Line {
+impl Write for LogLine {
     fn write(&mut self, part: &[u8]) -> std::io::Result<usize> {
         self.0.extend_from_slice(part);
         Ok(part.len())
@@ -135,7 +135,7 @@ impl Write for Line {
     }
 }
 
-impl Drop for Line {
+impl Drop for LogLine {
     fn drop(&mut self) {
         if !self.0.is_empty() {
             engineer().put(std::mem::take(&mut self.0));
@@ -151,7 +151,7 @@ fn clock_text() -> String {
 /// Starts the engineer's log. A second call in one process changes nothing.
 pub fn start(format: LogFormat, level: Level) {
     let wanted = filter_fn(move |event| *event.level() <= level);
-    let base = tracing_subscriber::fmt::layer().with_writer(Line::default).with_ansi(false);
+    let base = tracing_subscriber::fmt::layer().with_writer(LogLine::default).with_ansi(false);
     let layer = match format {
         LogFormat::Off => return,
         LogFormat::Text => base.with_filter(wanted).boxed(),

@@ -34,7 +34,7 @@ const APART_NS: i64 = 6 * 3600 * SECOND_NS;
 struct Remembered {
     /// The model under which it was learned.
     toml: String,
-    memory: live::Memory,
+    memory: live::LiveState,
     /// A diagnosis that is due or was interrupted.
     #[serde(default)]
     due: Option<Due>,

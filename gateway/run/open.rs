@@ -1,7 +1,7 @@
 //! From the configuration to something that gives samples at its pace.
 
 use super::feed::Feed;
-use super::pace::Pace;
+use super::pace::TickSchedule;
 use crate::alignment::{Alignment, Patience};
 use crate::config::{self, Config};
 use adapters::address::Target;
@@ -42,7 +42,7 @@ pub struct Sources {
     /// The samples.
     pub feed: Feed,
     /// When they are taken.
-    pub pace: Pace,
+    pub pace: TickSchedule,
     /// Ways to the machines.
     pub ways: Vec<Way>,
     /// The simulated machines among them, which count what is written to them.
@@ -107,7 +107,7 @@ fn live(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>>
     }
     let feed =
         threads(found, clock, &config.alignment).map_err(|error| vec![format!("no thread for a source: {error}")])?;
-    let pace = Pace::on_clock(clock.clone(), period(config));
+    let pace = TickSchedule::on_clock(clock.clone(), period(config));
     Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }
 
@@ -156,7 +156,7 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
     let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
     let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
     let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
-    let pace = Pace::stepped(speed.factor(), start_ns, period(config));
+    let pace = TickSchedule::stepped(speed.factor(), start_ns, period(config));
     Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }
 

@@ -29,7 +29,7 @@ enum Beat {
 }
 
 /// Gives the times of the ticks, waiting for each.
-pub struct Pace {
+pub struct TickSchedule {
     beat: Beat,
     period_ns: i64,
     due_ns: TimeNs,
@@ -38,7 +38,7 @@ pub struct Pace {
     skipped: u64,
 }
 
-impl Pace {
+impl TickSchedule {
     /// Ticks on the clock.
     #[must_use]
     pub fn on_clock(clock: Arc<dyn Clock>, period: Duration) -> Self {
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn late_ticks_are_left_out_and_counted() {
         let clock = ManualClock::at(0);
-        let mut pace = Pace::on_clock(Arc::new(clock.clone()), Duration::from_millis(100));
+        let mut pace = TickSchedule::on_clock(Arc::new(clock.clone()), Duration::from_millis(100));
         clock.set(100_000_000);
         assert_eq!(pace.next_tick(&GO), Some(100_000_000));
         clock.set(450_000_000);
@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn whoever_is_woken_does_what_is_asked_and_the_tick_comes_when_it_is_due() {
         let wake = Wake::default();
-        let mut pace = Pace::stepped(Some(1.0), 0, Duration::from_millis(300));
+        let mut pace = TickSchedule::stepped(Some(1.0), 0, Duration::from_millis(300));
         let of_other = wake.clone();
         let (began, mut after) = (Instant::now(), None);
         let tick = std::thread::scope(|scope| {
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn an_accelerated_machine_leaves_no_tick_out() {
-        let mut pace = Pace::stepped(Some(1000.0), 0, Duration::from_millis(100));
+        let mut pace = TickSchedule::stepped(Some(1000.0), 0, Duration::from_millis(100));
         let began = Instant::now();
         let ticks: Vec<_> = (0..100).filter_map(|_| pace.next_tick(&GO)).collect();
         assert_eq!(ticks, (1..=100).map(|n| n * 100_000_000).collect::<Vec<_>>());

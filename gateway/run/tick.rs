@@ -4,7 +4,7 @@ use super::command::Commands;
 use super::feed::Feed;
 use super::health::Health;
 use super::live_twin::Twin;
-use super::pace::Pace;
+use super::pace::TickSchedule;
 use super::priority::{self, Granted};
 use super::report;
 use super::rules::Watched;
@@ -59,7 +59,7 @@ pub struct Ticker {
     /// See [`Identity`].
     pub identity: Identity,
     /// Gives the times of the ticks.
-    pub pace: Pace,
+    pub pace: TickSchedule,
     /// Gives the samples.
     pub feed: Feed,
     /// Infers, decides, records.

@@ -9,7 +9,7 @@ use adapters::address::{Address, HncNetTarget, NcLinkTarget, Target, WaveformKee
 use adapters::clock::{Clock, TimeNs};
 use adapters::driver::Fact;
 use adapters::nclink::BlockSink;
-use adapters::nclink::sample::Block;
+use adapters::nclink::sample::SampleBlock;
 use adapters::open::{OpenError, Opened};
 use adapters::waveform::SampledCurrent;
 use adapters::{ChannelId, Reading, Source, SourceError};
@@ -26,7 +26,7 @@ const SILENT: Duration = Duration::from_secs(3);
 /// The spindle among the axes of an HNC-8, where the address does not say.
 const SPINDLE_AXIS: u32 = 5;
 
-type Waiting = Arc<Mutex<VecDeque<(Block, Instant)>>>;
+type Waiting = Arc<Mutex<VecDeque<(SampleBlock, Instant)>>>;
 
 /// A controller whose sampling is wanted, opened with it; `None` for every other address.
 pub(super) fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
@@ -61,7 +61,7 @@ fn joined(samples: ControllerSamples, mut opened: Opened) -> Opened {
 fn queue() -> (Waiting, BlockSink) {
     let waiting = Waiting::default();
     let filled = waiting.clone();
-    let sink = move |block: &Block, arrived: Instant| {
+    let sink = move |block: &SampleBlock, arrived: Instant| {
         let mut waiting = filled.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.push_back((block.clone(), arrived));
         if waiting.len() > WAITING_MAX {

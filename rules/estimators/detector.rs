@@ -67,7 +67,7 @@ enum Phase {
 
 /// What the tick amounts to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Verdict {
+pub(super) struct Detected {
     pub(super) state: State,
     pub(super) because: Option<NoEstimate>,
     /// The power settled at this tick: its level, which is no-load power if the feed is off, and an upper bound of it
@@ -127,7 +127,7 @@ impl Detector {
     }
 
     /// Takes a tick and tells the state.
-    pub(super) fn step(&mut self, tick: &Tick<'_>) -> Verdict {
+    pub(super) fn step(&mut self, tick: &Tick<'_>) -> Detected {
         // The first tick, or time has been set back.
         self.since_ns = self.since_ns.min(tick.inputs.at_ns);
         let verdict = self.judge(tick);
@@ -138,7 +138,7 @@ impl Detector {
         verdict
     }
 
-    fn judge(&mut self, tick: &Tick<'_>) -> Verdict {
+    fn judge(&mut self, tick: &Tick<'_>) -> Detected {
         self.notice_hidden_change(tick);
         let powered_before = self.powered;
         self.powered = tick.powered().unwrap_or(powered_before);
@@ -168,7 +168,7 @@ impl Detector {
         turned && fed && seconds(since, now_ns) < tick.settings.reversal_s
     }
 
-    fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Verdict {
+    fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Detected {
         let since = *self.missing_since_ns.get_or_insert(tick.inputs.at_ns);
         if seconds(since, tick.inputs.at_ns) < tick.settings.dropout_hold_s && self.state != State::Unknown {
             return verdict(self.state);
@@ -176,7 +176,7 @@ impl Detector {
         unknown(reason)
     }
 
-    fn at_rest(&mut self, state: State, tick: &Tick<'_>) -> Verdict {
+    fn at_rest(&mut self, state: State, tick: &Tick<'_>) -> Detected {
         self.enter(Phase::Rest, tick.inputs.at_ns);
         self.evidence.clear();
         verdict(state)
@@ -189,7 +189,7 @@ impl Detector {
         }
     }
 
-    fn turning(&mut self, tick: &Tick<'_>) -> Verdict {
+    fn turning(&mut self, tick: &Tick<'_>) -> Detected {
         let now_ns = tick.inputs.at_ns;
         if self.phase == Phase::Rest {
             self.enter(Phase::Starting, now_ns);
@@ -214,7 +214,7 @@ impl Detector {
     }
 
     /// A steady spindle whose load nobody measures.
-    fn moving(&mut self, tick: &Tick<'_>) -> Verdict {
+    fn moving(&mut self, tick: &Tick<'_>) -> Detected {
         if self.phase != Phase::Settled {
             self.enter(Phase::Settled, tick.inputs.at_ns);
             self.settled_speed = None;
@@ -251,7 +251,7 @@ impl Detector {
     }
 
     /// Not settled yet.
-    fn pending(&self, tick: &Tick<'_>) -> Verdict {
+    fn pending(&self, tick: &Tick<'_>) -> Detected {
         let overdue = tick.no_load.is_err() && seconds(self.phase_since_ns, tick.inputs.at_ns) > SETTLING_LIMIT_S;
         match self.phase {
             Phase::Starting if !overdue || tick.feed() == Feed::Off => verdict(State::SpindleStart),
@@ -260,7 +260,7 @@ impl Detector {
         }
     }
 
-    fn settle(&mut self, tick: &Tick<'_>) -> Verdict {
+    fn settle(&mut self, tick: &Tick<'_>) -> Detected {
         let Some(filtered_w) = tick.filtered_w else { return self.pending(tick) };
         let agreement_w = tick.signals.agreement_w(filtered_w, tick.settings);
         let means = tick.signals.window.stationary(agreement_w, tick.settings);
@@ -288,10 +288,10 @@ impl Detector {
         self.enter(Phase::Settled, tick.inputs.at_ns);
         self.settled_speed = None;
         self.evidence.clear();
-        Verdict { settled_at_w, ..self.loaded(tick) }
+        Detected { settled_at_w, ..self.loaded(tick) }
     }
 
-    fn loaded(&mut self, tick: &Tick<'_>) -> Verdict {
+    fn loaded(&mut self, tick: &Tick<'_>) -> Detected {
         self.weigh(tick);
         let full = tick.settings.cutting_evidence;
         let rested = seconds(self.since_ns, tick.inputs.at_ns) >= tick.settings.dwell_s;
@@ -336,10 +336,10 @@ impl Detector {
     }
 }
 
-fn verdict(state: State) -> Verdict {
-    Verdict { state, because: None, settled_at_w: None }
+fn verdict(state: State) -> Detected {
+    Detected { state, because: None, settled_at_w: None }
 }
 
-fn unknown(reason: NoEstimate) -> Verdict {
-    Verdict { state: State::Unknown, because: Some(reason), settled_at_w: None }
+fn unknown(reason: NoEstimate) -> Detected {
+    Detected { state: State::Unknown, because: Some(reason), settled_at_w: None }
 }

@@ -3,7 +3,7 @@
 mod stand_in;
 
 use super::cutting::balance;
-use super::detector::{Detector, Verdict};
+use super::detector::{Detected, Detector};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 use super::inputs::{Channels, Inputs};
 use super::learning::{IdleTick, Learner};
@@ -32,13 +32,13 @@ pub struct RestoreError(#[from] serde_json::Error);
 pub struct Inference {
     settings: Settings,
     channels: Channels,
-    memory: Memory,
+    memory: InferenceState,
     estimates: Estimates,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Memory {
+struct InferenceState {
     signals: Signals,
     no_load: NoLoadTable,
     learner: Learner,
@@ -51,7 +51,7 @@ struct Memory {
     basis: String,
 }
 
-impl Memory {
+impl InferenceState {
     fn new(settings: &Settings) -> Self {
         Self {
             basis: String::new(),
@@ -70,7 +70,7 @@ impl Inference {
     /// [`Settings::contradictions`]) the stricter one holds.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        let memory = Memory::new(&settings);
+        let memory = InferenceState::new(&settings);
         Self { settings, channels: Channels::new(), memory, estimates: Estimates::none(0) }
     }
 
@@ -148,7 +148,7 @@ impl Inference {
         inputs: &Inputs,
         filtered_w: Option<f64>,
         no_load: Result<NoLoad, NoEstimate>,
-        verdict: &Verdict,
+        verdict: &Detected,
     ) {
         let memory = &mut self.memory;
         if let (State::Standby, Ok(total)) = (verdict.state, inputs.total) {
@@ -187,7 +187,7 @@ impl Inference {
         }
     }
 
-    fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) {
+    fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
         let memory = &mut self.memory;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
         let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
@@ -218,7 +218,7 @@ impl Inference {
         inputs: &Inputs,
         filtered_w: Option<f64>,
         no_load: Result<NoLoad, NoEstimate>,
-        verdict: &Verdict,
+        verdict: &Detected,
     ) -> Estimates {
         let detector = &self.memory.detector;
         let steady = self.steady(inputs, verdict);
@@ -264,7 +264,7 @@ impl Inference {
     }
 
     /// Does the balance of a steady spindle hold at this tick?
-    fn steady(&self, inputs: &Inputs, verdict: &Verdict) -> Result<(), NoEstimate> {
+    fn steady(&self, inputs: &Inputs, verdict: &Detected) -> Result<(), NoEstimate> {
         match verdict.state {
             State::Off => Err(NoEstimate::MachineOff),
             State::Standby => Err(NoEstimate::SpindleStopped),
@@ -315,7 +315,7 @@ impl Inference {
         Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
     }
 
-    fn visibility(&self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Verdict) -> Visibility {
+    fn visibility(&self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) -> Visibility {
         let fed = self.memory.signals.feed(inputs, &self.settings) == Feed::On;
         match verdict.state {
             State::Cutting => Visibility::Visible,
@@ -382,7 +382,7 @@ impl Inference {
     /// # Errors
     /// The snapshot is not one of this version.
     pub fn restore(settings: Settings, snapshot: serde_json::Value) -> Result<Self, RestoreError> {
-        let memory: Memory = serde_json::from_value(snapshot)?;
+        let memory: InferenceState = serde_json::from_value(snapshot)?;
         Ok(Self { memory, ..Self::new(settings) })
     }
 }

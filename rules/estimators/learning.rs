@@ -74,7 +74,7 @@ pub(super) struct IdleTick {
 /// Powers at one speed of one gear stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Block {
+struct IdleBlock {
     length: usize,
     /// The mean is that of the values between these quantiles.
     quantiles: (f64, f64),
@@ -92,13 +92,13 @@ struct Block {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Learner {
-    idle: Block,
-    fed: Block,
+    idle: IdleBlock,
+    fed: IdleBlock,
     waiting: VecDeque<IdleTick>,
     above_since_ns: Option<TimeNs>,
 }
 
-impl Block {
+impl IdleBlock {
     fn new(length: usize, quantiles: (f64, f64)) -> Self {
         let powers_w = Vec::with_capacity(length);
         Self {
@@ -180,7 +180,7 @@ impl Block {
 impl Learner {
     pub(super) fn new(settings: &Settings) -> Self {
         let length = length(settings.window_samples);
-        let (idle, fed) = (Block::new(length, MIDDLE), Block::new((3 * length / 4).max(5), UPPER));
+        let (idle, fed) = (IdleBlock::new(length, MIDDLE), IdleBlock::new((3 * length / 4).max(5), UPPER));
         Self { idle, fed, waiting: VecDeque::with_capacity(WAITING), above_since_ns: None }
     }
 

@@ -33,12 +33,12 @@ use window::CuttingTimes;
 
 /// What is remembered across a restart.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Memory {
-    watch: watch::Memory,
+pub struct LiveState {
+    watch: watch::WatchState,
     minutes: CuttingTimes,
 }
 
-impl Memory {
+impl LiveState {
     /// What still holds under another model: how long the tools have cut.
     #[must_use]
     pub fn of_the_machine(self) -> Self {
@@ -59,7 +59,7 @@ pub struct Live {
 impl Live {
     /// A model, and what was learned under the same model before.
     #[must_use]
-    pub fn new(model: Model, memory: Memory) -> Self {
+    pub fn new(model: Model, memory: LiveState) -> Self {
         Self {
             seconds: Seconds::new(&model.output),
             simulation: Simulation::new(model, memory.minutes),
@@ -114,8 +114,8 @@ impl Live {
 
     /// What to remember across a restart.
     #[must_use]
-    pub fn memory(&self) -> Memory {
-        Memory { watch: self.watch.memory(), minutes: self.simulation.minutes().clone() }
+    pub fn memory(&self) -> LiveState {
+        LiveState { watch: self.watch.memory(), minutes: self.simulation.minutes().clone() }
     }
 }
 

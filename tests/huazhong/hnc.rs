@@ -7,7 +7,7 @@ use adapters::address::Endpoint;
 use adapters::clock::SystemClock;
 use adapters::driver::Actuator;
 use adapters::hnc::item::Item;
-use adapters::hnc::line::{HncSettings, Line};
+use adapters::hnc::line::{HncLine, HncSettings};
 use adapters::hnc::sampling::Sampled;
 use adapters::hnc::{HncActuator, HncSource};
 use adapters::nclink::mailbox::Register;
@@ -34,8 +34,8 @@ fn settings(library: &Library) -> HncSettings {
     }
 }
 
-pub(crate) fn line(library: &Library) -> Line {
-    Line::new(settings(library))
+pub(crate) fn line(library: &Library) -> HncLine {
+    HncLine::new(settings(library))
 }
 
 fn source(library: &Library) -> HncSource {
@@ -175,7 +175,7 @@ fn a_dead_link_ends_the_poll_after_one_call() {
     let library = library(&[]);
     let mut settings = settings(&library);
     settings.deadline = Duration::from_millis(4500);
-    let mut source = HncSource::new(Line::new(settings), Duration::from_millis(100), false);
+    let mut source = HncSource::new(HncLine::new(settings), Duration::from_millis(100), false);
     cut(&poll(&mut source).expect("well before"));
     library.fault("slow HNC_ChannelGetValue");
     let began = Instant::now();
@@ -202,12 +202,12 @@ fn the_state_of_the_connection_comes_from_the_events() {
 #[test]
 fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
     let library = library(&[]);
-    let said = |settings: HncSettings| Line::new(settings).alive().expect_err("it cannot").to_string();
+    let said = |settings: HncSettings| HncLine::new(settings).alive().expect_err("it cannot").to_string();
     let absent = HncSettings { vendor_library: "/does/not/exist.so".into(), ..settings(&library) };
     let text = said(absent);
     assert!(text.contains("/does/not/exist.so") && text.contains("library="), "{text}");
     let first = settings(&library);
-    let holder = Line::new(first.clone());
+    let holder = HncLine::new(first.clone());
     holder.alive().expect("it listens");
     let text = said(first);
     assert!(text.contains("1009") && text.contains("local_port="), "{text}");

@@ -1,12 +1,12 @@
 //! Sample channels: every millisecond arrives once, and with the value that the machine had then.
 
 use crate::stand::{SERIAL, Stand};
-use adapters::nclink::sample::Block;
+use adapters::nclink::sample::SampleBlock;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// Reads at its pace for so long and gives the blocks of the fast channel.
-fn sampled(stand: &Stand, duration: Duration) -> (Vec<(Block, Instant)>, String) {
+fn sampled(stand: &Stand, duration: Duration) -> (Vec<(SampleBlock, Instant)>, String) {
     let mut source = stand.source();
     let (sender, blocks) = mpsc::channel();
     source.on_block(Box::new(move |block, arrived| {

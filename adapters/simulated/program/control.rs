@@ -3,7 +3,7 @@
 use super::super::frame::Frame;
 use super::super::plant::{Demand, Plant};
 use super::super::settings::FRESH_EDGE_MM;
-use super::{Action, Block, Cut, Planner, Rate};
+use super::{Action, Cut, NcBlock, Planner, Rate};
 use crate::words::{execution, mode};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -43,8 +43,8 @@ pub(in super::super) struct Control {
     rng: Pcg64Mcg,
     lathe: bool,
     rapid_mm_min: f64,
-    blocks: VecDeque<Block>,
-    pub(in super::super) block: Option<Block>,
+    blocks: VecDeque<NcBlock>,
+    pub(in super::super) block: Option<NcBlock>,
     path: Option<Path>,
     waited_s: f64,
     hold_at_mm: Option<f64>,
@@ -131,7 +131,7 @@ impl Control {
         }
     }
 
-    fn current(&mut self, since_s: f64) -> Block {
+    fn current(&mut self, since_s: f64) -> NcBlock {
         if let Some(block) = self.block {
             return block;
         }
@@ -142,7 +142,7 @@ impl Control {
             let worst = self.worst_edge();
             self.planner.refill(&mut self.blocks, since_s, worst);
         }
-        let idle = Block {
+        let idle = NcBlock {
             mode: mode::MANUAL,
             execution: execution::READY,
             program: 0,
@@ -157,7 +157,7 @@ impl Control {
     }
 
     /// Between two parts, when the ladder wants the program to stand: until the operator has changed the edge.
-    fn standing(&mut self) -> Option<Block> {
+    fn standing(&mut self) -> Option<NcBlock> {
         if self.attended {
             (self.attended, self.stood_s) = (false, None);
             self.worst_edge().into_iter().for_each(|(tool, _)| self.fresh_edge(usize::from(tool)));
@@ -167,7 +167,7 @@ impl Control {
         }
         let stood_s = self.stood_s.get_or_insert(0.0);
         *stood_s += STAND_S;
-        let block = Block {
+        let block = NcBlock {
             mode: mode::AUTOMATIC,
             execution: execution::STOPPED,
             program: 0,

@@ -73,7 +73,7 @@ pub(super) enum Action {
 
 /// One block with what the control shows while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Block {
+pub(super) struct NcBlock {
     pub(super) mode: &'static str,
     pub(super) execution: &'static str,
     pub(super) program: u16,
@@ -84,7 +84,7 @@ pub(super) struct Block {
 
 /// Writes blocks one after the other.
 pub(super) struct Writer<'a> {
-    blocks: &'a mut std::collections::VecDeque<Block>,
+    blocks: &'a mut std::collections::VecDeque<NcBlock>,
     pub(super) mode: &'static str,
     pub(super) execution: &'static str,
     pub(super) program: u16,
@@ -93,7 +93,7 @@ pub(super) struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    pub(super) fn new(blocks: &'a mut std::collections::VecDeque<Block>, program: u16) -> Self {
+    pub(super) fn new(blocks: &'a mut std::collections::VecDeque<NcBlock>, program: u16) -> Self {
         Self { blocks, mode: mode::AUTOMATIC, execution: execution::ACTIVE, program, operation: "", number: 0 }
     }
 
@@ -105,7 +105,7 @@ impl<'a> Writer<'a> {
     /// Appends an action under the present block number.
     pub(super) fn same(&mut self, action: Action) -> &mut Self {
         let (mode, execution, program, number) = (self.mode, self.execution, self.program, self.number);
-        self.blocks.push_back(Block { mode, execution, program, number, operation: self.operation, action });
+        self.blocks.push_back(NcBlock { mode, execution, program, number, operation: self.operation, action });
         self
     }
 
@@ -118,7 +118,7 @@ impl<'a> Writer<'a> {
     /// Appends an action that no program has: the operator, or the machine itself.
     pub(super) fn aside(&mut self, mode: &'static str, execution: &'static str, action: Action) -> &mut Self {
         let (program, number) = (self.program, self.number);
-        self.blocks.push_back(Block { mode, execution, program, number, operation: "", action });
+        self.blocks.push_back(NcBlock { mode, execution, program, number, operation: "", action });
         self
     }
 }

@@ -3,7 +3,7 @@
 use super::super::settings::SimulatedSettings;
 use super::experiment::{self, ExperimentStep};
 use super::short_day;
-use super::{Action, Block, Writer, lathe, mill};
+use super::{Action, NcBlock, Writer, lathe, mill};
 use crate::address::SimulatedMachine;
 use crate::words::{execution, mode};
 use rand::Rng;
@@ -36,7 +36,7 @@ impl Planner {
     }
 
     /// Appends the next piece of the day. `wear_mm` is that of the worst edge, with its tool.
-    pub(in super::super) fn refill(&mut self, blocks: &mut VecDeque<Block>, since_s: f64, worst: Option<(u8, f64)>) {
+    pub(in super::super) fn refill(&mut self, blocks: &mut VecDeque<NcBlock>, since_s: f64, worst: Option<(u8, f64)>) {
         let mut out = Writer::new(blocks, 0);
         if let Some(steps) = &mut self.experiment {
             return experiment::write(&mut out, &std::mem::take(steps));

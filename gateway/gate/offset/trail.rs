@@ -3,7 +3,7 @@
 use super::order::{Moved, Order, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::config;
-use crate::gate::trail::{Author, Pace, words};
+use crate::gate::trail::{Author, RowRate, words};
 use crate::history::Audit;
 use adapters::offset::{Axis, LastWrite};
 use rules::script::OffsetProposal;
@@ -23,7 +23,7 @@ pub struct OffsetTrail {
     known: [Option<Known>; Axis::ALL.len()],
     /// Who proposed what was ordered last.
     authors: [Author; Axis::ALL.len()],
-    pace: Pace,
+    pace: RowRate,
 }
 
 impl OffsetTrail {

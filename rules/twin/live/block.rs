@@ -1,6 +1,6 @@
 //! Seconds of settled work, gathered into blocks of one kind of work each.
 
-use super::learn::Block;
+use super::learn::WorkBlock;
 use super::regime::Regime;
 use crate::statistics::count;
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub struct Gathering {
 
 impl Gathering {
     /// Takes a second; gives the block that it completes.
-    pub fn add(&mut self, regime: Regime, work: usize, second: Second) -> Option<Block> {
+    pub fn add(&mut self, regime: Regime, work: usize, second: Second) -> Option<WorkBlock> {
         let open = self.open.entry((regime, work)).or_default();
         open.retain(|kept| second.at_s - kept.at_s <= OLDEST_S);
         open.push(second);
@@ -43,7 +43,7 @@ impl Gathering {
         residuals.sort_by(f64::total_cmp);
         let inner = &residuals[TRIMMED..BLOCK_SECONDS - TRIMMED];
         let (first, last) = (seconds.first()?, seconds.last()?);
-        Some(Block {
+        Some(WorkBlock {
             from_s: first.at_s,
             to_s: last.at_s,
             residual: inner.iter().sum::<f64>() / count(inner.len()),

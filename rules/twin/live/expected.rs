@@ -1,7 +1,7 @@
 //! What the model expects of the newest second, from the inputs of that second and of those before.
 
 use super::second::Row;
-use super::window::{CuttingTimes, Memory, Window};
+use super::window::{CuttingTimes, LookBack, Window};
 use crate::physics::Scene;
 use crate::twin::model::{Model, Part, simulate};
 use crate::twin::{bind::bind, inputs::rows_with_inputs};
@@ -79,7 +79,7 @@ impl Compared {
 #[derive(Debug, Clone)]
 pub struct Simulation {
     model: Model,
-    memory: Memory,
+    memory: LookBack,
     window: Window,
     parts: Option<Vec<Part>>,
     why: Option<String>,
@@ -90,7 +90,7 @@ impl Simulation {
     #[must_use]
     pub fn new(mut model: Model, minutes: CuttingTimes) -> Self {
         model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
-        let memory = model.parts.iter().map(|part| Memory::of(&part.kind)).max().unwrap_or(Memory::Moment);
+        let memory = model.parts.iter().map(|part| LookBack::of(&part.kind)).max().unwrap_or(LookBack::Moment);
         Self { model, memory, window: Window::new(memory, minutes), parts: None, why: None }
     }
 
@@ -114,7 +114,7 @@ impl Simulation {
         if off {
             return Compared::none(NoTwin::MachineOff);
         }
-        if self.memory == Memory::Shift && self.window.span_s() < WARM_S {
+        if self.memory == LookBack::Shift && self.window.span_s() < WARM_S {
             return Compared::none(NoTwin::WarmingUp);
         }
         let Some(expected) = self.expected() else {

@@ -24,7 +24,7 @@ const BAND_SHARE: f64 = 0.02;
 
 /// One block while learning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Block {
+pub struct WorkBlock {
     /// When it began and ended, s.
     pub from_s: f64,
     /// See `from_s`.
@@ -65,9 +65,9 @@ pub struct Usual {
 
 /// Learns from blocks in the order of time. `None` when no kind of work has enough of them.
 #[must_use]
-pub fn learn(blocks: &[Block]) -> Option<Learned> {
+pub fn learn(blocks: &[WorkBlock]) -> Option<Learned> {
     let (usual, shared) = usual(blocks);
-    let known: Vec<&Block> = blocks.iter().filter(|block| usual.contains_key(&block.work)).collect();
+    let known: Vec<&WorkBlock> = blocks.iter().filter(|block| usual.contains_key(&block.work)).collect();
     if known.len() < 2 * BAND_BLOCKS {
         return None;
     }
@@ -83,7 +83,7 @@ pub fn learn(blocks: &[Block]) -> Option<Learned> {
 }
 
 /// What is usual for each kind of work that was seen often enough, and the standard deviation within all of it.
-fn usual(blocks: &[Block]) -> (BTreeMap<usize, Usual>, f64) {
+fn usual(blocks: &[WorkBlock]) -> (BTreeMap<usize, Usual>, f64) {
     let mut works: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     blocks.iter().for_each(|block| works.entry(block.work).or_default().push(block.residual));
     works.retain(|_, residuals| residuals.len() >= WORK_BLOCKS);
@@ -143,11 +143,11 @@ fn band(deviations: &[f64], expected: f64, independent: f64) -> f64 {
 impl Learned {
     /// A block against what is usual for its work; `None` for work that is new.
     #[must_use]
-    pub fn point(&self, block: &Block) -> Option<Point> {
+    pub fn point(&self, block: &WorkBlock) -> Option<Point> {
         let usual = self.usual.get(&block.work)?;
         let difference = block.residual - usual.mean;
         let scale = if usual.sd > 0.0 { self.shared / usual.sd } else { 1.0 };
-        let Block { from_s, to_s, expected, .. } = *block;
+        let WorkBlock { from_s, to_s, expected, .. } = *block;
         Some(Point { from_s, to_s, deviation: difference * scale, difference, expected })
     }
 }

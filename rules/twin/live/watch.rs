@@ -2,7 +2,7 @@
 
 use super::block::{Gathering, Second};
 use super::chart::{Chart, Onset};
-use super::learn::{Block, Learned, Usual, WORK_BLOCKS, learn};
+use super::learn::{Learned, Usual, WORK_BLOCKS, WorkBlock, learn};
 use super::regime::{Regime, Settling};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -63,7 +63,7 @@ pub enum Stage {
 
 /// What is remembered across a restart.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Memory {
+pub struct WatchState {
     works: Vec<String>,
     compared_s: f64,
     regimes: Vec<(Regime, RegimeMemory)>,
@@ -71,7 +71,7 @@ pub struct Memory {
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct RegimeMemory {
-    blocks: Vec<Block>,
+    blocks: Vec<WorkBlock>,
     learned: Option<Learned>,
     differing: Option<Mismatch>,
 }
@@ -80,7 +80,7 @@ struct RegimeMemory {
 #[derive(Debug, Clone, Default)]
 struct Watched {
     /// While learning; afterwards blocks of work that is new.
-    blocks: Vec<Block>,
+    blocks: Vec<WorkBlock>,
     learned: Option<Learned>,
     chart: Option<Chart>,
     differing: Option<Mismatch>,
@@ -98,14 +98,14 @@ pub struct Watch {
 
 impl Default for Watch {
     fn default() -> Self {
-        Self::new(Memory::default())
+        Self::new(WatchState::default())
     }
 }
 
 impl Watch {
     /// Goes on from what was learned before.
     #[must_use]
-    pub fn new(memory: Memory) -> Self {
+    pub fn new(memory: WatchState) -> Self {
         let regimes = memory.regimes.into_iter().map(|(regime, before)| (regime, Watched::of(before)));
         Self {
             settling: Settling::new(),
@@ -118,12 +118,12 @@ impl Watch {
 
     /// What to remember across a restart.
     #[must_use]
-    pub fn memory(&self) -> Memory {
+    pub fn memory(&self) -> WatchState {
         let of = |(regime, watched): (&Regime, &Watched)| {
             let Watched { blocks, learned, differing, .. } = watched.clone();
             (*regime, RegimeMemory { blocks, learned, differing })
         };
-        Memory {
+        WatchState {
             works: self.works.clone(),
             compared_s: self.compared_s,
             regimes: self.regimes.iter().map(of).collect(),
@@ -175,7 +175,7 @@ impl Watched {
         }
     }
 
-    fn step(&mut self, regime: Regime, block: Block, may_learn: bool) -> Option<Notice> {
+    fn step(&mut self, regime: Regime, block: WorkBlock, may_learn: bool) -> Option<Notice> {
         if self.learned.is_none() {
             self.blocks.push(block);
             let enough = self.blocks.len() >= LEARN_BLOCKS && may_learn || self.blocks.len() >= BLOCKS_MAX;
@@ -212,7 +212,7 @@ impl Watched {
     }
 
     /// New work first shows what is usual for it, less what differs at the time.
-    fn learn_work(&mut self, block: Block) -> Option<Notice> {
+    fn learn_work(&mut self, block: WorkBlock) -> Option<Notice> {
         let work = block.work;
         self.blocks.push(block);
         let of_work = || self.blocks.iter().filter(|block| block.work == work);

@@ -23,7 +23,7 @@ const STEP_MAX_S: f64 = 3.0;
 
 /// How far back a model looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Memory {
+pub enum LookBack {
     /// Only the moment.
     Moment,
     /// The pass.
@@ -32,7 +32,7 @@ pub enum Memory {
     Shift,
 }
 
-impl Memory {
+impl LookBack {
     /// How far back the law of this kind looks.
     #[must_use]
     pub fn of(kind: &str) -> Self {
@@ -56,7 +56,7 @@ pub type CuttingTimes = BTreeMap<String, (f64, TimeNs)>;
 /// See the [module](self).
 #[derive(Debug, Clone)]
 pub struct Window {
-    memory: Memory,
+    memory: LookBack,
     fine: VecDeque<(Row, Option<f64>)>,
     coarse: VecDeque<(Row, Option<f64>)>,
     minutes: CuttingTimes,
@@ -65,7 +65,7 @@ pub struct Window {
 impl Window {
     /// An empty window; `minutes` is what the tools have cut before.
     #[must_use]
-    pub fn new(memory: Memory, minutes: CuttingTimes) -> Self {
+    pub fn new(memory: LookBack, minutes: CuttingTimes) -> Self {
         Self { memory, fine: VecDeque::new(), coarse: VecDeque::new(), minutes }
     }
 
@@ -86,10 +86,10 @@ impl Window {
     pub fn push(&mut self, row: Row) {
         let minutes = self.cut_on(&row);
         self.fine.push_back((row, minutes));
-        let kept = if self.memory == Memory::Moment { FINE_ROWS } else { PASS_ROWS };
+        let kept = if self.memory == LookBack::Moment { FINE_ROWS } else { PASS_ROWS };
         while self.fine.len() > kept {
             let Some(old) = self.fine.pop_front() else { break };
-            if self.memory == Memory::Shift {
+            if self.memory == LookBack::Shift {
                 self.remember(old);
             }
         }
