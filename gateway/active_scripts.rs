@@ -1,4 +1,4 @@
-//! The scripts that were last in charge, kept beside everything else that the box writes: what a backtest compares with, and
+//! The scripts that were last active, kept beside everything else that the box writes: what a backtest compares with, and
 //! what comes into charge again after a start at which the directory holds something broken.
 
 use crate::history::Event;

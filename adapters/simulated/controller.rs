@@ -16,7 +16,7 @@ use std::time::Duration;
 #[derive(Clone, Copy)]
 enum Get {
     Number(fn(&Moment) -> f64),
-    /// The actual speed, with the unrest of its encoder.
+    /// The actual speed, with the noise of its encoder.
     Speed,
     Text(fn(&Panel) -> Word),
 }

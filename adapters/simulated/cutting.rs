@@ -23,7 +23,7 @@ pub(super) struct Circumstances {
     pub(super) diameter_mm: f64,
     pub(super) engaged: f64,
     pub(super) wear_mm: f64,
-    /// Material against the plan, and the unrest of the process.
+    /// Material against the plan, and the noise of the process.
     pub(super) hardness: f64,
     pub(super) no_load_w: f64,
 }

@@ -49,7 +49,7 @@ pub(super) struct Plant {
     housing_c: f64,
     pub(super) motor_c: f64,
     pub(super) ambient_c: f64,
-    /// Slow unrest of the supply, of its frequency and of the cut, each of unit variance.
+    /// Slow fluctuation of the supply, of its frequency and of the cut, each of unit variance.
     supply_unrest: f64,
     frequency_unrest: f64,
     pub(super) cut_unrest: f64,

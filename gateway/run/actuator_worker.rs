@@ -1,4 +1,4 @@
-//! The hand that writes: the only thing in the process that holds an actuator, on a thread of its own because a controller
+//! The worker that writes: the only thing in the process that holds an actuator, on a thread of its own because a controller
 //! may take seconds to answer. The tick lays its verdict down and goes on; only the newest counts. Whatever stops the tick
 //! stops the verdicts, with them the signs of life, and with those the override at the machine.
 //!
@@ -17,11 +17,11 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What is told but not yet listened to; beyond that the hand lets go.
+/// What is told but not yet listened to; beyond that the worker ends.
 const REPORTS_MAX: usize = 1024;
 /// While a change has not been seen in force it is looked for this often.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
-/// Without a verdict for this long the hand looks whether it shall end.
+/// Without a verdict for this long the worker looks whether it shall end.
 const REST: Duration = Duration::from_millis(500);
 /// A controller that does not answer is not waited for at the end; the ladder falls back by itself.
 const LET_GO_WITHIN: Duration = Duration::from_secs(3);
@@ -33,7 +33,7 @@ const WITHDRAW_PAUSE: Duration = Duration::from_millis(100);
 const NOT_PASSED_ON: &str = "not handed over: the gate was disarmed before the controller had time for it, or it had none for \
                                ten seconds";
 
-/// What the hand tells.
+/// What the worker reports.
 #[derive(Debug)]
 pub enum ActuatorReport {
     /// It wrote.
@@ -50,7 +50,7 @@ pub enum ActuatorReport {
     Withdrawn(Order),
 }
 
-/// What the hand may touch.
+/// What the worker may write to.
 #[derive(Default)]
 pub struct Tools {
     /// The way to the feed override.
@@ -153,7 +153,7 @@ impl ActuatorWorker {
         }
     }
 
-    /// What the hand has told since; also that it is not there any more.
+    /// What the worker has reported since; also that it is not there any more.
     pub fn listen(&mut self, mut tell: impl FnMut(ActuatorReport)) {
         let Self::Thread(remote) = self else { return };
         loop {

@@ -1,5 +1,5 @@
 //! From the gate's verdict to the machine, and from the machine's answer to the history: orders of a person, the audit, the
-//! hand that writes, the alarm when it has to let go.
+//! worker that writes, the alarm when it has to let go.
 
 use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;

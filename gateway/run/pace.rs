@@ -46,7 +46,7 @@ impl TickSchedule {
         Self::new(Beat::Clock(clock, 0), due_ns, period)
     }
 
-    /// From now on lies in wait for each tick: for a machine that is written to, by a thread of real-time priority. One of
+    /// From now on wakes a little before each tick: for a machine that is written to, by a thread of real-time priority. One of
     /// ordinary priority would be passed over for it when it is needed.
     pub fn wake_early(&mut self) {
         let lead_ns = i64::try_from(LEAD.as_nanos()).unwrap_or(0);

@@ -64,7 +64,7 @@ pub struct Ticker {
     pub feed: Feed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
-    /// Orders, audit, and the hand that writes.
+    /// Orders, audit, and the worker that writes.
     pub commands: Commands,
     /// The simulated machines, which count what is written to them.
     pub machines: Vec<Simulated>,

@@ -1,7 +1,7 @@
-//! Where the tick lays down what the hand is to do.
+//! Where the tick lays down what the writing thread is to do.
 //!
 //! A thread that sleeps is woken by way of the kernel and of a processor that may sleep too, which takes between some tens of
-//! microseconds and, on a loaded or virtual processor, a millisecond. While the gate is armed a hand of real-time priority
+//! microseconds and, on a loaded or virtual processor, a millisecond. While the gate is armed a worker of real-time priority
 //! therefore wakes by itself shortly before the next verdict is due, and looks for it until it is there. A thread of ordinary
 //! priority that looked would have used up its turn when the verdict comes.
 
@@ -53,7 +53,7 @@ pub(super) struct VerdictMailbox {
     arrived: Condvar,
     /// Grows with everything that is laid down.
     laid: AtomicU64,
-    /// Time between two verdicts; none where nobody lies in wait.
+    /// Time between two verdicts; none where nobody waits awake.
     period: Option<Duration>,
 }
 
@@ -69,7 +69,7 @@ impl VerdictMailbox {
     }
 
     fn lock(&self) -> MutexGuard<'_, Pending> {
-        // A paper is complete whenever the lock is free.
+        // It is complete whenever the lock is free.
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -114,7 +114,7 @@ impl VerdictMailbox {
     }
 
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
-    /// `awake`, it lies in wait for the next verdict that is due.
+    /// `awake`, it waits awake for the next verdict that is due.
     pub(super) fn take(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
         let empty = |pending: &mut Pending| pending.verdict.is_none() && pending.orders.is_empty() && !pending.closing;
         let pending = self.lock();

@@ -1,4 +1,4 @@
-//! One script in charge: its variables, its timers, its last good version.
+//! One active script: its variables, its timers, its last good version.
 
 use super::collect::{Collected, Outcome};
 use super::compile::Script;
@@ -47,7 +47,7 @@ struct Previous {
     script_memory: ScriptMemory,
 }
 
-/// One script in charge.
+/// One active script.
 pub(super) struct Slot {
     script: Arc<Script>,
     previous: Option<Previous>,

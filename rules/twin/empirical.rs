@@ -1,7 +1,7 @@
 //! Empirical forms: what remains is described over one input, without claiming a cause.
 //!
 //! A form is a bent line over one channel (slope and three hinges at its quartiles), a peak at one speed, something
-//! that fades through each pass, a wave (`periodic`), or shots that come again and again (`recurring_pulses`); by itself, in the
+//! that fades through each pass, a wave (`periodic`), or pulses that come again and again (`recurring_pulses`); by itself, in the
 //! cut only, or in proportion to the removal rate or the speed. It is the yardstick for "something real remains that no
 //! candidate explains".
 

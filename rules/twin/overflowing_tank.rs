@@ -1,4 +1,4 @@
-//! A vessel that a pump fills and that spills, for tests: the model knows the pump only.
+//! A tank that a pump fills and that overflows, for tests: the model knows the pump only.
 
 use super::{Diagnosis, diagnose, parse_model};
 use adapters::Recording;

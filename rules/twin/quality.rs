@@ -81,7 +81,7 @@ fn at_stop(scene: &Scene) -> Vec<bool> {
     stands
 }
 
-/// Rows in which the output repeats exactly, where that is unusual and nothing stands at a stop: what a full vessel, a
+/// Rows in which the output repeats exactly, where that is unusual and nothing stands at a stop: what a full tank, a
 /// limit or a meter at its end holds is no dropout.
 fn held(scene: &Scene, at_stop: &[bool]) -> Vec<usize> {
     let recorded = scene.recorded();

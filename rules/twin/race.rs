@@ -11,7 +11,7 @@ pub(super) struct Seen {
     pub(super) weight: f64,
 }
 
-/// What is carried along by every state (off, on) and age of a spell, and what each way on from there weighs.
+/// What belongs to every state (off, on) and age of a spell, and what each way on from there weighs.
 struct Lanes<T> {
     now: [Vec<T>; 2],
     next: [Vec<T>; 2],

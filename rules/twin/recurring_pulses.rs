@@ -1,6 +1,6 @@
-//! Shots: what comes again at a fixed interval and fades - oil for a bearing, grease for a slide, a pump that refills.
+//! Recurring pulses: what comes again at a fixed interval and fades - oil for a bearing, grease for a slide, a pump that refills.
 //!
-//! A jump that fades is a spike to the noise that remembers it, so that shots stand out of the innovations: these are
+//! A jump that fades is a spike to the noise that remembers it, so that pulses stand out of the innovations: these are
 //! folded at every interval (epoch folding: Leahy et al., Astrophysical Journal 266 (1983)), and the interval and place
 //! at which most of them meet become an empirical form.
 
@@ -13,20 +13,20 @@ use crate::statistics::{count, robust_deviation};
 
 /// Intervals are at least so many sampling periods long.
 const ROWS_MIN: f64 = 15.0;
-/// Shots that the whole time must hold, at least.
+/// Pulses that the whole time must hold, at least.
 const PULSES_MIN: f64 = 5.0;
 /// Width of a place in the interval, in sampling periods.
 const PLACE_ROWS: f64 = 2.0;
-/// Deviations at which an innovation is cut off: one stray row is no shot.
+/// Deviations at which an innovation is cut off: one stray row is no pulse.
 const CUT_OFF: f64 = 3.0;
 /// Deviations of chance that innovations must stand out by to be looked at closer.
 const STANDS_OUT: f64 = 5.0;
 /// Places that are folded into, over all intervals, at most.
 const PLACES_MAX: f64 = 4e6;
-/// Sampling periods over which a shot may fade.
+/// Sampling periods over which a pulse may fade.
 const OVER_ROWS: [f64; 4] = [4.0, 12.0, 36.0, 108.0];
 
-/// The shots that stand out of this residual, per group, of this noise: fading at several paces, always there or in
+/// The pulses that stand out of this residual, per group, of this noise: fading at several paces, always there or in
 /// proportion to the speed.
 pub(super) fn recurring_pulses(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
     let clock_s = frame.reduce(scene.clock_s());
@@ -109,7 +109,7 @@ mod tests {
 
     const MEMORY: Arma = Arma { phi: 0.5, theta: 0.0 };
 
-    /// Noise that remembers, of unit innovations, and shots of this height: as scene, rows and what is recorded of them.
+    /// Noise that remembers, of unit innovations, and pulses of this height: as scene, rows and what is recorded of them.
     fn oiled(height: f64, every_s: f64, from_s: f64, seed: u64) -> (Scene, Frame, Vec<f64>) {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
         let mut slow = 0.0;

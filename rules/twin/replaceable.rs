@@ -1,8 +1,8 @@
 //! Of several names found together, which would be better without one: each is tried against a cause without a name in
 //! its place, beside all the others.
 //!
-//! One that leads and is outdone is not what it was called, and with it falls what was named to mend it: a taper and a
-//! load loss imitate an insert that is cold when it enters better than either alone. One that adds little and is outdone
+//! A leading name that a nameless form replaces is not what it was called, and with it falls what was named to mend it: a taper and a
+//! load loss imitate an insert that is cold when it enters better than either alone. A name that adds little and can be replaced
 //! mends the form of the law that leads; nothing follows for the leader, and it is not claimed.
 
 use super::designs::Design;
@@ -27,7 +27,7 @@ pub(super) struct Replaceable {
 }
 
 impl Case<'_> {
-    /// The members that are outdone; none of a name that stands alone, which is weighed as a whole.
+    /// The members that a nameless form replaces; none of a name that stands alone, which is weighed as a whole.
     pub(super) fn replaceable(
         &mut self,
         base: &Fit,
@@ -74,7 +74,7 @@ impl Case<'_> {
         replaceable.then_some(Replaceable { position, share })
     }
 
-    /// Drops the members that add little and are outdone, one after the other.
+    /// Drops the members that add little and can be replaced, one after the other.
     pub(super) fn drop_minor(
         &mut self,
         base: &Fit,

@@ -85,7 +85,7 @@ struct Looks {
 struct Way {
     from: usize,
     to: usize,
-    /// The innovation that is carried on.
+    /// The innovation of the path so far.
     e: f64,
     /// Square of the innovation, in variances.
     surprise: f64,

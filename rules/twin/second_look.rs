@@ -39,7 +39,7 @@ impl Case<'_> {
 mod tests {
     use crate::twin::overflowing_tank;
 
-    /// Of a vessel in twelve runs; in every fourth of them, which are held out first, it is fuller, and spills.
+    /// Of a tank in twelve runs; in every fourth of them, which are held out first, it is fuller, and spills.
     fn verdict(spills: f64) -> (&'static str, Vec<String>) {
         let full = |row: u32| if row / 150 % 4 == 3 { 3.0 } else { 0.0 };
         let level = |row: u32| 5.0 + full(row) + 2.0 * (f64::from(row) / 61.0).sin();

@@ -134,7 +134,7 @@ impl Doubt {
 /// Why names are withdrawn, whatever a form without a name explains.
 #[derive(Debug, Clone, Copy)]
 struct Withdrawn<'a> {
-    /// The leading one is outdone in its place.
+    /// A nameless form replaces the leading one.
     leading: bool,
     /// What the model file excludes, where it explains clearly more.
     excluded: Option<&'a str>,

@@ -29,7 +29,7 @@ pub(crate) struct Terms {
     /// Added to the factor of the nominal cutting power.
     pub(crate) gain: f64,
     pub(crate) power_w: f64,
-    /// Standard deviation of unrest that comes on top, W; not part of the contribution.
+    /// Standard deviation of noise that comes on top, W; not part of the contribution.
     pub(crate) jitter_w: f64,
 }
 

@@ -119,7 +119,7 @@ impl Chain {
         (power, jitter)
     }
 
-    /// Total power, cutting power and unrest of one instant.
+    /// Total power, cutting power and extra noise of one instant.
     fn step(&mut self, baseline: &Baseline, tick: &Tick) -> (f64, f64, f64) {
         let nominal_w = baseline.cutting_w(tick);
         let no_load_w = baseline.no_load_w(tick.speed_rpm);

@@ -1,4 +1,4 @@
-//! How promptly the threads between a sample and a write are woken: the tick, and the hand that writes.
+//! How promptly the threads between a sample and a write are woken: the tick, and the worker that writes.
 //!
 //! What a loaded box adds to the latency is the time that a thread which has been woken waits for a processor. A thread of
 //! real-time priority does not wait: it is asked for, and granted where the process may (root, `CAP_SYS_NICE`, or

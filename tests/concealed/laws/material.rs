@@ -149,7 +149,7 @@ pub(crate) fn chatter_with_memory(dice: &mut Dice, _: &Plan, strength: f64) -> P
     })
 }
 
-/// Chatter beyond a depth that follows the stability lobes: more mean power and much unrest.
+/// Chatter beyond a depth that follows the stability lobes: more mean power and much noise.
 pub(crate) fn chatter(dice: &mut Dice, _: &Plan, strength: f64) -> Planted {
     let (limit, lobe, phase) = (dice.uniform(1.3, 1.9), dice.uniform(300.0, 520.0), dice.uniform(0.0, 6.0));
     let (height, soft) = (dice.uniform(0.05, 0.10), dice.uniform(0.4, 0.8));

@@ -9,10 +9,10 @@ use crate::real::sheet::Sheet;
 use crate::score::answer::Answer;
 
 const STEP_S: f64 = 4.0;
-/// Level at which the vessel is full, V.
+/// Level at which the tank is full, V.
 const FULL_V: f64 = 9.7;
 
-/// The overflow must be found where the vessel is full.
+/// The overflow must be found where the tank is full.
 pub(crate) fn line(data: &Path) -> Line {
     let expected = "mismatch located at level 10 V; unknown with an empirical form is right";
     match Sheet::read(&data.join("cascaded-tanks/recording.csv")).and_then(|sheet| prepared(&sheet)) {
