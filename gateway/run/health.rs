@@ -174,7 +174,7 @@ impl Health {
         self.paces.resize(paces.len(), None);
         for (index, pace) in paces.iter().enumerate() {
             let Some(pace) = pace else { continue };
-            let (wanted_s, kept_s) = (pace.wanted.as_secs_f64(), pace.history_store.as_secs_f64());
+            let (wanted_s, kept_s) = (pace.wanted.as_secs_f64(), pace.kept.as_secs_f64());
             let told_s = self.paces[index].unwrap_or(wanted_s);
             if (kept_s / told_s).ln().abs() < OTHER_PACE.ln() {
                 continue;
@@ -236,8 +236,8 @@ impl Health {
 }
 
 /// What the pace of a source means for who reads its values.
-fn told_pace(SourcePace { name, wanted, history_store }: &SourcePace) -> Notice {
-    let (wanted_s, kept_s) = (wanted.as_secs_f64(), history_store.as_secs_f64());
+fn told_pace(SourcePace { name, wanted, kept }: &SourcePace) -> Notice {
+    let (wanted_s, kept_s) = (wanted.as_secs_f64(), kept.as_secs_f64());
     if kept_s < wanted_s * OTHER_PACE {
         return Notice::new(
             Severity::Info,
