@@ -5,7 +5,6 @@
 //! earlier rows only.
 
 use super::inputs::Inputs;
-use super::noise::Noise;
 use crate::statistics::{count, median, robust_deviation};
 
 /// Steps between the levels that are tried, in deviations of the residual.
@@ -51,9 +50,9 @@ struct Levels {
     change: f64,
 }
 
-/// The likeliest sequence in a residual; `None` where nothing switches.
-pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], noise: Noise) -> Option<Sequence> {
-    let phi = (noise.share * noise.phi).min(PHI_MAX);
+/// The likeliest sequence in a residual whose noise has this memory from row to row; `None` where nothing switches.
+pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], phi: f64) -> Option<Sequence> {
+    let phi = phi.min(PHI_MAX);
     let x = inputs.column(|row| if inputs.comparable[row] { residual[row] / scale[row] } else { 0.0 });
     let starts = |row: usize| row == 0 || inputs.block[row] != inputs.block[row - 1];
     let memory = inputs.column(|row| if starts(row) { 0.0 } else { phi });
@@ -79,10 +78,7 @@ pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], noi
     if changes < CHANGES_MIN {
         return None;
     }
-    // When something changes has to be told change by change, ln C(rows, changes): what that costs no path can save.
-    let rows = count(inputs.taken(false).count());
-    let told = -count(changes) * ((rows / count(changes)).ln() + 1.0);
-    let ln = chain.evidence(&on, levels).min(told) + SEQUENCE;
+    let ln = chain.evidence(&on, levels).min(-3.0) + SEQUENCE;
     chain.follow(&mut on, levels);
     Some(Sequence { on, changes, ln })
 }

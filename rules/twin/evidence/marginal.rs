@@ -8,7 +8,6 @@
 use super::algebra::{Factor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
-use super::inputs::Inputs;
 use super::noise::Noise;
 use crate::statistics::count;
 use ndarray::linalg::general_mat_mul;
@@ -132,30 +131,6 @@ impl Comparison<'_> {
         let square: f64 = white.iter().map(|x| x * x).sum();
         let ln_determinant = noise.ln_determinant(self.rows.len(), self.blocks.len());
         -0.5 * self.tempering * (rows * (square.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
-    }
-
-    /// What a sequence of two levels loses where the noise may be as slow as it likes: a level that moves as noise does may
-    /// be noise. Zero where it loses nothing.
-    pub(super) fn slow_noise(&self, inputs: &Inputs<'_>, residual: &[f64], on: &[f64]) -> f64 {
-        let gain = |noises: &[Noise]| {
-            let best = |with: bool| {
-                let ln = |noise: &Noise| {
-                    let y = self.whitened(residual, *noise);
-                    let x = self.whitened(on, *noise);
-                    let one = self.whitened(&vec![1.0; on.len()], *noise);
-                    let columns = if with { vec![one, x] } else { vec![one] };
-                    let left = crate::twin::linear::least_squares(&columns, &y).rss;
-                    let rows = count(y.len());
-                    let ln_determinant = noise.ln_determinant(self.rows.len(), self.blocks.len());
-                    -0.5 * self.tempering * (rows * (left.max(f64::MIN_POSITIVE) / rows).ln() + ln_determinant)
-                };
-                noises.iter().map(ln).fold(f64::NEG_INFINITY, f64::max)
-            };
-            best(true) - best(false)
-        };
-        let bounded = Noise::grid(inputs.median_block(), inputs.period_s);
-        let slow = Noise::grid(f64::INFINITY, inputs.period_s);
-        (gain(&slow) - gain(&bounded)).min(0.0)
     }
 
     fn flat(&self, gram: &Array2<f64>, share: f64) -> f64 {

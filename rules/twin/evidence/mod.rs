@@ -51,6 +51,8 @@ use settings::{Settings, settings};
 
 /// Sets that are followed in the first and in the second stage.
 const BEAMS: (usize, usize) = (5, 6);
+/// Shares of the memory of the noise with which hidden sequences are looked for: what switches poses as memory.
+const MEMORY_SHARES: [f64; 3] = [1.0, 0.7, 0.4];
 /// Share of the rows in which two hidden sequences may agree (or disagree) before they are one.
 const SAME_SEQUENCE: f64 = 0.97;
 
@@ -175,13 +177,14 @@ fn add_sequences(
             let x = first.bank.contribution(&first.bank.variants[*variant], w);
             left.iter_mut().zip(&x).for_each(|(left, x)| *left -= x);
         }
-        let Some(mut sequence) = hidden::sequence(inputs, &left, &outliers.scale, noise) else { continue };
-        sequence.ln += first.slow_noise(inputs, &left, &sequence.on);
-        if known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
-            continue;
+        for share in MEMORY_SHARES {
+            let memory = share * noise.share * noise.phi;
+            let Some(sequence) = hidden::sequence(inputs, &left, &outliers.scale, memory) else { continue };
+            if !known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
+                known.push(sequence.on.clone());
+                add_sequence(inputs, second, sequence, known.len());
+            }
         }
-        known.push(sequence.on.clone());
-        add_sequence(inputs, second, sequence, known.len());
     }
 }
 

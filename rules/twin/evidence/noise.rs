@@ -7,7 +7,7 @@ use crate::statistics::count;
 use std::ops::Range;
 
 /// Shares of the variance that have a memory.
-const SHARES: [f64; 4] = [0.15, 0.4, 0.7, 0.95];
+const SHARES: [f64; 5] = [0.15, 0.4, 0.7, 0.95, 1.0];
 /// Correlation times, in samples.
 const MEMORIES: [f64; 8] = [1.5, 4.0, 10.0, 25.0, 60.0, 150.0, 400.0, 1200.0];
 /// Longest memory, s, where samples come faster than one a second; in samples where they do not.

@@ -10,7 +10,7 @@ const CURVES_MAX: usize = 16;
 /// Logarithm of the likelihood within which a setting counts as likely.
 const WITHIN: f64 = 12.0;
 /// Settings that go into the comparison from each residual.
-const PRESELECTED: usize = 4;
+const PRESELECTED: usize = 7;
 /// Settings taken from each model.
 const OF_EACH: usize = 2;
 

@@ -10,7 +10,7 @@ const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
 const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
 const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
-const GAIN: Family = Family::of("sensor_gain").wide();
+const GAIN: Family = Family::of("sensor_gain").wide().rare(-1.5);
 const TAPER: Family = Family::of("depth_taper").at_edges().through(&[
     "axis_position_mm",
     "z_axis_position_mm",
