@@ -62,6 +62,16 @@ impl Sending {
         wait_for(what, Duration::from_secs(60), || Some(self.sink()).filter(&ready))
     }
 
+    /// Waits until the machine is switched on and its spindle turns.
+    pub(crate) fn wait_spindle(&self) {
+        wait_for("the spindle", Duration::from_secs(120), || {
+            let status = self.status();
+            let channels = status["channels"].as_array()?;
+            let speed = channels.iter().find(|channel| channel["name"] == "spindle_speed_rpm")?["value"].as_f64()?;
+            (speed > 100.0).then_some(())
+        });
+    }
+
     /// Ends it cleanly and gives what it said.
     pub(crate) fn stop(&mut self) -> String {
         self.gateway.take().expect("it runs").stop()

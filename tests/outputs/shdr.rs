@@ -31,7 +31,7 @@ fn agent(devices: &Path, port: u16, seconds: f64) -> Option<Json> {
 fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
     let port = free_port();
     let mut sending = Sending::fast(&format!("shdr://127.0.0.1:{port}"));
-    sending.wait_sink("listening", |sink| sink["state"] == "connected" && sink["delivered"].as_u64() > Some(400));
+    sending.wait_spindle();
     let devices = sending.devices();
     let Some(agent) = agent(&devices, port, 4.0) else { return };
     sending.stop();
@@ -40,7 +40,7 @@ fn an_agent_reads_the_machine_with_the_devices_that_the_box_wrote() {
     assert_eq!(agent["values"]["avail"], "AVAILABLE");
     assert_eq!(agent["conditions"][0]["level"], "NORMAL");
     assert!(agent["assets"].as_array().is_some_and(|assets| !assets.is_empty()), "{}", agent["assets"]);
-    let names = "spindle_speed_rpm,spindle_power_w,feed_mm_min";
+    let names = "spindle_speed_rpm,spindle_power_w,total_power_w,supply_voltage_v";
     let (stored, mut compared) = (sending.queried(names), 0);
     for pushed in agent["pushed"].as_array().expect("a list") {
         let (name, at, value) = (&pushed[0], &pushed[1], &pushed[2]);
