@@ -12,7 +12,7 @@ use crate::files::replace;
 use crate::reload::read_directory;
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::StatusCode;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post, put};
 use rules::script::{self, Problem, ScriptFile, TEXT_MAX, TrialResult};
@@ -259,5 +259,7 @@ fn refused(name: &str, text: &str, found: &[Problem]) -> Response {
     document["title"] = json!("it does not come into charge: not every trial passes");
     document["hint"] = json!("it stays a draft; the version in charge goes on");
     document["problems"] = json!(problems(found, name));
-    told((StatusCode::UNPROCESSABLE_ENTITY, Json(document)).into_response(), format!("{name}: its trials do not pass"))
+    let problem = [(header::CONTENT_TYPE, "application/problem+json")];
+    let response = (StatusCode::UNPROCESSABLE_ENTITY, problem, document.to_string()).into_response();
+    told(response, format!("{name}: its trials do not pass"))
 }

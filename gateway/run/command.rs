@@ -293,6 +293,8 @@ impl Commands {
         self.actuator_worker.shift(&gate.offsets().farewell(), false, sample.at_ns, |it| said.push(it));
         self.actuator_worker.close(|it| said.push(it));
         self.hear(said, sample, gate, health);
+        // What the page has asked to be noted just before the end is noted too.
+        self.account(sample.at_ns, health);
     }
 
     /// Which alarms have been seen; told which ones stand.

@@ -65,10 +65,17 @@ function alarmCard(context) {
     drawn = key;
     section.dataset.worst = status.alarms.some((a) => a.severity === "critical") ? "bad" : status.alarms.some((a) => a.severity === "warning") ? "warn" : "";
     const lines = status.alarms.map((alarm) => alarmLine(alarm, status, context));
-    const troubles = status.problems.map((problem) => row(box(problem.what), "", box(problem.next), { dot: "warn" }));
+    const troubles = status.problems.map(troubleLine);
     fill(list, lines.length + troubles.length ? [...lines, ...troubles] : [make("p", "no-alarm", t("no_alarm"))]);
   };
   return { box: section, update };
+}
+
+// Something that is wrong and is no alarm of the machine: the whole sentence, and what to do next.
+function troubleLine(problem) {
+  const line = make("div", "alarm warning");
+  line.append(make("strong", "", box(problem.what)), make("span", "more", box(problem.next)));
+  return line;
 }
 
 function alarmLine(alarm, status, context) {
