@@ -157,7 +157,10 @@ fn another_model_takes_over_while_the_box_runs_and_a_broken_one_does_not() {
 #[test]
 fn without_a_model_there_is_no_twin() {
     let directory = tempfile::tempdir().expect("a directory");
-    let mut gateway = Gateway::start(directory.path(), &[]);
+    let config = directory.path().join("box.toml");
+    fs::write(&config, "[[source]]\naddress = \"simulated://lathe\"\n").expect("writable");
+    let data = directory.path().join("data");
+    let mut gateway = Gateway::start(&data, &["--config", config.to_str().expect("a path")]);
     let address = gateway.address();
     let document = wait_for("the page", Duration::from_secs(20), || {
         let answer = get(&address, "/api/v1/twin");
