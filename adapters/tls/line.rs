@@ -13,7 +13,7 @@ pub type Lines = Option<Arc<ClientConfig>>;
 /// Bytes read from the network at a time; a TLS record holds at most so many.
 const CHUNK: usize = 16 * 1024;
 
-/// See the [module](self).
+/// A TCP connection, with or without TLS, that one thread reads while others write.
 #[derive(Debug)]
 pub struct Line {
     tcp: TcpStream,

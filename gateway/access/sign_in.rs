@@ -67,7 +67,7 @@ struct Bearer {
     until: Instant,
 }
 
-/// See the [module](self).
+/// Who may do what: persons, sessions and tries, shared by all requests.
 #[derive(Debug)]
 pub struct Access {
     rules: Rules,

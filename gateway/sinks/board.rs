@@ -28,7 +28,7 @@ struct Entry {
     progress: Progress,
 }
 
-/// See the [module](self). Clones are the same board.
+/// What is known of every sink, for status and page. Clones are the same board.
 #[derive(Debug, Clone, Default)]
 pub struct Board {
     entries: Arc<Mutex<Vec<Entry>>>,
