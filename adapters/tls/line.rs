@@ -33,7 +33,7 @@ impl Line {
         let mut connection = ClientConnection::new(config.clone(), name).map_err(io::Error::other)?;
         connection.set_buffer_limit(None);
         while connection.is_handshaking() {
-            connection.complete_io(&mut tcp)?;
+            connection.complete_io(&mut tcp).map_err(|error| hung_up(error, host))?;
         }
         Ok(Self { tcp, host: host.to_owned(), tls: Some(Mutex::new(connection)) })
     }
@@ -105,6 +105,13 @@ impl Line {
         }
         let _already_gone = self.tcp.shutdown(Shutdown::Both);
     }
+}
+
+/// Something that does not speak TLS takes our greeting for nonsense and goes.
+fn hung_up(error: io::Error, host: &str) -> io::Error {
+    use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset, UnexpectedEof};
+    let gone = matches!(error.kind(), BrokenPipe | ConnectionAborted | ConnectionReset | UnexpectedEof);
+    if gone { io::Error::other(words::no_tls(host)) } else { error }
 }
 
 fn locked(connection: &Mutex<ClientConnection>) -> MutexGuard<'_, ClientConnection> {

@@ -48,15 +48,18 @@ pub(super) fn of(error: &Error, host: &str) -> TlsError {
     match error {
         Error::InvalidCertificate(wrong) => certificate(wrong, host),
         Error::AlertReceived(alert) => refused(*alert, host),
-        Error::InvalidMessage(_) => TlsError::new(
-            format!("{host} does not speak TLS on this port"),
-            "use the port of the TLS listener, usually 8883, or an address without TLS",
-        ),
+        Error::InvalidMessage(_) => no_tls(host),
         Error::NoCertificatesPresented => {
             TlsError::new(format!("{host} shows no certificate"), "configure one on its TLS listener")
         }
         other => TlsError::new(format!("TLS with {host} failed: {other}"), "compare the TLS settings of both sides"),
     }
+}
+
+/// Whoever answers there does not know TLS.
+pub(super) fn no_tls(host: &str) -> TlsError {
+    let next = "use the port of the TLS listener, usually 8883, or an address without TLS";
+    TlsError::new(format!("{host} does not speak TLS on this port"), next)
 }
 
 fn certificate(wrong: &CertificateError, host: &str) -> TlsError {

@@ -33,7 +33,7 @@ def main():
     known = set(agent.item_dict)
     line = socket.create_connection(("127.0.0.1", port), timeout=10)
     line.sendall(b"* PING\r\n")
-    pushed, unknown, conditions, assets, pong, rest = [], [], [], [], None, b""
+    heard, pushed, unknown, conditions, assets, pong = b"", [], [], [], [], None
     until = time.monotonic() + seconds
     line.settimeout(0.2)
     while time.monotonic() < until:
@@ -43,27 +43,27 @@ def main():
             continue
         if not part:
             break
-        *lines, rest = (rest + part).split(b"\n")
-        for text in (text.decode() for text in lines):
-            if text.startswith("* PONG"):
-                pong = text
-            if text.startswith("*") or not text:
+        heard += part
+    for text in heard.decode().split("\n")[:-1]:
+        if text.startswith("* PONG"):
+            pong = text
+        if text.startswith("*") or not text:
+            continue
+        at, *cells = text.split("|")
+        if cells[0] == "@ASSET@":
+            assets.append({"id": cells[1], "type": cells[2], "root": ElementTree.fromstring(cells[3]).tag})
+            continue
+        if cells[0] == "alarms":
+            conditions.append({"at": at, "level": cells[1], "code": cells[2], "text": cells[-1]})
+            agent.push_data("alarms", cells[1])
+            continue
+        for name, value in zip(cells[::2], cells[1::2]):
+            if name not in known:
+                unknown.append(name)
                 continue
-            at, *cells = text.split("|")
-            if cells[0] == "@ASSET@":
-                assets.append({"id": cells[1], "type": cells[2], "root": ElementTree.fromstring(cells[3]).tag})
-                continue
-            if cells[0] == "alarms":
-                conditions.append({"at": at, "level": cells[1], "code": cells[2], "text": cells[-1]})
-                agent.push_data("alarms", cells[1])
-                continue
-            for name, value in zip(cells[::2], cells[1::2]):
-                if name not in known:
-                    unknown.append(name)
-                    continue
-                sample = agent.item_dict[name].category == "SAMPLE" and value != "UNAVAILABLE"
-                agent.push_data(name, float(value) if sample else value)
-                pushed.append([name, at, value])
+            sample = agent.item_dict[name].category == "SAMPLE" and value != "UNAVAILABLE"
+            agent.push_data(name, float(value) if sample else value)
+            pushed.append([name, at, value])
     current = ElementTree.fromstring(agent.current().get_xml())
     values = {entry.get("dataItemId"): entry.text for entry in current.iter() if entry.get("dataItemId")}
     print(
