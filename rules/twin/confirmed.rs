@@ -141,15 +141,21 @@ mod tests {
         (named, found.alternatives.iter().map(|other| other.effect.as_str()).collect())
     }
 
+    /// Is the name told with a doubt?
+    fn doubted(found: &Diagnosis) -> bool {
+        found.missing[0].statement.contains("not ruled out") || !found.alternatives.is_empty()
+    }
+
     #[test]
     fn one_law_for_every_tool_and_every_run_is_beyond_doubt() {
-        assert_eq!(told(&found([30.0; 6], 30.0)), (vec!["viscous_friction"], vec![]));
+        let found = found([30.0; 6], 30.0);
+        assert_eq!((told(&found), doubted(&found)), ((vec!["viscous_friction"], vec![]), false));
     }
 
     #[test]
     fn a_law_that_every_tool_has_its_own_of_may_be_something_else() {
         let found = found([60.0, 30.0, 0.0, 45.0, 15.0, 30.0], 30.0);
-        assert_eq!(told(&found), (vec!["viscous_friction"], vec!["unknown"]), "{}", found.debug);
+        assert_eq!((told(&found).0, doubted(&found)), (vec!["viscous_friction"], true), "{}", found.debug);
     }
 
     #[test]
@@ -157,6 +163,6 @@ mod tests {
         let found = found([30.0; 6], 17.0);
         let fit = found.fit.as_ref().expect("fitted");
         assert!(!fit.carries_little(), "{}", found.debug);
-        assert_eq!(told(&found), (vec!["viscous_friction"], vec!["unknown"]), "{}", found.debug);
+        assert_eq!((told(&found).0, doubted(&found)), (vec!["viscous_friction"], true), "{}", found.debug);
     }
 }

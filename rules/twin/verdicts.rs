@@ -15,6 +15,9 @@ use crate::physics::state::BETWEEN_SAMPLES;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
+/// What is said of a name that is in doubt where no other name is near.
+const NOT_RULED_OUT: &str =
+    "; runs, tools or held-out rows differ in how much of it they show, so something beside it is not ruled out";
 /// Classes within which a name that is in doubt is compared with the next: beyond, no other name is an explanation.
 const FURTHER: f64 = 5.0;
 /// The kind whose mean delay may be too short to be told from a lag.
@@ -49,7 +52,7 @@ pub fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
 /// The diagnosis of a completed search.
 #[must_use]
 pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
-    let missing = missing(case, &outcome);
+    let mut missing = missing(case, &outcome);
     let mut alternatives = alternatives(case, &outcome);
     // Not after all names were found too small to be worth claiming.
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
@@ -75,7 +78,11 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         // Doubt about a name is told by the name that comes next, or there is none.
         match alternatives_within(case, &outcome, FURTHER * CLASS_INFORMATION).into_iter().next() {
             Some(nearest) => alternatives.insert(0, nearest),
-            None => alternatives.clear(),
+            None => {
+                let doubted = |named: &&mut Missing| alternatives.iter().any(|other| other.instead_of == named.effect);
+                missing.iter_mut().filter(doubted).for_each(|named| named.statement.push_str(NOT_RULED_OUT));
+                alternatives.clear();
+            }
         }
     }
     let verdict = outcome.verdict(!alternatives.is_empty());
