@@ -8,6 +8,7 @@
 //! |---|---|---|---|
 //! | `nothing_max` | odds of 7 to 1 against nothing; priors of -4.6 and -6.2 nats a name and a curve pay for the search | higher: false reports; lower: silence about weak effects | recordings with nothing hidden |
 //! | `inner_gain` | less than one deviation of a paired sum: it only refuses what does not carry over at all | higher: silence; lower: forms that fit one unit only | recordings with nothing hidden, real placebos |
+//! | `member_loss` | a third of a deviation: chance moves a useless member by more than that half of the time | higher: true names lost beside others; lower: forms that fit one unit stay | concealed pairs |
 //! | `alone` | the second name holds at most 15 % | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |
 //! | `name_share` | a tenth of a curve is noise at usual sizes, another tenth is form | higher: `unknown` for known laws; lower: names for unlisted physics | laws left out of the catalogue |
 //! | `pair_more`, `pair_gain` | two laws with five columns make 12 % of a smooth curve by chance | lower: pairs of names for one unlisted law | the same |
@@ -23,6 +24,8 @@ pub(super) struct Thresholds {
     /// Least paired deviation (mean over deviation of the mean, by stretches of 15 s) by which what is reported lowers the
     /// error in inner parts of the fitted rows that took no part in its sizes.
     pub(super) inner_gain: f64,
+    /// Paired deviation below which a member of a set does not carry over to such parts, so that sets without it are tried.
+    pub(super) member_loss: f64,
     /// Probability from which one name stands alone.
     pub(super) alone: f64,
     /// Share of a curve that a named law makes from which it gives it its name.
@@ -49,6 +52,7 @@ pub(super) struct Thresholds {
 pub(super) const THRESHOLDS: Thresholds = Thresholds {
     nothing_max: 0.12,
     inner_gain: 0.8,
+    member_loss: -0.3,
     alone: 0.85,
     name_share: 0.8,
     pair_more: 0.05,

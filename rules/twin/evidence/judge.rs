@@ -94,7 +94,7 @@ impl Judge<'_> {
         let inner = Inner::new(self.inputs, self.comparison, &self.settings[of.noise], &of.members);
         let all: Vec<usize> = (0..of.members.len()).collect();
         let without = |gone: usize| all.iter().copied().filter(|member| *member != gone).collect::<Vec<_>>();
-        let costs = |member: &usize| inner.gain(&all, &without(*member)).0 <= 0.0;
+        let costs = |member: &usize| inner.gain(&all, &without(*member)).0 < THRESHOLDS.member_loss;
         let kept = if all.iter().any(costs) { best_of(&inner, &all) } else { all };
         let gain = inner.gain(&kept, &[]).0;
         (kept, gain)

@@ -10,7 +10,7 @@ const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue
 const SOFTENING: Family = Family::of("speed_softening").signed(-1.0).through(&["cutting_speed_m_min"]);
 const BUILT_UP: Family = Family::of("built_up_edge").beside_catalogue().signed(-1.0).through(&["cutting_speed_m_min"]);
 const BATCH: Family = Family::of("hardness_batch").through(&["run", "lot", "tool"]);
-const GAIN: Family = Family::of("sensor_gain").wide().rare(-1.5);
+const GAIN: Family = Family::of("sensor_gain").rare(-1.0);
 const TAPER: Family = Family::of("depth_taper").at_edges().through(&[
     "axis_position_mm",
     "z_axis_position_mm",
@@ -20,9 +20,9 @@ const TAPER: Family = Family::of("depth_taper").at_edges().through(&[
 const ENTRY: Family = Family::of("entry_exit").beside_catalogue().rare(-0.5).at_edges();
 const THINNING: Family = Family::of("chip_thinning").beside_catalogue().signed(1.0).through(&["depth_of_cut_mm"]);
 const THINNING_WIDTH: Family = Family::of("chip_thinning").beside_catalogue().rare(-0.5);
-const TIMING: Family = Family::of("engagement_timing").beside_catalogue().rare(-0.7).wide().at_edges();
-const RECIPE: Family = Family::of("recipe_error").beside_catalogue().rare(-0.5).wide();
-const CONSUMER: Family = Family::of("auxiliary_switch").signed(1.0).wide();
+const TIMING: Family = Family::of("engagement_timing").beside_catalogue().rare(-0.7).at_edges();
+const RECIPE: Family = Family::of("recipe_error").beside_catalogue().rare(-0.5);
+const CONSUMER: Family = Family::of("auxiliary_switch").signed(1.0);
 const COOLANT: Family = Family::of("coolant_regime").beside_catalogue();
 const OVERRIDE: Family = Family::of("override_delay").beside_catalogue().signed(1.0).rare(-2.0);
 
@@ -69,7 +69,7 @@ fn over_speed(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
         let bent = inputs.column(|row| cut[row] * (over(row).powi(2) - spread * spread) * inputs.cutting(row));
         bank.of(SOFTENING, "").columns(inputs, [(linear, 1.0), (bent, 0.3)]);
     }
-    for (centre, width) in [(25.0_f64, 10.0_f64), (35.0, 12.0), (45.0, 15.0)] {
+    for (centre, width) in [(25.0_f64, 10.0_f64), (35.0, 12.0), (45.0, 15.0), (60.0, 15.0), (80.0, 20.0)] {
         let law = inputs.column(|row| cut[row] * (-0.5 * ((speed[row] - centre) / width).powi(2)).exp());
         bank.of(BUILT_UP, centre).column(inputs, law);
     }

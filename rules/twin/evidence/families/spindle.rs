@@ -206,7 +206,8 @@ impl Spindle<'_> {
         for base in BASE_SPEEDS.into_iter().filter(|base| *base < 0.9 * self.top_rpm) {
             let loss = self.inputs.column(|row| torque[row].powi(2) * weak(row, base));
             let idle = self.inputs.column(|row| (self.rpm[row] / base - 1.0).max(0.0));
-            bank.of(FIELD, base).columns(self.inputs, [(loss, 1.0), (idle, 0.4)]);
+            bank.of(FIELD, base).columns(self.inputs, [(loss.clone(), 1.0), (idle.clone(), 0.4)]);
+            bank.of(FIELD, format!("{base}, idle")).prior(-0.5).columns(self.inputs, [(idle, 1.0), (loss, 0.4)]);
         }
         let square: Vec<f64> = torque.iter().map(|t| t * t).collect();
         let warmth = self.inputs.temperature.as_ref().map(|t| {
