@@ -2,7 +2,7 @@
 
 use adapters::Recording;
 use rules::physics::explain::Language;
-use rules::twin::page::{PageInput, page};
+use crate::report::{PageInput, page};
 use rules::twin::plan::plan;
 use rules::twin::{Diagnosis, diagnosis::Verdict, report, text, write_model};
 use std::io::Write;

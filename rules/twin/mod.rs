@@ -59,7 +59,6 @@ mod offered;
 mod outcome;
 #[cfg(test)]
 mod overflowing_tank;
-pub mod page;
 mod path_state;
 mod periodic;
 pub mod plan;

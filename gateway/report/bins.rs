@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::{escape, number};
-use crate::twin::locate::Condition;
+use rules::twin::locate::Condition;
 use adapters::recording::{Cells, Numbers, Words, derived};
 use std::borrow::Cow;
 

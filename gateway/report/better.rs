@@ -4,9 +4,9 @@ use super::axis::{Axis, time_unit};
 use super::data::{Data, Fit};
 use super::plot::{Curve, Plot, thinned};
 use super::text::{number, with_unit};
-use crate::physics::explain::Language;
-use crate::twin::diagnosis::Fits;
-use crate::twin::frame::Unit;
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::Fits;
+use rules::twin::frame::Unit;
 use std::fmt::Write as _;
 use std::ops::Range;
 

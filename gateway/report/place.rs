@@ -3,8 +3,8 @@
 use super::data::Data;
 use super::strip::{REGIONS_MAX, strip};
 use super::text::{fixed, number, signed, with_unit};
-use crate::physics::explain::Language;
-use crate::twin::locate::{Onset, Region, active_rows};
+use rules::physics::explain::Language;
+use rules::twin::locate::{Onset, Region, active_rows};
 
 /// Mean, as a share of the typical size, below which an effect counts as one of both signs.
 const MEAN_TELLS: f64 = 0.3;

@@ -2,8 +2,8 @@
 
 use super::data::Data;
 use super::text::{escape, number, with_unit};
-use crate::physics::explain::Language;
-use crate::twin::diagnosis::{Fits, Verdict};
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Fits, Verdict};
 use std::fmt::Write as _;
 
 /// Every answer with its colour class and its short name.

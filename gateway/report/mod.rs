@@ -22,17 +22,17 @@ mod tests;
 mod text;
 mod verdict;
 
-use super::diagnosis::Diagnosis;
-use crate::physics::explain::Language;
+use rules::twin::diagnosis::Diagnosis;
+use rules::physics::explain::Language;
 use adapters::Recording;
 use data::Data;
 use std::fmt::Write as _;
 use text::escape;
 
 /// Styles of the page.
-const STYLE: &str = include_str!("page/style.css");
+const STYLE: &str = include_str!("style.css");
 /// The read-out under the pointer.
-const READ_OUT: &str = include_str!("page/read_out.js");
+const READ_OUT: &str = include_str!("read_out.js");
 
 /// What the page is made from.
 #[derive(Debug, Clone, Copy)]

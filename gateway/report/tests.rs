@@ -1,10 +1,10 @@
 //! The page of real diagnoses of small synthetic recordings: complete, self-contained, escaped, bounded, repeatable.
 
 use super::{PageInput, page};
-use crate::physics::explain::Language;
-use crate::twin::diagnosis::{Diagnosis, Verdict};
-use crate::twin::locate::{Onset, Span};
-use crate::twin::{diagnose, parse_model};
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Diagnosis, Verdict};
+use rules::twin::locate::{Onset, Span};
+use rules::twin::{diagnose, parse_model};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use rand::{Rng, SeedableRng};

@@ -2,8 +2,8 @@
 
 use super::PageInput;
 use super::text::{Tongue, escape};
-use crate::twin::diagnosis::Diagnosis;
-use crate::twin::frame::{Unit, units_of};
+use rules::twin::diagnosis::Diagnosis;
+use rules::twin::frame::{Unit, units_of};
 use adapters::recording::{Numbers, Run};
 use std::ops::Range;
 
@@ -126,10 +126,10 @@ impl<'a> Data<'a> {
         };
         let (run, part) = (escape(run), escape(part));
         match (self.runs.len(), self.tongue.0) {
-            (1, crate::physics::explain::Language::En) => format!("stretch {part}"),
-            (1, crate::physics::explain::Language::Zh) => format!("第{part}段"),
-            (_, crate::physics::explain::Language::En) => format!("run {run}, stretch {part}"),
-            (_, crate::physics::explain::Language::Zh) => format!("运行 {run} 第{part}段"),
+            (1, rules::physics::explain::Language::En) => format!("stretch {part}"),
+            (1, rules::physics::explain::Language::Zh) => format!("第{part}段"),
+            (_, rules::physics::explain::Language::En) => format!("run {run}, stretch {part}"),
+            (_, rules::physics::explain::Language::Zh) => format!("运行 {run} 第{part}段"),
         }
     }
 }

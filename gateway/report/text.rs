@@ -1,8 +1,8 @@
 //! Words and numbers of the page: two languages, quantities with units, escaping.
 
-use crate::physics::explain::Language;
-use crate::physics::{CATALOGUE, EffectDoc, effect};
-use crate::twin::locate::Condition;
+use rules::physics::explain::Language;
+use rules::physics::{CATALOGUE, EffectDoc, effect};
+use rules::twin::locate::Condition;
 use adapters::channel::ChannelId;
 
 /// Endings of quantities' names with their units as printed; longer endings come first.

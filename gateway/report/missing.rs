@@ -4,8 +4,8 @@ use super::data::Data;
 use super::place::capital;
 use super::table::{Head, table};
 use super::text::{escape, exponent, fixed, law, number, unit_text, with_unit};
-use crate::physics::explain::Language;
-use crate::twin::diagnosis::{Estimate, Missing};
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Estimate, Missing};
 use std::fmt::Write as _;
 
 /// Share swallowed by the baseline above which the effect's whole size is uncertain.

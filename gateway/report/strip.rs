@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::{escape, fixed};
-use crate::twin::locate::{Onset, Region, Span};
+use rules::twin::locate::{Onset, Region, Span};
 use std::fmt::Write as _;
 
 /// Runs above which every run becomes one tile.

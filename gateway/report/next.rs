@@ -3,9 +3,9 @@
 use super::data::Data;
 use super::table::{Head, listed};
 use super::text::{escape, fixed, number, signed, unit_text, with_unit};
-use crate::physics::explain::Language;
-use crate::twin::diagnosis::{Alternative, Shift};
-use crate::twin::quality::Fault;
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Alternative, Shift};
+use rules::twin::quality::Fault;
 use std::fmt::Write as _;
 
 /// Other explanations, each with what separates it.

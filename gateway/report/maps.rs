@@ -3,7 +3,7 @@
 use super::bins::{Binned, Cell, candidates, sample, told};
 use super::data::{Data, Fit};
 use super::text::{fixed, number, signed, with_unit};
-use crate::physics::explain::Language;
+use rules::physics::explain::Language;
 use std::fmt::Write as _;
 
 /// Bins of a map along each axis.
