@@ -5,6 +5,7 @@
 mod control;
 mod declared;
 mod paths;
+pub mod quantity;
 
 pub use declared::{DECLARED_MAX, DeclareError, NewChannel, declare};
 pub use paths::{PATHS, on_path};

@@ -1,8 +1,8 @@
 //! Where a diagnosis goes: words, JSON, a page, rows, the accepted model, the next experiment.
 
+use crate::report::{PageInput, page};
 use adapters::Recording;
 use rules::physics::explain::Language;
-use crate::report::{PageInput, page};
 use rules::twin::plan::plan;
 use rules::twin::{Diagnosis, diagnosis::Verdict, report, text, write_model};
 use std::io::Write;

@@ -2,8 +2,8 @@
 
 use super::data::Data;
 use super::text::{escape, number};
-use rules::twin::locate::Condition;
 use adapters::recording::{Cells, Numbers, Words, derived};
+use rules::twin::locate::Condition;
 use std::borrow::Cow;
 
 /// Rows looked at to choose columns and bins.

@@ -2,9 +2,9 @@
 
 use super::PageInput;
 use super::text::{Tongue, escape};
+use adapters::recording::{Numbers, Run};
 use rules::twin::diagnosis::Diagnosis;
 use rules::twin::frame::{Unit, units_of};
-use adapters::recording::{Numbers, Run};
 use std::ops::Range;
 
 /// Which simulation.

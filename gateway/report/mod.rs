@@ -22,10 +22,10 @@ mod tests;
 mod text;
 mod verdict;
 
-use rules::twin::diagnosis::Diagnosis;
-use rules::physics::explain::Language;
 use adapters::Recording;
 use data::Data;
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::Diagnosis;
 use std::fmt::Write as _;
 use text::escape;
 

@@ -1,14 +1,14 @@
 //! The page of real diagnoses of small synthetic recordings: complete, self-contained, escaped, bounded, repeatable.
 
 use super::{PageInput, page};
-use rules::physics::explain::Language;
-use rules::twin::diagnosis::{Diagnosis, Verdict};
-use rules::twin::locate::{Onset, Span};
-use rules::twin::{diagnose, parse_model};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Diagnosis, Verdict};
+use rules::twin::locate::{Onset, Span};
+use rules::twin::{diagnose, parse_model};
 
 const MODEL: &str = r#"
 schema = "model/1"

@@ -1,40 +1,9 @@
 //! Words and numbers of the page: two languages, quantities with units, escaping.
 
+use adapters::channel::{ChannelId, quantity};
 use rules::physics::explain::Language;
 use rules::physics::{CATALOGUE, EffectDoc, effect};
 use rules::twin::locate::Condition;
-use adapters::channel::ChannelId;
-
-/// Endings of quantities' names with their units as printed; longer endings come first.
-const ENDINGS: [(&str, &str); 27] = [
-    ("_rpm_per_s", "rpm/s"),
-    ("_cm3_min", "cm³/min"),
-    ("_mm_min", "mm/min"),
-    ("_mm_s2", "mm/s²"),
-    ("_counts", "counts"),
-    ("_per_s", "1/s"),
-    ("_m_min", "m/min"),
-    ("_mm_s", "mm/s"),
-    ("_m_s2", "m/s²"),
-    ("_m_s", "m/s"),
-    ("_rpm", "rpm"),
-    ("_pct", "%"),
-    ("_min", "min"),
-    ("_bar", "bar"),
-    ("_nm", "N m"),
-    ("_um", "µm"),
-    ("_mm", "mm"),
-    ("_kw", "kW"),
-    ("_hz", "Hz"),
-    ("_w", "W"),
-    ("_a", "A"),
-    ("_n", "N"),
-    ("_v", "V"),
-    ("_c", "°C"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_l", "l"),
-];
 
 /// Words of a condition that are listed.
 const WORDS_MAX: usize = 8;
@@ -122,7 +91,7 @@ impl Tongue {
         match (self.0, known, special(name)) {
             (_, _, Some((en, zh))) => self.say(en, zh).to_owned(),
             (Language::Zh, Some(zh), _) => escape(zh),
-            _ => escape(&without_unit(name).replace('_', " ")),
+            _ => escape(&quantity::without_unit(name).replace('_', " ")),
         }
     }
 
@@ -192,17 +161,9 @@ fn special(name: &str) -> Option<(&'static str, &'static str)> {
     known.into_iter().find(|(known, _)| *known == name).map(|(_, words)| words)
 }
 
-fn without_unit(name: &str) -> &str {
-    ENDINGS.iter().find_map(|(ending, _)| name.strip_suffix(ending)).unwrap_or(name)
-}
-
 /// The unit of a column as printed, escaped; empty for pure numbers and text.
 pub(super) fn unit_of(name: &str) -> String {
-    match ChannelId::of(name).map(|id| id.channel().unit) {
-        Some("1") => String::new(),
-        Some(unit) => unit_text(unit),
-        None => ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit).to_owned(),
-    }
+    quantity::unit_of(name).map_or_else(String::new, unit_text)
 }
 
 /// A unit as printed: powers raised, micro as a letter. Escaped.

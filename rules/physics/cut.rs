@@ -1,6 +1,7 @@
 //! The cut as effects see it.
 
 use super::{OutputKind, Role, Scene};
+use adapters::channel::quantity::Quantity;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
@@ -35,13 +36,10 @@ pub(crate) fn cut_times(scene: &Scene, factor: impl Fn(usize) -> f64) -> Option<
 /// What a force in the cut means in the output: `area` is in mm2, or mm for a force along an edge.
 /// A power takes `area * vc / 60`, a torque `area * D / 2000`, a force `area` itself.
 pub(crate) fn in_output(scene: &Scene, area: &[f64]) -> Option<Vec<f64>> {
-    let name = scene.output();
-    let lever = if name.contains("force") {
-        return Some(area.to_vec());
-    } else if name.contains("torque") {
-        scene.column("diameter_mm")?.iter().map(|diameter| diameter / 2000.0).collect::<Vec<_>>()
-    } else {
-        scene.column("cutting_speed_m_min")?.iter().map(|speed| speed / 60.0).collect()
+    let lever: Vec<f64> = match Quantity::of(scene.output()) {
+        Quantity::Force => return Some(area.to_vec()),
+        Quantity::Torque => scene.column("diameter_mm")?.iter().map(|diameter| diameter / 2000.0).collect(),
+        _ => scene.column("cutting_speed_m_min")?.iter().map(|speed| speed / 60.0).collect(),
     };
     Some(area.iter().zip(lever).map(|(area, lever)| area * lever).collect())
 }

@@ -2,6 +2,7 @@
 
 use super::excitation::greatest;
 use super::{OutputKind, Role, Scene};
+use adapters::channel::quantity::{is_of_spindle, unit_of};
 use std::f64::consts::PI;
 
 /// Radians per second of one revolution per minute.
@@ -16,7 +17,7 @@ pub(crate) fn is_axis_output(scene: &Scene) -> bool {
     let lettered = ["x_", "y_", "z_"].iter().any(|letter| name.starts_with(letter));
     name.contains("axis")
         || lettered
-        || (!name.contains("spindle") && !name.contains("total") && scene.role(Role::Speed).is_none())
+        || (!is_of_spindle(name) && !name.contains("total") && scene.role(Role::Speed).is_none())
 }
 
 /// Is the output a power, or something that adds up like one?
@@ -69,7 +70,7 @@ pub(crate) fn sliding(scene: &Scene) -> Option<Vec<f64>> {
 
 /// Does the output change its sign with the direction of motion? A true rms current of the spindle does not.
 pub(crate) fn is_signed(scene: &Scene) -> bool {
-    !scene.output().contains("spindle")
+    !is_of_spindle(scene.output())
         || scene.recorded().iter().zip(scene.usable()).any(|(value, usable)| *usable && *value < 0.0)
 }
 
@@ -120,10 +121,10 @@ pub(crate) fn turns(scene: &Scene) -> bool {
 
 /// A quantity in m, m/s, m/s2 or rad/s, by the unit at the end of its name.
 pub(crate) fn in_si(scene: &Scene, column: &str) -> Option<Vec<f64>> {
-    let scale = match column {
-        name if name.ends_with("_mm_min") => 1.0 / 60_000.0,
-        name if name.ends_with("_mm_s") || name.ends_with("_mm_s2") => 1e-3,
-        name if name.ends_with("_rpm") => RAD_PER_S_OF_RPM,
+    let scale = match unit_of(column) {
+        Some("mm/min") => 1.0 / 60_000.0,
+        Some("mm" | "mm/s" | "mm/s2") => 1e-3,
+        Some("rpm") => RAD_PER_S_OF_RPM,
         _ => 1.0,
     };
     Some(scene.column(column)?.iter().map(|value| value * scale).collect())

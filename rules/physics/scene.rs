@@ -4,6 +4,7 @@ mod excerpt;
 
 pub use excerpt::{Block, blocks_of};
 
+use adapters::channel::quantity::Quantity;
 use adapters::recording::{Recording, Words, with_derived};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -111,18 +112,14 @@ pub enum OutputKind {
 }
 
 impl OutputKind {
-    /// From the unit at the end of the output's name; drive counts follow the word before the unit.
+    /// From the quantity that the output's name tells.
     #[must_use]
     pub fn of(output: &str) -> Self {
-        let has = |word: &str| output.contains(word);
-        if output.ends_with("_um") {
-            Self::Displacement
-        } else if output.ends_with("_w") || has("power") {
-            Self::Power
-        } else if has("force") || has("torque") || has("current") || has("load") {
-            Self::Force
-        } else {
-            Self::Other
+        match Quantity::of(output) {
+            Quantity::Displacement => Self::Displacement,
+            Quantity::Power => Self::Power,
+            Quantity::Force | Quantity::Torque | Quantity::Current | Quantity::Load => Self::Force,
+            Quantity::Temperature | Quantity::Position | Quantity::Other => Self::Other,
         }
     }
 }

@@ -1,35 +1,12 @@
 //! Units of parameters in a scene: the catalogue's placeholders replaced by what the output and its drive are.
 
 use super::{OutputKind, Scene, drive};
-use adapters::channel::ChannelId;
+use adapters::channel::quantity;
 
-/// Unit at the end of a name, for quantities that are not in the table of channels. Longer ends come first.
-const SUFFIXES: [(&str, &str); 14] = [
-    ("_mm_min", "mm/min"),
-    ("_m_s2", "m/s2"),
-    ("_m_s", "m/s"),
-    ("_rpm", "rpm"),
-    ("_pct", "%"),
-    ("_nm", "N m"),
-    ("_um", "um"),
-    ("_mm", "mm"),
-    ("_kw", "kW"),
-    ("_w", "W"),
-    ("_a", "A"),
-    ("_n", "N"),
-    ("_v", "V"),
-    ("_m", "m"),
-];
-
-/// The unit of a quantity by its name: from the table of channels, else by how the name ends, else the name's own
-/// last word.
+/// The unit of a quantity by its name, else the name's own last word.
 #[must_use]
 pub fn unit_of_quantity(name: &str) -> &str {
-    if let Some(id) = ChannelId::of(name) {
-        return id.channel().unit;
-    }
-    let known = SUFFIXES.iter().find(|(suffix, _)| name.ends_with(suffix));
-    known.map_or_else(|| name.rsplit('_').next().unwrap_or(name), |(_, unit)| unit)
+    quantity::unit_of(name).unwrap_or_else(|| name.rsplit('_').next().unwrap_or(name))
 }
 
 /// The unit of a parameter in this scene. In [`super::ParameterDoc::unit`] `output` stands for the unit of the output,

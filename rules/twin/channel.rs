@@ -4,6 +4,7 @@
 use crate::physics::drive::{directions, goes_both_ways, sliding};
 use crate::physics::state::{first_order, first_order_behind};
 use crate::physics::{Role, Scene};
+use adapters::channel::quantity::Quantity;
 use std::borrow::Cow;
 
 /// Seconds of the recording's clock.
@@ -49,7 +50,7 @@ pub(super) fn channel_values<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s,
 
 /// The recorded positions of slides.
 pub(super) fn positions(scene: &Scene) -> impl Iterator<Item = &str> {
-    scene.column_names().filter(|name| name.contains("position"))
+    scene.column_names().filter(|name| Quantity::of(name) == Quantity::Position)
 }
 
 /// A channel that is made of a column named in its own name.
@@ -60,7 +61,7 @@ fn derived<'s>(scene: &'s Scene, name: &str) -> Option<Cow<'s, [f64]>> {
     let (tau_s, column) = name.strip_prefix(LAG_OF)?.split_once(LAG_OF_WHAT)?;
     let tau_s = tau_s.parse().ok().filter(|tau_s: &f64| *tau_s > 0.0)?;
     let input = scene.column(column)?;
-    let is_there_always = column.contains("temperature");
+    let is_there_always = Quantity::of(column) == Quantity::Temperature;
     let lag = if is_there_always { first_order_behind } else { first_order };
     Some(Cow::Owned(lag(scene, input, tau_s)))
 }

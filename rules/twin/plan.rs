@@ -9,6 +9,7 @@ use crate::physics::explain::Language;
 use crate::physics::{Role, Scene, effect};
 use crate::statistics::median;
 use adapters::Recording;
+use adapters::channel::quantity::is_of_spindle;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -153,7 +154,7 @@ impl Envelope {
             diameter_mm: middle(in_cut(column("diameter_mm")), 60.0),
             axis_speed: if axis_speed > 0.0 { axis_speed } else { 3000.0 },
             axis_column: axis_column.unwrap_or_else(|| "axis_velocity_mm_min".to_owned()),
-            spindle: diagnosis.output.contains("spindle"),
+            spindle: is_of_spindle(&diagnosis.output),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
 use crate::physics::effect;
 use crate::physics::state::BETWEEN_SAMPLES;
+use adapters::channel::quantity;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
@@ -130,23 +131,7 @@ fn is_like_an_entry(kind: &str) -> bool {
 /// The unit at the end of a channel's name, as a symbol.
 #[must_use]
 pub fn unit_of(output: &str) -> &'static str {
-    let units = [
-        ("_mm_min", "mm/min"),
-        ("_counts", "counts"),
-        ("_pct", "%"),
-        ("_rpm", "rpm"),
-        ("_um", "um"),
-        ("_mm", "mm"),
-        ("_nm", "N m"),
-        ("_kw", "kW"),
-        ("_w", "W"),
-        ("_a", "A"),
-        ("_v", "V"),
-        ("_n", "N"),
-        ("_c", "°C"),
-        ("_m", "m"),
-    ];
-    units.iter().find(|(suffix, _)| output.ends_with(suffix)).map_or("1", |(_, unit)| *unit)
+    quantity::unit_of(output).unwrap_or("1")
 }
 
 fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {

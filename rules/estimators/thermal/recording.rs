@@ -4,6 +4,7 @@ use super::course::{Course, Sensor};
 use super::quantities::THERMAL_ERROR;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use adapters::Recording;
+use adapters::channel::quantity::{has_word, unit_of};
 use adapters::recording::{Cells, Numbers};
 use serde::Serialize;
 
@@ -30,7 +31,7 @@ pub struct LeftOut {
 
 /// Is this the column of a temperature? `temperature_<n>_c`, `bearing_temperature_c` and the like.
 fn is_temperature(name: &str) -> bool {
-    name.ends_with("_c") && (name.starts_with("temperature_") || name.contains("_temperature_"))
+    unit_of(name) == Some("°C") && has_word(name, "temperature")
 }
 
 /// Temperatures and error of a recording, in rows that have all of them.
@@ -94,7 +95,7 @@ fn no_temperature(recording: &Recording, out: &[(&str, &Numbers)]) -> Refusal {
         let next = "record with every sensor connected";
         return Refusal::new(RefusalKind::Missing, "has no value in most rows", next).at(*name);
     }
-    let kelvin = |name: &str| name.ends_with("_k") && name.contains("temperature");
+    let kelvin = |name: &str| name.ends_with("_k") && has_word(name, "temperature");
     match recording.columns().iter().find(|column| kelvin(&column.name)) {
         Some(column) => {
             Refusal::new(RefusalKind::Unit, "is in kelvin", "give temperatures in °C, named .._c").at(&column.name)

@@ -1,6 +1,6 @@
 //! The ball screw grows as its nut rubs: the error grows with the distance from the fixed bearing.
 
-use crate::physics::drive::{axis_velocities, is_displacement};
+use crate::physics::drive::{axis_velocities, in_si, is_displacement};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::first_order;
 use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
@@ -82,7 +82,5 @@ impl Effect for ScrewGrowth {
 }
 
 fn position_m(scene: &Scene) -> Option<Vec<f64>> {
-    let name = scene.role_name(Role::Position)?;
-    let scale = if name.ends_with("_mm") { 1e-3 } else { 1.0 };
-    Some(scene.column(name)?.iter().map(|position| position * scale).collect())
+    in_si(scene, scene.role_name(Role::Position)?)
 }

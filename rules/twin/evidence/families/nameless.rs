@@ -8,6 +8,7 @@ use crate::physics::OutputKind;
 use crate::twin::evidence::bank::{Bank, Drawn};
 use crate::twin::evidence::inputs::Inputs;
 use crate::twin::model::Model;
+use adapters::channel::quantity::Quantity;
 
 /// Bumps over a channel, and over one that a machine may resonate or jam along.
 const BUMPS: usize = 7;
@@ -65,7 +66,7 @@ pub(super) fn add(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
             {
                 add_curve(inputs, bank, drawn("fine bumps"), &fine, carrier);
             }
-            let slow = channel.name == "time" || channel.name.contains("temperature");
+            let slow = channel.name == "time" || Quantity::of(&channel.name) == Quantity::Temperature;
             let skipped = carrier.name == "1" && alone
                 || carrier.name == "speed" && !slow
                 || carrier.name == "engaged" && inputs.knows_cut && !tells_in_cut(&channel.name);
