@@ -18,13 +18,13 @@ use std::ops::Range;
 use std::path::Path;
 
 /// The model of the lathe.
-const MODEL: &str = include_str!("demo/lathe.toml");
+const MODEL: &str = include_str!("lathe.toml");
 /// What the twin has learned under it.
-const LEARNED: &str = include_str!("demo/twin.json");
+const LEARNED: &str = include_str!("twin.json");
 /// What the estimators have learned.
-const ESTIMATED: &str = include_str!("demo/estimators.json");
+const ESTIMATED: &str = include_str!("estimators.json");
 /// Cutting power over the wear, in the cuts of the short part.
-const WEAR: &str = include_str!("demo/wear.toml");
+const WEAR: &str = include_str!("wear.toml");
 
 const HOUR_S: i64 = 3600;
 /// 2017 to 2096, in seconds since 1970.
