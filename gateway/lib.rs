@@ -5,6 +5,7 @@ pub mod active_scripts;
 pub mod alignment;
 pub mod backtest;
 pub mod bench;
+pub mod cannot_run;
 pub mod check;
 pub mod cli;
 pub mod config;

@@ -21,12 +21,12 @@ mod serve;
 mod simulate;
 mod vendor_child;
 
+pub(crate) use crate::cannot_run::CannotRun;
 use crate::config::Log;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
 use ::rules::script::{Host, Problem, shipped};
 use clap::{Args, Parser, Subcommand};
-use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -38,29 +38,6 @@ pub enum Outcome {
     Fine,
     /// The command ran and its answer is no: exit code 1.
     No,
-}
-
-/// Why a command could not run: exit code 2.
-#[derive(Debug)]
-pub struct CannotRun {
-    /// What happened, and where.
-    pub what: String,
-    /// What to do next; may be empty when `what` says it.
-    pub next: String,
-}
-
-impl CannotRun {
-    /// What happened and what to do next.
-    pub fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
-        Self { what: what.into(), next: next.into() }
-    }
-}
-
-impl fmt::Display for CannotRun {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.what)?;
-        if self.next.is_empty() { Ok(()) } else { write!(f, "\n  {}", self.next) }
-    }
 }
 
 /// What every subcommand returns.

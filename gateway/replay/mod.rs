@@ -10,7 +10,7 @@ mod summary;
 pub use motion::Motion;
 pub use summary::{FileSummary, StoredRows, Summary};
 
-use crate::cli::CannotRun;
+use crate::cannot_run::CannotRun;
 use crate::config;
 use crate::gate::Gate;
 use crate::history::{ExtraSeries, ExtraValue, Options, Record, WhenFull, Writer};

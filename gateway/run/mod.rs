@@ -24,7 +24,7 @@ pub mod wear;
 
 use crate::access::{self, Access};
 use crate::alignment;
-use crate::cli::CannotRun;
+use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control::{self, Inbox};
 use crate::gate::Gate;

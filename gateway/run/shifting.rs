@@ -1,7 +1,7 @@
 //! Thermal offsets on their way to the control and into the history, and what is left in the controls when the gateway ends.
 
 use super::health::Health;
-use crate::cli::CannotRun;
+use crate::cannot_run::CannotRun;
 use crate::gate::offset::{Account, Book, Moved, OffsetTrail, Order};
 use crate::gate::{Gate, OffsetVerdict};
 use crate::history::{Audit, Command};
