@@ -1,6 +1,6 @@
 //! What we know: pure functions of their arguments.
 //!
-//! The four rooms read as a sentence: [`physics`] is known, [`estimators`] infer, the [`twin`] doubts, the [`script`]
+//! The modules read as a sentence: [`physics`] is known, [`estimators`] infer, the [`twin`] doubts, the [`script`]
 //! decides; [`operations`] is what the process planner says. There is no clock, no IO, no thread and no `unsafe` here; time is an argument and randomness is seeded.
 
 pub mod estimators;

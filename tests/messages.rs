@@ -64,7 +64,7 @@ fn variables_are_checked_like_the_file() {
 }
 
 #[test]
-fn the_table_and_the_example_are_what_the_readme_shows() {
+fn the_table_of_keys_and_the_example_are_the_stored_ones() {
     golden("keys.md", &config::keys::table());
     golden("example.toml", &config::keys::example());
 }

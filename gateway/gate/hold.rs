@@ -45,29 +45,6 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// The word in the history and in JSON.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Missing(..) => "missing",
-            Self::OnlyEstimated => "only_estimated",
-            Self::StateUnknown => "state_unknown",
-            Self::Alarm => "alarm",
-            Self::Manual => "manual",
-            Self::Mdi => "mdi",
-            Self::SingleBlock => "single_block",
-            Self::DryRun => "dry_run",
-            Self::NotAutomatic => "not_automatic",
-            Self::FeedHold => "feed_hold",
-            Self::NotRunning => "not_running",
-            Self::Running => "running",
-            Self::Rapid => "rapid",
-            Self::Threading => "threading",
-            Self::Tapping => "tapping",
-        }
-    }
-
     /// The reason in Chinese.
     #[must_use]
     pub fn zh(self) -> String {

@@ -2,7 +2,7 @@
 //! network can explain itself.
 //!
 //! A chapter is about one topic. Its topic is the name of its file, its title is its first heading. Every chapter is a row
-//! of the table below; `tests/handbook.rs` fails when a file of the folder has no row.
+//! of the table below; `tests/handbook/` fails when a file of the folder has no row.
 
 use adapters::channel::nearest;
 

@@ -45,7 +45,7 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// Writes through this hand to the source of this name.
+    /// Commands that this worker writes to the source of this name.
     #[must_use]
     pub fn new(actuator_worker: ActuatorWorker, shifting: Shifting, target: String, inbox: Inbox) -> Self {
         Self {
