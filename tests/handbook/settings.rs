@@ -62,3 +62,15 @@ fn a_wrong_block_is_refused() {
             .is_empty()
     );
 }
+
+#[test]
+fn every_section_of_the_configuration_is_explained_in_its_chapter() {
+    let chapter = gateway::handbook::chapter("configuration").expect("the chapter");
+    let name = |section: &gateway::config::keys::Section| match section.repeated {
+        true => format!("[[{}]]", section.name),
+        false => format!("[{}]", section.name),
+    };
+    let untold: Vec<String> =
+        gateway::config::keys::SECTIONS.iter().map(name).filter(|name| !chapter.text.contains(name)).collect();
+    assert!(untold.is_empty(), "sections that gateway/handbook/configuration.md does not name: {untold:?}");
+}
