@@ -2,7 +2,7 @@
 //!
 //! A channel's name ends in its unit; the names are those of the recording format.
 
-mod control;
+mod appended;
 mod declared;
 mod paths;
 pub mod quantity;
@@ -68,8 +68,8 @@ pub static CHANNELS: &[Channel] = &ALL;
 
 const PATH_ROWS: &[Channel] = paths::FURTHER.as_flattened();
 
-static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + control::LATER.len()] = {
-    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + control::LATER.len()];
+static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + appended::LATER.len()] = {
+    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + appended::LATER.len()];
     let mut index = 0;
     while index < all.len() {
         let behind = FIRST.len() + PATH_ROWS.len();
@@ -78,7 +78,7 @@ static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + control::LATER.len()] = {
         } else if index < behind {
             PATH_ROWS[index - FIRST.len()]
         } else {
-            control::LATER[index - behind]
+            appended::LATER[index - behind]
         };
         index += 1;
     }

@@ -2,7 +2,7 @@
 //!
 //! Compiled, because no script may widen it. [`Gate::decide`] looks at the request, the sample, the estimates and the
 //! limits of the configuration, and at nothing else; given the same it decides the same. It never writes: in `shadow`,
-//! which is the default, a [`Verdict`] is recorded and that is all. Only a [`Writer`] writes, and only verdicts that say
+//! which is the default, a [`Verdict`] is recorded and that is all. Only a [`OverrideWriter`] writes, and only verdicts that say
 //! so, which needs `mode = "armed"` in the configuration *and* arming on the box, for a limited time, after every start.
 //!
 //! What holds 100 % whatever is asked for is the list of [`Hold`]: the contract that machine builders know from the
@@ -40,7 +40,7 @@ pub use hold::Hold;
 pub use limit::Bound;
 pub use offset::{OffsetVerdict, Offsets};
 pub use verdict::{Outcome, Verdict};
-pub use write::{Occasion, Reaction, Writer, Written};
+pub use write::{Occasion, OverrideWriter, Reaction, Written};
 
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -199,7 +199,7 @@ impl Gate {
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there. Call it after
     /// [`Gate::decide`].
-    pub fn looks(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::Order> {
+    pub fn looks(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::OffsetOrder> {
         let may = self.offsets.is_unsettled() && self.interlocks.between_programs(sample, estimates).is_none();
         if may { self.offsets.looks(sample.at_ns) } else { Vec::new() }
     }

@@ -88,8 +88,8 @@ pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, Span, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
 pub use outbox::{
-    Cell, Content, Feed, Figures, Head, Item, Outbox, Position, Reading, SeriesInfo, Settings as OutboxSettings,
-    Standing, Stretch,
+    Cell, Content, Figures, Head, Item, Outbox, OutboxReader, Position, Reading, SeriesInfo,
+    Settings as OutboxSettings, Standing, Stretch,
 };
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};

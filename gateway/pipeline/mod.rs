@@ -170,7 +170,7 @@ impl Pipeline {
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there; after
     /// [`Pipeline::decide`].
-    pub fn looks(&mut self, sample: &Sample) -> Vec<offset::Order> {
+    pub fn looks(&mut self, sample: &Sample) -> Vec<offset::OffsetOrder> {
         self.gate.looks(sample, &self.estimates)
     }
 

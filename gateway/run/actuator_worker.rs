@@ -8,8 +8,8 @@
 use super::priority::{self, Granted};
 use super::verdict_mailbox::VerdictMailbox;
 use crate::config;
-use crate::gate::offset::{Account, Moved, Order};
-use crate::gate::{Ask, Fault, Reaction, Verdict, Writer, Written};
+use crate::gate::offset::{Account, Moved, OffsetOrder};
+use crate::gate::{Ask, Fault, OverrideWriter, Reaction, Verdict, Written};
 use adapters::Actuator;
 use adapters::clock::{Clock, ManualClock, TimeNs};
 use std::sync::Arc;
@@ -47,7 +47,7 @@ pub enum ActuatorReport {
     /// An order to shift an axis was carried out, or could not be.
     Moved(Box<Moved>),
     /// An order that was not carried out: the arming ended before its turn came, or it waited too long.
-    Withdrawn(Order),
+    Withdrawn(OffsetOrder),
 }
 
 /// What the worker may write to.
@@ -67,11 +67,11 @@ pub struct Writers {
 
 impl Writers {
     fn of(tools: Tools, limits: &config::Gate) -> Self {
-        Self { writer: tools.actuator.map(|actuator| Writer::new(actuator, limits)), offsets: tools.offsets }
+        Self { writer: tools.actuator.map(|actuator| OverrideWriter::new(actuator, limits)), offsets: tools.offsets }
     }
 
     fn is_waiting(&self) -> bool {
-        self.writer.as_ref().is_some_and(Writer::is_waiting)
+        self.writer.as_ref().is_some_and(OverrideWriter::is_waiting)
     }
 
     fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
@@ -79,11 +79,11 @@ impl Writers {
     }
 
     fn owes_withdrawal(&self) -> bool {
-        self.writer.as_ref().is_some_and(Writer::owes_withdrawal)
+        self.writer.as_ref().is_some_and(OverrideWriter::owes_withdrawal)
     }
 }
 
-type AnyWriter = Writer<Box<dyn Actuator>>;
+type AnyWriter = OverrideWriter<Box<dyn Actuator>>;
 
 /// See the [module](self).
 pub enum ActuatorWorker {
@@ -139,7 +139,7 @@ impl ActuatorWorker {
     }
 
     /// Orders shifts of axes; `armed` tells whether any may be made. What came of them is told here or with [`ActuatorWorker::listen`].
-    pub fn shift(&mut self, orders: &[Order], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
+    pub fn shift(&mut self, orders: &[OffsetOrder], armed: bool, now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
         match self {
             Self::None => {}
             Self::Inline(writers, clock) => {
@@ -256,7 +256,7 @@ fn write(writers: &mut Writers, verdict: Option<&Verdict>, clock: &dyn Clock, te
     }
 }
 
-fn shift(writers: &mut Writers, order: Order, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+fn shift(writers: &mut Writers, order: OffsetOrder, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(offsets) = &mut writers.offsets else { return };
     tell(ActuatorReport::Moved(Box::new(offsets.carry_out(order, clock))));
 }

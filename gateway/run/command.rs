@@ -1,14 +1,14 @@
 //! From the gate's verdict to the machine, and from the machine's answer to the history: orders of a person, the audit, the
 //! worker that writes, the alarm when it has to let go.
 
+use super::acknowledged_alarms::AcknowledgedAlarms;
 use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;
+use super::offset_commands::{self, OffsetCommands};
 use super::report::milliseconds;
-use super::seen::Seen;
-use super::shifting::{self, Shifting};
 use crate::config::{self, GateMode};
 use crate::control::{self, Inbox, Posted, PostedRow, Reply};
-use crate::gate::offset::{Moved, Order};
+use crate::gate::offset::{Moved, OffsetOrder};
 use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Verdict, trail};
 use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
 use crate::log::{Notice, Severity};
@@ -28,11 +28,11 @@ const ROWS_AT_ONCE_MAX: usize = 32;
 /// See the [module](self).
 pub struct Commands {
     actuator_worker: ActuatorWorker,
-    shifting: Shifting,
+    shifting: OffsetCommands,
     /// Name of the source that is written to.
     target: String,
     inbox: Inbox,
-    seen: Seen,
+    seen: AcknowledgedAlarms,
     trail: trail::Trail,
     /// Who armed it last.
     by: String,
@@ -47,13 +47,13 @@ pub struct Commands {
 impl Commands {
     /// Commands that this worker writes to the source of this name.
     #[must_use]
-    pub fn new(actuator_worker: ActuatorWorker, shifting: Shifting, target: String, inbox: Inbox) -> Self {
+    pub fn new(actuator_worker: ActuatorWorker, shifting: OffsetCommands, target: String, inbox: Inbox) -> Self {
         Self {
             actuator_worker,
             shifting,
             target,
             inbox,
-            seen: Seen::default(),
+            seen: AcknowledgedAlarms::default(),
             trail: trail::Trail::default(),
             by: String::new(),
             was_armed: false,
@@ -204,7 +204,7 @@ impl Commands {
         let looks = pipeline.looks(sample);
         let gate = pipeline.gate_mut();
         rows.into_iter().for_each(|row| self.keep(row, gate, health));
-        let orders: Vec<Order> = verdicts.iter().filter_map(|verdict| verdict.order).chain(looks).collect();
+        let orders: Vec<OffsetOrder> = verdicts.iter().filter_map(|verdict| verdict.order).chain(looks).collect();
         let mut said = Vec::new();
         self.actuator_worker.shift(&orders, gate.writes_offsets(), now_ns, |it| said.push(it));
         self.hear(said, sample, gate, health);
@@ -212,7 +212,7 @@ impl Commands {
 
     fn moved(&mut self, moved: &Moved, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         if let Some(row) = self.shifting.row(moved) {
-            let command = shifting::command(moved, &row, &self.target_of_offsets(gate));
+            let command = offset_commands::command(moved, &row, &self.target_of_offsets(gate));
             self.keep(row, gate, health);
             command.into_iter().for_each(|row| health.keep(row.into()));
         }

@@ -2,8 +2,8 @@
 //! remembered as an event, and is shown while it lasts.
 
 use super::clock::{BoxClock, ClockStep};
-use super::feed::{Feed, SourcePace};
 use super::history_store::HistoryStore;
+use super::sample_feed::{SampleFeed, SourcePace};
 use super::save::Saver;
 use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
@@ -116,7 +116,7 @@ impl Health {
     }
 
     /// Looks after everything, about once per second.
-    pub fn look(&mut self, pipeline: &Pipeline, feed: &Feed, now_ns: TimeNs) {
+    pub fn look(&mut self, pipeline: &Pipeline, feed: &SampleFeed, now_ns: TimeNs) {
         if self.looked.is_some_and(|at| at.elapsed() < LOOK_EVERY) {
             return;
         }
@@ -155,7 +155,7 @@ impl Health {
         self.event(now_ns, "gateway", &notice);
     }
 
-    fn look_at_sources(&mut self, feed: &Feed, now_ns: TimeNs) {
+    fn look_at_sources(&mut self, feed: &SampleFeed, now_ns: TimeNs) {
         let status = feed.status(now_ns);
         self.sources.resize(status.len(), None);
         for (index, source) in status.into_iter().enumerate() {

@@ -1,13 +1,14 @@
 //! `run`: one machine, live. The tick has a thread of its own, so has every source; tokio only serves.
 
+pub mod acknowledged_alarms;
 pub mod actuator_worker;
 pub mod clock;
 pub mod command;
 pub mod deadline;
-pub mod feed;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
+pub mod offset_commands;
 pub mod open;
 pub mod outputs;
 pub mod pace;
@@ -15,9 +16,8 @@ pub mod priority;
 pub mod recent;
 pub mod report;
 pub mod rules;
+pub mod sample_feed;
 pub mod save;
-pub mod seen;
-pub mod shifting;
 pub mod tick;
 mod verdict_mailbox;
 pub mod wear;
@@ -43,9 +43,9 @@ use deadline::{RUN_MAX, RunLimit};
 use health::Health;
 use history_store::HistoryStore;
 use live_twin::Twin;
+use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
-use shifting::Shifting;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -223,12 +223,14 @@ fn commands(
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();
     if limits.greatest_mode() != GateMode::Armed {
-        return Ok(Commands::new(ActuatorWorker::None, Shifting::idle(data_dir), target, inbox));
+        return Ok(Commands::new(ActuatorWorker::None, OffsetCommands::idle(data_dir), target, inbox));
     }
     let (actuator, sink) = tools(limits, &mut ways)?;
     let (shifting, offsets) = match sink {
-        Some(sink) => Shifting::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?,
-        None => (Shifting::idle(data_dir), None),
+        Some(sink) => {
+            OffsetCommands::resume(data_dir, sink, gate).map(|(shifting, account)| (shifting, Some(account)))?
+        }
+        None => (OffsetCommands::idle(data_dir), None),
     };
     let tools = Tools { actuator, offsets };
     let actuator_worker = match plan.speed {

@@ -1,7 +1,7 @@
 //! From the configuration to something that gives samples at its pace.
 
-use super::feed::Feed;
 use super::pace::TickSchedule;
+use super::sample_feed::SampleFeed;
 use crate::alignment::{Alignment, Patience};
 use crate::config::{self, Config};
 use adapters::address::Target;
@@ -40,7 +40,7 @@ impl MachineSpeed {
 /// What the sources give.
 pub struct Sources {
     /// The samples.
-    pub feed: Feed,
+    pub feed: SampleFeed,
     /// When they are taken.
     pub pace: TickSchedule,
     /// Ways to the machines.
@@ -123,7 +123,7 @@ fn threads(
     sources: Vec<(Box<dyn Source>, WorkerSettings)>,
     clock: &Arc<dyn Clock>,
     alignment: &config::Alignment,
-) -> std::io::Result<Feed> {
+) -> std::io::Result<SampleFeed> {
     let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
         let plan = SourcePlan::of(source.as_ref());
         SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
@@ -132,7 +132,7 @@ fn threads(
     let merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
     let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
-    Ok(Feed::Threads { workers, merge, alignment: Alignment::of(&plans, alignment, Patience::GoesOn) })
+    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::of(&plans, alignment, Patience::GoesOn) })
 }
 
 fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
@@ -155,7 +155,7 @@ fn stepped(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sou
     let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
     let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
     let alignment = Alignment::of(&plans, &config.alignment, Patience::Waits);
-    let feed = Feed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
+    let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
     let pace = TickSchedule::stepped(speed.factor(), start_ns, period(config));
     Ok(Sources { feed, pace, ways, machines, simulated: simulated(config) })
 }

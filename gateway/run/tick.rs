@@ -1,13 +1,13 @@
 //! The tick thread: waits for the tick, samples, steps the pipeline, hands the status over.
 
 use super::command::Commands;
-use super::feed::Feed;
 use super::health::Health;
 use super::live_twin::Twin;
 use super::pace::TickSchedule;
 use super::priority::{self, Granted};
 use super::report;
 use super::rules::Watched;
+use super::sample_feed::SampleFeed;
 use super::wear::Wear;
 use crate::config::GateMode;
 use crate::control::Wake;
@@ -61,7 +61,7 @@ pub struct Ticker {
     /// Gives the times of the ticks.
     pub pace: TickSchedule,
     /// Gives the samples.
-    pub feed: Feed,
+    pub feed: SampleFeed,
     /// Infers, decides, records.
     pub pipeline: Pipeline,
     /// Orders, audit, and the worker that writes.

@@ -6,7 +6,7 @@
 //! priority that looked would have used up its turn when the verdict comes.
 
 use super::pace::{LEAD, LEAD_PERIOD_MIN};
-use crate::gate::offset::Order;
+use crate::gate::offset::OffsetOrder;
 use crate::gate::{Ask, Verdict};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -30,7 +30,7 @@ const SPIN_AFTER_DUE: Duration = Duration::from_micros(900);
 struct Pending {
     verdict: Option<(Instant, Verdict)>,
     asks: Waiting<Ask>,
-    orders: Waiting<Order>,
+    orders: Waiting<OffsetOrder>,
     closing: bool,
     /// When the last verdict came, if it was armed: the next is due a period later.
     armed_at: Option<Instant>,
@@ -91,11 +91,11 @@ impl VerdictMailbox {
     }
 
     /// Orders to shift axes. Gives those that will not be carried out: there is no room, or the arming has ended.
-    pub(super) fn order(&self, orders: &[Order], armed: bool) -> Vec<Order> {
+    pub(super) fn order(&self, orders: &[OffsetOrder], armed: bool) -> Vec<OffsetOrder> {
         let mut pending = self.lock();
         let mut withdrawn = Vec::new();
         if !armed {
-            let is_step = |order: &Order| matches!(order, Order::Shift { .. });
+            let is_step = |order: &OffsetOrder| matches!(order, OffsetOrder::Shift { .. });
             withdrawn.extend(pending.orders.iter().map(|(_, order)| *order).filter(is_step));
             pending.orders.retain(|(_, order)| !is_step(order));
         }
@@ -149,7 +149,7 @@ impl VerdictMailbox {
     }
 
     /// The next order, and whether it comes in time.
-    pub(super) fn next_order(&self) -> Option<(Order, bool)> {
+    pub(super) fn next_order(&self) -> Option<(OffsetOrder, bool)> {
         let (laid, order) = self.lock().orders.pop_front()?;
         Some((order, laid.elapsed() <= ORDER_LASTS))
     }

@@ -2,7 +2,7 @@
 
 use super::board::{Board, seconds};
 use super::{Batch, Sink, SinkAddress, SinkError, open};
-use crate::history::{Feed, Head, Outbox, Stretch};
+use crate::history::{Head, Outbox, OutboxReader, Stretch};
 use crate::log::{Notice, Severity};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -76,7 +76,7 @@ struct Task {
     board: Board,
     path: PathBuf,
     stopping: watch::Receiver<bool>,
-    feed: Option<Feed>,
+    feed: Option<OutboxReader>,
 }
 
 /// Why a connection was left.
@@ -210,7 +210,7 @@ impl Task {
     async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<Stretch, Left> {
         let (feed, path) = (self.feed.take(), self.path.clone());
         let reading = tokio::task::spawn_blocking(move || {
-            let mut feed = feed.map_or_else(|| Feed::open(&path), Ok)?;
+            let mut feed = feed.map_or_else(|| OutboxReader::open(&path), Ok)?;
             feed.read(from, to, items_max).map(|stretch| (feed, stretch))
         });
         let failed = |text: String| Left::Failed(SinkError::line(format!("the outbox cannot be read: {text}"), ""));

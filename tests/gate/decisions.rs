@@ -6,7 +6,7 @@ use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
 use adapters::{Absence, Actuator, LadderRule, Sample, Slot, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, Shown, Verdict, Writer};
+use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, OverrideWriter, Shown, Verdict};
 use rules::script::{Host, ScriptFile, shipped};
 use std::path::Path;
 use std::time::Duration;
@@ -49,8 +49,8 @@ impl Actuator for Machine {
     }
 }
 
-fn writer<A: Actuator>(actuator: A) -> Writer<A> {
-    Writer::new(actuator, &limits(GateMode::Armed))
+fn writer<A: Actuator>(actuator: A) -> OverrideWriter<A> {
+    OverrideWriter::new(actuator, &limits(GateMode::Armed))
 }
 
 #[test]
@@ -262,7 +262,12 @@ fn arming_lasts_no_longer_than_the_configuration_allows() {
     assert_eq!(armed.until_ns, 60 * SECOND_NS);
 }
 
-fn run(gate: &mut Gate, writer: &mut Writer<Machine>, ticks: std::ops::Range<i64>, pct: f64) -> Vec<Option<Fault>> {
+fn run(
+    gate: &mut Gate,
+    writer: &mut OverrideWriter<Machine>,
+    ticks: std::ops::Range<i64>,
+    pct: f64,
+) -> Vec<Option<Fault>> {
     let clock = ManualClock::at(0);
     let mut faults = Vec::new();
     for tick in ticks {

@@ -11,7 +11,7 @@ use adapters::simulated::{LadderSettings, Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRule};
 use gateway::config::{self, GateMode};
-use gateway::gate::{Gate, Writer};
+use gateway::gate::{Gate, OverrideWriter};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ fn pct(percent: u8) -> OverridePct {
 struct Stand {
     machine: Simulated,
     gate: Gate,
-    writer: Writer<Box<dyn Actuator>>,
+    writer: OverrideWriter<Box<dyn Actuator>>,
     clock: ManualClock,
     tick: i64,
 }
@@ -41,7 +41,7 @@ impl Stand {
         let armed_for = Duration::from_secs(86_400);
         let mut gate = Gate::new(config::Gate { above_dial, armed_for, ..limits(GateMode::Armed) });
         gate.arm("fitter", None, 0).expect("allowed");
-        let writer = Writer::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, gate.limits());
+        let writer = OverrideWriter::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, gate.limits());
         Self { machine, gate, writer, clock: ManualClock::at(0), tick: 0 }
     }
 
@@ -112,7 +112,8 @@ fn a_ladder_that_replaces_the_dial_where_a_product_is_configured_is_found_out() 
     let mut stand = Stand::new(LadderRule::Replace);
     stand.gate = Gate::new(config::Gate { above_dial: true, ..limits(GateMode::Armed) });
     stand.gate.arm("fitter", None, 0).expect("allowed");
-    stand.writer = Writer::new(Box::new(stand.machine.feed_override()) as Box<dyn Actuator>, stand.gate.limits());
+    stand.writer =
+        OverrideWriter::new(Box::new(stand.machine.feed_override()) as Box<dyn Actuator>, stand.gate.limits());
     stand.turn(70);
     let told = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| stand.ticks(5.0, Some(80.0))));
     let told = told.expect_err("a fault").downcast_ref::<String>().cloned().unwrap_or_default();

@@ -6,14 +6,14 @@ use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::units::OverridePct;
 use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
 use gateway::config::GateMode;
-use gateway::gate::offset::{Account, Book, Order};
-use gateway::gate::{Ask, Disarmed, Fault, Gate, Outcome, Verdict, Writer, trail};
+use gateway::gate::offset::{Account, Book, OffsetOrder};
+use gateway::gate::{Ask, Disarmed, Fault, Gate, Outcome, OverrideWriter, Verdict, trail};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 /// What waits for the controller beside the override.
-const SHIFT: Order = Order::Shift { axis: Axis::Z, from_um: 0.0, wanted_um: 5.0 };
+const SHIFT: OffsetOrder = OffsetOrder::Shift { axis: Axis::Z, from_um: 0.0, wanted_um: 5.0 };
 
 /// What a controller may do to whoever writes to it.
 #[derive(Default)]
@@ -161,7 +161,7 @@ fn whoever_arms_finds_the_machine_at_its_dial_and_never_with_a_leap() {
 #[test]
 fn after_a_fault_nothing_is_written_until_the_gate_has_let_go() {
     let (controller, clock) = (Controller::default(), ManualClock::at(0));
-    let mut writer = Writer::new(controller.clone(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
     writer.step(&verdict(90, true), &clock);
     controller.set(|state| state.shown = Some(37));
     clock.set(SECOND_NS / 2);
@@ -176,7 +176,7 @@ fn after_a_fault_nothing_is_written_until_the_gate_has_let_go() {
 #[test]
 fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
     let (controller, clock) = (Controller::default(), ManualClock::at(0));
-    let mut writer = Writer::new(controller.clone(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
     writer.step(&verdict(60, true), &clock);
     controller.set(|state| state.shown = Some(100));
     clock.set(2 * SECOND_NS);
@@ -184,7 +184,7 @@ fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
     assert_eq!(written.fault, Some(Fault::Late { silent_ms: 2000 }));
     assert_eq!(controller.log(), ["60"], "a leap from 100 to 60 % is not made");
     // The signs of life were late and the ladder has not minded.
-    let mut writer = Writer::new(Controller::default(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(Controller::default(), &limits(GateMode::Armed));
     clock.set(0);
     writer.step(&verdict(60, true), &clock);
     clock.set(2 * SECOND_NS);
@@ -253,7 +253,7 @@ fn every_write_says_which_script_of_which_version_asked_for_it_and_why() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("allowed");
     let (clock, mut trail) = (ManualClock::at(0), trail::Trail::default());
-    let mut writer = Writer::new(Controller::default(), gate.limits());
+    let mut writer = OverrideWriter::new(Controller::default(), gate.limits());
     let mut rows = Vec::new();
     for tick in 0..20 {
         clock.set(tick * TICK_NS);

@@ -7,7 +7,7 @@ use adapters::simulated::{Simulated, SimulatedOffsets, SimulatedSettings};
 use adapters::words::execution;
 use adapters::{Sample, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Account, Book, Moved, OffsetBound, OffsetOutcome, Order, Shifted};
+use gateway::gate::offset::{Account, Book, Moved, OffsetBound, OffsetOrder, OffsetOutcome, Shifted};
 use gateway::gate::{Disarmed, Gate, Hold, OffsetVerdict};
 use rules::estimators::{Estimates, State};
 use rules::script::OffsetProposal;
@@ -50,13 +50,13 @@ fn judged(gate: &mut Gate, at_ns: i64, um: Option<f64>) -> Option<OffsetVerdict>
     gate.shift(&proposals, &sample, &estimates).pop()
 }
 
-fn answer(order: Order, result: Result<Option<Shifted>, SourceError>) -> Moved {
+fn answer(order: OffsetOrder, result: Result<Option<Shifted>, SourceError>) -> Moved {
     Moved { at_ns: 0, order, result, left: None, kept: Ok(()) }
 }
 
 /// A control that does what it is told, at once.
 fn obey(gate: &mut Gate, verdict: &OffsetVerdict) -> Option<f64> {
-    let Some(Order::Shift { wanted_um, .. }) = verdict.order else { return None };
+    let Some(OffsetOrder::Shift { wanted_um, .. }) = verdict.order else { return None };
     let (base_um, before_um, last) = (0.0, 0.0, LastWrite::InForce);
     let shifted = Shifted { before_um, base_um, asked_um: wanted_um, after_um: wanted_um, last };
     gate.offsets_mut().answered(&answer(verdict.order?, Ok(Some(shifted))));
@@ -146,7 +146,7 @@ fn without_a_proposal_the_shift_goes_back_by_steps_and_after_disarming_at_once()
     gate.offsets_mut().resume(Axis::Z, 9.0);
     gate.disarm(Disarmed::Person);
     let verdict = judged(&mut gate, 400 * SECOND_NS, Some(9.0)).expect("decided");
-    assert_eq!(verdict.order, Some(Order::Restore(Axis::Z)));
+    assert_eq!(verdict.order, Some(OffsetOrder::Restore(Axis::Z)));
     let mut keeping = Gate::new(offset_limits(GateMode::Armed));
     keeping = Gate::new(config::Gate {
         offset: config::Offset { restore: false, ..keeping.limits().offset.clone() },
@@ -191,11 +191,11 @@ impl Bench {
     }
 }
 
-fn shift(from_um: f64, wanted_um: f64) -> Order {
-    Order::Shift { axis: Axis::Z, from_um, wanted_um }
+fn shift(from_um: f64, wanted_um: f64) -> OffsetOrder {
+    OffsetOrder::Shift { axis: Axis::Z, from_um, wanted_um }
 }
 
-fn done(account: &mut Account, clock: &ManualClock, order: Order) -> Shifted {
+fn done(account: &mut Account, clock: &ManualClock, order: OffsetOrder) -> Shifted {
     account.carry_out(order, clock).result.expect("at rest").expect("something to do")
 }
 
@@ -211,9 +211,9 @@ fn the_simulated_control_counts_refuses_in_a_program_and_gives_back_what_the_ope
     assert_eq!((shifted.before_um, shifted.after_um, shifted.shift_um()), (40.0, 43.0, 3.0), "whole micrometres");
     // Another process of the gateway, which knows what this one has left.
     let mut account = bench.started();
-    let back = done(&mut account, clock, Order::Restore(Axis::Z));
+    let back = done(&mut account, clock, OffsetOrder::Restore(Axis::Z));
     assert_eq!((back.after_um, machine.offset_um(Axis::Z), machine.written().offsets), (40.0, 40.0, 2));
-    assert_eq!(account.carry_out(Order::Restore(Axis::Z), clock).result, Ok(None), "nothing is left");
+    assert_eq!(account.carry_out(OffsetOrder::Restore(Axis::Z), clock).result, Ok(None), "nothing is left");
     machine.protect_offsets(true);
     let held_back = account.carry_out(shift(0.0, 5.0), clock);
     assert_eq!(held_back.fault().map(|fault| fault.disarmed()), Some(Disarmed::Offset), "{held_back:?}");
@@ -231,7 +231,7 @@ fn what_the_operator_sets_anew_is_the_beginning_and_no_step_is_made_on_top_of_it
     let shifted = done(&mut account, clock, shift(0.0, 5.0));
     assert_eq!((shifted.base_um, shifted.after_um), (100.0, 105.0), "by a step from where the gate knows it to be");
     machine.set_offset(Axis::Z, 7.0);
-    let found = done(&mut account, clock, Order::Restore(Axis::Z));
+    let found = done(&mut account, clock, OffsetOrder::Restore(Axis::Z));
     assert_eq!((found.last, machine.offset_um(Axis::Z)), (LastWrite::Replaced, 7.0), "it is the operator's");
     assert_eq!(machine.written().offsets, 2);
 }
@@ -277,12 +277,12 @@ fn a_write_whose_end_nobody_saw_is_settled_by_looking_and_never_made_twice() {
                 account = bench.started();
             }
             let writes = machine.written().offsets;
-            let found = done(&mut account, clock, Order::Look(Axis::Z));
+            let found = done(&mut account, clock, OffsetOrder::Look(Axis::Z));
             let shift_um = if taken { 5.0 } else { 0.0 };
             assert_eq!((found.last, found.base_um, found.shift_um()), (last, 40.0, shift_um), "{restarted}");
             assert_eq!(machine.written().offsets, writes, "looking writes nothing");
             let mut account = bench.started();
-            account.carry_out(Order::Restore(Axis::Z), clock).result.expect("at rest");
+            account.carry_out(OffsetOrder::Restore(Axis::Z), clock).result.expect("at rest");
             assert_eq!(machine.offset_um(Axis::Z), 40.0, "what the operator had set, whatever happened");
         }
     }
@@ -313,17 +313,21 @@ fn what_is_in_doubt_is_looked_at_before_anything_is_written_and_other_axes_are_g
         let (sample, estimates) = resting(at_ns);
         gate.decide(None, &sample, &estimates);
         let verdicts = gate.shift(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, &estimates);
-        let mut orders: Vec<Order> = verdicts.into_iter().filter_map(|verdict| verdict.order).collect();
+        let mut orders: Vec<OffsetOrder> = verdicts.into_iter().filter_map(|verdict| verdict.order).collect();
         orders.extend(gate.looks(&sample, &estimates));
         orders
     };
-    assert_eq!(orders(&mut gate, 0), [Order::Look(Axis::Z)]);
+    assert_eq!(orders(&mut gate, 0), [OffsetOrder::Look(Axis::Z)]);
     assert_eq!(orders(&mut gate, 5 * SECOND_NS), [], "it has not been answered");
     let off = SourceError::Off { source_name: "test".to_owned() };
-    gate.offsets_mut().answered(&answer(Order::Look(Axis::Z), Err(off)));
-    assert_eq!(orders(&mut gate, 6 * SECOND_NS), [Order::Look(Axis::Z)], "again");
+    gate.offsets_mut().answered(&answer(OffsetOrder::Look(Axis::Z), Err(off)));
+    assert_eq!(orders(&mut gate, 6 * SECOND_NS), [OffsetOrder::Look(Axis::Z)], "again");
     let found = Shifted { before_um: 3.0, base_um: 0.0, asked_um: 3.0, after_um: 3.0, last: LastWrite::NotTaken };
-    gate.offsets_mut().answered(&answer(Order::Look(Axis::Z), Ok(Some(found))));
-    assert_eq!(orders(&mut gate, 7 * SECOND_NS), [Order::Shift { axis: Axis::Z, from_um: 3.0, wanted_um: 8.0 }]);
-    assert_eq!(orders(&mut gate, 70 * SECOND_NS), [Order::Restore(Axis::X)], "the configuration does not name it");
+    gate.offsets_mut().answered(&answer(OffsetOrder::Look(Axis::Z), Ok(Some(found))));
+    assert_eq!(orders(&mut gate, 7 * SECOND_NS), [OffsetOrder::Shift { axis: Axis::Z, from_um: 3.0, wanted_um: 8.0 }]);
+    assert_eq!(
+        orders(&mut gate, 70 * SECOND_NS),
+        [OffsetOrder::Restore(Axis::X)],
+        "the configuration does not name it"
+    );
 }

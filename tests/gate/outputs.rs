@@ -5,7 +5,7 @@ use adapters::clock::{Clock, ManualClock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, SourceError};
 use gateway::config::GateMode;
-use gateway::gate::{Gate, Outcome, Writer};
+use gateway::gate::{Gate, Outcome, OverrideWriter};
 use rules::script::{Host, ScriptFile};
 
 /// Asks for what the channel `temperature_1_c` says: numbers of every kind, and everything that is no number.
@@ -82,7 +82,7 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
         ..limits(GateMode::Armed)
     });
     gate.arm("fitter", Some(std::time::Duration::from_secs(86_400 * 300)), 0).expect("allowed");
-    let mut writer = Writer::new(Controller { writes: Vec::new() }, gate.limits());
+    let mut writer = OverrideWriter::new(Controller { writes: Vec::new() }, gate.limits());
     let (mut host, clock, cases) = (host(), ManualClock::at(0), cases());
     let (mut at_ns, mut told) = (0, [0_u64; 3]);
     for _ in 0..count {
@@ -107,7 +107,7 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
     (std::mem::take(&mut writer_actuator(writer).writes), told)
 }
 
-fn writer_actuator(writer: Writer<Controller>) -> Controller {
+fn writer_actuator(writer: OverrideWriter<Controller>) -> Controller {
     Controller { writes: writer.actuator().writes.clone() }
 }
 

@@ -5,7 +5,7 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
 use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Account, Book, Moved, Order};
+use gateway::gate::offset::{Account, Book, Moved, OffsetOrder};
 use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
 use gateway::pipeline::{NoStore, Pipeline};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
@@ -115,7 +115,8 @@ impl Bench {
         let sent: Vec<Ask> = judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
         let mut said = Vec::new();
         self.actuator_worker.step(&verdict, &sent, self.now_ns, |it| said.push(it));
-        let orders: Vec<Order> = self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
+        let orders: Vec<OffsetOrder> =
+            self.pipeline.shift(&self.sample).iter().filter_map(|verdict| verdict.order).collect();
         let gate = self.pipeline.gate_mut();
         self.actuator_worker.shift(&orders, gate.writes_offsets(), self.now_ns, |it| said.push(it));
         for it in said {

@@ -2,7 +2,7 @@
 
 use crate::fake_sink::{FakeSink, Seen};
 use adapters::{ChannelId, Sample, Slot, Value};
-use gateway::history::{Event, ExtraSeries, ExtraValue, Feed, Item, Options, Outbox, OutboxSettings, Writer};
+use gateway::history::{Event, ExtraSeries, ExtraValue, Item, Options, Outbox, OutboxReader, OutboxSettings, Writer};
 use gateway::sinks::{Board, Sinks, drive};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -110,7 +110,7 @@ fn numbers(seen: &Mutex<Seen>) -> Vec<u64> {
 }
 
 fn read(path: &Path, from: u64, to: u64) -> Vec<Item> {
-    Feed::open(path).expect("a history").read(from, to, usize::MAX).expect("readable").items
+    OutboxReader::open(path).expect("a history").read(from, to, usize::MAX).expect("readable").items
 }
 
 #[test]

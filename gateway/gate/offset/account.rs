@@ -6,7 +6,7 @@
 //! anew from what was found.
 
 use super::book::Book;
-use super::order::{Moved, Order, Shifted};
+use super::order::{Moved, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
 use adapters::offset::{Axis, LastWrite, Ledger, Left, OffsetSink, same};
@@ -30,7 +30,7 @@ impl Account {
     }
 
     /// Carries out an order.
-    pub fn carry_out(&mut self, order: Order, clock: &dyn Clock) -> Moved {
+    pub fn carry_out(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Moved {
         let at_ns = clock.now_ns();
         let axis = order.axis();
         let result = self.result(order, clock);
@@ -44,19 +44,19 @@ impl Account {
         self.ledgers[axis.index()].left()
     }
 
-    fn result(&mut self, order: Order, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
+    fn result(&mut self, order: OffsetOrder, clock: &dyn Clock) -> Result<Option<Shifted>, SourceError> {
         let axis = order.axis();
-        if matches!(order, Order::Restore(_)) && self.left(axis).is_none() {
+        if matches!(order, OffsetOrder::Restore(_)) && self.left(axis).is_none() {
             return Ok(None);
         }
         let before_um = self.sink.at_rest(clock, axis)?;
         let (base_um, last) = self.ledgers[axis.index()].settle(before_um);
         let asked_um = match order {
-            Order::Look(_) => before_um,
+            OffsetOrder::Look(_) => before_um,
             _ if last == LastWrite::Replaced => before_um,
-            Order::Shift { from_um, .. } if !same(from_um, before_um - base_um) => before_um,
-            Order::Shift { wanted_um, .. } => base_um + wanted_um.round().clamp(-MOST_UM, MOST_UM),
-            Order::Restore(_) => base_um,
+            OffsetOrder::Shift { from_um, .. } if !same(from_um, before_um - base_um) => before_um,
+            OffsetOrder::Shift { wanted_um, .. } => base_um + wanted_um.round().clamp(-MOST_UM, MOST_UM),
+            OffsetOrder::Restore(_) => base_um,
         };
         let after_um = match same(asked_um, before_um) {
             true => before_um,

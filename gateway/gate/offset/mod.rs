@@ -25,7 +25,7 @@ mod trail;
 
 pub use account::Account;
 pub use book::Book;
-pub use order::{Moved, Order, Shifted};
+pub use order::{Moved, OffsetOrder, Shifted};
 pub use trail::OffsetTrail;
 
 use super::hold::Hold;
@@ -76,7 +76,7 @@ pub struct OffsetVerdict {
     /// May it be written?
     pub armed: bool,
     /// What is to be written now.
-    pub order: Option<Order>,
+    pub order: Option<OffsetOrder>,
 }
 
 /// One axis that may be shifted.
@@ -147,7 +147,7 @@ impl Offsets {
     }
 
     /// What is to be looked at now, while nothing stands in the way.
-    pub(super) fn looks(&mut self, at_ns: TimeNs) -> Vec<Order> {
+    pub(super) fn looks(&mut self, at_ns: TimeNs) -> Vec<OffsetOrder> {
         self.slides.iter_mut().filter_map(|slide| slide.look(at_ns)).collect()
     }
 
@@ -206,16 +206,16 @@ impl Offsets {
     }
 
     /// An order that was not carried out.
-    pub fn withdrawn(&mut self, order: Order) {
+    pub fn withdrawn(&mut self, order: OffsetOrder) {
         self.of(order.axis(), |slide| slide.waiting = false);
     }
 
     /// What is to be given back at the end.
     #[must_use]
-    pub fn farewell(&self) -> Vec<Order> {
+    pub fn farewell(&self) -> Vec<OffsetOrder> {
         let restore = self.limits.restore && self.limits.mode == GateMode::Armed;
         let shifted = self.slides.iter().filter(|slide| restore && slide.shift_um != 0.0);
-        shifted.map(|slide| Order::Restore(slide.axis)).collect()
+        shifted.map(|slide| OffsetOrder::Restore(slide.axis)).collect()
     }
 }
 
@@ -250,13 +250,13 @@ impl Slide {
         !self.waiting && !self.unsettled
     }
 
-    fn look(&mut self, at_ns: TimeNs) -> Option<Order> {
+    fn look(&mut self, at_ns: TimeNs) -> Option<OffsetOrder> {
         let since_ns = |looked_ns: TimeNs| at_ns - looked_ns;
         let rested = self.looked_ns.is_none_or(|looked_ns| !(0..LOOK_EVERY_NS).contains(&since_ns(looked_ns)));
         let looks = self.unsettled && !self.waiting && rested;
         looks.then(|| {
             (self.waiting, self.looked_ns) = (true, Some(at_ns));
-            Order::Look(self.axis)
+            OffsetOrder::Look(self.axis)
         })
     }
 
@@ -290,12 +290,12 @@ impl Slide {
     }
 
     /// What is to be written: a step while armed; afterwards everything back, where that is configured.
-    fn order(&self, verdict: &OffsetVerdict, limits: &config::Offset) -> Option<Order> {
+    fn order(&self, verdict: &OffsetVerdict, limits: &config::Offset) -> Option<OffsetOrder> {
         if verdict.armed && !self.retired {
             let (axis, from_um, wanted_um) = (self.axis, self.shift_um, verdict.permitted_um);
-            let step = Order::Shift { axis, from_um, wanted_um };
+            let step = OffsetOrder::Shift { axis, from_um, wanted_um };
             return (verdict.permitted_um != self.shift_um).then_some(step);
         }
-        (limits.restore && self.shift_um != 0.0).then_some(Order::Restore(self.axis))
+        (limits.restore && self.shift_um != 0.0).then_some(OffsetOrder::Restore(self.axis))
     }
 }

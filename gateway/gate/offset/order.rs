@@ -7,7 +7,7 @@ use adapters::offset::{Axis, LastWrite, Left, same};
 
 /// What is to be done at the control.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Order {
+pub enum OffsetOrder {
     /// This shift from what the operator has set.
     Shift {
         /// Which axis.
@@ -23,7 +23,7 @@ pub enum Order {
     Look(Axis),
 }
 
-impl Order {
+impl OffsetOrder {
     /// Which axis.
     #[must_use]
     pub fn axis(self) -> Axis {
@@ -74,7 +74,7 @@ pub struct Moved {
     /// When it was carried out.
     pub at_ns: TimeNs,
     /// What was ordered.
-    pub order: Order,
+    pub order: OffsetOrder,
     /// What is in force now; nothing where there was nothing to give back.
     pub result: Result<Option<Shifted>, SourceError>,
     /// What is left in the control, by the account.

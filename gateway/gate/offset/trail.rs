@@ -1,6 +1,6 @@
 //! What of the offsets goes into the audit: each change of what is proposed and of what becomes of it, and each write.
 
-use super::order::{Moved, Order, Shifted};
+use super::order::{Moved, OffsetOrder, Shifted};
 use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::config;
 use crate::gate::trail::{Author, RowRate, words};
@@ -70,8 +70,8 @@ impl OffsetTrail {
         let axis = moved.order.axis();
         let author = &self.authors[axis.index()];
         let (script, script_version) = match moved.order {
-            Order::Shift { .. } => (author.script.clone(), author.version.clone()),
-            Order::Restore(_) | Order::Look(_) => (String::new(), String::new()),
+            OffsetOrder::Shift { .. } => (author.script.clone(), author.version.clone()),
+            OffsetOrder::Restore(_) | OffsetOrder::Look(_) => (String::new(), String::new()),
         };
         let signed = |row: Audit| Audit { script, script_version, ..row };
         match &moved.result {
@@ -88,19 +88,22 @@ impl OffsetTrail {
     }
 }
 
-fn verb(order: Order) -> &'static str {
+fn verb(order: OffsetOrder) -> &'static str {
     match order {
-        Order::Shift { .. } => "write",
-        Order::Restore(_) => "restore",
-        Order::Look(_) => "found",
+        OffsetOrder::Shift { .. } => "write",
+        OffsetOrder::Restore(_) => "restore",
+        OffsetOrder::Look(_) => "found",
     }
 }
 
 fn written(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
     let (base_um, shift_um) = (shifted.base_um, shifted.shift_um());
     let taken = if shifted.is_taken() { "" } else { "; the control shows something else than was written" };
-    let why =
-        if why.is_empty() || matches!(moved.order, Order::Restore(_)) { String::new() } else { format!("{why}: ") };
+    let why = if why.is_empty() || matches!(moved.order, OffsetOrder::Restore(_)) {
+        String::new()
+    } else {
+        format!("{why}: ")
+    };
     Audit {
         outcome: if shifted.is_taken() { "written" } else { "failed" }.to_owned(),
         before: Some(shifted.before_um),
@@ -114,7 +117,7 @@ fn written(moved: &Moved, shifted: &Shifted, why: &str) -> Audit {
 /// Nothing was written; what was found may be news.
 fn found(moved: &Moved, shifted: &Shifted) -> Option<Audit> {
     let (outcome, of_last) = match shifted.last {
-        LastWrite::InForce if !matches!(moved.order, Order::Look(_)) => return None,
+        LastWrite::InForce if !matches!(moved.order, OffsetOrder::Look(_)) => return None,
         LastWrite::InForce => ("settled", "as was known"),
         LastWrite::Taken => ("settled", "the write before, whose end nobody saw, was taken"),
         LastWrite::NotTaken => ("settled", "the write before, whose end nobody saw, was not taken"),

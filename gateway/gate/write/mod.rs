@@ -102,7 +102,7 @@ struct Pending {
 }
 
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
-pub struct Writer<A> {
+pub struct OverrideWriter<A> {
     actuator: A,
     pace: WriteSchedule,
     settle_ns: i64,
@@ -122,7 +122,7 @@ pub struct Writer<A> {
     pending: Option<Pending>,
 }
 
-impl<A: Actuator> Writer<A> {
+impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
     pub fn new(actuator: A, limits: &config::Gate) -> Self {
         let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);

@@ -1,7 +1,7 @@
 //! The enable is withdrawn: when nothing is asked for any more, at the end, and once after every start in case an earlier run
 //! could not. A withdrawal that the machine refuses is repeated until it is taken.
 
-use super::{Occasion, Pending, Writer, Written};
+use super::{Occasion, OverrideWriter, Pending, Written};
 use crate::gate::fault::Fault;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
@@ -40,7 +40,7 @@ impl Owed {
     }
 }
 
-impl<A: Actuator> Writer<A> {
+impl<A: Actuator> OverrideWriter<A> {
     /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
     pub fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
         if std::mem::take(&mut self.holding) {

@@ -19,20 +19,20 @@
 //! # Who does what
 //! `report` decides which values of a tick are worth sending, `gather` numbers them on the writer thread, `store` puts them
 //! into the transaction of the commit, `position` is the arithmetic of what is delivered, [`Outbox`] is the handle through
-//! which sinks read ([`Feed`]) and acknowledge.
+//! which sinks read ([`OutboxReader`]) and acknowledge.
 
-mod feed;
 mod gather;
 mod item;
 mod line;
 mod position;
+mod reader;
 mod report;
 mod shared;
 mod store;
 
-pub use feed::{Feed, Stretch};
 pub(crate) use gather::Gatherer;
 pub use item::{Cell, Content, Item, Reading, SeriesInfo};
 pub use position::Position;
+pub use reader::{OutboxReader, Stretch};
 pub use report::Settings;
 pub use shared::{Figures, Head, Outbox, Standing};

@@ -6,12 +6,12 @@ use adapters::clock::TimeNs;
 
 /// See the [module](self).
 #[derive(Debug, Default)]
-pub struct Seen {
+pub struct AcknowledgedAlarms {
     standing: Vec<String>,
     seen: Vec<Acknowledged>,
 }
 
-impl Seen {
+impl AcknowledgedAlarms {
     /// These alarms stand now.
     pub fn stand(&mut self, alarms: &[AlarmStatus]) {
         self.standing = alarms.iter().map(|alarm| alarm.code.clone()).collect();
@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn an_alarm_that_comes_again_has_not_been_seen() {
-        let mut seen = Seen::default();
+        let mut seen = AcknowledgedAlarms::default();
         assert!(!seen.acknowledge("overload", "Li", 5_000_000), "it does not stand");
         seen.stand(&[alarm("overload", 1)]);
         assert!(seen.acknowledge("overload", "Li", 5_000_000));

@@ -9,7 +9,7 @@ use adapters::{Fact, FactValue, Sample, SourceError};
 use std::time::Duration;
 
 /// See the [module](self).
-pub enum Feed {
+pub enum SampleFeed {
     /// One thread per source.
     Threads {
         /// The sources, in the order of precedence.
@@ -41,7 +41,7 @@ pub struct SourcePace {
     pub kept: Duration,
 }
 
-impl Feed {
+impl SampleFeed {
     /// The pace of each source that has been read.
     #[must_use]
     pub fn paces(&self, now_ns: TimeNs) -> Vec<Option<SourcePace>> {

@@ -20,7 +20,7 @@ pub struct Stretch {
 
 /// Reads items.
 #[derive(Debug)]
-pub struct Feed {
+pub struct OutboxReader {
     db: Connection,
     known: Known,
 }
@@ -28,7 +28,7 @@ pub struct Feed {
 /// A body that claims to be larger is damaged: a commit holds a minute at most.
 const BODY_BYTES_MAX: usize = 256_000_000;
 
-impl Feed {
+impl OutboxReader {
     /// Opens the history at `path`, which the gateway must have opened for writing before.
     ///
     /// # Errors

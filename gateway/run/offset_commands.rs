@@ -2,7 +2,7 @@
 
 use super::health::Health;
 use crate::cannot_run::CannotRun;
-use crate::gate::offset::{Account, Book, Moved, OffsetTrail, Order};
+use crate::gate::offset::{Account, Book, Moved, OffsetOrder, OffsetTrail};
 use crate::gate::{Gate, OffsetVerdict};
 use crate::history::{Audit, Command};
 use crate::log::{Notice, Severity};
@@ -16,7 +16,7 @@ const SOURCE: &str = "gate";
 
 /// See the [module](self).
 #[derive(Debug, Default)]
-pub struct Shifting {
+pub struct OffsetCommands {
     /// The control that is written to; none where nothing can be.
     target: Option<String>,
     /// What is left in each control.
@@ -27,7 +27,7 @@ pub struct Shifting {
     refused: Option<String>,
 }
 
-impl Shifting {
+impl OffsetCommands {
     /// With what an earlier run has left in this control, which the gate is told; it is looked at before anything is written.
     ///
     /// # Errors
@@ -149,9 +149,9 @@ fn left(book: &Book) -> Vec<(String, Axis, Left)> {
 #[must_use]
 pub fn command(moved: &Moved, row: &Audit, target: &str) -> Option<Command> {
     let verb = match moved.order {
-        Order::Shift { .. } => "shift",
-        Order::Restore(_) => "restore",
-        Order::Look(_) => return None,
+        OffsetOrder::Shift { .. } => "shift",
+        OffsetOrder::Restore(_) => "restore",
+        OffsetOrder::Look(_) => return None,
     };
     let outcome = match row.outcome.as_str() {
         "written" => "done",
