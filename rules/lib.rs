@@ -4,6 +4,7 @@
 //! decides; [`operations`] is what the process planner says. There is no clock, no IO, no thread and no `unsafe` here; time is an argument and randomness is seeded.
 
 pub mod estimators;
+pub mod linear;
 pub mod operations;
 pub mod physics;
 pub mod script;

@@ -45,7 +45,6 @@ mod inner_split;
 pub mod inputs;
 pub mod latent;
 mod levels;
-pub mod linear;
 pub mod live;
 mod load_dependent_noise;
 mod localised;
@@ -84,6 +83,7 @@ pub mod verdicts;
 pub mod wave;
 pub mod words;
 
+use crate::linear::columns as linear;
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
 pub use examine::{Examination, examine};

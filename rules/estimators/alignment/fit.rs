@@ -2,6 +2,7 @@
 
 use super::speed::{PREDICTORS, Running, Transient};
 use super::steady::steadied;
+use crate::linear::cholesky::{NormalEquations, Solved};
 
 /// Constant, and every predictor.
 const COLUMNS: usize = PREDICTORS + 1;
@@ -79,16 +80,6 @@ impl Fitted {
     }
 }
 
-/// Sums of products of the columns and the power.
-#[derive(Debug, Clone, Copy)]
-struct Normal {
-    xx: [[f64; COLUMNS]; COLUMNS],
-    xy: [f64; COLUMNS],
-    yy: f64,
-    y: f64,
-    rows: usize,
-}
-
 /// Which predictors take part besides those that always do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
@@ -109,14 +100,15 @@ impl Shape {
 
 /// Fits all transients together at one lag and window; a predictor that takes no part has the coefficient 0.
 pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: Shape) -> Fitted {
-    let mut normal = Normal { xx: [[0.0; COLUMNS]; COLUMNS], xy: [0.0; COLUMNS], yy: 0.0, y: 0.0, rows: 0 };
+    let mut sums = NormalEquations::<COLUMNS>::new();
     for one in ready {
         for (time_s, power_w) in &one.power {
             let Some(mean) = one.running.mean(time_s - lag_s, window_s) else { continue };
-            normal.add(&row(&mean, shape), *power_w);
+            sums.add(&row(&mean, shape), *power_w);
         }
     }
-    normal.solve()
+    let Solved { coefficients, rss, total, rows } = sums.solve();
+    Fitted { model: coefficients, rss, rows, total }
 }
 
 /// Residual sum of squares of one transient under a given model.
@@ -135,51 +127,4 @@ fn row(mean: &[f64; PREDICTORS], shape: Shape) -> [f64; COLUMNS] {
     let (up, down) = (with(shape.inertia, up), with(shape.inertia, down));
     let turning = with(shape.turning, turning);
     [1.0, linear, square, with(shape.cube, cube), up, down, with(shape.excess, start), turning]
-}
-
-impl Normal {
-    fn add(&mut self, row: &[f64; COLUMNS], power_w: f64) {
-        for (i, a) in row.iter().enumerate() {
-            self.xy[i] += a * power_w;
-            row.iter().enumerate().for_each(|(j, b)| self.xx[i][j] += a * b);
-        }
-        self.yy += power_w * power_w;
-        self.y += power_w;
-        self.rows += 1;
-    }
-
-    /// Cholesky of the columns scaled to length one; a column that says what others say gets 0.
-    fn solve(&self) -> Fitted {
-        let length: Vec<f64> = (0..COLUMNS).map(|i| self.xx[i][i].sqrt()).collect();
-        let scaled = |i: usize, j: usize| self.xx[i][j] / (length[i] * length[j]);
-        let mut lower = [[0.0; COLUMNS]; COLUMNS];
-        let mut used = [false; COLUMNS];
-        let mut half = [0.0; COLUMNS];
-        for i in 0..COLUMNS {
-            if length[i] <= 0.0 {
-                continue;
-            }
-            for j in (0..i).filter(|j| used[*j]).collect::<Vec<_>>() {
-                let inner: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
-                lower[i][j] = (scaled(i, j) - inner) / lower[j][j];
-            }
-            let rest = 1.0 - (0..i).map(|k| lower[i][k].powi(2)).sum::<f64>();
-            if rest < 1e-9 {
-                lower[i] = [0.0; COLUMNS];
-                continue;
-            }
-            used[i] = true;
-            lower[i][i] = rest.sqrt();
-            half[i] = (self.xy[i] / length[i] - (0..i).map(|k| lower[i][k] * half[k]).sum::<f64>()) / lower[i][i];
-        }
-        let mut model = [0.0; COLUMNS];
-        for i in (0..COLUMNS).rev().filter(|i| used[*i]).collect::<Vec<_>>() {
-            let inner: f64 = (i + 1..COLUMNS).map(|k| lower[k][i] * model[k] * length[k]).sum();
-            model[i] = (half[i] - inner) / lower[i][i] / length[i];
-        }
-        let explained: f64 = half.iter().map(|half| half * half).sum();
-        let rows = f64::from(u32::try_from(self.rows).unwrap_or(u32::MAX)).max(1.0);
-        let total = (self.yy - self.y * self.y / rows).max(0.0);
-        Fitted { model, rss: (self.yy - explained).max(0.0), rows: self.rows, total }
-    }
 }

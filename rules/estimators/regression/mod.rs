@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `least_squares` | [`fit`]: coefficients with intervals, and how good the fit is |
 //! | `prediction` | what a fit says at a new point, and tests between fits |
-//! | `orthogonal` | Householder QR of scaled columns, singular values |
 //! | `distributions` | Student's t and Fisher's F |
 //! | `series` | level and trend of noise that remembers |
 //! | `refusal` | why there is no number: what, where, and what to record instead |
@@ -12,7 +11,6 @@
 
 mod distributions;
 mod least_squares;
-mod orthogonal;
 mod plausible;
 mod prediction;
 mod refusal;

@@ -3,7 +3,7 @@
 //! The number of independent samples follows from the integrated autocorrelation time, summed while the sums of pairs are
 //! positive and falling. Source: Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992) 473, section 3.3.
 
-use super::orthogonal::product;
+use crate::linear::orthogonal::product;
 use crate::statistics::{count, median, robust_deviation};
 use serde::Serialize;
 

@@ -6,8 +6,8 @@
 
 use super::CONFIDENCE;
 use super::distributions::{t_quantile, t_two_sided};
-use super::orthogonal::{Factored, back_substitute, factor, inverse, product, singular_values};
 use super::refusal::{Refusal, RefusalKind};
+use crate::linear::orthogonal::{Factored, back_substitute, factor, inverse, product, singular_values};
 use crate::statistics::count;
 use serde::Serialize;
 

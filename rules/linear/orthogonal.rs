@@ -4,24 +4,24 @@
 //! Jacobi).
 
 /// Rows down, columns across: `columns[j][i]`.
-pub(super) type Columns = Vec<Vec<f64>>;
+pub(crate) type Columns = Vec<Vec<f64>>;
 
 /// `X D^-1 = Q R` with `D` the lengths of the columns.
 #[derive(Debug, Clone)]
-pub(super) struct Factored {
+pub(crate) struct Factored {
     /// Orthonormal columns, as many as X has.
-    pub(super) q: Columns,
+    pub(crate) q: Columns,
     /// Upper triangle, column by column, full height.
-    pub(super) r: Columns,
+    pub(crate) r: Columns,
     /// Length of each column of X.
-    pub(super) lengths: Vec<f64>,
+    pub(crate) lengths: Vec<f64>,
 }
 
-pub(super) fn product(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-pub(super) fn length(a: &[f64]) -> f64 {
+pub(crate) fn length(a: &[f64]) -> f64 {
     let greatest = a.iter().fold(0.0_f64, |greatest, x| greatest.max(x.abs()));
     if greatest == 0.0 { 0.0 } else { greatest * a.iter().map(|x| (x / greatest).powi(2)).sum::<f64>().sqrt() }
 }
@@ -32,7 +32,7 @@ fn reflect(v: &[f64], x: &mut [f64]) {
 }
 
 /// Factors columns of equal height, at least as high as there are columns, none of length zero.
-pub(super) fn factor(columns: &[Vec<f64>]) -> Factored {
+pub(crate) fn factor(columns: &[Vec<f64>]) -> Factored {
     let lengths: Vec<f64> = columns.iter().map(|column| length(column)).collect();
     let mut a: Columns =
         columns.iter().zip(&lengths).map(|(column, length)| column.iter().map(|x| x / length).collect()).collect();
@@ -72,7 +72,7 @@ fn upper(column: &[f64], k: usize, size: usize) -> Vec<f64> {
 }
 
 /// Solves `R x = b` for an upper triangle without zeros on the diagonal.
-pub(super) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
+pub(crate) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
     let mut x = b.to_vec();
     for i in (0..x.len()).rev() {
         let sum: f64 = (i + 1..x.len()).map(|j| r[j][i] * x[j]).sum();
@@ -82,13 +82,13 @@ pub(super) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
 }
 
 /// Inverse of an upper triangle, column by column.
-pub(super) fn inverse(r: &[Vec<f64>]) -> Columns {
+pub(crate) fn inverse(r: &[Vec<f64>]) -> Columns {
     let unit = |k| (0..r.len()).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     (0..r.len()).map(|k| back_substitute(r, &unit(k))).collect()
 }
 
 /// Singular values of a small square matrix and the right singular vector of the least, by one-sided Jacobi.
-pub(super) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let size = matrix.len();
     let mut a: Columns = matrix.to_vec();
     let mut v: Columns = (0..size).map(|k| (0..size).map(|i| if i == k { 1.0 } else { 0.0 }).collect()).collect();
