@@ -17,6 +17,7 @@ pub mod clock;
 pub mod driver;
 pub mod eda9033a;
 pub mod fanuc;
+pub mod histogram;
 pub mod hnc;
 pub mod merge;
 pub mod modbus;

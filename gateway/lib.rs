@@ -15,12 +15,16 @@ pub mod diagnosis;
 pub mod doctor;
 pub mod drafts;
 pub mod files;
+#[cfg(feature = "fleet")]
+pub mod fleet;
 pub mod gate;
 pub mod handbook;
 pub mod history;
 pub mod http;
 pub mod log;
 pub mod moment;
+pub mod monitoring;
+pub mod nats;
 pub mod operations;
 pub mod pipeline;
 pub mod records;

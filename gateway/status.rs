@@ -3,6 +3,7 @@
 //! The tick builds it a few times per second and hands it over whole, so that no reader ever waits for the tick or the
 //! tick for a reader. Every number carries its unit in its name or beside it; a missing one carries its reason.
 
+use adapters::histogram::Histogram;
 use serde::Serialize;
 
 /// A number or a word.
@@ -191,6 +192,12 @@ pub struct SourceStatus {
     pub round_trip_p50_ms: Option<f64>,
     /// See `round_trip_p50_ms`.
     pub round_trip_p99_ms: Option<f64>,
+    /// From asking to answer, of all polls; for the metrics.
+    #[serde(skip)]
+    pub round_trips: Histogram,
+    /// Since the last poll that succeeded, s; for the metrics.
+    #[serde(skip)]
+    pub lag_s: Option<f64>,
     /// Readings since the start.
     pub readings: u64,
     /// Failed polls since the start.
@@ -289,6 +296,9 @@ pub struct TickStatus {
     pub late_p50_ms: f64,
     /// See `late_p50_ms`.
     pub late_p99_ms: f64,
+    /// Lateness of all ticks; for the metrics.
+    #[serde(skip)]
+    pub late: Histogram,
     /// Ticks left out because the box was too late for them.
     pub skipped: u64,
 }

@@ -2,6 +2,7 @@
 
 use crate::clock::TimeNs;
 use crate::driver::{Fact, SourceError};
+use crate::histogram::Histogram;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -79,6 +80,10 @@ pub struct WorkerStats {
     pub lateness: Spread,
     /// Duration of a poll.
     pub round_trip: Spread,
+    /// Durations of all polls.
+    pub round_trips: Histogram,
+    /// Since the last poll that succeeded, s; `None` before the first.
+    pub lag_s: Option<f64>,
     /// Polls that ended.
     pub polls: u64,
     /// Polls that failed; a machine that is off does not count.
@@ -135,6 +140,8 @@ pub(super) struct Ledger {
     intervals: Window,
     lateness: Window,
     round_trip: Window,
+    round_trips: Histogram,
+    last_success_ns: Option<TimeNs>,
     polls: u64,
     failures: u64,
     missed: u64,
@@ -162,6 +169,8 @@ impl Ledger {
             intervals: Window::new(),
             lateness: Window::new(),
             round_trip: Window::new(),
+            round_trips: Histogram::default(),
+            last_success_ns: None,
             polls: 0,
             failures: 0,
             missed: 0,
@@ -195,6 +204,10 @@ impl Ledger {
         self.polls += 1;
         self.lateness.add((began_ns - due_ns).max(0));
         self.round_trip.add(ended_ns - began_ns);
+        self.round_trips.add_ns(ended_ns - began_ns);
+        if error.is_none() {
+            self.last_success_ns = Some(ended_ns);
+        }
         if let Some(last_ns) = self.last_began_ns {
             self.intervals.add(began_ns - last_ns);
             if self.latest.len() >= PACE_POLLS {
@@ -274,6 +287,8 @@ impl Ledger {
             period_kept: self.intervals.spread(),
             lateness: self.lateness.spread(),
             round_trip: self.round_trip.spread(),
+            round_trips: self.round_trips,
+            lag_s: self.last_success_ns.map(|last_ns| (now_ns - last_ns).max(0) as f64 / 1e9),
             polls: self.polls,
             failures: self.failures,
             missed: self.missed,

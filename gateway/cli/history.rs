@@ -1,7 +1,7 @@
 //! `cnc-gateway history`: what the box remembers.
 
 use super::{CannotRun, CommandResult, Outcome, print, print_json};
-use crate::history::{HistoryError, Query, Reader, SqlValue};
+use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of};
 use crate::moment;
 use crate::records::{RecordKind, RecordQuery, document, records};
 use crate::samples;
@@ -28,6 +28,8 @@ enum Question {
     Query(QueryArguments),
     /// Samples into a file: .csv, .csv.gz or .parquet, a recording that replay and diagnose read.
     Export(ExportArguments),
+    /// Whole days into a directory that DuckDB, ClickHouse or Spark read: machine=NAME/date=DAY.
+    Partitions(PartitionArguments),
     /// The audit of the gate: every request, refusal, write and arming.
     Audit(super::audit::AuditArguments),
     /// How much there is, how fast it grows and how long the disk lasts.
@@ -98,6 +100,44 @@ struct ExportArguments {
     selection: Selection,
 }
 
+#[derive(Debug, Args)]
+struct PartitionArguments {
+    /// The directory; it is made where it is missing.
+    directory: PathBuf,
+    /// Name of the machine in the path.
+    #[arg(long, value_name = "NAME")]
+    machine: String,
+    /// First day: 2026-01-31, or a time before the newest sample such as -7d; the first of the history when left out.
+    #[arg(long, allow_hyphen_values = true, value_name = "DAY")]
+    from: Option<String>,
+    /// Last day (included), in the same notation; the running day when left out, as far as it has got.
+    #[arg(long, allow_hyphen_values = true, value_name = "DAY")]
+    to: Option<String>,
+}
+
+impl PartitionArguments {
+    fn write(&self, reader: &Reader) -> CommandResult {
+        let span = reader.span().map_err(|error| cannot(&error))?;
+        let Some((first_ns, newest_ns)) = span else {
+            return Err(CannotRun::new("the history holds no samples", "let the gateway run first"));
+        };
+        let bad = |what: String| CannotRun::new(what, "");
+        let day = |text: &Option<String>, otherwise| match text {
+            Some(text) => moment::parse(text, newest_ns).map(day_of).map_err(bad),
+            None => Ok(day_of(otherwise)),
+        };
+        let (from_ns, to_ns) = (day(&self.from, first_ns)?, day(&self.to, newest_ns)?);
+        let mut day_ns = from_ns.max(day_of(first_ns));
+        while day_ns <= to_ns.min(newest_ns) {
+            let written = reader.export_day(&self.directory, &self.machine, day_ns).map_err(|error| cannot(&error))?;
+            let date: String = moment::utc(day_ns).chars().take(10).collect();
+            print(&format!("{date}: {} samples, {} diagnoses\n", written.samples, written.diagnoses));
+            day_ns += DAY_NS;
+        }
+        Ok(Outcome::Fine)
+    }
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 31_622_400.0 => Ok(seconds),
@@ -118,6 +158,7 @@ pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
             Ok(Outcome::Fine)
         }
         Question::Query(query) => query.answer(&reader, path),
+        Question::Partitions(partitions) => partitions.write(&reader),
         Question::Audit(audit) => super::audit::answer(&audit, &reader),
     }
 }

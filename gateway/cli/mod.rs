@@ -10,9 +10,12 @@ mod devices;
 mod diagnose;
 mod doctor;
 mod effects;
+#[cfg(feature = "fleet")]
+mod fleet;
 mod help;
 mod history;
 mod identify;
+mod metrics;
 mod person;
 mod replay;
 mod rules;
@@ -107,6 +110,13 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// Write the devices.xml with which an MTConnect agent reads this machine (sink shdr://).
     Devices(devices::DevicesArguments),
+    /// Dashboard and alert rules for Grafana and Prometheus.
+    #[command(subcommand)]
+    Metrics(metrics::Metrics),
+    /// Many boxes, one database: NATS JetStream into PostgreSQL.
+    #[cfg(feature = "fleet")]
+    #[command(subcommand)]
+    Fleet(fleet::Fleet),
     /// Serve the simulated machine over a real protocol, to try clients and scripts without a machine.
     #[command(subcommand)]
     Serve(serve::Served),
@@ -155,6 +165,9 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Rules(rules) => rules::run(&rules),
         Command::Doctor(doctor) => doctor::doctor(&doctor),
         Command::Devices(devices) => devices::run(&devices),
+        Command::Metrics(metrics) => metrics::run(metrics),
+        #[cfg(feature = "fleet")]
+        Command::Fleet(fleet) => fleet::run(fleet),
         Command::Serve(served) => serve::run(&served),
         Command::Help(topic) => help::help(&topic),
         Command::VendorChild(child) => vendor_child::run(&child),

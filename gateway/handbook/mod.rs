@@ -44,6 +44,7 @@ chapters! {
     "access",
     "page",
     "outputs",
+    "fleet",
     "mismatch",
     "twin",
     "measured",

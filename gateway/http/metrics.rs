@@ -5,7 +5,9 @@ use super::Shared;
 use super::problem::ApiProblem;
 use super::route::Route;
 use crate::alignment::AlignmentStatus;
+use crate::sinks::SinkStatus;
 use crate::status::{Shown, Status};
+use adapters::histogram::Histogram;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
@@ -52,6 +54,25 @@ impl Page {
         for (labels, value) in samples {
             let labels = if labels.is_empty() { labels } else { format!("{{{labels}}}") };
             let _written = writeln!(self.0, "{name}{labels} {value}");
+        }
+    }
+
+    /// One histogram for each pair of labels and durations.
+    fn histograms(&mut self, name: &str, help: &str, each: &[(String, Histogram)]) {
+        let mut counted = each.iter().filter(|(_, histogram)| histogram.count() > 0).peekable();
+        if counted.peek().is_none() {
+            return;
+        }
+        let _written = writeln!(self.0, "# HELP {name} {help}\n# TYPE {name} histogram");
+        for (labels, histogram) in counted {
+            let comma = if labels.is_empty() { "" } else { "," };
+            for (end_s, count) in histogram.cumulative() {
+                let _written = writeln!(self.0, "{name}_bucket{{{labels}{comma}le=\"{end_s}\"}} {count}");
+            }
+            let (count, sum_s) = (histogram.count(), histogram.sum_s());
+            let _written = writeln!(self.0, "{name}_bucket{{{labels}{comma}le=\"+Inf\"}} {count}");
+            let labels = if labels.is_empty() { String::new() } else { format!("{{{labels}}}") };
+            let _written = writeln!(self.0, "{name}_sum{labels} {sum_s}\n{name}_count{labels} {count}");
         }
     }
 
@@ -126,7 +147,42 @@ fn sources(page: &mut Page, status: &Status) {
         jitter,
     );
     let trip = each(|source| source.round_trip_p50_ms.map(|ms| ms / 1e3));
-    page.family("cncgw_source_round_trip_seconds", "gauge", "From asking to answer, median", trip);
+    page.family("cncgw_source_round_trip_median_seconds", "gauge", "From asking to answer, median", trip);
+    let lag = each(|source| source.lag_s);
+    page.family("cncgw_source_lag_seconds", "gauge", "Since the last poll that succeeded", lag);
+    let trips: Vec<_> = status.sources.iter().map(|one| (label("source", &one.name), one.round_trips)).collect();
+    page.histograms("cncgw_source_round_trip_seconds", "From asking to answer", &trips);
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a counter beyond 2^53 may lose its last digit")]
+fn sinks(page: &mut Page, status: &Status) {
+    let each = |value: fn(&SinkStatus) -> Option<f64>| {
+        let of = |sink: &SinkStatus| Some((label("sink", &sink.name), value(sink)?));
+        status.sinks.iter().filter_map(of).collect::<Vec<_>>()
+    };
+    let up = each(|sink| Some(f64::from(u8::from(sink.state == "connected" && !sink.failing))));
+    page.family("cncgw_sink_up", "gauge", "1 while the receiver takes what is sent", up);
+    let behind = each(|sink| Some(sink.behind_items as f64));
+    page.family("cncgw_sink_behind_items", "gauge", "Items that are not delivered", behind);
+    let lag = each(|sink| sink.behind_s);
+    page.family(
+        "cncgw_sink_lag_seconds",
+        "gauge",
+        "How much older than the newest the oldest undelivered item is",
+        lag,
+    );
+    let delivered = each(|sink| Some(sink.delivered as f64));
+    page.family("cncgw_sink_delivered_total", "counter", "Items delivered since the start", delivered);
+    let dropped = each(|sink| Some(sink.dropped as f64));
+    page.family("cncgw_sink_dropped_total", "counter", "Items that the bounds of the outbox dropped", dropped);
+    let refused = each(|sink| Some(sink.refused as f64));
+    page.family("cncgw_sink_refused_total", "counter", "Items that the receiver will never take", refused);
+    let connections = each(|sink| Some(sink.connections as f64));
+    page.family("cncgw_sink_connections_total", "counter", "Connections since the start", connections);
+    let fits = each(|sink| sink.outage_fits_h.map(|hours| hours * 3600.0));
+    page.family("cncgw_sink_outage_fits_seconds", "gauge", "How long an outage fits at the present rate", fits);
+    let delays: Vec<_> = status.sinks.iter().map(|one| (label("sink", &one.name), one.delays)).collect();
+    page.histograms("cncgw_sink_delay_seconds", "From the time of a value to its delivery, live data", &delays);
 }
 
 fn alignment(page: &mut Page, status: &Status) {
@@ -184,6 +240,7 @@ fn own(page: &mut Page, status: &Status) {
         "Lateness of the tick, 99th percentile",
         status.tick.late_p99_ms / 1e3,
     );
+    page.histograms("cncgw_tick_lateness_seconds", "Lateness of the ticks", &[(String::new(), status.tick.late)]);
     page.counter("cncgw_history_samples_total", "Samples acknowledged by the history", status.history.rows);
     page.counter("cncgw_history_lost_samples_total", "Samples that could not be stored", status.history.lost);
     page.gauge("cncgw_history_size_bytes", "Bytes of the history on disk", status.history.bytes as f64);
@@ -208,6 +265,7 @@ pub fn render(status: &Status) -> String {
     machine(&mut page, status);
     quantities(&mut page, status);
     sources(&mut page, status);
+    sinks(&mut page, status);
     alignment(&mut page, status);
     own(&mut page, status);
     page.0

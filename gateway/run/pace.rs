@@ -2,6 +2,7 @@
 
 use crate::control::Wake;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use adapters::histogram::Histogram;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -34,6 +35,7 @@ pub struct TickSchedule {
     period_ns: i64,
     due_ns: TimeNs,
     late_ns: Vec<i64>,
+    late: Histogram,
     cursor: usize,
     skipped: u64,
 }
@@ -65,7 +67,15 @@ impl TickSchedule {
 
     fn new(beat: Beat, due_ns: TimeNs, period: Duration) -> Self {
         let period_ns = i64::try_from(period.as_nanos()).unwrap_or(SECOND_NS).max(1);
-        Self { beat, period_ns, due_ns, late_ns: Vec::with_capacity(WINDOW), cursor: 0, skipped: 0 }
+        Self {
+            beat,
+            period_ns,
+            due_ns,
+            late_ns: Vec::with_capacity(WINDOW),
+            late: Histogram::default(),
+            cursor: 0,
+            skipped: 0,
+        }
     }
 
     /// Waits for the next tick and gives its time; `None` when it shall stop.
@@ -111,7 +121,14 @@ impl TickSchedule {
         (!stop.load(Ordering::SeqCst)).then_some(self.due_ns)
     }
 
+    /// Lateness of all ticks since the start.
+    #[must_use]
+    pub fn late(&self) -> Histogram {
+        self.late
+    }
+
     fn note(&mut self, late_ns: i64) {
+        self.late.add_ns(late_ns);
         if self.late_ns.len() < WINDOW {
             self.late_ns.push(late_ns);
         } else {

@@ -3,6 +3,7 @@
 use crate::alignment::Alignment;
 use crate::status::{FactStatus, Shown, SourceStatus};
 use adapters::clock::TimeNs;
+use adapters::histogram::Histogram;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
 use adapters::worker::{Poll, Worker, WorkerState, WorkerStats};
 use adapters::{Fact, FactValue, Sample, SourceError};
@@ -136,6 +137,8 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         jitter_p99_ms: known.then(|| milliseconds(stats.lateness.p99)),
         round_trip_p50_ms: known.then(|| milliseconds(stats.round_trip.p50)),
         round_trip_p99_ms: known.then(|| milliseconds(stats.round_trip.p99)),
+        round_trips: stats.round_trips,
+        lag_s: stats.lag_s,
         readings: counts.readings,
         failures: stats.failures,
         missed: stats.missed,
@@ -169,6 +172,8 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         jitter_p99_ms: None,
         round_trip_p50_ms: None,
         round_trip_p99_ms: None,
+        round_trips: Histogram::default(),
+        lag_s: None,
         readings: counts.readings,
         failures: counts.failures,
         missed: 0,

@@ -1,6 +1,8 @@
 //! Addresses of sinks: the notation of sources, with schemes of their own.
 
 use super::mqtt::MqttTarget;
+use super::nats::NatsSinkTarget;
+use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
 use adapters::address::{AddressError, Keys};
@@ -9,9 +11,12 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The schemes of the notation, each with how an address of it is written.
-pub const SCHEMES: [(&str, &str); 5] = [
+pub const SCHEMES: [(&str, &str); 8] = [
     ("mqtt", "mqtt://BROKER:1883/PREFIX"),
     ("mqtts", "mqtts://BROKER:8883/PREFIX"),
+    ("nats", "nats://SERVER:4222,SERVER:4222/PREFIX"),
+    ("natss", "natss://SERVER:4222,SERVER:4222/PREFIX"),
+    ("parquet", "parquet:DIRECTORY"),
     ("sparkplug", "sparkplug://BROKER:1883/GROUP/NODE/DEVICE"),
     ("shdr", "shdr://0.0.0.0:7878"),
     ("sparkplugs", "sparkplugs://BROKER:8883/GROUP/NODE/DEVICE"),
@@ -22,6 +27,10 @@ pub const SCHEMES: [(&str, &str); 5] = [
 pub enum SinkTarget {
     /// JSON documents on plain topics.
     Mqtt(MqttTarget),
+    /// A stream of NATS JetStream.
+    Nats(NatsSinkTarget),
+    /// A file of columns for each day.
+    Parquet(ParquetTarget),
     /// Lines for MTConnect agents.
     Shdr(ShdrTarget),
     /// Sparkplug B.
@@ -53,6 +62,8 @@ impl SinkAddress {
     pub fn check(&self) -> Vec<(String, String)> {
         match &self.target {
             SinkTarget::Mqtt(target) => target.broker.check(),
+            SinkTarget::Nats(target) => target.servers.check(),
+            SinkTarget::Parquet(target) => target.check(),
             SinkTarget::Shdr(_) => Vec::new(),
             SinkTarget::Sparkplug(target) => target.broker.check(),
         }
@@ -108,6 +119,8 @@ fn no_scheme() -> String {
 fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String> {
     match scheme {
         "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
+        "nats" | "natss" => NatsSinkTarget::parse(body, keys, scheme == "natss").map(SinkTarget::Nats),
+        "parquet" => ParquetTarget::parse(body, keys).map(SinkTarget::Parquet),
         "shdr" => ShdrTarget::parse(body, keys).map(SinkTarget::Shdr),
         "sparkplug" | "sparkplugs" => {
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)

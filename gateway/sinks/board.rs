@@ -5,6 +5,7 @@ use super::status::SinkStatus;
 use crate::history::Outbox;
 use crate::status::Problem;
 use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::histogram::Histogram;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What one task tells of itself.
@@ -15,6 +16,7 @@ pub(super) struct Progress {
     pub(super) refused: u64,
     pub(super) connections: u64,
     pub(super) delay_s: Option<f64>,
+    pub(super) delays: Histogram,
     pub(super) error: Option<String>,
     pub(super) failing: bool,
     /// Time of the newest delivered item of the oldest gap, or of live data where there is no gap.
@@ -97,6 +99,7 @@ impl Board {
                 behind_s: if behind_items == 0 { Some(0.0) } else { age.map(|age| age.max(0.0)) },
                 delivered: progress.delivered,
                 delay_s: progress.delay_s,
+                delays: progress.delays,
                 dropped: standing.map_or(0, |standing| standing.dropped),
                 refused: progress.refused,
                 connections: progress.connections,

@@ -3,6 +3,7 @@
 use super::{SinkAddress, SinkError, open};
 use crate::history::{Outbox, OutboxSettings};
 use serde_json::json;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// A receiver that takes longer than this does not answer.
@@ -20,7 +21,7 @@ pub struct Found {
 /// Connects to the receiver once.
 pub async fn examine(address: &SinkAddress) -> Found {
     let outbox = Outbox::new("doctor", OutboxSettings::default(), []);
-    let mut sink = open(address, "doctor", &outbox);
+    let mut sink = open(address, "doctor", &outbox, Path::new(""));
     let began = Instant::now();
     let connected = tokio::time::timeout(DEADLINE, sink.probe()).await;
     let connected_ms = began.elapsed().as_secs_f64() * 1e3;

@@ -33,7 +33,7 @@ pub struct Sinks {
 /// opened later. Call it within a runtime.
 #[must_use]
 pub fn start(sinks: &[(String, SinkAddress)], outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
-    let opened = sinks.iter().map(|(name, address)| (name.clone(), open(address, name, outbox)));
+    let opened = sinks.iter().map(|(name, address)| (name.clone(), open(address, name, outbox, path)));
     start_with(opened.collect(), outbox, board, path)
 }
 
@@ -233,6 +233,7 @@ impl Task {
             }
             if !historical {
                 progress.delay_s = delay_s;
+                delay_s.into_iter().for_each(|delay_s| progress.delays.add_s(delay_s));
             }
         });
     }

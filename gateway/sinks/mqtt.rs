@@ -62,12 +62,18 @@ impl MqttSink {
     }
 
     fn message(&self, item: &Item, historical: bool) -> Outgoing {
-        let mut document = item.json();
-        document["machine"] = Json::from(self.outbox.machine());
-        document["box"] = Json::from(self.outbox.box_id());
-        document["historical"] = Json::from(historical);
+        let document = document(&self.outbox, item, historical);
         Outgoing { topic: self.topic(item.kind()), payload: document.to_string().into_bytes(), retain: false }
     }
+}
+
+/// The document of an item, with who made it and whether it comes late.
+pub(super) fn document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
+    let mut document = item.json();
+    document["machine"] = Json::from(outbox.machine());
+    document["box"] = Json::from(outbox.box_id());
+    document["historical"] = Json::from(historical);
+    document
 }
 
 impl Sink for MqttSink {

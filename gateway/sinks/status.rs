@@ -1,5 +1,6 @@
 //! How each sink is doing, for the status, the page and the metrics.
 
+use adapters::histogram::Histogram;
 use serde::Serialize;
 
 /// One sink.
@@ -19,6 +20,9 @@ pub struct SinkStatus {
     pub delivered: u64,
     /// From the time of the newest delivered item to its delivery, s; of live data only.
     pub delay_s: Option<f64>,
+    /// The same of all batches of live data; for the metrics.
+    #[serde(skip)]
+    pub delays: Histogram,
     /// Items that the bounds of the outbox dropped before they were delivered, since the sink was first configured.
     pub dropped: u64,
     /// Items that the receiver will never take, since the start.

@@ -25,7 +25,8 @@ impl Sending {
         Self::at_speed("20", address, "")
     }
 
-    fn at_speed(speed: &'static str, address: &str, more: &str) -> Self {
+    /// The same so many times as fast.
+    pub(crate) fn at_speed(speed: &'static str, address: &str, more: &str) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let config = format!(
             "[gateway]\nname = \"Lathe 7\"\n[[source]]\naddress = \"simulated://lathe?seed=3\"\n\
@@ -47,6 +48,11 @@ impl Sending {
 
     pub(crate) fn database(&self) -> PathBuf {
         self.directory.path().join("data/history.db")
+    }
+
+    /// `127.0.0.1:PORT` of its page.
+    pub(crate) fn page(&self) -> &str {
+        &self.page
     }
 
     pub(crate) fn status(&self) -> Json {

@@ -12,6 +12,7 @@ mod broker;
 #[path = "../support/port.rs"]
 mod port;
 
+#[expect(dead_code, reason = "the tests of the fleet use the rest of it")]
 mod box_under_test;
 mod certificates;
 mod delivery;

@@ -5,7 +5,10 @@
 
 mod csv;
 mod parquet;
+mod partitions;
 mod recording;
+
+pub use partitions::{DayWritten, day_file, day_of};
 
 use super::error::{Doing, HistoryError, at};
 use super::query::Query;
@@ -94,7 +97,7 @@ impl Reader {
         match format {
             Format::Csv => csv::write(self, query, &plan, out, path),
             Format::CsvGz => csv::write_gzip(self, query, &plan, out, path),
-            Format::Parquet => parquet::write(self, query, &plan, out, path),
+            Format::Parquet => parquet::write(self, query, &plan, &[], out, path),
         }
     }
 

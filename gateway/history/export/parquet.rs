@@ -4,10 +4,12 @@ use super::super::error::{HistoryError, at};
 use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
+use super::super::record::Diagnosis;
 use super::{Plan, RUN, run_text};
 use ::parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{Type, TypePtr};
@@ -31,16 +33,17 @@ pub(super) fn write(
     reader: &Reader,
     query: &Query,
     plan: &Plan,
+    about: &[(String, String)],
     out: impl Write + Send,
     path: &Path,
 ) -> Result<u64, HistoryError> {
     let say = |error: ParquetError| at(path)(std::io::Error::other(error));
     let mut group = Group::new(plan);
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_created_by(concat!("cnc-gateway ", env!("CARGO_PKG_VERSION")).to_owned());
+    let numbers = plan.series.iter().filter(|(series, _)| series.kind == SeriesKind::Number);
+    let units = numbers.map(|(series, _)| (format!("unit.{}", series.name), series.unit.to_string()));
     let schema = schema(plan).map_err(say)?;
-    let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties.build())).map_err(say)?;
+    let properties = properties(about.iter().cloned().chain(units));
+    let mut file = SerializedFileWriter::new(out, schema, properties).map_err(say)?;
     let mut problem = None;
     let mut rows = 0;
     reader.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
@@ -59,6 +62,58 @@ pub(super) fn write(
     file.finish().map_err(say)?;
     file.inner_mut().flush().map_err(at(path))?;
     Ok(rows)
+}
+
+/// Compressed, with these pairs in the metadata of the file.
+fn properties(pairs: impl Iterator<Item = (String, String)>) -> Arc<WriterProperties> {
+    let pairs = pairs.map(|(key, value)| KeyValue::new(key, value)).collect();
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_key_value_metadata(Some(pairs))
+        .set_created_by(concat!("cnc-gateway ", env!("CARGO_PKG_VERSION")).to_owned());
+    Arc::new(properties.build())
+}
+
+/// Writes diagnoses: `time_utc`, `from_utc`, `to_utc`, `verdict`, `summary`, `diagnosis` (JSON).
+pub(super) fn write_diagnoses(
+    rows: &[Diagnosis],
+    machine: &str,
+    out: impl Write + Send,
+    path: &Path,
+) -> Result<u64, HistoryError> {
+    let say = |error: ParquetError| at(path)(std::io::Error::other(error));
+    let fields = || -> Result<Vec<TypePtr>, ParquetError> {
+        let times = ["time_utc", "from_utc", "to_utc"].map(utc_field);
+        let texts = ["verdict", "summary", "diagnosis"].map(text_field);
+        times.into_iter().chain(texts).collect()
+    };
+    let schema = fields().and_then(|fields| Type::group_type_builder("diagnoses").with_fields(fields).build());
+    let about = [("machine".to_owned(), machine.to_owned())];
+    let properties = properties(about.into_iter());
+    let mut file = SerializedFileWriter::new(out, Arc::new(schema.map_err(say)?), properties).map_err(say)?;
+    let mut group = file.next_row_group().map_err(say)?;
+    let mut index = 0;
+    while let Some(column) = group.next_column().map_err(say)? {
+        if index < 3 {
+            let times: Vec<i64> = rows.iter().map(|row| [row.at_ns, row.from_ns, row.to_ns][index]).collect();
+            put::<Int64Type>(column, &times, None).map_err(say)?;
+        } else {
+            let texts: Vec<ByteArray> =
+                rows.iter().map(|row| [&row.verdict, &row.summary, &row.json][index - 3].as_str().into()).collect();
+            put::<ByteArrayType>(column, &texts, Some(&vec![1; rows.len()])).map_err(say)?;
+        }
+        index += 1;
+    }
+    group.close().map_err(say)?;
+    file.finish().map_err(say)?;
+    file.inner_mut().flush().map_err(at(path))?;
+    Ok(rows.len() as u64)
+}
+
+fn utc_field(name: &str) -> Result<TypePtr, ParquetError> {
+    let utc = LogicalType::timestamp(true, TimeUnit::NANOS);
+    let field = Type::primitive_type_builder(name, Physical::INT64).with_logical_type(Some(utc));
+    field.with_repetition(Repetition::REQUIRED).build().map(Arc::new)
 }
 
 fn schema(plan: &Plan) -> Result<TypePtr, ParquetError> {

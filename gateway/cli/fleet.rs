@@ -1,0 +1,171 @@
+//! `cnc-gateway fleet`: many boxes, one database.
+
+use super::{CannotRun, CommandResult, Outcome, print};
+use crate::fleet::ingest::{self, Done, Settings};
+use crate::fleet::{DatabaseSettings, SAME_FINDING, SAME_FINDING_PARQUET, SCHEMA, cluster};
+use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
+use crate::signals::{Request, Signals};
+use clap::{Args, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What is asked for.
+#[derive(Debug, Subcommand)]
+pub(super) enum Fleet {
+    /// Take what the boxes send from a NATS JetStream stream, and write it into PostgreSQL.
+    Ingest(IngestArguments),
+    /// Create the stream that takes what the boxes send, unless it is there.
+    Stream(StreamArguments),
+    /// Print the tables, or a question over all machines.
+    Sql {
+        /// Which text.
+        #[arg(value_enum)]
+        text: Text,
+    },
+}
+
+/// A text in SQL.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Text {
+    /// The tables and views that `fleet ingest` creates.
+    Tables,
+    /// Which machines have had the same finding of the twin (PostgreSQL).
+    SameFinding,
+    /// The same over Parquet partitions (DuckDB).
+    SameFindingParquet,
+}
+
+/// The stream.
+#[derive(Debug, Args)]
+pub(super) struct StreamArguments {
+    /// The cluster and the beginning of the subjects: nats://SERVER:4222,SERVER:4222/PREFIX, the same as in the boxes' [[sink]].
+    address: String,
+    /// Name of the stream.
+    #[arg(long, default_value = "CNC", value_name = "NAME")]
+    stream: String,
+    /// On how many servers it lies; with 3 one may fail.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=5))]
+    replicas: u32,
+    /// How long messages are kept, days.
+    #[arg(long, default_value_t = 7, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=3660))]
+    max_age_d: u32,
+    /// Greatest size on each server, GB; beyond it new messages are refused and wait in the boxes.
+    #[arg(long, default_value_t = 10.0, value_name = "GB")]
+    max_gb: f64,
+}
+
+/// From the stream into the database.
+#[derive(Debug, Args)]
+pub(super) struct IngestArguments {
+    #[command(flatten)]
+    stream: StreamArguments,
+    /// The database: postgres://USER@HOST:5432/DATABASE. A server elsewhere belongs behind a private network or a TLS tunnel.
+    #[arg(long, value_name = "ADDRESS")]
+    database: String,
+    /// The file whose first line is the password of the database.
+    #[arg(long, value_name = "FILE")]
+    password_file: Option<PathBuf>,
+    /// Name of the durable consumer; all that share the work give the same.
+    #[arg(long, default_value = "fleet", value_name = "NAME")]
+    consumer: String,
+    /// End when nothing is left to do, instead of waiting for more.
+    #[arg(long)]
+    once: bool,
+}
+
+impl From<NatsError> for CannotRun {
+    fn from(error: NatsError) -> Self {
+        Self::new(error.what, error.next)
+    }
+}
+
+/// A second copy of a message within this time is not stored a second time; PostgreSQL recognises later ones.
+const DUPLICATE_WINDOW: Duration = Duration::from_secs(120);
+
+impl StreamArguments {
+    fn settings(&self) -> Result<(NatsTarget, StreamSettings), CannotRun> {
+        let (servers, prefix) = cluster(&self.address).map_err(|what| CannotRun::new(what, ""))?;
+        let plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
+        if self.stream.is_empty() || !self.stream.chars().all(plain) {
+            return Err(CannotRun::new(
+                format!("{:?} is no name of a stream", self.stream),
+                "use letters, digits, - and _",
+            ));
+        }
+        if !(self.max_gb > 0.0 && self.max_gb <= 1e6) {
+            return Err(CannotRun::new("--max-gb is out of range", "give a size above 0"));
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the range that was checked"
+        )]
+        let max_bytes = (self.max_gb * 1e9) as u64;
+        let settings = StreamSettings {
+            name: self.stream.clone(),
+            subjects: format!("{prefix}.>"),
+            replicas: self.replicas,
+            max_age: Duration::from_secs(86_400 * u64::from(self.max_age_d)),
+            max_bytes,
+            duplicate_window: DUPLICATE_WINDOW,
+        };
+        Ok((servers, settings))
+    }
+}
+
+/// Does what is asked for.
+pub(super) fn run(fleet: Fleet) -> CommandResult {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(|error| CannotRun::new(format!("no threads: {error}"), ""))?;
+    match fleet {
+        Fleet::Ingest(arguments) => runtime.block_on(ingest(&arguments)),
+        Fleet::Stream(arguments) => runtime.block_on(stream(&arguments)),
+        Fleet::Sql { text } => {
+            print(match text {
+                Text::Tables => SCHEMA,
+                Text::SameFinding => SAME_FINDING,
+                Text::SameFindingParquet => SAME_FINDING_PARQUET,
+            });
+            Ok(Outcome::Fine)
+        }
+    }
+}
+
+async fn stream(arguments: &StreamArguments) -> CommandResult {
+    let (servers, settings) = arguments.settings()?;
+    let mut connection = Connection::open(&servers, 0, "cnc-gateway fleet stream").await?;
+    let created = connection.create_stream(&settings).await?;
+    let (messages, bytes) = connection.stream_size(&settings.name).await?;
+    let StreamSettings { name, subjects, replicas, .. } = &settings;
+    print(&match created {
+        true => format!("stream {name} created for {subjects}, on {replicas} server(s)\n"),
+        false => format!("stream {name} is there: {messages} messages, {:.1} MB\n", bytes as f64 / 1e6),
+    });
+    Ok(Outcome::Fine)
+}
+
+async fn ingest(arguments: &IngestArguments) -> CommandResult {
+    let (servers, stream) = arguments.stream.settings()?;
+    let settings = Settings {
+        servers,
+        stream,
+        consumer: arguments.consumer.clone(),
+        database: DatabaseSettings {
+            address: arguments.database.clone(),
+            password_file: arguments.password_file.clone(),
+        },
+        once: arguments.once,
+    };
+    let mut signals =
+        Signals::listen().map_err(|error| CannotRun::new(format!("signals cannot be heard: {error}"), ""))?;
+    let stopped = async { while signals.next().await != Request::Stop {} };
+    tokio::select! {
+        ended = ingest::run(&settings) => {
+            let Done { new, known, refused } = ended?;
+            print(&format!("{new} rows written, {known} known already, {refused} refused\n"));
+        }
+        // What was not committed was not acknowledged: it is given out again.
+        () = stopped => {}
+    }
+    Ok(Outcome::Fine)
+}

@@ -1,0 +1,113 @@
+//! Days as files for a data lake: `ROOT/samples/machine=M/date=D/samples.parquet`, and beside it
+//! `ROOT/diagnoses/machine=M/date=D/diagnoses.parquet`.
+//!
+//! The layout is that of Hive, which `DuckDB`, `ClickHouse`, Spark and pandas read as two further columns. Days are those of
+//! UTC. A file appears whole or not at all: it is written under another name first. Units and the name of the machine stand
+//! in the metadata of the file as `unit.<column>` and `machine`.
+
+use super::super::error::{HistoryError, at};
+use super::super::list::Span;
+use super::super::options::DAY_NS;
+use super::super::query::Query;
+use super::super::reader::Reader;
+use super::parquet;
+use adapters::clock::TimeNs;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+/// What a day brought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DayWritten {
+    /// Rows of samples.
+    pub samples: u64,
+    /// Diagnoses.
+    pub diagnoses: u64,
+}
+
+/// Beginning of the UTC day that holds this time.
+#[must_use]
+pub fn day_of(at_ns: TimeNs) -> TimeNs {
+    at_ns.div_euclid(DAY_NS) * DAY_NS
+}
+
+/// Letters, digits, `-`, `_` and `.` stay; every other byte is escaped with `%`, as Hive does.
+fn escaped(name: &str) -> String {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+    name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
+}
+
+/// The file of a machine and day for one kind of rows.
+#[must_use]
+pub fn day_file(root: &Path, kind: &str, machine: &str, day_ns: TimeNs) -> PathBuf {
+    let date: String = crate::moment::utc(day_ns).chars().take(10).collect();
+    root.join(kind)
+        .join(format!("machine={}", escaped(machine)))
+        .join(format!("date={date}"))
+        .join(format!("{kind}.parquet"))
+}
+
+impl Reader {
+    /// Writes the files of the UTC day that begins at `day_ns`; an older file of that day is replaced. Without samples there
+    /// is no file of samples, without a diagnosis none of diagnoses.
+    ///
+    /// # Errors
+    /// As [`Reader::export`].
+    pub fn export_day(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<DayWritten, HistoryError> {
+        let mut written = DayWritten::default();
+        let query = Query::between(day_ns, day_ns + DAY_NS);
+        if self.has_samples(&query)? {
+            let plan = self.plan(&query)?;
+            let about = [("machine".to_owned(), machine.to_owned())];
+            written.samples = whole(&day_file(root, "samples", machine, day_ns), |out, path| {
+                parquet::write(self, &query, &plan, &about, out, path)
+            })?;
+        }
+        let diagnoses = self.diagnoses(Span { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
+        if !diagnoses.is_empty() {
+            written.diagnoses = whole(&day_file(root, "diagnoses", machine, day_ns), |out, path| {
+                parquet::write_diagnoses(&diagnoses, machine, out, path)
+            })?;
+        }
+        Ok(written)
+    }
+
+    fn has_samples(&self, query: &Query) -> Result<bool, HistoryError> {
+        let mut found = false;
+        let one = self.series()?.first().map(|series| series.name.to_string());
+        self.samples(&Query { series: one.into_iter().collect(), ..query.clone() }, |chunk| {
+            found = !chunk.at_ns.is_empty();
+            std::ops::ControlFlow::Break(())
+        })?;
+        Ok(found)
+    }
+}
+
+/// Writes a file under another name, and gives it its own when it is complete.
+fn whole(
+    path: &Path,
+    write: impl FnOnce(BufWriter<File>, &Path) -> Result<u64, HistoryError>,
+) -> Result<u64, HistoryError> {
+    let directory = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(directory).map_err(at(directory))?;
+    let beside = path.with_extension("part");
+    let file = File::create(&beside).map_err(at(&beside))?;
+    let rows = write(BufWriter::with_capacity(1 << 16, file), &beside)?;
+    File::open(&beside).and_then(|file| file.sync_all()).map_err(at(&beside))?;
+    fs::rename(&beside, path).map_err(at(path))?;
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_machines_become_names_of_directories() {
+        let file = day_file(Path::new("/lake"), "samples", "Lathe 7/车", 1_769_847_300_100_000_000);
+        let text = file.display().to_string();
+        assert_eq!(text, "/lake/samples/machine=Lathe%207%2F%E8%BD%A6/date=2026-01-31/samples.parquet");
+        assert_eq!(day_of(1_769_847_300_100_000_000) % DAY_NS, 0);
+        assert!(day_of(-1) < 0);
+    }
+}

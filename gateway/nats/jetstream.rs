@@ -1,0 +1,275 @@
+//! JetStream: publishing with acknowledgement, streams, durable consumers.
+//!
+//! The server's interface is requests with JSON on subjects that begin with `$JS.API`
+//! (<https://docs.nats.io/reference/reference-protocols/nats_api_reference>).
+
+use super::connection::{Connection, DEADLINE, Message};
+use super::{NatsError, words};
+use serde_json::{Value as Json, json};
+use std::time::Duration;
+use tokio::time::{Instant, timeout_at};
+
+/// Nobody listens on this subject.
+const NO_RESPONDERS: u16 = 503;
+/// Error numbers that say that this message will never be taken: larger than the stream allows.
+const TOO_LARGE: [u64; 1] = [10054];
+/// A message that is not acknowledged within this time is given out again: ten times what a batch takes on a slow computer. Too
+/// short, and work is done twice; too long, and rows of a reader that died come late.
+const ACKNOWLEDGE_WITHIN: Duration = Duration::from_secs(10);
+/// Messages that may be under way to all readers of one consumer together.
+const UNDER_WAY_MAX: u64 = 20_000;
+
+/// A message to be stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Its subject.
+    pub subject: String,
+    /// What makes a second copy recognisable within the stream's window.
+    pub id: String,
+    /// Its content.
+    pub payload: Vec<u8>,
+}
+
+/// Why a message was not stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Failure {
+    /// The connection, or the cluster for the time being.
+    Line(NatsError),
+    /// This message will never be stored.
+    Message(NatsError),
+}
+
+/// How a stream is created.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StreamSettings {
+    /// Its name.
+    pub name: String,
+    /// What it takes, such as `cnc.>`.
+    pub subjects: String,
+    /// On how many servers it lies: 1, 3 or 5.
+    pub replicas: u32,
+    /// How long a message is kept.
+    pub max_age: Duration,
+    /// Greatest size, bytes. Beyond it new messages are refused, and the boxes keep them.
+    pub max_bytes: u64,
+    /// A second message with the same id within this time is not stored.
+    pub duplicate_window: Duration,
+}
+
+/// How far the readers of a consumer are behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Backlog {
+    /// Messages that nobody has been given.
+    pub pending: u64,
+    /// Messages that are given out and not acknowledged.
+    pub under_way: u64,
+}
+
+fn nanoseconds(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// The error of an answer, with its number.
+fn refusal(answer: &Json) -> Option<(u64, String)> {
+    let error = answer.get("error")?;
+    let code = error["err_code"].as_u64().or(error["code"].as_u64()).unwrap_or(0);
+    Some((code, error["description"].as_str().unwrap_or("no description").to_owned()))
+}
+
+impl Connection {
+    /// Stores the messages in this order and waits until all are acknowledged; how many of them were there already.
+    ///
+    /// # Errors
+    /// The index of the first that is not stored, and why.
+    pub async fn publish_all(&mut self, messages: &[Outgoing]) -> Result<u64, (usize, Failure)> {
+        let oversize = |message: &Outgoing| message.payload.len() + message.id.len() + 40 > self.max_payload();
+        let sendable = messages.iter().position(oversize).unwrap_or(messages.len());
+        let mut first_token = None;
+        for message in &messages[..sendable] {
+            let (reply, token) = self.answer_subject();
+            first_token.get_or_insert(token);
+            self.put(&message.subject, Some(&reply), Some(&message.id), &message.payload);
+        }
+        let first_token = first_token.unwrap_or(0);
+        let mut open: Vec<bool> = vec![true; sendable];
+        let (mut left, mut duplicates) = (sendable, 0);
+        let mut failed: Option<(usize, Failure)> = None;
+        let until = Instant::now() + DEADLINE;
+        while left > 0 {
+            let first_open = open.iter().position(|open| *open).unwrap_or(0);
+            let line = |error| (first_open, Failure::Line(error));
+            let waited = timeout_at(until, self.next()).await;
+            let late = |_| line(words::silent(self.at(), "a message is not acknowledged"));
+            let came = waited.map_err(late)?.map_err(line)?;
+            let index = self.token_of(&came).and_then(|token| token.checked_sub(first_token));
+            let index =
+                index.and_then(|index| usize::try_from(index).ok()).filter(|index| open.get(*index) == Some(&true));
+            let Some(index) = index else { continue };
+            (open[index], left) = (false, left - 1);
+            match acknowledgement(&came, &messages[index].subject) {
+                Ok(duplicate) => duplicates += u64::from(duplicate),
+                Err(failure) if failed.as_ref().is_none_or(|(first, _)| index < *first) => {
+                    failed = Some((index, failure))
+                }
+                Err(_) => {}
+            }
+        }
+        match failed {
+            Some(failed) => Err(failed),
+            None if sendable < messages.len() => {
+                let (length, most) = (messages[sendable].payload.len(), self.max_payload());
+                let what = format!("its {length} bytes are more than the {most} that the server takes");
+                Err((sendable, Failure::Message(NatsError::new(what, "raise max_payload of the server"))))
+            }
+            None => Ok(duplicates),
+        }
+    }
+
+    async fn api(&mut self, what: &str, request: &Json) -> Result<Result<Json, (u64, String)>, NatsError> {
+        let subject = format!("$JS.API.{what}");
+        let answer = self.request(&subject, request.to_string().as_bytes()).await?;
+        if answer.status.as_ref().is_some_and(|(code, _)| *code == NO_RESPONDERS) {
+            return Err(words::no_jetstream(self.at()));
+        }
+        let document: Json = serde_json::from_slice(&answer.payload)
+            .map_err(|error| words::no_nats(self.at(), &format!("an answer of JetStream that is no JSON ({error})")))?;
+        Ok(refusal(&document).map_or(Ok(document), Err))
+    }
+
+    async fn asked(&mut self, what: &str, request: &Json) -> Result<Json, NatsError> {
+        self.api(what, request).await?.map_err(|(code, said)| words::of_jetstream(code, &said))
+    }
+
+    /// The stream that takes this subject.
+    ///
+    /// # Errors
+    /// There is none, JetStream is not there, or the connection is over.
+    pub async fn stream_of(&mut self, subject: &str) -> Result<String, NatsError> {
+        let answer = self.asked("STREAM.NAMES", &json!({"subject": subject})).await?;
+        let name = answer["streams"].as_array().and_then(|names| names.first()?.as_str());
+        name.map(str::to_owned).ok_or_else(|| words::no_stream(subject))
+    }
+
+    /// Creates the stream unless it exists; true when it was created.
+    ///
+    /// # Errors
+    /// What JetStream says.
+    pub async fn create_stream(&mut self, settings: &StreamSettings) -> Result<bool, NatsError> {
+        let name = &settings.name;
+        match self.api(&format!("STREAM.INFO.{name}"), &json!({})).await? {
+            Ok(_exists) => return Ok(false),
+            Err((10059, _not_found)) => {}
+            Err((code, said)) => return Err(words::of_jetstream(code, &said)),
+        }
+        let request = json!({
+            "name": name, "subjects": [settings.subjects], "retention": "limits", "storage": "file", "discard": "new",
+            "num_replicas": settings.replicas, "max_age": nanoseconds(settings.max_age), "max_bytes": settings.max_bytes,
+            "duplicate_window": nanoseconds(settings.duplicate_window.min(settings.max_age)),
+            "max_msgs": -1, "max_consumers": -1, "max_msg_size": -1,
+        });
+        self.asked(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
+    }
+
+    /// Messages and bytes in a stream.
+    ///
+    /// # Errors
+    /// What JetStream says.
+    pub async fn stream_size(&mut self, name: &str) -> Result<(u64, u64), NatsError> {
+        let answer = self.asked(&format!("STREAM.INFO.{name}"), &json!({})).await?;
+        let number = |key: &str| answer["state"][key].as_u64().unwrap_or(0);
+        Ok((number("messages"), number("bytes")))
+    }
+
+    /// Creates the durable consumer unless it exists. Several readers share it: each message is given to one of them, and
+    /// again when it is not acknowledged.
+    ///
+    /// # Errors
+    /// What JetStream says.
+    pub async fn create_consumer(&mut self, stream: &str, name: &str) -> Result<(), NatsError> {
+        let request = json!({"stream_name": stream, "config": {
+            "durable_name": name, "ack_policy": "explicit", "deliver_policy": "all", "replay_policy": "instant",
+            "ack_wait": nanoseconds(ACKNOWLEDGE_WITHIN), "max_deliver": -1, "max_ack_pending": UNDER_WAY_MAX,
+        }});
+        self.asked(&format!("CONSUMER.DURABLE.CREATE.{stream}.{name}"), &request).await.map(drop)
+    }
+
+    /// How far the readers of a consumer are behind.
+    ///
+    /// # Errors
+    /// What JetStream says.
+    pub async fn backlog(&mut self, stream: &str, consumer: &str) -> Result<Backlog, NatsError> {
+        let answer = self.asked(&format!("CONSUMER.INFO.{stream}.{consumer}"), &json!({})).await?;
+        let number = |key: &str| answer[key].as_u64().unwrap_or(0);
+        Ok(Backlog { pending: number("num_pending"), under_way: number("num_ack_pending") })
+    }
+
+    /// Up to `most` messages of a consumer; fewer, or none, after `patience`.
+    ///
+    /// # Errors
+    /// The connection is over, the consumer is gone, or the server does not answer.
+    pub async fn fetch(
+        &mut self,
+        stream: &str,
+        consumer: &str,
+        most: usize,
+        patience: Duration,
+    ) -> Result<Vec<Message>, NatsError> {
+        let inbox = format!("_INBOX.{}", adapters::mqtt::unique());
+        let number = self.subscribe(&inbox);
+        let request = json!({"batch": most, "expires": nanoseconds(patience)}).to_string();
+        self.put(&format!("$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"), Some(&inbox), None, request.as_bytes());
+        let until = Instant::now() + patience + DEADLINE;
+        let mut messages = Vec::new();
+        while messages.len() < most {
+            let waited = timeout_at(until, self.next()).await;
+            let came = waited.map_err(|_| words::silent(self.at(), "messages were asked for"))??;
+            if came.subscription != number {
+                continue;
+            }
+            match came.status {
+                None => messages.push(came),
+                // 404 nothing there, 408 the time is over, 409 the request was cut short (limits, a new leader).
+                Some((404 | 408, _)) => break,
+                Some((409, said)) if said.to_ascii_lowercase().contains("deleted") => {
+                    let what = format!("the consumer {consumer} of stream {stream} was deleted");
+                    return Err(NatsError::new(what, "it is created again with the next connection"));
+                }
+                Some((409, _)) => break,
+                Some((NO_RESPONDERS, _)) => {
+                    let what = format!("nobody answers for consumer {consumer} of stream {stream}");
+                    return Err(NatsError::new(what, "while a cluster chooses a new leader this passes by itself"));
+                }
+                Some(_) => {}
+            }
+        }
+        self.unsubscribe(number);
+        Ok(messages)
+    }
+
+    fn unsubscribe(&mut self, number: u64) {
+        self.put_line(&format!("UNSUB {number}"));
+    }
+
+    /// These messages are done; sent with the next [`Connection::flush`]. One that does not arrive is given out again.
+    pub fn acknowledge<'a>(&mut self, messages: impl IntoIterator<Item = &'a Message>) {
+        for reply in messages.into_iter().filter_map(|message| message.reply.clone()) {
+            self.put(&reply, None, None, b"+ACK");
+        }
+    }
+}
+
+/// Was the message there already?
+fn acknowledgement(came: &Message, subject: &str) -> Result<bool, Failure> {
+    if came.status.as_ref().is_some_and(|(code, _)| *code == NO_RESPONDERS) {
+        return Err(Failure::Line(words::no_stream(subject)));
+    }
+    let answer: Json = serde_json::from_slice(&came.payload).unwrap_or(Json::Null);
+    match refusal(&answer) {
+        Some((code, said)) if TOO_LARGE.contains(&code) => Err(Failure::Message(NatsError::new(
+            format!("JetStream says {said:?}"),
+            "raise max_msg_size of the stream",
+        ))),
+        Some((code, said)) => Err(Failure::Line(words::of_jetstream(code, &said))),
+        None => Ok(answer["duplicate"].as_bool().unwrap_or(false)),
+    }
+}

@@ -1,0 +1,109 @@
+//! What is wrong with a NATS server, and what to do next.
+
+use super::NatsError;
+use adapters::address::Endpoint;
+use adapters::tls::TlsError;
+use std::io::{self, ErrorKind};
+
+/// The connection could not be made or broke.
+pub(super) fn of_io(at: &Endpoint, error: &io::Error) -> NatsError {
+    if let Some(error) = TlsError::within(error, &at.host) {
+        return NatsError::new(error.what, error.next);
+    }
+    let place = format!("{}:{}", at.host, at.port);
+    let (what, next) = match error.kind() {
+        ErrorKind::ConnectionRefused => (
+            format!("{place} refuses the connection"),
+            "look whether the NATS server runs there and listens on this port (4222 is usual)",
+        ),
+        ErrorKind::TimedOut => (
+            format!("{place} does not answer"),
+            "look whether the server is on, the address is right, and no firewall stands between",
+        ),
+        ErrorKind::UnexpectedEof | ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => {
+            (format!("{place} closed the connection"), "look at the log of the NATS server")
+        }
+        _ => (format!("{place} cannot be reached: {error}"), "look at the name of the server and at the network"),
+    };
+    NatsError::new(what, next)
+}
+
+/// Something else than NATS answers there.
+pub(super) fn no_nats(at: &Endpoint, came: &str) -> NatsError {
+    let what = format!("{}:{} does not speak NATS: {came}", at.host, at.port);
+    NatsError::new(what, "use the port of NATS clients, usually 4222, not that of MQTT, WebSocket or monitoring")
+}
+
+/// The server wants TLS and the address has none, or the other way round.
+pub(super) fn tls_differs(at: &Endpoint, wanted: bool) -> NatsError {
+    let place = format!("{}:{}", at.host, at.port);
+    match wanted {
+        true => {
+            NatsError::new(format!("{place} asks for TLS"), "write the address with natss://, and ca= where needed")
+        }
+        false => NatsError::new(
+            format!("{place} does not speak TLS"),
+            "switch TLS on in its configuration, or write nats://",
+        ),
+    }
+}
+
+/// `-ERR`: what the server says.
+pub(super) fn of_server(at: &Endpoint, said: &str) -> NatsError {
+    let place = format!("{}:{}", at.host, at.port);
+    let low = said.to_ascii_lowercase();
+    let next = if low.contains("authorization") || low.contains("authentication") {
+        "compare user=, password_file=, token_file= or the client certificate with the server's users"
+    } else if low.contains("permissions violation") {
+        "allow this user to publish and subscribe to the subjects that the handbook lists under NATS (chapter outputs)"
+    } else if low.contains("maximum connections") {
+        "raise max_connections of the server, or look who holds so many"
+    } else if low.contains("payload") {
+        "raise max_payload of the server"
+    } else if low.contains("slow consumer") || low.contains("stale connection") {
+        "look whether the network or this computer is overloaded"
+    } else {
+        "look at the log of the NATS server"
+    };
+    NatsError::new(format!("{place} says {said:?}"), next)
+}
+
+/// Nobody answers a request.
+pub(super) fn silent(at: &Endpoint, what: &str) -> NatsError {
+    let what = format!("{}:{} did not answer in time: {what}", at.host, at.port);
+    NatsError::new(
+        what,
+        "JetStream has no leader while fewer than half of its servers run: look at `nats-server` on each",
+    )
+}
+
+/// JetStream is not there.
+pub(super) fn no_jetstream(at: &Endpoint) -> NatsError {
+    let what = format!("{}:{} has no JetStream", at.host, at.port);
+    NatsError::new(what, "add `jetstream { store_dir: ... }` to its configuration; a leaf node needs `domain` too")
+}
+
+/// No stream takes this subject.
+pub(super) fn no_stream(subject: &str) -> NatsError {
+    let next = "create one with `cnc-gateway fleet stream nats://...`; while a cluster chooses a new leader this passes by itself";
+    NatsError::new(format!("no stream takes the subject {subject}"), next)
+}
+
+/// An error of the JetStream interface: number and description as the server gives them.
+pub(super) fn of_jetstream(code: u64, said: &str) -> NatsError {
+    let next = match code {
+        10023 | 10047 | 10077 | 10122 | 10028 => {
+            "the stream or its disk is full: raise its limits, or look whether `fleet ingest` runs; the box keeps what waits"
+        }
+        10005 | 10074 => {
+            "fewer servers run than the stream has replicas: start the others, or create it with fewer replicas"
+        }
+        10039 | 10076 => "switch JetStream on for this account",
+        10058 | 10065 => {
+            "a stream with this name or these subjects exists with other settings: use it, or choose another name"
+        }
+        10008 | 10009 => "the cluster chooses a new leader: this passes by itself",
+        _ => "look up the number in the documentation of JetStream",
+    };
+    NatsError::new(format!("JetStream says {said:?} (error {code})"), next)
+}

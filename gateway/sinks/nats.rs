@@ -1,0 +1,115 @@
+//! `nats://HOST:4222,HOST:4222/PREFIX` and `natss://`: every item as one message in a JetStream stream.
+//!
+//! Subjects: `PREFIX.BOX.KIND`, where the prefix is `cnc` if none is written; the document is that of `mqtt://`. The header
+//! `Nats-Msg-Id` is `<box>-<sequence>`: what a box sends twice within the stream's window is stored once. A message counts as
+//! delivered when the stream has acknowledged it, with replicas when most of them have it.
+
+use super::mqtt::document;
+use super::{Batch, Pending, Sink, SinkError};
+use crate::history::{Item, Outbox};
+use crate::nats::{Connection, Failure, NatsError, NatsTarget, Outgoing};
+use adapters::address::Keys;
+
+/// Where to, and under which subjects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NatsSinkTarget {
+    /// The cluster.
+    pub servers: NatsTarget,
+    /// What every subject begins with.
+    pub prefix: String,
+}
+
+impl NatsSinkTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, String> {
+        let (servers, prefix) = NatsTarget::parse(body, keys, secured)?;
+        let prefix = if prefix.is_empty() { "cnc" } else { prefix };
+        let bad = |part: &str| part.is_empty() || part.starts_with('$') || part.contains(['*', '>', ' ', '/']);
+        if prefix.split('.').any(bad) {
+            return Err(format!(
+                "{prefix:?} is no beginning of a subject; write words with points between, such as cnc.hall-2"
+            ));
+        }
+        Ok(Self { servers, prefix: prefix.to_owned() })
+    }
+}
+
+/// See the [module](self).
+pub(super) struct NatsSink {
+    target: NatsSinkTarget,
+    name: String,
+    outbox: Outbox,
+    connection: Option<Connection>,
+    /// With which server the next connection is tried first.
+    server: usize,
+}
+
+impl NatsSink {
+    pub(super) fn new(target: NatsSinkTarget, name: &str, outbox: &Outbox) -> Self {
+        Self { target, name: name.to_owned(), outbox: outbox.clone(), connection: None, server: 0 }
+    }
+
+    fn subject(&self, kind: &str) -> String {
+        let id = self.outbox.box_id();
+        // `doctor` asks before there is a box.
+        let id = if id.is_empty() { "doctor" } else { &id };
+        format!("{}.{id}.{kind}", self.target.prefix)
+    }
+
+    fn message(&self, item: &Item, historical: bool) -> Outgoing {
+        Outgoing {
+            subject: self.subject(item.kind()),
+            id: format!("{}-{}", self.outbox.box_id(), item.sequence),
+            payload: document(&self.outbox, item, historical).to_string().into_bytes(),
+        }
+    }
+
+    async fn begin(&mut self) -> Result<(), SinkError> {
+        self.connection = None;
+        let name = format!("{} ({})", self.outbox.box_id(), self.name);
+        let first = self.server;
+        self.server = self.server.wrapping_add(1);
+        let mut connection = Connection::open(&self.target.servers, first, &name).await?;
+        connection.stream_of(&self.subject("sample")).await?;
+        self.connection = Some(connection);
+        Ok(())
+    }
+}
+
+impl From<NatsError> for SinkError {
+    fn from(error: NatsError) -> Self {
+        Self::Line { what: error.what, next: error.next }
+    }
+}
+
+fn not_connected() -> SinkError {
+    SinkError::line("not connected to a NATS server", "")
+}
+
+impl Sink for NatsSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.begin())
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        Box::pin(async move {
+            let messages: Vec<Outgoing> = batch.items.iter().map(|item| self.message(item, batch.historical)).collect();
+            let connection = self.connection.as_mut().ok_or_else(not_connected)?;
+            match connection.publish_all(&messages).await {
+                Ok(_duplicates) => Ok(()),
+                Err((_, Failure::Line(error))) => Err(error.into()),
+                Err((index, Failure::Message(NatsError { what, next }))) => {
+                    let sequence = batch.items.get(index).map_or(0, |item| item.sequence);
+                    Err(SinkError::Item { sequence, what, next })
+                }
+            }
+        })
+    }
+
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move {
+            // What comes here is nothing that was asked for: late acknowledgements.
+            let connection = self.connection.as_mut().ok_or_else(not_connected)?;
+            connection.next().await.map(drop).map_err(SinkError::from)
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! A PostgreSQL cluster of the test's own in a directory that is removed afterwards.
+
+use crate::port::free_port;
+use crate::process::wait_for;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A running server with a database `postgres` and everyone as its owner.
+pub(crate) struct Postgres {
+    child: Option<Child>,
+    directory: tempfile::TempDir,
+    port: u16,
+    bin: PathBuf,
+}
+
+/// Where Debian keeps the programs of the server.
+fn programs() -> Option<PathBuf> {
+    let versions = std::fs::read_dir("/usr/lib/postgresql").ok().into_iter().flatten().filter_map(Result::ok);
+    let found = versions.map(|version| version.path().join("bin")).find(|bin| bin.join("initdb").is_file());
+    if found.is_none() {
+        assert!(std::env::var_os("CNC_GATEWAY_CI").is_none(), "PostgreSQL is not installed");
+        eprintln!("SKIPPED: PostgreSQL is not installed (Debian: postgresql)");
+    }
+    found
+}
+
+/// The server refuses to run as root; then it runs as the user that its package has made.
+fn as_ordinary_user(program: &Path) -> Command {
+    if !rustix_is_root() {
+        return Command::new(program);
+    }
+    let mut command = Command::new("setpriv");
+    command.args(["--reuid=postgres", "--regid=postgres", "--clear-groups", "--"]).arg(program);
+    command
+}
+
+fn rustix_is_root() -> bool {
+    let said = Command::new("id").arg("-u").output().expect("id runs");
+    String::from_utf8_lossy(&said.stdout).trim() == "0"
+}
+
+impl Postgres {
+    /// Makes and starts one; `None` where it is not installed.
+    pub(crate) fn start() -> Option<Self> {
+        let bin = programs()?;
+        let directory = tempfile::tempdir().expect("a directory");
+        if rustix_is_root() {
+            let owned = Command::new("chown").arg("postgres").arg(directory.path()).status();
+            assert!(owned.expect("chown runs").success());
+        }
+        let mut postgres = Self { child: None, directory, port: free_port(), bin };
+        let data = postgres.directory.path().join("data");
+        let mut init = as_ordinary_user(&postgres.bin.join("initdb"));
+        init.args(["--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D"]).arg(&data);
+        let made = init.current_dir("/").output().expect("initdb runs");
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let mut server = as_ordinary_user(&postgres.bin.join("postgres"));
+        server.arg("-D").arg(&data).args(["-p", &postgres.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
+        server.arg("-c").arg(format!("unix_socket_directories={}", postgres.directory.path().display()));
+        server.current_dir("/").stdout(Stdio::null()).stderr(Stdio::null());
+        postgres.child = Some(server.spawn().expect("it starts"));
+        wait_for("PostgreSQL", Duration::from_secs(30), || postgres.try_sql("SELECT 1").ok());
+        Some(postgres)
+    }
+
+    /// Its address.
+    pub(crate) fn address(&self) -> String {
+        format!("postgres://postgres@127.0.0.1:{}/postgres", self.port)
+    }
+
+    fn try_sql(&self, statement: &str) -> Result<String, String> {
+        let mut client = Command::new(self.bin.join("psql"));
+        client.args(["-X", "-A", "-t", "-F", "|", "-v", "ON_ERROR_STOP=1", &self.address(), "-c", statement]);
+        let said = client.output().expect("psql runs");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
+        if said.status.success() { Ok(text(&said.stdout)) } else { Err(text(&said.stderr)) }
+    }
+
+    /// What psql prints for a statement: rows as lines, columns apart by `|`.
+    pub(crate) fn sql(&self, statement: &str) -> String {
+        self.try_sql(statement).unwrap_or_else(|error| panic!("{statement}: {error}"))
+    }
+
+    /// A number.
+    pub(crate) fn number(&self, statement: &str) -> u64 {
+        let said = self.try_sql(statement).unwrap_or_default();
+        said.parse().unwrap_or(0)
+    }
+}
+
+impl Drop for Postgres {
+    fn drop(&mut self) {
+        let Some(mut child) = self.child.take() else { return };
+        // SIGQUIT: the server ends its own children at once.
+        let _told = Command::new("kill").args(["-QUIT", &child.id().to_string()]).status();
+        let _ended = child.wait();
+    }
+}
