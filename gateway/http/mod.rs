@@ -10,6 +10,7 @@
 mod backtests;
 mod connection;
 mod description;
+mod diagnoses;
 mod files;
 mod guard;
 mod handbook;
@@ -46,6 +47,7 @@ pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
 use crate::control::Post;
+use crate::diagnosis::desk::Desk;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
 use axum::Router;
@@ -94,6 +96,8 @@ pub struct Parts {
     pub post: Post,
     /// Names by which browsers reach the box, besides its own addresses, in lower case.
     pub hosts: Vec<String>,
+    /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
+    pub desk: Option<Desk>,
 }
 
 /// What every request can see.
@@ -110,13 +114,14 @@ pub struct Shared {
     access: Arc<Access>,
     post: Post,
     hosts: Arc<[String]>,
+    desk: Option<Desk>,
 }
 
 impl Shared {
     /// From these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { live, history, scripts, data_dir, language, access, post, hosts } = parts;
+        let Parts { live, history, scripts, data_dir, language, access, post, hosts, desk } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
@@ -130,6 +135,7 @@ impl Shared {
             access,
             post,
             hosts: hosts.into(),
+            desk,
         }
     }
 
@@ -157,6 +163,7 @@ const GROUPS: &[&[Route]] = &[
     vocabulary::ROUTES,
     history::ROUTES,
     twin::ROUTES,
+    diagnoses::ROUTES,
     series::ROUTES,
     utilisation::ROUTES,
     wear::ROUTES,
