@@ -70,8 +70,12 @@ pub enum Said {
 /// No process could be started.
 pub fn start(job: &Job) -> std::io::Result<Child> {
     let program = if cfg!(target_os = "linux") { PathBuf::from("/proc/self/exe") } else { std::env::current_exe()? };
-    let mut child =
-        Command::new(program).arg(COMMAND).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+    let mut child = Command::new(program)
+        .arg(COMMAND)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()?;
     let line = serde_json::to_string(job)? + "\n";
     let told = child.stdin.as_mut().map_or(Ok(()), |pipe| pipe.write_all(line.as_bytes()));
     if let Err(error) = told {

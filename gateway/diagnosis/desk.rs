@@ -223,7 +223,9 @@ impl Desk {
     /// # Errors
     /// The diagnosis has no model, the file has been changed since, or it cannot be written.
     pub fn accept(&self, key: &str) -> Result<String, Refusal> {
-        let gone = || Refusal::new("this diagnosis has left no model", "only one that names what is missing does; diagnose again");
+        let gone = || {
+            Refusal::new("this diagnosis has left no model", "only one that names what is missing does; diagnose again")
+        };
         let text = self.kept.text(key, Part::Model).ok_or_else(gone)?;
         let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
         let model = parse_model(&text).map_err(|wrong| Refusal::new(format!("the kept model: {}", wrong[0]), next))?;
@@ -239,6 +241,10 @@ impl Desk {
         replace_durably(&kept_before, &now).map_err(cannot)?;
         replace_durably(&self.model, &text).map_err(cannot)?;
         let before = before.map_or_else(|| "none".to_owned(), |before| before.model.name);
-        Ok(format!("model {:?} of diagnosis {key} in the place of {before:?}; the one before is in {}", model.name, kept_before.display()))
+        Ok(format!(
+            "model {:?} of diagnosis {key} in the place of {before:?}; the one before is in {}",
+            model.name,
+            kept_before.display()
+        ))
     }
 }

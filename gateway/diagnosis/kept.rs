@@ -57,7 +57,8 @@ pub fn key(row: &history::Diagnosis) -> String {
 /// Has it the form of a key? Anything else must not become part of a path.
 #[must_use]
 pub fn is_key(text: &str) -> bool {
-    let digits = |part: &str, all: fn(&u8) -> bool| !part.is_empty() && part.len() <= 20 && part.as_bytes().iter().all(all);
+    let digits =
+        |part: &str, all: fn(&u8) -> bool| !part.is_empty() && part.len() <= 20 && part.as_bytes().iter().all(all);
     text.split_once('-').is_some_and(|(at, of)| digits(at, u8::is_ascii_digit) && digits(of, u8::is_ascii_hexdigit))
 }
 
@@ -109,7 +110,12 @@ impl Kept {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn keep(&self, row: &history::Diagnosis, found: &twin::Diagnosis, recording: &Recording) -> std::io::Result<()> {
+    pub fn keep(
+        &self,
+        row: &history::Diagnosis,
+        found: &twin::Diagnosis,
+        recording: &Recording,
+    ) -> std::io::Result<()> {
         let key = key(row);
         let put = |part, text: &str| replace(&self.path(&key, part), text);
         for language in [Language::En, Language::Zh] {

@@ -10,8 +10,8 @@ use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
 use rules::twin::{self, Model, parse_model};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Weak};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 /// So long the newest samples may take to become durable before a diagnosis goes on without them.
@@ -201,7 +201,9 @@ fn in_child(job: &Job, desk: &Desk) -> Result<Found, String> {
         });
     }
     let status = desk.take_child().map(|mut child| child.wait());
-    let broken = || format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()));
+    let broken = || {
+        format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()))
+    };
     ended_by(desk).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
@@ -216,7 +218,8 @@ fn wait_for_samples(history: &Path, to_ns: TimeNs, desk: &Desk) {
     desk.reached(Stage::Waiting, 0);
     let until = Instant::now() + WAIT_MAX;
     let newest_ns = || Reader::open(history).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns);
-    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns) && desk.cancelled().is_none() && Instant::now() < until {
+    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns) && desk.cancelled().is_none() && Instant::now() < until
+    {
         std::thread::sleep(Duration::from_millis(200));
     }
 }

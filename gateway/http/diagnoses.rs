@@ -134,13 +134,21 @@ fn language(pairs: Vec<(String, String)>) -> Result<Language, ApiProblem> {
 }
 
 /// `GET /api/v1/diagnoses/{key}/page`: the report.
-async fn page(State(shared): State<Shared>, Path(key): Path<String>, Pairs(pairs): Given) -> Result<Response, ApiProblem> {
+async fn page(
+    State(shared): State<Shared>,
+    Path(key): Path<String>,
+    Pairs(pairs): Given,
+) -> Result<Response, ApiProblem> {
     let html = kept(shared, key, Part::Page(language(pairs)?)).await?;
     Ok(headers::report(&html))
 }
 
 /// `GET /api/v1/diagnoses/{key}/plan`: the experiment as a recording plan.
-async fn plan(State(shared): State<Shared>, Path(key): Path<String>, Pairs(pairs): Given) -> Result<Response, ApiProblem> {
+async fn plan(
+    State(shared): State<Shared>,
+    Path(key): Path<String>,
+    Pairs(pairs): Given,
+) -> Result<Response, ApiProblem> {
     let csv = kept(shared, key, Part::Plan(language(pairs)?)).await?;
     Ok(download("text/csv; charset=utf-8", "experiment.csv", csv))
 }

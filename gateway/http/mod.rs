@@ -17,8 +17,10 @@ mod handbook;
 mod headers;
 mod history;
 mod host;
+mod identified;
 mod live;
 mod metrics;
+mod operations;
 mod orders;
 mod page;
 mod peer;
@@ -30,6 +32,7 @@ mod route;
 mod rules;
 mod series;
 mod server;
+mod settings;
 mod sign_in;
 mod streams;
 mod twin;
@@ -43,6 +46,7 @@ pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
 pub use route::{Needs, Route, Verb};
 pub use server::{Server, bind, port_trouble};
+pub use settings::Configured;
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
@@ -98,6 +102,8 @@ pub struct Parts {
     pub hosts: Vec<String>,
     /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
     pub desk: Option<Desk>,
+    /// The configuration.
+    pub configured: Configured,
 }
 
 /// What every request can see.
@@ -115,13 +121,15 @@ pub struct Shared {
     post: Post,
     hosts: Arc<[String]>,
     desk: Option<Desk>,
+    configured: Configured,
+    doctor: Arc<Semaphore>,
 }
 
 impl Shared {
     /// From these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { live, history, scripts, data_dir, language, access, post, hosts, desk } = parts;
+        let Parts { live, history, scripts, data_dir, language, access, post, hosts, desk, configured } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
@@ -136,6 +144,8 @@ impl Shared {
             post,
             hosts: hosts.into(),
             desk,
+            configured,
+            doctor: Arc::new(Semaphore::new(1)),
         }
     }
 
@@ -164,6 +174,9 @@ const GROUPS: &[&[Route]] = &[
     history::ROUTES,
     twin::ROUTES,
     diagnoses::ROUTES,
+    settings::ROUTES,
+    identified::ROUTES,
+    operations::ROUTES,
     series::ROUTES,
     utilisation::ROUTES,
     wear::ROUTES,

@@ -29,7 +29,7 @@ use crate::config::{self, Config, GateMode};
 use crate::control::{self, Inbox};
 use crate::diagnosis::desk::Desk;
 use crate::gate::Gate;
-use crate::http::{Certificate, Parts, Published, Server, Shared, bind, port_trouble};
+use crate::http::{Certificate, Configured, Parts, Published, Server, Shared, bind, port_trouble};
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
@@ -48,7 +48,7 @@ use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use shifting::Shifting;
 use std::net::SocketAddr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -67,6 +67,8 @@ const FOLLOW_EVERY: Duration = Duration::from_secs(1);
 pub struct Plan {
     /// The configuration.
     pub config: Config,
+    /// Its file; `None`: the built-in one.
+    pub config_file: Option<PathBuf>,
     /// Did the user name the port? Then one that is in use is an error; otherwise the box goes on without its page and
     /// keeps trying.
     pub port_named: bool,
@@ -304,7 +306,19 @@ async fn serve(
             let hosts = plan.config.http.allow_hosts.clone();
             let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
             let live = live.clone();
-            let shared = Shared::new(Parts { live, history, scripts, data_dir, language, access, post, hosts, desk });
+            let configured = Configured { config: Arc::new(plan.config.clone()), file: plan.config_file.clone() };
+            let shared = Shared::new(Parts {
+                live,
+                history,
+                scripts,
+                data_dir,
+                language,
+                access,
+                post,
+                hosts,
+                desk,
+                configured,
+            });
             Some(Server::start((address, listener), certificate, shared, report))
         }
         _ => None,

@@ -136,4 +136,6 @@ globalThis.cncGateway = { live, view: () => mounted, when: () => (live.status ? 
 
 show();
 live.start();
-ask("/api/v1/session").then((session) => { context.session = session; drawPerson(); mounted?.session?.(session); }).catch(() => {});
+addEventListener("signed-out", () => { if (context.session?.person) whoIsHere(); });
+function whoIsHere() { return ask("/api/v1/session").then((session) => { context.session = session; drawPerson(); mounted?.session?.(session); }).catch(() => {}); }
+whoIsHere();

@@ -2,6 +2,7 @@
 
 mod browser;
 mod cost;
+mod diagnosing;
 mod editing;
 mod http;
 mod kill;

@@ -4,6 +4,7 @@ import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { bytes, clock, dateTime, duration, number, quantity, when } from "/web/format.js";
 import { box, has, t } from "/web/words.js";
 import { armDialog, sourceName } from "/web/now.js";
+import { systemView } from "/web/system.js";
 
 const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "persons", "request_refused", "stop", "feed_hold", "acknowledged", "reaction", "started"];
 const PAGE = 1000;
@@ -31,10 +32,12 @@ export function mount(root, context) {
     } catch (error) { fill(list, [make("p", "note bad", error.message)]); }
   };
   const system = systemCards(context);
-  root.append(gate.box, card("", [make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]), make("p", "note", t("audit_words")), note, list]), system.box);
+  const more = systemView(context);
+  root.append(gate.box, card("", [make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]), make("p", "note", t("audit_words")), note, list]), system.box, ...more.parts);
   read();
+  if (context.session) more.session();
   state.timer = setInterval(read, 3000);
-  return { update(status) { gate.update(status); system.update(status); }, session: () => gate.update(context.status()), leave: () => clearInterval(state.timer) };
+  return { update(status) { gate.update(status); system.update(status); more.update(status); }, session: () => { gate.update(context.status()); more.session(); }, leave: () => clearInterval(state.timer) };
 }
 
 async function verified() {
