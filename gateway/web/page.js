@@ -78,6 +78,8 @@ function drawPerson() {
 }
 
 function drawStatus(status) {
+  const version = at("footer").firstElementChild;
+  if (version) say(version, `cnc-gateway ${status.version}`);
   document.body.dataset.state = status.state.word;
   say(at("machine"), status.machine);
   say(at("pill"), context.state(status.state.word));

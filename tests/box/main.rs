@@ -11,6 +11,7 @@ mod operations;
 mod page;
 mod process;
 mod replay;
+mod system;
 mod twin;
 mod views;
 mod watchdog;

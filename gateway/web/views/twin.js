@@ -28,7 +28,8 @@ export function mount(root, context) {
     if (!status) return;
     const twin = await ask("/api/v1/twin?limit=20").catch(() => ({ diagnoses: [] }));
     drawDiagnoses(latest, past, twin.diagnoses, context, state.done);
-    figure.closest(".card").hidden = !status.twin;
+    figure.closest(".card").hidden = regimes.closest(".card").hidden = !status.twin;
+    for (const it of [latest, past]) it.closest(".card").hidden = !status.twin && !twin.diagnoses.length;
     if (!status.twin) return;
     try {
       const known = (await ask("/api/v1/series")).series.map((s) => s.name);
