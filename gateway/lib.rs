@@ -3,7 +3,9 @@
 pub mod access;
 pub mod active_scripts;
 pub mod alignment;
+pub mod archive;
 pub mod backtest;
+pub mod backup;
 pub mod bench;
 pub mod cannot_run;
 pub mod check;

@@ -47,6 +47,14 @@ pub fn utc(at_ns: TimeNs) -> String {
     format!("{stamp:.3}")
 }
 
+/// `6:00` or `6` in minutes after midnight; `None`: it is no time of day.
+#[must_use]
+pub fn time_of_day(text: &str) -> Option<i64> {
+    let (hour, minute) = text.split_once(':').unwrap_or((text, "0"));
+    let (hour, minute): (i64, i64) = (hour.parse().ok()?, minute.parse().ok()?);
+    ((0..24).contains(&hour) && (0..60).contains(&minute)).then_some(60 * hour + minute)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,7 @@ mod bench;
 mod check;
 mod devices;
 mod diagnose;
+mod diagnosis_child;
 mod doctor;
 mod effects;
 #[cfg(feature = "fleet")]
@@ -125,6 +126,9 @@ enum Command {
     /// The child process around a vendor's library; started by the gateway itself.
     #[command(hide = true)]
     VendorChild(vendor_child::VendorChildArguments),
+    /// The child process that makes a diagnosis; started by the gateway itself.
+    #[command(hide = true)]
+    DiagnosisChild,
 }
 
 /// Parses the arguments of this process and does what they say.
@@ -171,6 +175,7 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Serve(served) => serve::run(&served),
         Command::Help(topic) => help::help(&topic),
         Command::VendorChild(child) => vendor_child::run(&child),
+        Command::DiagnosisChild => diagnosis_child::run(),
     }
 }
 

@@ -74,7 +74,13 @@ fn plan(arguments: RunArguments) -> Result<Plan, CannotRun> {
     if arguments.config.is_none() {
         demo::furnish(&mut config, arguments.speed);
     }
-    Ok(Plan { config, port_named, speed: arguments.speed, stop_after_s: arguments.seconds })
+    Ok(Plan {
+        config,
+        config_file: arguments.config,
+        port_named,
+        speed: arguments.speed,
+        stop_after_s: arguments.seconds,
+    })
 }
 
 /// RunArguments go before the environment and the file: they are given as variables in place of those of the environment.

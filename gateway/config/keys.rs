@@ -300,6 +300,13 @@ const CORE: &[Key] = &[
         "The gate may be armed from the page too, by an armer who gives the token once more; false: at the box only",
         "允许在网页上授权写入；false：仅限本机命令行",
     ),
+    key(
+        ("http", "shifts"),
+        Text,
+        Default("\"6:00 14:00 22:00\""),
+        "When shifts begin, by the clock of whoever looks: the use of the machine is told for each",
+        "班次开始时间（按查看者时钟）",
+    ),
     key(("twin", "model"), Path, Optional, "Model file (model/1); relative to this file", "仿真模型文件"),
     key(
         ("log", "level"),

@@ -9,6 +9,7 @@ mod build;
 mod channel_keys;
 mod channels;
 mod check_value;
+mod in_force;
 pub mod keys;
 mod keys_of_gate;
 mod keys_of_outputs;
@@ -17,6 +18,7 @@ mod problem;
 mod read;
 mod shown;
 
+pub use in_force::{InForce, masked};
 pub use problem::Problem;
 
 use crate::history::OutboxSettings;
@@ -65,6 +67,8 @@ pub struct Config {
     pub twin: Twin,
     /// The log.
     pub log: Log,
+    /// Every key with its value and where that was written.
+    pub in_force: Vec<InForce>,
 }
 
 /// `[gateway]`.
@@ -263,6 +267,8 @@ pub struct Http {
     pub allow_hosts: Vec<String>,
     /// The gate may be armed from the page.
     pub allow_arming: bool,
+    /// Beginnings of the shifts, minutes after midnight, increasing.
+    pub shifts: Vec<i64>,
 }
 
 /// `[twin]`.

@@ -1,15 +1,19 @@
 //! The twin at work: recordings from files and from the history, models from files, what becomes of a diagnosis. What a
 //! diagnosis is stands in `rules::twin`.
 
+pub mod child;
+pub mod desk;
 pub mod execute;
 mod history;
 mod join;
+pub mod kept;
 mod models;
 mod outputs;
 mod parquet;
 mod recordings;
 pub mod simulation;
 pub mod status;
+pub mod steps;
 pub mod stretch;
 pub mod words;
 pub mod worker;

@@ -1,21 +1,21 @@
-//! Beside the tick: looks whether the model file has changed, and diagnoses in the background, one stretch at a time and
-//! only with the processor time that nobody else wants.
+//! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
+//! a process that has only the processor time that nobody else wants.
 
-use super::{outputs, stretch};
+use super::child::{self, Job, Said, Stage};
+use super::desk::Desk;
+use super::kept::{self, Kept, Part};
+use super::outputs;
 use crate::files::{LOOK_EVERY, Mark, Rest, mark};
 use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
-use rules::twin::{self, Model, parse_model, report};
+use rules::twin::{self, Model, parse_model};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 /// So long the newest samples may take to become durable before a diagnosis goes on without them.
 const WAIT_MAX: Duration = Duration::from_secs(10);
-/// A tenth of the claim to the processor that everything else has; with less, a busy box would never finish.
-const NICE: i32 = 10;
-/// Seed of the resampling: the same stretch and model give the same diagnosis.
-const SEED: u64 = 1;
 
 /// A model as read from its file.
 #[derive(Debug, Clone)]
@@ -29,8 +29,10 @@ pub struct Loaded {
 /// A stretch to be diagnosed.
 #[derive(Debug, Clone)]
 pub struct Request {
-    /// The model in charge.
-    pub model: Model,
+    /// The model in charge, as text.
+    pub toml: String,
+    /// The person who asks for it; `None`: the box itself.
+    pub by: Option<String>,
     /// Beginning.
     pub from_ns: TimeNs,
     /// End.
@@ -46,13 +48,15 @@ pub enum Report {
     Refused(String),
     /// A diagnosis is finished.
     Diagnosed(Box<Finished>),
-    /// A stretch could not be diagnosed, for these reasons.
-    NotDiagnosed(String),
+    /// A stretch could not be diagnosed, for these reasons; with the person who had asked for it.
+    NotDiagnosed(String, Option<String>),
 }
 
 /// A finished diagnosis.
 #[derive(Debug, Clone)]
 pub struct Finished {
+    /// The person who had asked for it; `None`: the box itself.
+    pub by: Option<String>,
     /// As stored; `at_ns` is for the tick to fill in.
     pub record: history::Diagnosis,
     /// What is missing.
@@ -64,8 +68,10 @@ pub struct Finished {
 /// The worker, as the tick sees it. It ends when this is dropped.
 #[derive(Debug)]
 pub struct Worker {
-    requests: SyncSender<Request>,
+    desk: Desk,
     reports: Receiver<Report>,
+    /// The thread ends when this goes, whoever still holds the desk.
+    _going_on: Arc<()>,
 }
 
 /// Where the worker finds and leaves things.
@@ -77,6 +83,8 @@ pub struct Places {
     pub history: PathBuf,
     /// Where the improved model of a diagnosis goes.
     pub improved: PathBuf,
+    /// What is kept of diagnoses.
+    pub kept: Kept,
 }
 
 /// Reads a model.
@@ -101,13 +109,18 @@ impl Worker {
         let (requests, asked) = sync_channel(1);
         let (send, reports) = sync_channel(8);
         let file = FileWatch { path: places.model.clone(), rest: Rest::new(), known };
-        std::thread::Builder::new().name("twin".to_owned()).spawn(move || work(file, &places, &asked, &send))?;
-        Ok(Self { requests, reports })
+        let desk = Desk::new(requests, places.model.clone(), places.kept.clone());
+        let going_on = Arc::new(());
+        let (own, still) = (desk.clone(), Arc::downgrade(&going_on));
+        let body = move || work(file, &places, (&asked, &own), &send, &still);
+        std::thread::Builder::new().name("twin".to_owned()).spawn(body)?;
+        Ok(Self { desk, reports, _going_on: going_on })
     }
 
-    /// Asks for a diagnosis; `false` while one is waiting already.
-    pub fn ask(&self, request: Request) -> bool {
-        self.requests.try_send(request).is_ok()
+    /// Where diagnoses are asked for.
+    #[must_use]
+    pub fn desk(&self) -> &Desk {
+        &self.desk
     }
 
     /// What there is to tell since the last call.
@@ -116,12 +129,16 @@ impl Worker {
     }
 }
 
-fn work(mut file: FileWatch, places: &Places, asked: &Receiver<Request>, send: &SyncSender<Report>) {
-    // On Linux this concerns the calling thread alone, which is what is meant; a refusal costs nothing but niceness.
-    let _refused = rustix::process::nice(NICE);
-    loop {
+fn work(
+    mut file: FileWatch,
+    places: &Places,
+    (asked, desk): (&Receiver<Request>, &Desk),
+    send: &SyncSender<Report>,
+    going_on: &Weak<()>,
+) {
+    while going_on.strong_count() > 0 {
         let report = match asked.recv_timeout(LOOK_EVERY) {
-            Ok(request) => Some(diagnose(&request, places)),
+            Ok(request) => Some(diagnose(request, places, desk)),
             Err(RecvTimeoutError::Timeout) => file.look(),
             Err(RecvTimeoutError::Disconnected) => return,
         };
@@ -152,43 +169,57 @@ impl FileWatch {
     }
 }
 
-fn diagnose(request: &Request, places: &Places) -> Report {
-    wait_for_samples(&places.history, request.to_ns);
-    let recording = match stretch::read(&places.history, request.from_ns, request.to_ns, &request.model.output) {
-        Ok(recording) => recording,
-        Err(error) => return Report::NotDiagnosed(error.to_string()),
-    };
-    let examination = twin::examine(&recording, &request.model);
-    if !examination.unusable.is_empty() {
-        return Report::NotDiagnosed(examination.unusable.join("; "));
-    }
-    match twin::diagnose(&recording, &request.model, SEED) {
-        Ok(diagnosis) => Report::Diagnosed(Box::new(finished(request, places, &diagnosis))),
-        Err(problems) => Report::NotDiagnosed(problems.join("; ")),
+fn diagnose(request: Request, places: &Places, desk: &Desk) -> Report {
+    wait_for_samples(&places.history, request.to_ns, desk);
+    let Request { toml, by, from_ns, to_ns } = request;
+    let job = Job { toml, history: places.history.clone(), from_ns, to_ns, kept: places.kept.directory().to_owned() };
+    let found = in_child(&job, desk);
+    desk.ended(found.as_ref().map(|(record, _)| kept::key(record)).map_err(Clone::clone));
+    match found {
+        Ok((record, missing)) => Report::Diagnosed(Box::new(finished(by, places, record, missing))),
+        Err(problem) => Report::NotDiagnosed(problem, by),
     }
 }
 
-fn finished(request: &Request, places: &Places, diagnosis: &twin::Diagnosis) -> Finished {
-    let missing: Vec<String> = diagnosis.missing.iter().map(|missing| missing.effect.clone()).collect();
-    let written = (!missing.is_empty())
-        .then(|| outputs::put(&places.improved, &twin::write_model(&diagnosis.model)))
-        .and_then(Result::ok);
-    let record = history::Diagnosis {
-        at_ns: request.to_ns,
-        from_ns: request.from_ns,
-        to_ns: request.to_ns,
-        verdict: diagnosis.verdict.word().to_owned(),
-        summary: diagnosis.summary.clone(),
-        json: report::to_json(diagnosis).to_string(),
+/// Row of the history and what is missing.
+type Found = (history::Diagnosis, Vec<String>);
+
+fn in_child(job: &Job, desk: &Desk) -> Result<Found, String> {
+    let ended_by = |desk: &Desk| desk.cancelled().map(|by| format!("{by} has ended it"));
+    if let Some(ended) = ended_by(desk) {
+        return Err(ended);
+    }
+    let mut child = child::start(job).map_err(|error| format!("no process for the diagnosis: {error}"))?;
+    let output = child.stdout.take();
+    desk.put_child(child);
+    let mut outcome = None;
+    if let Some(output) = output {
+        child::listen(output, |said| match said {
+            Said::Stage(stage, rows) => desk.reached(stage, rows),
+            Said::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
+            Said::Refused(problem) => outcome = Some(Err(problem)),
+        });
+    }
+    let status = desk.take_child().map(|mut child| child.wait());
+    let broken = || {
+        format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()))
     };
-    Finished { record, missing, improved: written.map(|()| places.improved.clone()) }
+    ended_by(desk).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
+}
+
+fn finished(by: Option<String>, places: &Places, record: history::Diagnosis, missing: Vec<String>) -> Finished {
+    let model = places.kept.text(&kept::key(&record), Part::Model);
+    let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
+    Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }
 }
 
 /// What was just measured may not be durable yet.
-fn wait_for_samples(history: &Path, to_ns: TimeNs) {
+fn wait_for_samples(history: &Path, to_ns: TimeNs, desk: &Desk) {
+    desk.reached(Stage::Waiting, 0);
     let until = Instant::now() + WAIT_MAX;
     let newest_ns = || Reader::open(history).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns);
-    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns) && Instant::now() < until {
+    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns) && desk.cancelled().is_none() && Instant::now() < until
+    {
         std::thread::sleep(Duration::from_millis(200));
     }
 }

@@ -43,6 +43,8 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "wear.js" from "views/wear.js",
     SCRIPT "thermal.js" from "views/thermal.js",
     SCRIPT "twin.js" from "views/twin.js",
+    SCRIPT "diagnosis.js" from "views/diagnosis.js",
+    SCRIPT "system.js" from "views/system.js",
     SCRIPT "rules.js" from "views/rules.js",
     SCRIPT "audit.js" from "views/audit.js",
     SCRIPT "help.js" from "views/help.js",

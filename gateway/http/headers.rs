@@ -46,6 +46,35 @@ pub(super) fn page(html: &str) -> Response {
     ([kind, (header::CONTENT_SECURITY_POLICY, policy)], html.replace(PLACE, &nonce)).into_response()
 }
 
+/// A report that was made to be read anywhere, with its style and script inside. Here nothing inline is allowed, so its style and
+/// script get a nonce, and what stands in `style` attributes moves into a style element of its own.
+pub(super) fn report(html: &str) -> Response {
+    let nonce = nonce().unwrap_or_default();
+    let (html, rules) = without_style_attributes(html);
+    let head = format!("<style nonce=\"{nonce}\">{rules}</style></head>");
+    let html = html.replacen("<style>", &format!("<style nonce=\"{nonce}\">"), 1);
+    let html = html.replacen("<script>", &format!("<script nonce=\"{nonce}\">"), 1).replacen("</head>", &head, 1);
+    let policy = format!(
+        "default-src 'none'; style-src 'nonce-{nonce}'; script-src 'nonce-{nonce}'; img-src data:; frame-ancestors 'none'; base-uri 'none'"
+    );
+    let policy = HeaderValue::from_str(&policy).unwrap_or(HeaderValue::from_static(POLICY));
+    let kind = HeaderValue::from_static("text/html; charset=utf-8");
+    ([(header::CONTENT_TYPE, kind), (header::CONTENT_SECURITY_POLICY, policy)], html).into_response()
+}
+
+/// The document with a number in the place of every `style="..."`, and the rules that these numbers stand for.
+fn without_style_attributes(html: &str) -> (String, String) {
+    let (mut kept, mut rules, mut rest, mut number) = (String::with_capacity(html.len()), String::new(), html, 0_u32);
+    while let Some((before, after)) = rest.split_once(" style=\"") {
+        let Some((style, after)) = after.split_once('"') else { break };
+        let _infallible = write!(kept, "{before} data-style=\"{number}\"");
+        let _infallible = write!(rules, "[data-style=\"{number}\"]{{{style}}}");
+        (rest, number) = (after, number + 1);
+    }
+    kept.push_str(rest);
+    (kept, rules)
+}
+
 fn nonce() -> Result<String, TokenError> {
     Ok(crate::access::random::<16>()?.iter().fold(String::with_capacity(32), |mut hex, byte| {
         let _infallible = write!(hex, "{byte:02x}");
@@ -56,6 +85,16 @@ fn nonce() -> Result<String, TokenError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_stands_in_style_attributes_moves_into_a_style_element() {
+        let html = "<head><style>a</style></head><i style=\"width:3%\" class=\"x\"></i><b style=\"left:1%\"></b><script>1</script>";
+        let (kept, rules) = without_style_attributes(html);
+        assert!(!kept.contains(" style=") && kept.contains("<i data-style=\"0\" class=\"x\">"), "{kept}");
+        assert_eq!(rules, "[data-style=\"0\"]{width:3%}[data-style=\"1\"]{left:1%}");
+        let policy = report(html).headers()[header::CONTENT_SECURITY_POLICY].to_str().expect("text").to_owned();
+        assert!(policy.contains("script-src 'nonce-") && !policy.contains("unsafe"), "{policy}");
+    }
 
     #[test]
     fn a_nonce_is_new_in_every_page_and_stands_in_its_policy() {

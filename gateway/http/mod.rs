@@ -10,14 +10,17 @@
 mod backtests;
 mod connection;
 mod description;
+mod diagnoses;
 mod files;
 mod guard;
 mod handbook;
 mod headers;
 mod history;
 mod host;
+mod identified;
 mod live;
 mod metrics;
+mod operations;
 mod orders;
 mod page;
 mod peer;
@@ -29,6 +32,7 @@ mod route;
 mod rules;
 mod series;
 mod server;
+mod settings;
 mod sign_in;
 mod streams;
 mod twin;
@@ -42,10 +46,12 @@ pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
 pub use route::{Needs, Route, Verb};
 pub use server::{Server, bind, port_trouble};
+pub use settings::Configured;
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
 use crate::control::Post;
+use crate::diagnosis::desk::Desk;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
 use axum::Router;
@@ -94,6 +100,10 @@ pub struct Parts {
     pub post: Post,
     /// Names by which browsers reach the box, besides its own addresses, in lower case.
     pub hosts: Vec<String>,
+    /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
+    pub desk: Option<Desk>,
+    /// The configuration.
+    pub configured: Configured,
 }
 
 /// What every request can see.
@@ -110,13 +120,16 @@ pub struct Shared {
     access: Arc<Access>,
     post: Post,
     hosts: Arc<[String]>,
+    desk: Option<Desk>,
+    configured: Configured,
+    doctor: Arc<Semaphore>,
 }
 
 impl Shared {
     /// From these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { live, history, scripts, data_dir, language, access, post, hosts } = parts;
+        let Parts { live, history, scripts, data_dir, language, access, post, hosts, desk, configured } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
@@ -130,6 +143,9 @@ impl Shared {
             access,
             post,
             hosts: hosts.into(),
+            desk,
+            configured,
+            doctor: Arc::new(Semaphore::new(1)),
         }
     }
 
@@ -157,6 +173,10 @@ const GROUPS: &[&[Route]] = &[
     vocabulary::ROUTES,
     history::ROUTES,
     twin::ROUTES,
+    diagnoses::ROUTES,
+    settings::ROUTES,
+    identified::ROUTES,
+    operations::ROUTES,
     series::ROUTES,
     utilisation::ROUTES,
     wear::ROUTES,

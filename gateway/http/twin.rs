@@ -4,6 +4,7 @@ use super::Shared;
 use super::history::{Answer, Given, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
+use crate::diagnosis::kept::{self, Kept, Part};
 use crate::history::{Diagnosis, Span};
 use adapters::clock::TimeNs;
 use axum::extract::{Query as Pairs, State};
@@ -20,23 +21,34 @@ pub(super) async fn twin(State(shared): State<Shared>, Pairs(pairs): Given) -> A
     let keys = QueryKeys::of(pairs, &["limit"])?;
     let limit = keys.number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
     let status = shared.status()?;
+    let kept = shared.desk.as_ref().map(|desk| desk.kept().clone());
     reading(shared, move |reader, _| {
         let found = reader.diagnoses(Span::newest(limit)).map_err(|error| trouble(&error))?;
-        let diagnoses: Vec<Value> = found.iter().rev().map(diagnosis).collect();
+        let diagnoses: Vec<Value> = found.iter().rev().map(|row| diagnosis(row, kept.as_ref())).collect();
         Ok(json!({ "schema": "twin/1", "at_ms": status.at_ms, "twin": status.twin, "diagnoses": diagnoses }))
     })
     .await
 }
 
-/// Newest first; the whole diagnosis stands under `diagnosis` (`diagnosis/1`).
-fn diagnosis(found: &Diagnosis) -> Value {
+/// Newest first; the whole diagnosis stands under `diagnosis` (`diagnosis/1`). What was kept of it - the report page, the model, the
+/// steps of the experiment - is told where it is still there.
+fn diagnosis(found: &Diagnosis, kept: Option<&Kept>) -> Value {
     let ms = |at_ns: TimeNs| at_ns.div_euclid(1_000_000);
+    let key = kept::key(found);
+    let words = kept.and_then(|kept| kept.words(&key));
+    let model = kept.is_some_and(|kept| kept.path(&key, Part::Model).exists());
     json!({
         "at_ms": ms(found.at_ns),
         "from_ms": ms(found.from_ns),
         "to_ms": ms(found.to_ns),
         "verdict": found.verdict,
         "summary": found.summary,
+        "summary_zh": words.as_ref().map(|words| &words.summary_zh),
+        "page": words.is_some().then(|| format!("/api/v1/diagnoses/{key}/page")),
+        "model": model,
+        "key": key,
+        "steps": words.as_ref().map(|words| &words.steps),
+        "minutes": words.as_ref().and_then(|words| words.minutes),
         "diagnosis": serde_json::from_str::<Value>(&found.json).unwrap_or(Value::Null),
     })
 }

@@ -6,6 +6,7 @@ use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::{Reader, Span, StateHour};
+use crate::moment::time_of_day;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
@@ -19,8 +20,6 @@ const DAY_MINUTES: i64 = 24 * 60;
 const HOURS_MAX: u32 = 400_000;
 /// Shifts of one day.
 const SHIFTS_MAX: usize = 12;
-/// Three shifts, where nobody says otherwise.
-const SHIFTS_DEFAULT: [i64; 3] = [6 * 60, 14 * 60, 22 * 60];
 
 /// How the time is cut.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,19 +54,14 @@ impl By {
 }
 
 /// `6:00,14:00,22:00` in minutes after midnight.
-fn shifts(keys: &QueryKeys) -> Result<Vec<i64>, ApiProblem> {
+fn shifts(keys: &QueryKeys, usual: &[i64]) -> Result<Vec<i64>, ApiProblem> {
     let bad = |text: &str| {
         ApiProblem::request(format!("shifts: {text:?} is no time of day"), "write the beginnings as 6:00,14:00,22:00")
     };
-    let minutes = |text: &str| {
-        let (hour, minute) = text.split_once(':').unwrap_or((text, "0"));
-        let (hour, minute): (i64, i64) = (hour.parse().ok()?, minute.parse().ok()?);
-        ((0..24).contains(&hour) && (0..60).contains(&minute)).then_some(60 * hour + minute)
-    };
     let mut starts =
-        keys.list("shifts").map(|text| minutes(text).ok_or_else(|| bad(text))).collect::<Result<Vec<_>, _>>()?;
+        keys.list("shifts").map(|text| time_of_day(text).ok_or_else(|| bad(text))).collect::<Result<Vec<_>, _>>()?;
     if starts.is_empty() {
-        starts = SHIFTS_DEFAULT.to_vec();
+        starts = usual.to_vec();
     }
     if starts.len() > SHIFTS_MAX {
         return Err(ApiProblem::request(format!("{} shifts in one day", starts.len()), "give at most 12"));
@@ -76,12 +70,12 @@ fn shifts(keys: &QueryKeys) -> Result<Vec<i64>, ApiProblem> {
     Ok(starts)
 }
 
-fn cut(keys: &QueryKeys) -> Result<By, ApiProblem> {
+fn cut(keys: &QueryKeys, usual: &[i64]) -> Result<By, ApiProblem> {
     match keys.text("by") {
         None | Some("day") => Ok(By::Day),
         Some("hour") => Ok(By::Hour),
         Some("week") => Ok(By::Week),
-        Some("shift") => shifts(keys).map(By::Shift),
+        Some("shift") => shifts(keys, usual).map(By::Shift),
         Some(other) => {
             Err(ApiProblem::request(format!("by={other} is not known"), "write by=hour, shift, day or week"))
         }
@@ -93,7 +87,8 @@ pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(
 /// `GET /api/v1/utilisation`
 async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
     let keys = QueryKeys::of(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
-    let by = cut(&keys)?;
+    let usual = shared.configured.config.http.shifts.clone();
+    let by = cut(&keys, &usual)?;
     let offset_min = keys.number("offset_min", -1080_i64, 1080)?.unwrap_or(0);
     reading(shared, move |reader, newest_ns| {
         let (from_ns, to_ns) = range(&keys, newest_ns)?;
@@ -104,6 +99,7 @@ async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answe
             "from_ms": from_ns.div_euclid(1_000_000),
             "to_ms": to_ns.div_euclid(1_000_000),
             "rows": rows,
+            "shifts": usual.iter().map(|at| format!("{}:{:02}", at / 60, at % 60)).collect::<Vec<_>>(),
         }))
     })
     .await
@@ -157,7 +153,7 @@ mod tests {
         let wednesday_5_00 = 6 * DAY_MINUTES + 5 * 60;
         assert_eq!(By::Day.begin(wednesday_5_00), 6 * DAY_MINUTES);
         assert_eq!(By::Week.begin(wednesday_5_00), 4 * DAY_MINUTES);
-        let shift = By::Shift(SHIFTS_DEFAULT.to_vec());
+        let shift = By::Shift(vec![360, 840, 1320]);
         assert_eq!(shift.begin(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
         assert_eq!(shift.begin(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
         assert_eq!(By::Week.begin(-1), -3 * DAY_MINUTES);
@@ -185,8 +181,9 @@ mod tests {
         let keys =
             |text: &str| QueryKeys::of(vec![("shifts".to_owned(), text.to_owned())], &["shifts"]).expect("known");
         for text in ["25:00", "6:61", "six", "-1:00"] {
-            assert!(shifts(&keys(text)).is_err(), "{text}");
+            assert!(shifts(&keys(text), &[0]).is_err(), "{text}");
         }
-        assert_eq!(shifts(&keys("14,6:30")), Ok(vec![390, 840]));
+        assert_eq!(shifts(&keys("14,6:30"), &[0]), Ok(vec![390, 840]));
+        assert_eq!(shifts(&keys(""), &[360]), Ok(vec![360]));
     }
 }

@@ -27,8 +27,9 @@ use crate::alignment;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control::{self, Inbox};
+use crate::diagnosis::desk::Desk;
 use crate::gate::Gate;
-use crate::http::{Certificate, Parts, Published, Server, Shared, bind, port_trouble};
+use crate::http::{Certificate, Configured, Parts, Published, Server, Shared, bind, port_trouble};
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
@@ -47,7 +48,7 @@ use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use std::net::SocketAddr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -66,6 +67,8 @@ const FOLLOW_EVERY: Duration = Duration::from_secs(1);
 pub struct Plan {
     /// The configuration.
     pub config: Config,
+    /// Its file; `None`: the built-in one.
+    pub config_file: Option<PathBuf>,
     /// Did the user name the port? Then one that is in use is an error; otherwise the box goes on without its page and
     /// keeps trying.
     pub port_named: bool,
@@ -101,11 +104,12 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
     let (ticker, live) = ticker(&plan, &run_flags, port, inbox, outputs.as_ref())?;
+    let desk = ticker.twin.as_ref().and_then(Twin::desk);
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, (report, post), outputs.as_ref()));
+    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, (report, post, desk), outputs.as_ref()));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -291,7 +295,7 @@ async fn serve(
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
     run_flags: &Arc<RunFlags>,
-    (report, post): (watch::Sender<Option<String>>, control::Post),
+    (report, post, desk): (watch::Sender<Option<String>>, control::Post, Option<Desk>),
     outputs: Option<&Outputs>,
 ) {
     let sinks = outputs.map(Outputs::start);
@@ -304,7 +308,19 @@ async fn serve(
             let hosts = plan.config.http.allow_hosts.clone();
             let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
             let live = live.clone();
-            let shared = Shared::new(Parts { live, history, scripts, data_dir, language, access, post, hosts });
+            let configured = Configured { config: Arc::new(plan.config.clone()), file: plan.config_file.clone() };
+            let shared = Shared::new(Parts {
+                live,
+                history,
+                scripts,
+                data_dir,
+                language,
+                access,
+                post,
+                hosts,
+                desk,
+                configured,
+            });
             Some(Server::start((address, listener), certificate, shared, report))
         }
         _ => None,

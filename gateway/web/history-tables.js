@@ -55,7 +55,7 @@ export async function useTable(root, [from, to], context, by, chosen) {
     return [name, { text: shareBar(r.seconds, context) }, { num: duration(r.total_s) }, { num: duration(on) }, { num: duration(cutting) }, { num: on > 0 ? `${number((100 * cutting) / on, "%")} %` : "–" }];
   });
   const head = [t(`by_${by}`), t("time_per_state"), { num: t("recorded") }, { num: t("switched_on") }, { num: t("cutting_time") }, { num: t("cutting_share") }];
-  fill(root, [make("div", "head", [make("div", "buttons", buttons), make("span", "note", t("use_words"))]), rows.length ? table(head, rows, { caption: t("use_title") }) : make("p", "empty", t("no_data_here"))]);
+  fill(root, [make("div", "head", [make("div", "buttons", buttons), make("span", "note", t("use_words", found.shifts.join(", ")))]), rows.length ? table(head, rows, { caption: t("use_title") }) : make("p", "empty", t("no_data_here"))]);
 }
 
 export function marksTable(root, found, range, go) {

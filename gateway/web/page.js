@@ -78,6 +78,8 @@ function drawPerson() {
 }
 
 function drawStatus(status) {
+  const version = at("footer").firstElementChild;
+  if (version) say(version, `cnc-gateway ${status.version}`);
   document.body.dataset.state = status.state.word;
   say(at("machine"), status.machine);
   say(at("pill"), context.state(status.state.word));
@@ -136,4 +138,6 @@ globalThis.cncGateway = { live, view: () => mounted, when: () => (live.status ? 
 
 show();
 live.start();
-ask("/api/v1/session").then((session) => { context.session = session; drawPerson(); mounted?.session?.(session); }).catch(() => {});
+addEventListener("signed-out", () => { if (context.session?.person) whoIsHere(); });
+function whoIsHere() { return ask("/api/v1/session").then((session) => { context.session = session; drawPerson(); mounted?.session?.(session); }).catch(() => {}); }
+whoIsHere();

@@ -49,6 +49,8 @@ export async function ask(path, options) {
   const text = await answer.text();
   let document;
   try { document = JSON.parse(text); } catch { document = { title: text || answer.statusText }; }
+  // A session that is over: the frame asks who is signed in now.
+  if (answer.status === 401) dispatchEvent(new Event("signed-out"));
   if (!answer.ok) throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), { status: answer.status, document });
   return document;
 }

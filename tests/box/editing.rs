@@ -10,7 +10,7 @@ use std::time::Duration;
 const FILE: &str = "energy.rhai";
 
 /// A new person; gives the token.
-fn person(data: &Path, name: &str, role: &str) -> String {
+pub(super) fn person(data: &Path, name: &str, role: &str) -> String {
     let made = run(&["person", "add", name, "--role", role, "--data-dir", text(data)]);
     let said = stdout(&made);
     let token = said.split_whitespace().find(|word| word.matches('-').count() == 4);
@@ -21,7 +21,7 @@ fn person(data: &Path, name: &str, role: &str) -> String {
 }
 
 /// Asks as the page does; gives the status and the answer.
-fn ask(browser: &mut Browser, method: &str, path: &str, body: &Value) -> (u64, Value) {
+pub(super) fn ask(browser: &mut Browser, method: &str, path: &str, body: &Value) -> (u64, Value) {
     let told = browser.value(&format!(
         "fetch({}, {{ method: '{method}', headers: {{ 'content-type': 'application/json' }}, body: JSON.stringify({body}) }})
             .then(async (answer) => [answer.status, await answer.json().catch(() => null)])",
@@ -30,7 +30,7 @@ fn ask(browser: &mut Browser, method: &str, path: &str, body: &Value) -> (u64, V
     (told[0].as_u64().expect("a status"), told[1].clone())
 }
 
-fn sign_in(browser: &mut Browser, name: &str, token: &str) {
+pub(super) fn sign_in(browser: &mut Browser, name: &str, token: &str) {
     let (status, told) = ask(browser, "POST", "/api/v1/login", &json!({ "name": name, "token": token }));
     assert_eq!(status, 200, "{told}");
 }

@@ -2,6 +2,7 @@
 
 mod browser;
 mod cost;
+mod diagnosing;
 mod editing;
 mod http;
 mod kill;
@@ -10,6 +11,7 @@ mod operations;
 mod page;
 mod process;
 mod replay;
+mod system;
 mod twin;
 mod views;
 mod watchdog;

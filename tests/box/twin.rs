@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// What the simulated lathe does, as a patient integrator would write it down: its laws are other ones.
-const MODEL: &str = r#"schema = "model/1"
+pub(super) const MODEL: &str = r#"schema = "model/1"
 name = "small lathe"
 output = "spindle_power_w"
 
@@ -35,7 +35,7 @@ parameters = { k = 0.022, p = 0.9 }
 
 const HOUR_S: u32 = 3600;
 
-fn configure(directory: &Path, lathe: &str, model: &str) {
+pub(super) fn configure(directory: &Path, lathe: &str, model: &str) {
     fs::write(directory.join("model.toml"), model).expect("writable");
     let text = format!(
         "[gateway]\ndata_dir = \"data\"\n[twin]\nmodel = \"model.toml\"\n[[source]]\naddress = \"simulated://lathe{lathe}\"\n"
@@ -43,14 +43,14 @@ fn configure(directory: &Path, lathe: &str, model: &str) {
     fs::write(directory.join("box.toml"), text).expect("writable");
 }
 
-fn start(directory: &Path, more: &[&str]) -> Gateway {
+pub(super) fn start(directory: &Path, more: &[&str]) -> Gateway {
     let mut command = program();
     command.current_dir(directory).args(["run", "--config", "box.toml", "--listen", "127.0.0.1:0"]).args(more);
     Gateway::spawn(command)
 }
 
 /// So many hours of machine time, as fast as possible.
-fn hours(directory: &Path, hours: u32) {
+pub(super) fn hours(directory: &Path, hours: u32) {
     let mut gateway = start(directory, &["--speed", "max", "--for", &(hours * HOUR_S).to_string()]);
     wait_for("the end of the run", Duration::from_secs(400), || gateway.has_ended().then_some(()));
     assert!(gateway.said().contains("history closed"), "{}", gateway.said());

@@ -19,12 +19,36 @@ pub(super) fn http(reading: &Reading<'_>, base: &Path) -> Option<Http> {
         session: seconds(reading, SECTION, "session_s")?,
         allow_hosts: hosts(&text(reading, SECTION, "allow_hosts").unwrap_or_default()),
         allow_arming: flag(reading, SECTION, "allow_arming")?,
+        shifts: shifts(&text(reading, SECTION, "shifts")?).unwrap_or_default(),
     })
 }
 
 /// Names with blanks or commas between them, in lower case.
 fn hosts(text: &str) -> Vec<String> {
     text.split([' ', ',']).filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
+}
+
+/// Shifts of one day.
+const SHIFTS_MAX: usize = 12;
+
+/// Times of day with blanks or commas between them, as minutes after midnight in increasing order. `None`: one of them is none, there
+/// are none, or more than twelve.
+fn shifts(text: &str) -> Option<Vec<i64>> {
+    let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+    let mut starts: Vec<i64> = words.map(crate::moment::time_of_day).collect::<Option<_>>()?;
+    starts.sort_unstable();
+    starts.dedup();
+    (1..=SHIFTS_MAX).contains(&starts.len()).then_some(starts)
+}
+
+fn check_shifts(reading: &mut Reading<'_>) {
+    let Some(written) = text(reading, SECTION, "shifts").filter(|written| shifts(written).is_none()) else { return };
+    let at = origin(reading, "shifts");
+    reading.problem(
+        &at,
+        format!("`shifts` is {written:?}, which are no times of day"),
+        "write 1 to 12 of them: \"6:00 14:00 22:00\"",
+    );
 }
 
 /// Can only this box reach the address?
@@ -39,6 +63,7 @@ pub(super) fn own(listen: &str) -> bool {
 pub(super) fn check(reading: &mut Reading<'_>) {
     check_files(reading);
     check_hosts(reading);
+    check_shifts(reading);
     check_reach(reading);
 }
 
@@ -93,7 +118,15 @@ fn check_reach(reading: &mut Reading<'_>) {
 
 #[cfg(test)]
 mod tests {
-    use super::own;
+    use super::{own, shifts};
+
+    #[test]
+    fn shifts_are_times_of_day() {
+        assert_eq!(shifts("14:00, 6:30"), Some(vec![390, 840]));
+        for wrong in ["", "25:00", "6:61", "six", "0 1 2 3 4 5 6 7 8 9 10 11 12"] {
+            assert_eq!(shifts(wrong), None, "{wrong}");
+        }
+    }
 
     #[test]
     fn only_loopback_is_this_box_alone() {

@@ -31,7 +31,9 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     let sinks = outputs::sinks(reading);
     let outbox = outputs::outbox(reading);
     let gateway = gateway(reading, base)?;
+    let in_force = super::in_force::in_force(reading);
     Some(Config {
+        in_force,
         alignment: Alignment {
             spindle_power: alignment_use(&text(reading, "alignment", "spindle_power")?),
             total_power: alignment_use(&text(reading, "alignment", "total_power")?),

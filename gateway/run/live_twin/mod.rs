@@ -5,8 +5,10 @@ mod shown;
 
 use super::health::Health;
 use crate::config::Config;
+use crate::diagnosis::desk::Desk;
+use crate::diagnosis::kept::Kept;
 use crate::diagnosis::words;
-use crate::diagnosis::worker::{self, Finished, Loaded, Places, Report, Request, Worker};
+use crate::diagnosis::worker::{self, Finished, Loaded, Places, Report, Worker};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
@@ -85,8 +87,12 @@ impl Twin {
     pub fn of(config: &Config) -> Option<Self> {
         let model = config.twin.model.clone()?;
         let data_dir = &config.gateway.data_dir;
-        let places =
-            Places { model, history: config.history.path.clone(), improved: data_dir.join("model-improved.toml") };
+        let places = Places {
+            model,
+            history: config.history.path.clone(),
+            improved: data_dir.join("model-improved.toml"),
+            kept: Kept::below(data_dir),
+        };
         let mut twin = Self {
             places,
             memory: data_dir.join("twin.json"),
@@ -117,12 +123,21 @@ impl Twin {
             Err(problem) => self.refuse(problem),
         }
         match Worker::start(self.places.clone(), known) {
-            Ok(worker) => self.worker = Some(worker),
+            Ok(worker) => {
+                self.active.iter().for_each(|active| worker.desk().in_charge(&active.loaded));
+                self.worker = Some(worker);
+            }
             Err(error) => {
                 let text = format!("no thread for the twin ({error}): nothing is diagnosed in the background");
                 self.told.push(Notice::new(Severity::Warning, "twin_alone", text));
             }
         }
+    }
+
+    /// Where diagnoses are asked for; `None` where there is no thread for them.
+    #[must_use]
+    pub fn desk(&self) -> Option<Desk> {
+        self.worker.as_ref().map(|worker| worker.desk().clone())
     }
 
     fn put_in_charge(&mut self, loaded: Loaded, before: Remembered) {
@@ -141,6 +156,7 @@ impl Twin {
         self.told.push(Notice::new(Severity::Info, "twin_model", text));
         self.problem = None;
         self.new = (!same).then(|| loaded.clone());
+        self.worker.iter().for_each(|worker| worker.desk().in_charge(&loaded));
         self.active = Some(ActiveModel { live: Live::new(loaded.model.clone(), memory), loaded });
     }
 
@@ -254,8 +270,9 @@ impl Twin {
 
     fn ask_when_due(&mut self, now_ns: TimeNs, health: &mut Health) {
         let Some(Due { from_ns, .. }) = self.due.filter(|due| now_ns >= due.at_ns && !self.diagnosing) else { return };
-        let (Some(worker), Some(ActiveModel { loaded, .. })) = (&self.worker, &self.active) else { return };
-        if worker.ask(Request { model: loaded.model.clone(), from_ns, to_ns: now_ns }) {
+        let Some(worker) = &self.worker else { return };
+        // While a person's diagnosis is under way, this one waits.
+        if worker.desk().ask(None, from_ns, now_ns).is_ok() {
             (self.begun_ns, self.diagnosing) = (Some(now_ns), true);
             let text = "a diagnosis of the difference between machine and simulation has begun in the background";
             health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));
@@ -268,19 +285,26 @@ impl Twin {
         match report {
             Report::Model(loaded) => self.replace(*loaded, health, now_ns),
             Report::Refused(problem) => self.refuse(problem),
-            Report::NotDiagnosed(problem) => {
-                (self.diagnosing, self.due) = (false, None);
-                let text = format!("the difference between machine and simulation could not be diagnosed: {problem}");
+            Report::NotDiagnosed(problem, by) => {
+                self.was_due(by.as_deref());
+                let text = format!("{} could not be made: {problem}", diagnosis_of(by.as_deref()));
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
             }
             Report::Diagnosed(mut finished) => {
-                (self.diagnosing, self.due) = (false, None);
+                self.was_due(finished.by.as_deref());
                 finished.record.at_ns = now_ns;
-                let text = format!("diagnosis: {}", finished.record.summary);
+                let text = format!("{}: {}", diagnosis_of(finished.by.as_deref()), finished.record.summary);
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_finished", text));
                 health.keep(finished.record.clone().into());
                 self.finished = Some(*finished);
             }
+        }
+    }
+
+    /// The one that the box itself had asked for is no longer due.
+    fn was_due(&mut self, by: Option<&str>) {
+        if by.is_none() {
+            (self.diagnosing, self.due) = (false, None);
         }
     }
 
@@ -305,6 +329,11 @@ impl Twin {
             Err(error) => tracing::warn!("what the twin has learned could not be saved: {error}"),
         }
     }
+}
+
+/// Which diagnosis it is, in messages.
+fn diagnosis_of(by: Option<&str>) -> String {
+    by.map_or_else(|| "diagnosis".to_owned(), |by| format!("diagnosis asked for by {by}"))
 }
 
 fn code(regime: Regime) -> String {

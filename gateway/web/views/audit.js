@@ -4,14 +4,17 @@ import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { bytes, clock, dateTime, duration, number, quantity, when } from "/web/format.js";
 import { box, has, t } from "/web/words.js";
 import { armDialog, sourceName } from "/web/now.js";
+import { systemView } from "/web/system.js";
 
 const KINDS = ["", "all", "write", "request", "armed", "disarmed", "change", "login", "persons", "request_refused", "stop", "feed_hold", "acknowledged", "reaction", "started"];
 const PAGE = 1000;
+/** Lines that are shown at first: what stands below the list must be found. */
+const LINES = 25;
 /** Rows of the same kind, script and outcome that follow each other within this time are one line. */
 const RAMP_S = 10;
 
 export function mount(root, context) {
-  const state = { kind: "", text: "", rows: [], timer: null, open: new Set() };
+  const state = { kind: "", text: "", rows: [], timer: null, open: new Set(), most: LINES };
   const gate = gateCard(context);
   const list = make("div", "");
   const note = make("p", "note", " ", { role: "status" });
@@ -31,10 +34,12 @@ export function mount(root, context) {
     } catch (error) { fill(list, [make("p", "note bad", error.message)]); }
   };
   const system = systemCards(context);
-  root.append(gate.box, card("", [make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]), make("p", "note", t("audit_words")), note, list]), system.box);
+  const more = systemView(context);
+  root.append(gate.box, card("", [make("div", "head", [make("h2", "", t("audit_title")), select, search, verify]), make("p", "note", t("audit_words")), note, list]), system.box, ...more.parts);
   read();
+  if (context.session) more.session();
   state.timer = setInterval(read, 3000);
-  return { update(status) { gate.update(status); system.update(status); }, session: () => gate.update(context.status()), leave: () => clearInterval(state.timer) };
+  return { update(status) { gate.update(status); system.update(status); more.update(status); }, session: () => { gate.update(context.status()); more.session(); }, leave: () => clearInterval(state.timer) };
 }
 
 async function verified() {
@@ -67,7 +72,7 @@ function drawRows(list, state, context) {
   if (!groups.length) return fill(list, [make("p", "empty", state.rows.length ? t("no_match") : t("no_audit"))]);
   const now = context.status()?.at_ms ?? 0;
   const value = (v, unit) => (v === null ? "–" : quantity(v, unit));
-  const rows = groups.slice(0, 300).flatMap((g) => {
+  const rows = groups.slice(0, state.most).flatMap((g) => {
     const [first, last] = [g.rows[0], g.rows.at(-1)];
     const ramp = g.rows.length > 1;
     const figures = g.unit ? (ramp ? `${value(first.asked, g.unit)} … ${value(last.asked, g.unit)} → ${value(last.after, g.unit)}` : `${value(g.asked, g.unit)} → ${value(g.after, g.unit)}`) : "";
@@ -80,7 +85,7 @@ function drawRows(list, state, context) {
     line[0] = { text: make("button", "link-button", `${opened ? "▾" : "▸"} ${time}`, { type: "button", "aria-expanded": String(opened), onclick: () => { if (!state.open.delete(first.number)) state.open.add(first.number); drawRows(list, state, context); } }) };
     return opened ? [line, ...g.rows.slice().reverse().slice(0, 50).map((e) => [`   ${clock(e.at_ns / 1e6)}`, "", `${value(e.asked, e.unit)} → ${value(e.after, e.unit)}`, box(e.reason), ""])] : [line];
   });
-  fill(list, [table([t("time"), t("what"), t("asked_let"), t("why"), t("who")], rows, { caption: t("audit_title") })]);
+  fill(list, [table([t("time"), t("what"), t("asked_let"), t("why"), t("who")], rows, { caption: t("audit_title") }), groups.length > state.most ? make("button", "", t("show_more", groups.length - state.most), { type: "button", onclick: () => { state.most += 300; drawRows(list, state, context); } }) : null]);
 }
 
 function gateCard(context) {

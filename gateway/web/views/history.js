@@ -33,7 +33,7 @@ class HistoryView {
     ranges.push(make("button", "", t("all"), { type: "button", onclick: () => this.look(this.first, this.edge(), true) }));
     const step = (text, label, act) => make("button", "", text, { type: "button", "aria-label": label, title: label, onclick: act });
     this.ranges = ranges;
-    const tools = make("div", "head", [make("div", "buttons", ranges), make("div", "buttons", [step("◀", t("earlier"), () => this.move.pan(-0.5)), step("▶", t("later"), () => this.move.pan(0.5)), step("+", t("zoom_in"), () => this.move.zoom(0.5)), step("−", t("zoom_out"), () => this.move.zoom(2))]), this.text, this.busy, make("button", "grow", t("export_seen"), { type: "button", onclick: () => this.save() })]);
+    const tools = make("div", "head", [make("div", "buttons", ranges), make("div", "buttons", [step("◀", t("earlier"), () => this.move.pan(-0.5)), step("▶", t("later"), () => this.move.pan(0.5)), step("+", t("zoom_in"), () => this.move.zoom(0.5)), step("−", t("zoom_out"), () => this.move.zoom(2))]), this.text, this.busy, make("a", "button-link grow", t("diagnose_seen"), { href: "/twin", "data-view": "twin", onclick: (event) => { event.currentTarget.href = `/twin?from=${new Date(this.from * 1000).toISOString()}&to=${new Date(this.to * 1000).toISOString()}`; } }), make("button", "", t("export_seen"), { type: "button", onclick: () => this.save() })]);
     this.ribbonBox = make("div", "ribbon-box");
     this.readout = make("div", "readout", null, { "aria-live": "off" });
     this.charts = make("div", "charts");
@@ -99,7 +99,8 @@ class HistoryView {
       const found = await this.data.read(this.from, this.to, this.channels, { first: this.first, last: this.edge() });
       if (!found) return;
       this.found = found;
-      say(this.note, "");
+      const empty = found.series.every((s) => !s.points.some((p) => typeof p[1] === "number"));
+      say(this.note, empty ? t("nothing_in_range") : "");
       for (const plot of this.plots) plot.give(columns(found.series, plot.names));
       this.read_out(null, null);
       this.drawRibbon();

@@ -1,5 +1,5 @@
 // Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets proposed and written.
-import { ask, card, fill, make, row, say } from "/web/parts.js";
+import { ask, card, fill, make, row, say, table } from "/web/parts.js";
 import { number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
@@ -15,7 +15,9 @@ export function mount(root, context) {
   const warmth = make("div", "plot-box");
   const note = make("p", "note", " ");
   const list = make("div", "legend");
-  root.append(make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]), card("", [make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]), error, note]), card("", [make("h2", "", t("temperatures")), list, warmth]));
+  const points = make("div", "");
+  root.append(make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]), card("", [make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]), error, note]), card("", [make("h2", "", t("temperatures")), list, warmth]), card(t("thermal_points"), points));
+  drawPoints(points, context);
   let plots = [];
   const read = async () => {
     const status = context.status();
@@ -64,4 +66,15 @@ export function mount(root, context) {
     },
     leave() { clearInterval(timer); plots.forEach((plot) => plot.destroy()); },
   };
+}
+
+/** Which points of measurement the law uses and why, from the answer of `identify thermal`. */
+async function drawPoints(root, context) {
+  const found = await ask("/api/v1/identified/thermal").catch((error) => ({ error: error.message }));
+  const selection = found.identified?.learned?.selection;
+  if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", found.file))]);
+  const cell = (value, unit) => ({ num: value === null || value === undefined ? "–" : quantity(value, unit) });
+  const rows = selection.sensors.map((s) => [context.name(s.sensor), t(s.chosen ? "chosen" : "not_chosen"), s.reason, cell(s.correlation), cell(s.grade_initial_image), cell(s.variance_inflation), cell(s.held_out_rms_um, "um")]);
+  const head = [t("temperatures"), "", t("why"), ...["correlation", "grade", "inflation", "held_out_error"].map((key) => ({ num: t(key) }))];
+  fill(root, [table(head, rows, { caption: t("thermal_points") }), make("p", "note", found.identified.learned.reason ?? "")]);
 }

@@ -1,14 +1,15 @@
 // Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try next.
-import { ask, card, fill, make, row, say, table } from "/web/parts.js";
-import { clock, dateTime, number, quantity } from "/web/format.js";
+import { ask, card, fill, make, row, say } from "/web/parts.js";
+import { clock, number, quantity } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
+import { Asking, drawDiagnoses, ticked } from "/web/diagnosis.js";
 
 const SPANS = [3600, 6 * 3600, 86400, 7 * 86400];
 
 export function mount(root, context) {
-  const state = { span: 3600, read: 0, plots: [], done: new Set(stored()) };
+  const state = { span: 3600, read: 0, plots: [], done: ticked() };
   const verdict = make("p", "verdict", " ");
   const facts = make("div", "");
   const regimes = make("div", "");
@@ -20,13 +21,15 @@ export function mount(root, context) {
   const ranges = make("div", "buttons", SPANS.map((s) => make("button", "", s < 86400 ? `${s / 3600} ${t("h")}` : `${s / 86400} ${t("d")}`, { type: "button", "data-span": s, onclick: () => { state.span = s; press(); read(); } })));
   const press = () => { for (const b of ranges.children) b.setAttribute("aria-pressed", String(Number(b.dataset.span) === state.span)); };
   press();
-  root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), card(t("past_diagnoses"), past));
+  const asking = new Asking(context, () => setTimeout(() => read(), 1500));
+  root.append(make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]), card("", [make("div", "head", [make("h2", "", t("twin_figure")), ranges]), make("div", "legend", [["line-a", "recorded_value"], ["line-c", "simulated_value"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); })), figure, make("h3", "", t("twin_residual")), left, note]), card(t("latest_diagnosis"), latest), asking.box, card(t("past_diagnoses"), past));
   const read = async () => {
     const status = context.status();
     if (!status) return;
     const twin = await ask("/api/v1/twin?limit=20").catch(() => ({ diagnoses: [] }));
-    drawDiagnoses(latest, past, twin.diagnoses, state);
-    figure.closest(".card").hidden = !status.twin;
+    drawDiagnoses(latest, past, twin.diagnoses, context, state.done);
+    figure.closest(".card").hidden = regimes.closest(".card").hidden = !status.twin;
+    for (const it of [latest, past]) it.closest(".card").hidden = !status.twin && !twin.diagnoses.length;
     if (!status.twin) return;
     try {
       const known = (await ask("/api/v1/series")).series.map((s) => s.name);
@@ -51,8 +54,10 @@ export function mount(root, context) {
     update(status) {
       if (!begun) { begun = true; read(); }
       drawNow(verdict, facts, regimes, status, context);
+      asking.update(status);
     },
-    leave() { clearInterval(timer); state.plots.forEach((plot) => plot.destroy()); },
+    session: () => read(),
+    leave() { clearInterval(timer); asking.leave(); state.plots.forEach((plot) => plot.destroy()); },
   };
 }
 
@@ -80,37 +85,4 @@ function drawNow(verdict, facts, regimes, status, context) {
     return row(t(`regime_${r.regime}`), share, r.text ? own({ en: r.text, zh: r.zh ?? r.text }) : t(`stage_${r.stage}`), { dot: { watching: "good", differing: "bad" }[r.stage] ?? "" });
   };
   fill(regimes, twin.regimes.length ? twin.regimes.map(line) : [make("p", "empty", t("twin_nothing_yet"))]);
-}
-
-function drawDiagnoses(latest, past, diagnoses, state) {
-  const newest = diagnoses[0];
-  fill(latest, newest ? [told(newest, state)] : [make("p", "empty", t("no_diagnosis"))]);
-  const rows = diagnoses.slice(1).map((d) => [dateTime(d.at_ms), t(`verdict_${d.verdict}`), d.summary, `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`]);
-  fill(past, rows.length ? [table([t("time"), t("verdict"), t("what"), t("examined")], rows, { caption: t("past_diagnoses") })] : [make("p", "empty", t("no_past_diagnosis"))]);
-}
-
-function told(found, state) {
-  const d = found.diagnosis ?? {};
-  const parts = [make("p", "summary", found.summary), make("p", "note", `${t(`verdict_${found.verdict}`)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
-  if (d.fit?.before) parts.push(make("p", "", t("fit_words", quantity(d.fit.before.held_out_rmse, d.unit), quantity(d.fit.after?.held_out_rmse ?? d.fit.before.held_out_rmse, d.unit), quantity(d.fit.noise_floor, d.unit))));
-  for (const it of d.missing ?? []) {
-    const numbers = (it.parameters ?? []).map((p) => `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`);
-    parts.push(row(it.statement ?? it.effect, it.effect, [it.equation, ...numbers].filter(Boolean).join(" · "), { dot: "bad" }));
-  }
-  if (d.alternatives?.length) parts.push(make("h3", "", t("alternatives")), ...d.alternatives.map((a) => row(a.effect, t("instead_of", a.instead_of), a.separating_experiment)));
-  const steps = [d.next_experiment?.statement, ...(d.next_experiment?.steps ?? [])].filter((s) => typeof s === "string");
-  if (steps.length) parts.push(make("h3", "", t("experiment")), ...steps.map((text) => step(text, state)));
-  return make("div", "diagnosis", parts);
-}
-
-/** The experiment asked for, to tick off; what is ticked is remembered by this browser. */
-function step(text, state) {
-  const tick = make("input", "", null, { type: "checkbox" });
-  tick.checked = state.done.has(text);
-  tick.addEventListener("change", () => { if (tick.checked) state.done.add(text); else state.done.delete(text); try { localStorage.setItem("experiment", JSON.stringify([...state.done].slice(-50))); } catch { /* not remembered */ } });
-  return make("label", "step", [tick, text]);
-}
-
-function stored() {
-  try { return JSON.parse(localStorage.getItem("experiment") ?? "[]"); } catch { return []; }
 }

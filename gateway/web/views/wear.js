@@ -18,8 +18,9 @@ export function mount(root, context) {
   const figure = make("div", "plot-box wear-figure");
   const below = make("p", "note", " ");
   const models = make("div", "");
+  const variance = make("div", "");
   tools.addEventListener("change", () => { state.tool = tools.value; draw(); });
-  root.append(make("div", "columns", [card(t("edge_now"), [lamp, facts], "ages"), card(t("wear_models"), models)]), card("", [make("div", "head", [make("h2", "", t("wear_figure")), tools]), legend(), figure, below]));
+  root.append(make("div", "columns", [card(t("edge_now"), [lamp, facts], "ages"), card(t("wear_models"), models)]), card("", [make("div", "head", [make("h2", "", t("wear_figure")), tools]), legend(), figure, below]), card(t("anova"), variance));
   let plot = null;
   const draw = () => {
     plot?.destroy();
@@ -38,6 +39,7 @@ export function mount(root, context) {
     } catch (error) { say(below, error.message); }
   };
   read();
+  drawVariance(variance);
   const timer = setInterval(read, READ_EVERY_MS);
   return { update: (status) => drawEdge(lamp, facts, status, context, state), leave() { clearInterval(timer); plot?.destroy(); } };
 }
@@ -107,5 +109,17 @@ function drawModels(root, models) {
   if (!models.length) return fill(root, [make("p", "empty", t("no_wear_model_words"))]);
   const any = (text) => text || t("any");
   const rows = models.map((m) => [any(m.machine), any(m.tool), any(m.work_material), any(m.operation), t(`form_${m.form}`), { num: quantity(m.criterion_mm, "mm") }, { num: String(m.cuts) }, { num: `${number(100 * m.r2)} %` }, m.in_force ? t("in_charge") : t("replaced")]);
-  fill(root, [table([t("machine"), t("tool"), t("material"), t("operation"), t("wear_form"), { num: t("criterion_short") }, { num: t("cuts") }, { num: "R²" }, ""], rows, { caption: t("wear_models") }), ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula)), make("p", "note", t("anova_where"))]);
+  fill(root, [table([t("machine"), t("tool"), t("material"), t("operation"), t("wear_form"), { num: t("criterion_short") }, { num: t("cuts") }, { num: "R²" }, ""], rows, { caption: t("wear_models") }), ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula))]);
+}
+
+/** The table that tells which factors count, from the answer of `identify tool-wear`. */
+async function drawVariance(root) {
+  const found = await ask("/api/v1/identified/tool-wear").catch((error) => ({ error: error.message }));
+  const anova = found.identified?.learned?.surface?.anova;
+  if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", found.file))]);
+  const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
+  const percent = (share) => (share === null ? "–" : number(100 * share));
+  const rows = anova.sources.map((s) => [s.source, cell(s.sum_of_squares), { num: String(s.degrees_of_freedom) }, cell(s.mean_square), cell(s.f), { num: s.p === null || s.p === undefined ? "–" : s.p < 0.0001 ? "< 0.0001" : s.p.toFixed(4) }]);
+  const head = [t("anova_source"), ...["sum_of_squares", "degrees_of_freedom", "mean_square"].map((key) => ({ num: t(key) })), { num: "F" }, { num: "p" }];
+  fill(root, [table(head, rows, { caption: t("anova") }), make("p", "note", t("anova_shares", percent(anova.r2), percent(anova.adjusted_r2), percent(anova.predicted_r2)))]);
 }

@@ -1,0 +1,157 @@
+//! The child process in which a diagnosis is made. It takes minutes and as much memory as the stretch is long, so it can be ended
+//! at any moment, and whatever happens to it, the gateway goes on.
+//!
+//! The gateway writes one line, the [`Job`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
+//! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`Said`].
+
+use super::kept::Kept;
+use super::stretch;
+use crate::history;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::twin::{self, parse_model, report};
+use serde::{Deserialize, Serialize};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+
+/// A tenth of the claim to the processor that everything else has; with less, a busy box would never finish.
+const NICE: i32 = 10;
+/// Seed of the resampling: the same stretch and model give the same diagnosis.
+const SEED: u64 = 1;
+/// The longest line that is read: a diagnosis as JSON is some ten kilobytes.
+const LINE_MAX: u64 = 16 << 20;
+/// The word of the command line.
+pub const COMMAND: &str = "diagnosis-child";
+
+/// What is to be diagnosed.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Job {
+    /// The model, `model/1`.
+    pub toml: String,
+    /// The history.
+    pub history: PathBuf,
+    /// Beginning of the stretch.
+    pub from_ns: TimeNs,
+    /// Its end.
+    pub to_ns: TimeNs,
+    /// Where report, plan and model are kept.
+    pub kept: PathBuf,
+}
+
+/// How far it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Until what was just measured is in the history.
+    Waiting,
+    /// The stretch is read.
+    Reading,
+    /// The model is fitted and every effect of the catalogue is tried.
+    Comparing,
+    /// Report, plan and model are written.
+    Writing,
+}
+
+/// One line of the child.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Said {
+    /// It goes on, with so many rows of a second where that is known.
+    Stage(Stage, usize),
+    /// It is done: the row of the history (its time is for the tick to fill in) and what is missing.
+    Finished(Box<history::Diagnosis>, Vec<String>),
+    /// It cannot be done, for these reasons.
+    Refused(String),
+}
+
+/// Starts a child on a job.
+///
+/// # Errors
+/// No process could be started.
+pub fn start(job: &Job) -> std::io::Result<Child> {
+    let program = if cfg!(target_os = "linux") { PathBuf::from("/proc/self/exe") } else { std::env::current_exe()? };
+    let mut child = Command::new(program)
+        .arg(COMMAND)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()?;
+    let line = serde_json::to_string(job)? + "\n";
+    let told = child.stdin.as_mut().map_or(Ok(()), |pipe| pipe.write_all(line.as_bytes()));
+    if let Err(error) = told {
+        let _already_gone = child.kill();
+        let _reaped = child.wait();
+        return Err(error);
+    }
+    Ok(child)
+}
+
+/// Every line of the child until it ends or says the outcome.
+pub fn listen(output: impl Read, mut said: impl FnMut(Said)) {
+    let mut lines = BufReader::new(output.take(LINE_MAX)).lines();
+    while let Some(Ok(line)) = lines.next() {
+        if let Ok(it) = serde_json::from_str(&line) {
+            said(it);
+        }
+    }
+}
+
+/// The child itself: reads its job, says how it goes, ends when its parent does.
+///
+/// # Errors
+/// There is no job to be read.
+pub fn run() -> std::io::Result<()> {
+    let _refused = rustix::process::nice(NICE);
+    let mut line = String::new();
+    let mut input = BufReader::new(std::io::stdin().take(LINE_MAX));
+    input.read_line(&mut line)?;
+    let job: Job = serde_json::from_str(&line)?;
+    std::thread::Builder::new().name("parent".to_owned()).spawn(move || {
+        let _until_it_is_gone = std::io::copy(&mut input, &mut std::io::sink());
+        std::process::exit(2);
+    })?;
+    let outcome = diagnose(&job).map_or_else(Said::Refused, |(row, missing)| Said::Finished(Box::new(row), missing));
+    say(&outcome)
+}
+
+fn say(said: &Said) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", serde_json::to_string(said)?)?;
+    out.flush()
+}
+
+fn diagnose(job: &Job) -> Result<(history::Diagnosis, Vec<String>), String> {
+    let tell = |stage, rows| say(&Said::Stage(stage, rows)).map_err(|error| error.to_string());
+    let model = parse_model(&job.toml)
+        .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+    tell(Stage::Reading, 0)?;
+    let recording = stretch::read(&job.history, job.from_ns, job.to_ns, &model.output).map_err(|it| it.to_string())?;
+    if recording.rows() == 0 {
+        return Err("the history holds no sample of this time; choose another one".to_owned());
+    }
+    tell(Stage::Comparing, recording.rows())?;
+    let examination = twin::examine(&recording, &model);
+    if !examination.unusable.is_empty() {
+        return Err(examination.unusable.join("; "));
+    }
+    let found = twin::diagnose(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
+    tell(Stage::Writing, recording.rows())?;
+    let row = history::Diagnosis {
+        at_ns: job.to_ns,
+        from_ns: begin_ns(&recording).unwrap_or(job.from_ns),
+        to_ns: job.to_ns,
+        verdict: found.verdict.word().to_owned(),
+        summary: found.summary.clone(),
+        json: report::to_json(&found).to_string(),
+    };
+    let kept = Kept::at(job.kept.clone());
+    kept.keep(&row, &found, &recording).map_err(|error| format!("{}: {error}", kept.directory().display()))?;
+    Ok((row, found.missing.iter().map(|missing| missing.effect.clone()).collect()))
+}
+
+/// When the stretch that was really examined began: of a long one the beginning is left out.
+#[expect(clippy::cast_possible_truncation, reason = "seconds of a stretch of eight hours")]
+fn begin_ns(recording: &adapters::Recording) -> Option<TimeNs> {
+    let first_s = recording.time_s.first()?;
+    Some(recording.start_ns? + (first_s * SECOND_NS as f64) as i64)
+}

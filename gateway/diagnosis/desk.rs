@@ -1,0 +1,250 @@
+//! The one place where diagnoses are asked for, by the tick and by persons on the page: one at a time, with how far it is, and
+//! ended at any moment.
+
+use super::child::Stage;
+use super::kept::{Kept, Part};
+use super::worker::{Loaded, Request};
+use crate::files::{read_text, replace_durably};
+use adapters::clock::TimeNs;
+use rules::twin::parse_model;
+use std::path::{Path, PathBuf};
+use std::process::Child;
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The longest model file that is read.
+const MODEL_MAX: usize = 4 << 20;
+
+/// What is being done, or was done last.
+#[derive(Debug, Clone, Default)]
+pub enum Run {
+    /// Nothing yet.
+    #[default]
+    None,
+    /// A diagnosis is under way.
+    Running(Running),
+    /// It is in the history, under this key.
+    Done {
+        /// Who asked for it; `None`: the box itself.
+        by: Option<String>,
+        /// See `kept::key`.
+        key: String,
+        /// How long it took, s.
+        seconds: f64,
+    },
+    /// It could not be made.
+    Failed {
+        /// Who asked for it.
+        by: Option<String>,
+        /// Why.
+        what: String,
+    },
+    /// A person ended it.
+    Cancelled {
+        /// Who did.
+        by: String,
+    },
+}
+
+/// A diagnosis under way.
+#[derive(Debug, Clone)]
+pub struct Running {
+    /// Who asked for it; `None`: the box itself.
+    pub by: Option<String>,
+    /// The stretch.
+    pub from_ns: TimeNs,
+    /// Its end.
+    pub to_ns: TimeNs,
+    /// Since when.
+    pub since: Instant,
+    /// How far it is.
+    pub stage: Stage,
+    /// Rows of a second that are examined; 0 while that is not known.
+    pub rows: usize,
+    /// Who wants it ended.
+    cancelled: Option<String>,
+}
+
+/// Why nothing was begun, cancelled or accepted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// What is in the way.
+    pub what: String,
+    /// What to do next.
+    pub next: &'static str,
+}
+
+impl Refusal {
+    fn new(what: impl Into<String>, next: &'static str) -> Self {
+        Self { what: what.into(), next }
+    }
+}
+
+#[derive(Debug, Default)]
+struct State {
+    run: Run,
+    child: Option<Child>,
+    model: Option<Loaded>,
+    /// Seconds per row of the last one: from these follows about how long the next one takes.
+    pace_s: Option<f64>,
+}
+
+/// See the [module](self). Clones are the same desk.
+#[derive(Debug, Clone)]
+pub struct Desk {
+    state: Arc<Mutex<State>>,
+    requests: SyncSender<Request>,
+    model: PathBuf,
+    kept: Kept,
+}
+
+impl Desk {
+    /// A desk whose requests go there.
+    #[must_use]
+    pub fn new(requests: SyncSender<Request>, model: PathBuf, kept: Kept) -> Self {
+        Self { state: Arc::default(), requests, model, kept }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // The state is complete whenever the lock is free.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What was kept of diagnoses.
+    #[must_use]
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// The model file.
+    #[must_use]
+    pub fn model(&self) -> &Path {
+        &self.model
+    }
+
+    /// Another model has come into force.
+    pub fn in_charge(&self, loaded: &Loaded) {
+        self.lock().model = Some(loaded.clone());
+    }
+
+    /// What is being done, and about how long it takes in all, s, where that is known.
+    #[must_use]
+    pub fn run(&self) -> (Run, Option<f64>) {
+        let state = self.lock();
+        let rows = if let Run::Running(running) = &state.run { running.rows } else { 0 };
+        #[expect(clippy::cast_precision_loss, reason = "at most some ten thousand rows")]
+        let about_s = state.pace_s.filter(|_| rows > 0).map(|pace_s| pace_s * rows as f64);
+        (state.run.clone(), about_s)
+    }
+
+    /// Asks for a diagnosis of this stretch under the model in charge.
+    ///
+    /// # Errors
+    /// No model is in charge, or one is under way.
+    pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), Refusal> {
+        let mut state = self.lock();
+        if let Run::Running(running) = &state.run {
+            let who = running.by.as_deref().unwrap_or("the box itself");
+            let what = format!("a diagnosis is under way (asked for by {who})");
+            return Err(Refusal::new(what, "wait for it or end it; there is one at a time"));
+        }
+        let none = || Refusal::new("no model is in charge", "name one under [twin] model in the configuration");
+        let toml = state.model.as_ref().ok_or_else(none)?.toml.clone();
+        let request = Request { toml, by: by.clone(), from_ns, to_ns };
+        let busy = |_| Refusal::new("the thread of the twin does not answer", "try again in a few seconds");
+        self.requests.try_send(request).map_err(busy)?;
+        let (since, stage) = (Instant::now(), Stage::Waiting);
+        state.run = Run::Running(Running { by, from_ns, to_ns, since, stage, rows: 0, cancelled: None });
+        Ok(())
+    }
+
+    /// Ends the one under way.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn cancel(&self, by: &str) -> Result<(), Refusal> {
+        let mut state = self.lock();
+        let Run::Running(running) = &mut state.run else {
+            return Err(Refusal::new("no diagnosis is under way", "GET /api/v1/diagnosis tells what was done last"));
+        };
+        running.cancelled = Some(by.to_owned());
+        if let Some(child) = &mut state.child {
+            let _already_gone = child.kill();
+        }
+        Ok(())
+    }
+
+    /// Who has ended the one under way.
+    #[must_use]
+    pub fn cancelled(&self) -> Option<String> {
+        if let Run::Running(running) = &self.lock().run { running.cancelled.clone() } else { None }
+    }
+
+    /// The process that does the work; one that was ended meanwhile is killed at once.
+    pub(super) fn put_child(&self, mut child: Child) {
+        if self.cancelled().is_some() {
+            let _already_gone = child.kill();
+        }
+        self.lock().child = Some(child);
+    }
+
+    /// The process, to be waited for.
+    pub(super) fn take_child(&self) -> Option<Child> {
+        self.lock().child.take()
+    }
+
+    pub(super) fn reached(&self, stage: Stage, rows: usize) {
+        if let Run::Running(running) = &mut self.lock().run {
+            (running.stage, running.rows) = (stage, rows);
+        }
+    }
+
+    /// What came of it.
+    pub(super) fn ended(&self, outcome: Result<String, String>) {
+        let mut state = self.lock();
+        let Run::Running(Running { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else { return };
+        let seconds = since.elapsed().as_secs_f64();
+        state.run = match (cancelled, outcome) {
+            (Some(by), _) => Run::Cancelled { by },
+            (None, Err(what)) => Run::Failed { by, what },
+            (None, Ok(key)) => {
+                #[expect(clippy::cast_precision_loss, reason = "at most some ten thousand rows")]
+                let pace_s = (rows > 0).then(|| seconds / rows as f64);
+                state.pace_s = pace_s.or(state.pace_s);
+                Run::Done { by, key, seconds }
+            }
+        };
+    }
+
+    /// Puts the model of a diagnosis in the place of the one in charge; the one before is kept beside it. Gives what was done, in
+    /// words. The box notices the file within two seconds.
+    ///
+    /// # Errors
+    /// The diagnosis has no model, the file has been changed since, or it cannot be written.
+    pub fn accept(&self, key: &str) -> Result<String, Refusal> {
+        let gone = || {
+            Refusal::new("this diagnosis has left no model", "only one that names what is missing does; diagnose again")
+        };
+        let text = self.kept.text(key, Part::Model).ok_or_else(gone)?;
+        let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
+        let model = parse_model(&text).map_err(|wrong| Refusal::new(format!("the kept model: {}", wrong[0]), next))?;
+        let before = self.lock().model.clone();
+        let now = read_text(&self.model, MODEL_MAX).unwrap_or_default();
+        if before.as_ref().is_some_and(|before| before.toml != now) {
+            let what = format!("{} has just been changed by somebody else", self.model.display());
+            return Err(Refusal::new(what, "look at what is in charge now, and decide again"));
+        }
+        let permission = "the user of the gateway must be allowed to write the file of [twin] model";
+        let cannot = |error: std::io::Error| Refusal::new(format!("{}: {error}", self.model.display()), permission);
+        let kept_before = self.model.with_extension("before.toml");
+        replace_durably(&kept_before, &now).map_err(cannot)?;
+        replace_durably(&self.model, &text).map_err(cannot)?;
+        let before = before.map_or_else(|| "none".to_owned(), |before| before.model.name);
+        Ok(format!(
+            "model {:?} of diagnosis {key} in the place of {before:?}; the one before is in {}",
+            model.name,
+            kept_before.display()
+        ))
+    }
+}

@@ -1,0 +1,193 @@
+//! What is kept of a diagnosis beside its row in the history: the report page in both languages, the model with what was missing,
+//! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
+//! the row, so that no second list can disagree with the history.
+
+use super::steps::{Step, steps};
+use crate::files::{read_text, replace};
+use crate::history;
+use crate::reload::digest;
+use adapters::Recording;
+use rules::physics::explain::Language;
+use rules::twin::page::{PageInput, page};
+use rules::twin::{self, diagnosis::Verdict, plan, text};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Diagnoses whose files are kept: half a megabyte each, and one in six hours at most without being asked for.
+const KEPT_MAX: usize = 40;
+/// The longest file that is read back.
+const FILE_MAX: usize = 16 << 20;
+
+/// Where the files are.
+#[derive(Debug, Clone)]
+pub struct Kept {
+    directory: PathBuf,
+}
+
+/// One file of a diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The report page.
+    Page(Language),
+    /// The experiment it asks for, as a recording plan.
+    Plan(Language),
+    /// The model with what was missing.
+    Model,
+    /// [`Words`].
+    Words,
+}
+
+/// What the page of the box shows of a diagnosis that its JSON does not hold.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Words {
+    /// The first sentence in Chinese; the English one stands in the row.
+    pub summary_zh: String,
+    /// The experiment it asks for.
+    pub steps: Vec<Step>,
+    /// How long the experiment takes, minutes.
+    pub minutes: Option<f64>,
+}
+
+/// The key of a row: the end of its stretch and what was found.
+#[must_use]
+pub fn key(row: &history::Diagnosis) -> String {
+    format!("{}-{:016x}", row.to_ns.div_euclid(1_000_000), digest(row.json.as_bytes()))
+}
+
+/// Has it the form of a key? Anything else must not become part of a path.
+#[must_use]
+pub fn is_key(text: &str) -> bool {
+    let digits =
+        |part: &str, all: fn(&u8) -> bool| !part.is_empty() && part.len() <= 20 && part.as_bytes().iter().all(all);
+    text.split_once('-').is_some_and(|(at, of)| digits(at, u8::is_ascii_digit) && digits(of, u8::is_ascii_hexdigit))
+}
+
+impl Kept {
+    /// Below this data directory.
+    #[must_use]
+    pub fn below(data_dir: &Path) -> Self {
+        Self { directory: data_dir.join("diagnoses") }
+    }
+
+    /// In this folder.
+    #[must_use]
+    pub fn at(directory: PathBuf) -> Self {
+        Self { directory }
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// The path of a file.
+    #[must_use]
+    pub fn path(&self, key: &str, part: Part) -> PathBuf {
+        let word = |language| if language == Language::Zh { "zh" } else { "en" };
+        let end = match part {
+            Part::Page(language) => format!("{}.html", word(language)),
+            Part::Plan(language) => format!("{}.csv", word(language)),
+            Part::Model => "toml".to_owned(),
+            Part::Words => "json".to_owned(),
+        };
+        self.directory.join(format!("{key}.{end}"))
+    }
+
+    /// The text of a file; `None` where nothing was kept, or no longer.
+    #[must_use]
+    pub fn text(&self, key: &str, part: Part) -> Option<String> {
+        is_key(key).then(|| read_text(&self.path(key, part), FILE_MAX).ok()).flatten()
+    }
+
+    /// What is shown of it besides its JSON.
+    #[must_use]
+    pub fn words(&self, key: &str) -> Option<Words> {
+        serde_json::from_str(&self.text(key, Part::Words)?).ok()
+    }
+
+    /// Keeps everything of a diagnosis; older ones beyond the limit go.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn keep(
+        &self,
+        row: &history::Diagnosis,
+        found: &twin::Diagnosis,
+        recording: &Recording,
+    ) -> std::io::Result<()> {
+        let key = key(row);
+        let put = |part, text: &str| replace(&self.path(&key, part), text);
+        for language in [Language::En, Language::Zh] {
+            put(Part::Page(language), &page(&PageInput { diagnosis: found, recording, language }))?;
+        }
+        let mut words = Words { summary_zh: summary_zh(found), ..Words::default() };
+        if let Ok(plan) = plan::plan(found, recording) {
+            (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
+            for language in [Language::En, Language::Zh] {
+                put(Part::Plan(language), &plan.csv(language))?;
+            }
+        }
+        if found.verdict != Verdict::CannotTell && !found.missing.is_empty() {
+            put(Part::Model, &twin::write_model(&found.model))?;
+        }
+        put(Part::Words, &serde_json::to_string(&words)?)?;
+        self.forget_the_oldest()
+    }
+
+    fn forget_the_oldest(&self) -> std::io::Result<()> {
+        let names = std::fs::read_dir(&self.directory)?.flatten();
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        let key = |name: &str| name.split_once('.').map(|(key, _)| key.to_owned()).filter(|key| is_key(key));
+        let mut files: Vec<(u64, String, String)> = names
+            .filter_map(|name| {
+                let key = key(&name)?;
+                Some((key.split_once('-')?.0.parse().ok()?, key, name))
+            })
+            .collect();
+        files.sort_unstable_by(|a, b| b.cmp(a));
+        let mut keys: Vec<&str> = files.iter().map(|(_, key, _)| key.as_str()).collect();
+        keys.dedup();
+        let Some(first_gone) = keys.get(KEPT_MAX).map(|key| (*key).to_owned()) else { return Ok(()) };
+        let at = files.iter().position(|(_, key, _)| *key == first_gone).unwrap_or(files.len());
+        files[at..].iter().try_for_each(|(.., name)| std::fs::remove_file(self.directory.join(name)))
+    }
+}
+
+/// The headline of the report in Chinese, without the word of the verdict before it.
+fn summary_zh(found: &twin::Diagnosis) -> String {
+    let report = text::report(found, Language::Zh);
+    let headline = report.lines().next().unwrap_or_default();
+    headline.split_once('：').map_or(headline, |(_, words)| words).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_never_a_way_out_of_the_folder() {
+        let row = history::Diagnosis { to_ns: 1_700_000_000_123_000_000, json: "{}".to_owned(), ..Default::default() };
+        assert!(is_key(&key(&row)) && key(&row).starts_with("1700000000123-"));
+        for wrong in ["", "-", "1-", "../1-a", "1-a/b", "1-g", "a-1", "1-a.html", "123456789012345678901-a"] {
+            assert!(!is_key(wrong), "{wrong}");
+            assert_eq!(Kept::at(PathBuf::from("/")).text(wrong, Part::Words), None);
+        }
+    }
+
+    #[test]
+    fn the_oldest_go_with_all_their_files() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let kept = Kept::at(directory.path().to_owned());
+        for at in 0..KEPT_MAX + 3 {
+            for part in [Part::Words, Part::Model] {
+                replace(&kept.path(&format!("{}-00ff", 900 + at), part), "{}").expect("written");
+            }
+        }
+        std::fs::write(directory.path().join("of a person.txt"), "stays").expect("written");
+        kept.forget_the_oldest().expect("swept");
+        let left = std::fs::read_dir(directory.path()).expect("there").count();
+        assert_eq!(left, 2 * KEPT_MAX + 1);
+        assert!(kept.text("902-00ff", Part::Model).is_none() && kept.text("903-00ff", Part::Model).is_some());
+    }
+}

@@ -1,0 +1,177 @@
+//! Diagnoses that a person asks for: begin, watch, end, read the report, take the model over. The work is done in a process of its
+//! own, see `diagnosis::child`; what is found is stored by the tick, as it is for diagnoses that the box begins by itself.
+
+use super::Shared;
+use super::guard::told;
+use super::headers;
+use super::history::range;
+use super::person::{JsonBody, SignedIn};
+use super::problem::ApiProblem;
+use super::query::QueryKeys;
+use super::route::Route;
+use crate::access::Role;
+use crate::diagnosis::desk::{Desk, Refusal, Run};
+use crate::diagnosis::kept::{Part, is_key};
+use adapters::clock::SECOND_NS;
+use axum::Json;
+use axum::extract::{Path, Query as Pairs, State};
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use axum::routing::{delete, get, post};
+use rules::physics::explain::Language;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// Two times, or a key.
+const BYTES_MAX: usize = 1024;
+/// A shorter stretch has too few rows for any claim.
+const SPAN_MIN_NS: i64 = 120 * SECOND_NS;
+
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/api/v1/diagnosis", || get(state)),
+    Route::post(Role::Setter, "/api/v1/diagnosis", BYTES_MAX, || post(begin)),
+    Route::delete(Role::Setter, "/api/v1/diagnosis", 0, || delete(cancel)),
+    Route::read("/api/v1/diagnoses/{key}/page", || get(page)),
+    Route::read("/api/v1/diagnoses/{key}/plan", || get(plan)),
+    Route::read("/api/v1/diagnoses/{key}/model", || get(model)),
+    Route::post(Role::Setter, "/api/v1/twin/model", BYTES_MAX, || post(accept)),
+];
+
+/// The stretch to be diagnosed, as everywhere in the API: `2026-01-31T08:00:00Z`, or `-2h` before the newest sample.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stretch {
+    from: String,
+    to: String,
+}
+
+/// The diagnosis whose model is taken over.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Accepted {
+    key: String,
+}
+
+impl Shared {
+    fn desk(&self) -> Result<&Desk, ApiProblem> {
+        let none = || ApiProblem::conflict("no simulation runs beside this machine", "name a model under [twin] model");
+        self.desk.as_ref().ok_or_else(none)
+    }
+}
+
+fn refused(refusal: Refusal) -> ApiProblem {
+    ApiProblem::conflict(refusal.what, refusal.next)
+}
+
+/// `GET /api/v1/diagnosis`
+async fn state(State(shared): State<Shared>) -> Json<Value> {
+    let (run, about_s) = shared.desk.as_ref().map(Desk::run).unwrap_or_default();
+    let (mut told, by) = match run {
+        Run::None => (json!({ "state": "none" }), None),
+        Run::Running(it) => {
+            let told = json!({
+                "state": "running",
+                "stage": it.stage,
+                "seconds": it.since.elapsed().as_secs_f64(),
+                "about_s": about_s,
+                "rows": it.rows,
+                "from_ms": it.from_ns.div_euclid(1_000_000),
+                "to_ms": it.to_ns.div_euclid(1_000_000),
+            });
+            (told, it.by)
+        }
+        Run::Done { by, key, seconds } => (json!({ "state": "done", "key": key, "seconds": seconds }), by),
+        Run::Failed { by, what } => (json!({ "state": "failed", "what": what }), by),
+        Run::Cancelled { by } => (json!({ "state": "cancelled" }), Some(by)),
+    };
+    told["schema"] = json!("diagnosis-run/1");
+    told["by"] = json!(by);
+    Json(told)
+}
+
+/// `POST /api/v1/diagnosis`: begins; `GET` tells how it goes.
+async fn begin(
+    State(shared): State<Shared>,
+    SignedIn(person): SignedIn,
+    JsonBody(asked): JsonBody<Stretch>,
+) -> Result<Response, ApiProblem> {
+    let newest_ns = shared.status()?.at_ms.saturating_mul(1_000_000);
+    let pairs = vec![("from".to_owned(), asked.from.clone()), ("to".to_owned(), asked.to.clone())];
+    let (from_ns, to_ns) = range(&QueryKeys::of(pairs, &["from", "to"])?, newest_ns)?;
+    let to_ns = to_ns.min(newest_ns);
+    if to_ns.saturating_sub(from_ns) < SPAN_MIN_NS {
+        let what = "this is less than two minutes of history".to_owned();
+        return Err(ApiProblem::request(what, "choose a longer time, best one with cuts of several kinds"));
+    }
+    shared.desk()?.ask(Some(person.name), from_ns, to_ns).map_err(refused)?;
+    let words = format!("a diagnosis of {} to {}", crate::moment::utc(from_ns), crate::moment::utc(to_ns));
+    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), words))
+}
+
+/// `DELETE /api/v1/diagnosis`: ends the one under way.
+async fn cancel(State(shared): State<Shared>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
+    shared.desk()?.cancel(&person.name).map_err(refused)?;
+    Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
+}
+
+type Given = Pairs<Vec<(String, String)>>;
+
+/// A file that was kept of a diagnosis.
+async fn kept(shared: Shared, key: String, part: Part) -> Result<String, ApiProblem> {
+    let gone = || ApiProblem::not_found(&format!("the files of diagnosis {key:?} (the newest 40 are kept)"));
+    let desk = shared.desk.clone().filter(|_| is_key(&key)).ok_or_else(gone)?;
+    let wanted = key.clone();
+    let text = super::rules::aside(move || Ok(desk.kept().text(&wanted, part))).await?;
+    text.ok_or_else(gone)
+}
+
+fn language(pairs: Vec<(String, String)>) -> Result<Language, ApiProblem> {
+    match QueryKeys::of(pairs, &["lang"])?.text("lang") {
+        None | Some("en") => Ok(Language::En),
+        Some("zh") => Ok(Language::Zh),
+        Some(other) => Err(ApiProblem::request(format!("lang={other} is not known"), "write lang=en or lang=zh")),
+    }
+}
+
+/// `GET /api/v1/diagnoses/{key}/page`: the report.
+async fn page(
+    State(shared): State<Shared>,
+    Path(key): Path<String>,
+    Pairs(pairs): Given,
+) -> Result<Response, ApiProblem> {
+    let html = kept(shared, key, Part::Page(language(pairs)?)).await?;
+    Ok(headers::report(&html))
+}
+
+/// `GET /api/v1/diagnoses/{key}/plan`: the experiment as a recording plan.
+async fn plan(
+    State(shared): State<Shared>,
+    Path(key): Path<String>,
+    Pairs(pairs): Given,
+) -> Result<Response, ApiProblem> {
+    let csv = kept(shared, key, Part::Plan(language(pairs)?)).await?;
+    Ok(download("text/csv; charset=utf-8", "experiment.csv", csv))
+}
+
+/// `GET /api/v1/diagnoses/{key}/model`: the model with what was missing.
+async fn model(State(shared): State<Shared>, Path(key): Path<String>) -> Result<Response, ApiProblem> {
+    let toml = kept(shared, key, Part::Model).await?;
+    Ok(download("application/toml", "model.toml", toml))
+}
+
+/// A file that a browser saves.
+pub(super) fn download(kind: &'static str, name: &str, content: impl IntoResponse) -> Response {
+    let disposition = format!("attachment; filename=\"{name}\"");
+    ([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, disposition)], content).into_response()
+}
+
+/// `POST /api/v1/twin/model`: the model of a diagnosis takes the place of the one in charge.
+async fn accept(
+    State(shared): State<Shared>,
+    SignedIn(_): SignedIn,
+    JsonBody(Accepted { key }): JsonBody<Accepted>,
+) -> Result<Response, ApiProblem> {
+    let desk = shared.desk()?.clone();
+    let done = super::rules::aside(move || desk.accept(&key).map_err(refused)).await?;
+    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
+}

@@ -1,0 +1,42 @@
+//! `GET /api/v1/identified/{subject}`: what `identify tool-wear` and `identify thermal` have found, for the tables beside the figures.
+//!
+//! The model in the library holds what is needed to use it, not how it was found. Whoever identifies keeps the whole answer with
+//! `cnc-gateway identify thermal ... --json > DATA_DIR/identified/thermal.json`.
+
+use super::Shared;
+use super::problem::ApiProblem;
+use super::route::Route;
+use super::rules::aside;
+use crate::files::read_text;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::routing::get;
+use serde_json::{Value, json};
+
+/// What can be identified and is shown.
+const SUBJECTS: [&str; 2] = ["tool-wear", "thermal"];
+/// Such a document is some ten kilobytes.
+const BYTES_MAX: usize = 4 << 20;
+
+pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/identified/{subject}", || get(identified))];
+
+async fn identified(State(shared): State<Shared>, Path(subject): Path<String>) -> Result<Json<Value>, ApiProblem> {
+    if !SUBJECTS.contains(&subject.as_str()) {
+        return Err(ApiProblem::not_found(&format!("/api/v1/identified/{subject}; known are {}", SUBJECTS.join(", "))));
+    }
+    aside(move || {
+        let path = shared.data_dir.join("identified").join(format!("{subject}.json"));
+        let found = match read_text(&path, BYTES_MAX) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Value::Null,
+            Err(error) => {
+                return Err(ApiProblem::unavailable(format!("{}: {error}", path.display()), "look at the file"));
+            }
+            Ok(text) => serde_json::from_str(&text).map_err(|error| {
+                let next = "write it anew with `cnc-gateway identify ... --json`";
+                ApiProblem::unavailable(format!("{} is not JSON: {error}", path.display()), next)
+            })?,
+        };
+        Ok(Json(json!({ "schema": "identified/1", "file": path.display().to_string(), "identified": found })))
+    })
+    .await
+}

@@ -1,0 +1,157 @@
+// Diagnoses in the view of the twin: one asked for over a chosen time, with how far it is; the latest in words; earlier ones; its
+// report, its model to take over, and the experiment it asks for as a list to tick off.
+import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
+import { dateTime, duration, number, quantity } from "/web/format.js";
+import { language, own, t } from "/web/words.js";
+
+const SPANS_H = [1, 2, 4, 8];
+const STAGES = ["waiting", "reading", "comparing", "writing"];
+/** Of a longer time the beginning is left out: 28,800 rows of a second. */
+const LONGEST_H = 8;
+
+export const summaryOf = (found) => own({ en: found.summary, zh: found.summary_zh ?? found.summary });
+const report = (found) => `${found.page}?lang=${language()}`;
+const local = (ms) => new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 16);
+
+/** The card from which a diagnosis is begun; `changed` is called when another one is finished. */
+export class Asking {
+  constructor(context, changed) {
+    Object.assign(this, { context, changed, run: null });
+    const input = (label) => make("input", "", null, { type: "datetime-local", "aria-label": label });
+    [this.from, this.to] = [input(t("from")), input(t("to"))];
+    const quick = SPANS_H.map((h) => make("button", "", t("last_hours", h), { type: "button", onclick: () => this.last(h) }));
+    this.begin = make("button", "primary", t("diagnose"), { type: "button", onclick: () => this.start() });
+    this.end = make("button", "", t("end_diagnosis"), { type: "button", hidden: true, onclick: () => this.act(() => ask("/api/v1/diagnosis", { method: "DELETE" })) });
+    this.note = make("p", "note", " ", { role: "status" });
+    this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
+    this.box = card(t("diagnose_title"), [make("p", "note", t("diagnose_words", LONGEST_H)), make("div", "buttons", [make("label", "field", [t("from"), this.from]), make("label", "field", [t("to"), this.to]), ...quick, this.begin, this.end]), this.bar, this.note]);
+    const asked = new URLSearchParams(location.search);
+    if (asked.get("from")) this.choose(Date.parse(asked.get("from")), Date.parse(asked.get("to") ?? "") || Date.now());
+    this.timer = setInterval(() => this.look(), 2000);
+    this.look();
+  }
+
+  /** The newest hours; the box says what time it is. */
+  last(hours) {
+    const now = this.context.status()?.at_ms;
+    if (now) this.choose(now - hours * 3600000, now);
+  }
+
+  choose(fromMs, toMs) {
+    if (Number.isFinite(fromMs) && Number.isFinite(toMs)) [this.from.value, this.to.value] = [local(fromMs), local(Math.ceil(toMs / 60000) * 60000)];
+  }
+
+  update(status) {
+    if (!this.from.value) this.last(1);
+    this.box.hidden = !status.twin;
+    const may = Boolean(this.context.session?.may?.edit);
+    this.begin.disabled = !may || this.run?.state === "running";
+    this.end.disabled = !may;
+    if (!may && this.context.session && !this.told) { this.told = true; say(this.note, t("sign_in_to_diagnose")); }
+  }
+
+  start() {
+    const utc = (field) => new Date(field.value).toISOString();
+    if (!this.from.value || !this.to.value) return say(this.note, t("choose_times"));
+    return this.act(() => send("/api/v1/diagnosis", { from: utc(this.from), to: utc(this.to) }));
+  }
+
+  async act(what) {
+    try { await what(); await this.look(); } catch (error) { say(this.note, error.message); }
+  }
+
+  async look() {
+    const run = await ask("/api/v1/diagnosis").catch(() => null);
+    if (!run) return;
+    const before = this.run;
+    this.run = run;
+    const running = run.state === "running";
+    this.bar.hidden = this.end.hidden = !running;
+    if (running) {
+      const stage = STAGES.indexOf(run.stage);
+      // Fitting takes nearly all of the time; how long is known from the one before.
+      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s); else this.bar.removeAttribute("value");
+      const about = run.about_s ? t("about_in_all", duration(run.about_s)) : "";
+      say(this.note, [t("stage_of", stage + 1, STAGES.length, t(`stage_${run.stage}`)), run.rows ? t("seconds_examined", run.rows.toLocaleString()) : "", t("running_for", duration(run.seconds)), about, run.by ? t("asked_by", run.by) : t("asked_by_box")].filter(Boolean).join(" · "));
+    } else if (before?.state === "running") {
+      say(this.note, run.state === "failed" ? t("diagnosis_failed", run.what) : run.state === "cancelled" ? t("diagnosis_ended", run.by) : t("diagnosis_done", duration(run.seconds)));
+      this.changed();
+    }
+  }
+
+  leave() { clearInterval(this.timer); }
+}
+
+/** The latest one in words, the earlier ones as a table. */
+export function drawDiagnoses(latest, past, diagnoses, context, done) {
+  const newest = diagnoses[0];
+  fill(latest, newest ? [told(newest, context, done)] : [make("p", "empty", t("no_diagnosis"))]);
+  const link = (d) => ({ text: d.page ? make("a", "", t("open_report"), { href: report(d), target: "_blank", rel: "noopener" }) : "–" });
+  const rows = diagnoses.slice(1).map((d) => [dateTime(d.at_ms), t(`verdict_${d.verdict}`), summaryOf(d), `${dateTime(d.from_ms)} – ${dateTime(d.to_ms)}`, link(d)]);
+  fill(past, rows.length ? [table([t("time"), t("verdict"), t("what"), t("examined"), t("report")], rows, { caption: t("past_diagnoses") })] : [make("p", "empty", t("no_past_diagnosis"))]);
+}
+
+function told(found, context, done) {
+  const d = found.diagnosis ?? {};
+  const parts = [make("p", "summary", summaryOf(found)), make("p", "note", `${t(`verdict_${found.verdict}`)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`)];
+  if (d.fit?.before) parts.push(make("p", "", t("fit_words", quantity(d.fit.before.held_out_rmse, d.unit), quantity(d.fit.after?.held_out_rmse ?? d.fit.before.held_out_rmse, d.unit), quantity(d.fit.noise_floor, d.unit))));
+  for (const it of d.missing ?? []) {
+    const numbers = (it.parameters ?? []).map((p) => `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`);
+    parts.push(row(language() === "zh" ? it.effect : it.statement ?? it.effect, it.effect, [it.equation, ...numbers].filter(Boolean).join(" · "), { dot: "bad" }));
+  }
+  if (d.alternatives?.length) parts.push(make("h3", "", t("alternatives")), ...d.alternatives.map((a) => row(a.effect, t("instead_of", a.instead_of), a.separating_experiment)));
+  parts.push(...experiment(found, d, done), buttons(found, context));
+  return make("div", "diagnosis", parts);
+}
+
+function experiment(found, d, done) {
+  const steps = (found.steps ?? []).map(own);
+  const statement = d.next_experiment?.statement;
+  if (!statement && !steps.length) return [];
+  const title = found.minutes ? `${t("experiment")} (${t("about", `${number(Math.ceil(found.minutes))} ${t("min")}`)})` : t("experiment");
+  const list = steps.length ? steps : [statement];
+  const tick = list.map((text, at) => step(`${found.key}#${at}`, text, done));
+  return [make("h3", "", title), statement && steps.length ? make("p", "", statement) : null, make("ol", "steps", tick.map((it) => make("li", "", it)))].filter(Boolean);
+}
+
+function buttons(found, context) {
+  const note = make("span", "note", "", { role: "status" });
+  const link = (path, text, more = {}) => make("a", "button-link", text, { href: path, ...more });
+  const all = [];
+  if (found.page) all.push(link(report(found), t("open_report"), { target: "_blank", rel: "noopener" }));
+  if (found.steps?.length) all.push(link(`/api/v1/diagnoses/${found.key}/plan?lang=${language()}`, t("plan_csv")));
+  if (found.model) {
+    const accept = make("button", "", t("accept_model"), { type: "button", onclick: () => confirmed(accept, found, note) });
+    accept.disabled = !context.session?.may?.edit;
+    all.push(accept);
+  }
+  return make("div", "buttons", [...all, note]);
+}
+
+/** Once more: what is watched from now on is learned anew. */
+function confirmed(button, found, note) {
+  const dialog = make("dialog", "", make("form", "", [make("h2", "", t("accept_title")), make("p", "", t("accept_words")), make("div", "buttons", [make("button", "primary", t("accept_model"), { value: "yes" }), make("button", "", t("cancel"), { value: "no" })])], { method: "dialog" }));
+  dialog.addEventListener("close", async () => {
+    dialog.remove();
+    if (dialog.returnValue !== "yes") return;
+    try { say(note, (await send("/api/v1/twin/model", { key: found.key })).text && t("accepted")); button.disabled = true; } catch (error) { say(note, error.message); }
+  });
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+/** A step to tick off; what is ticked is remembered by this browser. */
+function step(key, text, done) {
+  const tick = make("input", "", null, { type: "checkbox" });
+  tick.checked = done.has(key);
+  tick.addEventListener("change", () => { if (tick.checked) done.add(key); else done.delete(key); remember(done); });
+  return make("label", "step", [tick, text]);
+}
+
+const NAME = "experiment";
+function remember(done) {
+  try { localStorage.setItem(NAME, JSON.stringify([...done].slice(-200))); } catch { /* not remembered */ }
+}
+export function ticked() {
+  try { return new Set(JSON.parse(localStorage.getItem(NAME) ?? "[]")); } catch { return new Set(); }
+}
