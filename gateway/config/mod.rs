@@ -12,6 +12,7 @@ mod check_value;
 pub mod keys;
 mod keys_of_gate;
 mod keys_of_outputs;
+mod keys_of_thermal;
 mod outputs;
 mod problem;
 mod read;
@@ -23,6 +24,7 @@ use crate::history::OutboxSettings;
 use crate::log::LogFormat;
 use crate::sinks::SinkAddress;
 use adapters::{Address, Axis};
+use rules::estimators::thermal::CompensationSettings;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -63,6 +65,8 @@ pub struct Config {
     pub http: Http,
     /// The simulation.
     pub twin: Twin,
+    /// The thermal law.
+    pub thermal: Thermal,
     /// The log.
     pub log: Log,
 }
@@ -270,6 +274,25 @@ pub struct Http {
 pub struct Twin {
     /// Model file.
     pub model: Option<PathBuf>,
+}
+
+/// `[thermal]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// Model file that `identify thermal --model` writes.
+    pub model: Option<PathBuf>,
+    /// Axis whose error it predicts.
+    pub axis: Axis,
+    /// Propose the offset to the gate?
+    pub propose: bool,
+    /// Do readings of the error correct the law?
+    pub learn: bool,
+    /// Greatest change of the prediction by one reading, um.
+    pub step_um: f64,
+    /// Greatest change of the prediction by all readings, um.
+    pub total_um: f64,
+    /// From prediction to offset and pulses.
+    pub compensation: CompensationSettings,
 }
 
 /// `[log]`.

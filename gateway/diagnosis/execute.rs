@@ -114,11 +114,16 @@ fn step(plan: &Recording, row: usize) -> ExperimentStep {
     }
 }
 
-/// The simulated machine runs the plan from a cold start; what a gateway at `rate_hz` records of it.
+/// The simulated machine runs the plan from a cold start; what a gateway at `rate_hz` records of it, and what instruments beside
+/// the gateway show.
 ///
 /// # Errors
 /// See [`Steps::of`].
-pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> Result<Recording, String> {
+pub fn execute(
+    settings: SimulatedSettings,
+    plan: &Recording,
+    rate_hz: f64,
+) -> Result<(Recording, Instruments), String> {
     let steps = Steps::of(plan)?;
     let name = match settings.machine {
         SimulatedMachine::Lathe => "simulated://lathe",
@@ -128,7 +133,71 @@ pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> R
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut table = Table::new(name, &steps);
     table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz);
-    Ok(table.finish())
+    let times_ns = table.samples.iter().map(|(.., sample)| sample.at_ns);
+    let instruments = Instruments::beside(&machine, times_ns, settings.seed);
+    Ok((table.finish(), instruments))
+}
+
+/// What instruments that are no part of the gateway show of the simulated machine during an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instruments {
+    /// A torque sensor at the spindle: times on its own clock, s, and torques, N·m, with zero error and noise.
+    pub torque: Vec<(f64, f64)>,
+    /// Flank wear of the edge in use before and after, as a microscope shows it, mm.
+    pub flank_wear_mm: (f64, f64),
+}
+
+/// Samples of the torque sensor per second,
+const SENSOR_HZ: f64 = 25.0;
+/// its clock, which began at another time and runs fast,
+const SENSOR_CLOCK: (f64, f64) = (4321.7, 40e-6);
+/// its zero error and its noise, N·m.
+const SENSOR_ERRORS_NM: (f64, f64) = (0.4, 0.1);
+
+impl Instruments {
+    fn beside(machine: &Simulated, times_ns: impl Iterator<Item = TimeNs>, seed: u64) -> Self {
+        let times: Vec<TimeNs> = times_ns.collect();
+        let (first_ns, last_ns) = (times.first().copied().unwrap_or(ORIGIN_NS), times.last().copied().unwrap_or(ORIGIN_NS));
+        let worn = |at_ns| machine.truth(at_ns).flank_wear_mm;
+        let before_mm = worn(first_ns);
+        let mut noise = Noise(seed | 1);
+        let mut torque = Vec::new();
+        #[expect(clippy::cast_possible_truncation, reason = "a 25th of a second")]
+        let step_ns = (SECOND_NS as f64 / SENSOR_HZ) as i64;
+        let mut at_ns = first_ns;
+        while at_ns <= last_ns {
+            let truth = machine.truth(at_ns);
+            let rad_s = truth.spindle_speed_rpm.abs() * std::f64::consts::TAU / 60.0;
+            let cutting = if rad_s > 1.0 { truth.cutting_power_w / rad_s } else { 0.0 };
+            let own_s = (at_ns - first_ns) as f64 / SECOND_NS as f64 * (1.0 + SENSOR_CLOCK.1) + SENSOR_CLOCK.0;
+            torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * noise.normal()));
+            at_ns += step_ns;
+        }
+        Self { torque, flank_wear_mm: (before_mm, worn(last_ns)) }
+    }
+
+    /// The file of the torque sensor.
+    #[must_use]
+    pub fn torque_csv(&self) -> String {
+        let mut text = String::from("time_s,torque_nm\n");
+        for (time_s, torque) in &self.torque {
+            let _ = writeln!(text, "{time_s:.3},{torque:.4}");
+        }
+        text
+    }
+}
+
+/// Normal noise from a seed: a sum of twelve even numbers (Irwin-Hall), from a linear congruential generator.
+struct Noise(u64);
+
+impl Noise {
+    fn normal(&mut self) -> f64 {
+        let mut even = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| even()).sum::<f64>() - 6.0
+    }
 }
 
 /// The recording under construction.
