@@ -88,7 +88,10 @@ impl Heads {
     fn of(line: &str) -> Result<Self, String> {
         let names: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let at = |name: &str| names.iter().position(|it| *it == name);
-        let need = |name: &str| at(name).ok_or_else(|| format!("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]"));
+        let need = |name: &str| {
+            at(name)
+                .ok_or_else(|| format!("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]"))
+        };
         Ok(Self { time: need("time_ns")?, a: need("a")?, b: need("b")?, request: at("request"), bypass: at("bypass") })
     }
 
@@ -100,7 +103,9 @@ impl Heads {
             "1" => Ok(true),
             other => Err(format!("line {number}: {name} is {other:?}; a level is 0 or 1")),
         };
-        let at_ns = cell(self.time).parse().map_err(|_| format!("line {number}: {:?} is no time in whole ns", cell(self.time)))?;
+        let at_ns = cell(self.time)
+            .parse()
+            .map_err(|_| format!("line {number}: {:?} is no time in whole ns", cell(self.time)))?;
         let request = match self.request.map_or("", cell) {
             "" => 0,
             text => text.parse().map_err(|_| format!("line {number}: {text:?} is no whole number of pulses"))?,
@@ -129,7 +134,14 @@ impl Bench {
     fn new(first: &Row, spacing_ns: u64) -> Self {
         let device = PulseInserter::new(first.lines, first.at_ns, spacing_ns);
         let decoder = Decoder::new(device.lines(), 0);
-        Self { device, decoder, encoder: Decoder::new(first.lines, 0), begun: (0, 0), last_ns: None, proof: Proof::default() }
+        Self {
+            device,
+            decoder,
+            encoder: Decoder::new(first.lines, 0),
+            begun: (0, 0),
+            last_ns: None,
+            proof: Proof::default(),
+        }
     }
 
     fn take(&mut self, row: &Row, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
@@ -171,7 +183,12 @@ impl Bench {
 ///
 /// # Errors
 /// A row that is none with its line, a fault of the device, or what the system said.
-pub fn stream(input: impl BufRead, mut output: impl Write, spacing_ns: u64, first_request: i64) -> Result<Proof, String> {
+pub fn stream(
+    input: impl BufRead,
+    mut output: impl Write,
+    spacing_ns: u64,
+    first_request: i64,
+) -> Result<Proof, String> {
     let mut heads = None;
     let mut bench: Option<Bench> = None;
     let mut last: Option<Row> = None;
@@ -196,7 +213,9 @@ pub fn stream(input: impl BufRead, mut output: impl Write, spacing_ns: u64, firs
         last = Some(row);
         flush(&mut out, &mut output).map_err(io)?;
     }
-    let (Some(mut bench), Some(last)) = (bench, last) else { return Err("there is no row of encoder lines".to_owned()) };
+    let (Some(mut bench), Some(last)) = (bench, last) else {
+        return Err("there is no row of encoder lines".to_owned());
+    };
     let end_ns = last.at_ns.saturating_add(spacing_ns.saturating_mul(TAIL_SPACINGS));
     bench.pass(end_ns, last.lines, &mut out)?;
     flush(&mut out, &mut output).map_err(io)?;
@@ -250,16 +269,76 @@ struct Source {
 }
 
 const VECTORS: &[Source] = &[
-    Source { name: "rest_up", shows: "three pulses up at rest, both lines low", spacing_ns: 250, motion: &[(0, 1000)], requests: &[(0, 3, None)] },
-    Source { name: "rest_down", shows: "three pulses down at rest", spacing_ns: 250, motion: &[(0, 1000)], requests: &[(0, -3, None)] },
-    Source { name: "forward", shows: "pulses up while the axis moves up: each waits for both lines low", spacing_ns: 250, motion: &[(40, 5000)], requests: &[(0, 4, None)] },
-    Source { name: "forward_down", shows: "pulses down while the axis moves up", spacing_ns: 250, motion: &[(40, 5000)], requests: &[(0, -4, None)] },
-    Source { name: "backward", shows: "pulses up while the axis moves down", spacing_ns: 250, motion: &[(-40, 5000)], requests: &[(0, 4, None)] },
-    Source { name: "reversal", shows: "the axis reverses within a period while pulses wait", spacing_ns: 250, motion: &[(13, 4000), (-17, 4000), (9, 4000)], requests: &[(0, 2, None), (1, -3, None), (2, 2, None)] },
-    Source { name: "not_low", shows: "the axis stands with a line high: nothing is inserted until it moves on", spacing_ns: 250, motion: &[(2, 4000), (0, 1000), (6, 4000)], requests: &[(1, 1, None)] },
-    Source { name: "bypass", shows: "bypass holds pulses back, and lets them go", spacing_ns: 250, motion: &[(16, 4000), (16, 4000)], requests: &[(0, 2, Some(true)), (1, 0, Some(false))] },
-    Source { name: "burst", shows: "a slow device: encoder edges wait their turn in order, none is lost", spacing_ns: 3000, motion: &[(8, 4000), (12, 1500), (8, 20000)], requests: &[(0, 1, None)] },
-    Source { name: "there_and_back", shows: "what is inserted up and taken back adds up to nothing", spacing_ns: 250, motion: &[(24, 4000), (-24, 4000)], requests: &[(0, 5, None), (1, -5, None)] },
+    Source {
+        name: "rest_up",
+        shows: "three pulses up at rest, both lines low",
+        spacing_ns: 250,
+        motion: &[(0, 1000)],
+        requests: &[(0, 3, None)],
+    },
+    Source {
+        name: "rest_down",
+        shows: "three pulses down at rest",
+        spacing_ns: 250,
+        motion: &[(0, 1000)],
+        requests: &[(0, -3, None)],
+    },
+    Source {
+        name: "forward",
+        shows: "pulses up while the axis moves up: each waits for both lines low",
+        spacing_ns: 250,
+        motion: &[(40, 5000)],
+        requests: &[(0, 4, None)],
+    },
+    Source {
+        name: "forward_down",
+        shows: "pulses down while the axis moves up",
+        spacing_ns: 250,
+        motion: &[(40, 5000)],
+        requests: &[(0, -4, None)],
+    },
+    Source {
+        name: "backward",
+        shows: "pulses up while the axis moves down",
+        spacing_ns: 250,
+        motion: &[(-40, 5000)],
+        requests: &[(0, 4, None)],
+    },
+    Source {
+        name: "reversal",
+        shows: "the axis reverses within a period while pulses wait",
+        spacing_ns: 250,
+        motion: &[(13, 4000), (-17, 4000), (9, 4000)],
+        requests: &[(0, 2, None), (1, -3, None), (2, 2, None)],
+    },
+    Source {
+        name: "not_low",
+        shows: "the axis stands with a line high: nothing is inserted until it moves on",
+        spacing_ns: 250,
+        motion: &[(2, 4000), (0, 1000), (6, 4000)],
+        requests: &[(1, 1, None)],
+    },
+    Source {
+        name: "bypass",
+        shows: "bypass holds pulses back, and lets them go",
+        spacing_ns: 250,
+        motion: &[(16, 4000), (16, 4000)],
+        requests: &[(0, 2, Some(true)), (1, 0, Some(false))],
+    },
+    Source {
+        name: "burst",
+        shows: "a slow device: encoder edges wait their turn in order, none is lost",
+        spacing_ns: 3000,
+        motion: &[(8, 4000), (12, 1500), (8, 20000)],
+        requests: &[(0, 1, None)],
+    },
+    Source {
+        name: "there_and_back",
+        shows: "what is inserted up and taken back adds up to nothing",
+        spacing_ns: 250,
+        motion: &[(24, 4000), (-24, 4000)],
+        requests: &[(0, 5, None), (1, -5, None)],
+    },
 ];
 
 impl Source {

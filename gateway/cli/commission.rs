@@ -80,7 +80,11 @@ pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
     let noted = annotations::read(&config.gateway.data_dir).map_err(say)?;
     let Some((first_ns, newest_ns)) = span(&config.history.path)? else {
         let next = "start the box with this configuration and let it record: `cnc-gateway run --config FILE`";
-        return tell(arguments, &format!("nothing is known yet: the history {} is empty\nnext: {next}\n", config.history.path.display()), &json!({ "schema": "commission/1", "parts": [], "next": next }));
+        return tell(
+            arguments,
+            &format!("nothing is known yet: the history {} is empty\nnext: {next}\n", config.history.path.display()),
+            &json!({ "schema": "commission/1", "parts": [], "next": next }),
+        );
     };
     let from = arguments.from.as_deref().map(|text| moment::parse(text, newest_ns)).transpose().map_err(say)?;
     let (recording, merged) = prepared(&config.history.path, &noted, from).map_err(say)?;
@@ -96,7 +100,11 @@ pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
 }
 
 fn tell(arguments: &CommissionArguments, text: &str, document: &Value) -> CommandResult {
-    if arguments.json { print_json(document) } else { print(text) }
+    if arguments.json {
+        print_json(document)
+    } else {
+        print(text)
+    }
     let missing = document["next"].as_str().is_some_and(|next| !next.is_empty());
     Ok(if missing { Outcome::No } else { Outcome::Fine })
 }
@@ -153,7 +161,10 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
     if let Some(model) = &learned.thermal {
         let text = model.text().map_err(|problem| CannotRun::new(problem, ""))?;
         file(config.gateway.data_dir.join("thermal_model.json"), &text)?;
-        written.push("write model = \"thermal_model.json\" under [thermal], with its path from the configuration file".to_owned());
+        written.push(
+            "write model = \"thermal_model.json\" under [thermal], with its path from the configuration file"
+                .to_owned(),
+        );
     }
     if let Some(record) = &learned.wear {
         let now_ns = SystemClock::new().now_ns();
@@ -166,12 +177,8 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
 }
 
 fn words(learned: &Learned, noted: &[Annotation], written: &[String], (from_ns, to_ns): (i64, i64)) -> String {
-    let mut text = format!(
-        "history from {} to {}; {} annotations\n\n",
-        moment::utc(from_ns),
-        moment::utc(to_ns),
-        noted.len()
-    );
+    let mut text =
+        format!("history from {} to {}; {} annotations\n\n", moment::utc(from_ns), moment::utc(to_ns), noted.len());
     for part in &learned.parts {
         let _ = match &part.known {
             Ok(known) => writeln!(text, "known    {:<10} {known}", part.name),
@@ -197,7 +204,11 @@ fn of_file(merged: &Merged) -> String {
     match &merged.matched {
         Ok(it) => format!(
             "torque   {}: its clock is {:+.2} s off, drifting {:.0} ppm; correlation {:.3}, elsewhere at most {:.3}\n",
-            merged.file, it.lag_s, 1e6 * it.drift, it.correlation, it.rival
+            merged.file,
+            it.lag_s,
+            1e6 * it.drift,
+            it.correlation,
+            it.rival
         ),
         Err(why) => format!("torque   {}: cannot be laid beside the history: {why}\n", merged.file),
     }
@@ -219,7 +230,9 @@ fn document(learned: &Learned, written: &[String], (from_ns, to_ns): (i64, i64))
         .merged
         .iter()
         .map(|it| match &it.matched {
-            Ok(found) => json!({ "file": it.file, "lag_s": found.lag_s, "drift": found.drift, "correlation": found.correlation }),
+            Ok(found) => {
+                json!({ "file": it.file, "lag_s": found.lag_s, "drift": found.drift, "correlation": found.correlation })
+            }
             Err(why) => json!({ "file": it.file, "refused": why }),
         })
         .collect();

@@ -39,11 +39,8 @@ pub(super) fn run(arguments: &PulsesArguments) -> CommandResult {
         move |error: std::io::Error| CannotRun::new(format!("{path}: {error}"), "")
     };
     let standard = |path: &Path| path == Path::new("-");
-    let reader: Box<dyn std::io::Read> = if standard(input) {
-        Box::new(std::io::stdin())
-    } else {
-        Box::new(File::open(input).map_err(say(input))?)
-    };
+    let reader: Box<dyn std::io::Read> =
+        if standard(input) { Box::new(std::io::stdin()) } else { Box::new(File::open(input).map_err(say(input))?) };
     let writer: Box<dyn Write> = if standard(&arguments.out) {
         Box::new(std::io::stdout())
     } else {

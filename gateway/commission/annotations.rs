@@ -108,7 +108,8 @@ pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result
         return torque(given, newest_ns);
     }
     let name = quantity.word();
-    let value = given.value.ok_or_else(|| format!("{name}: the value is missing: write annotate {name} 0.12 --unit mm"))?;
+    let value =
+        given.value.ok_or_else(|| format!("{name}: the value is missing: write annotate {name} 0.12 --unit mm"))?;
     let unit = given.unit.as_deref().ok_or_else(|| {
         format!("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")
     })?;
@@ -123,7 +124,9 @@ pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result
     let (least, greatest, why) = quantity.range();
     if !(least..=greatest).contains(&value) {
         let kept = quantity.unit();
-        return Err(format!("{name}: {value} {kept} lies outside {least} to {greatest} {kept}: {why}; is the unit right?"));
+        return Err(format!(
+            "{name}: {value} {kept} lies outside {least} to {greatest} {kept}: {why}; is the unit right?"
+        ));
     }
     let sd = given.sd.map(|sd| sd * factor);
     if sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
@@ -133,7 +136,8 @@ pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result
 }
 
 fn torque(given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
-    let usage = "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
+    let usage =
+        "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
     let file = given.file.ok_or_else(|| format!("torque: the file is missing: {usage}"))?;
     match given.unit.as_deref() {
         None => return Err(format!("torque {}: the unit is missing: {usage}", file.display())),
@@ -142,7 +146,14 @@ fn torque(given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
     }
     let file = std::path::absolute(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     super::columns::torque_course(&file)?;
-    Ok(Annotation { quantity: Quantity::Torque, at_ns: newest_ns, value: None, sd: None, file: Some(file), of: given.of })
+    Ok(Annotation {
+        quantity: Quantity::Torque,
+        at_ns: newest_ns,
+        value: None,
+        sd: None,
+        file: Some(file),
+        of: given.of,
+    })
 }
 
 /// Lengths of `from` in those of `to`.
@@ -182,8 +193,9 @@ pub fn read(data_dir: &Path) -> Result<Vec<Annotation>, String> {
     };
     let lines = text.lines().take(LINES_MAX).enumerate().filter(|(_, line)| !line.trim().is_empty());
     let one = |(index, line): (usize, &str)| {
-        serde_json::from_str::<Annotation>(line)
-            .map_err(|error| format!("{}, line {}: {error}; put the line right or take it out", path.display(), index + 1))
+        serde_json::from_str::<Annotation>(line).map_err(|error| {
+            format!("{}, line {}: {error}; put the line right or take it out", path.display(), index + 1)
+        })
     };
     let mut all = lines.map(one).collect::<Result<Vec<_>, _>>()?;
     all.sort_by_key(|annotation| annotation.at_ns);

@@ -54,7 +54,8 @@ const GAUGE_REACHES_NS: i64 = 30 * SECOND_NS;
 /// The history cannot be read, or is empty.
 pub fn read(history: &Path, from_ns: Option<TimeNs>) -> Result<Recording, String> {
     let reader = Reader::open(history).map_err(|error| error.to_string())?;
-    let known: Vec<String> = reader.series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
+    let known: Vec<String> =
+        reader.series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
     let series: Vec<String> =
         SERIES.iter().filter(|name| known.iter().any(|it| it == *name)).map(|name| (*name).to_owned()).collect();
     reader.recording(&Query { from_ns, series, ..Query::default() }).map_err(|error| error.to_string())
@@ -80,7 +81,8 @@ pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
     let wear = |at_ns: TimeNs| {
         let next = readings.partition_point(|(then_ns, ..)| *then_ns < at_ns);
         let after = readings.get(next).filter(|(then_ns, ..)| then_ns - at_ns <= WEAR_REACHES_NS);
-        let before = next.checked_sub(1).map(|at| &readings[at]).filter(|(then_ns, ..)| at_ns - then_ns <= WEAR_REACHES_NS);
+        let before =
+            next.checked_sub(1).map(|at| &readings[at]).filter(|(then_ns, ..)| at_ns - then_ns <= WEAR_REACHES_NS);
         match (before, after) {
             (Some(one), Some(other)) if one.2 == other.2 && other.1 >= one.1 => {
                 let span = (other.0 - one.0).max(1) as f64;
@@ -118,7 +120,8 @@ pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) 
 /// What is wrong with the file.
 pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, String> {
     let at = |what: &str| format!("{}: {what}", file.display());
-    let read = crate::diagnosis::read_recordings(&[file.display().to_string()]).map_err(|problems| problems.join("\n"))?;
+    let read =
+        crate::diagnosis::read_recordings(&[file.display().to_string()]).map_err(|problems| problems.join("\n"))?;
     let torque = read.recording.numbers("torque_nm").ok_or_else(|| {
         at("there is no column torque_nm; the file needs time_s, on the sensor's own clock, and torque_nm in N·m")
     })?;

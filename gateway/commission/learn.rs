@@ -73,7 +73,8 @@ impl Learned {
         let known = found.as_ref().map_err(Clone::clone).and_then(|learned| {
             let speeds = learned.speeds.len();
             if speeds < 4 {
-                let what = format!("only {speeds} speeds are known; between fewer than 4 the interpolation cannot be checked");
+                let what =
+                    format!("only {speeds} speeds are known; between fewer than 4 the interpolation cannot be checked");
                 return Err(Refusal::new(RefusalKind::TooFew, what, "let the spindle turn at more speeds"));
             }
             Ok(format!("{speeds} speeds, {} visits", learned.stretches.len()))
@@ -86,7 +87,11 @@ impl Learned {
             6.0,
         );
         let Ok(learned) = found else { return };
-        let dots = learned.speeds.iter().map(|it| Dot { x: it.speed_rpm, y: it.power_w, sd: 0.5 * (it.interval_w.1 - it.interval_w.0) });
+        let dots = learned.speeds.iter().map(|it| Dot {
+            x: it.speed_rpm,
+            y: it.power_w,
+            sd: 0.5 * (it.interval_w.1 - it.interval_w.0),
+        });
         self.pictures.push(Picture::curve("No-load power 空载功率", "rpm", "W", dots.collect()));
         self.no_load = Some(learned);
     }
@@ -95,8 +100,12 @@ impl Learned {
         let found = identify_load_loss(recording, &ReferenceChoice::default());
         let known = found.as_ref().map(|learned| {
             let each = learned.stages.iter().map(|stage| {
-                let accuracy = stage.accuracy.as_ref().map_or_else(String::new, |it| format!(", E {:.2} %", 100.0 * it.mean));
-                format!("stage {}: a0 {:.4}, a1 {:.2e} 1/W{accuracy}", stage.stage, stage.linear.value, stage.quadratic_per_w.value)
+                let accuracy =
+                    stage.accuracy.as_ref().map_or_else(String::new, |it| format!(", E {:.2} %", 100.0 * it.mean));
+                format!(
+                    "stage {}: a0 {:.4}, a1 {:.2e} 1/W{accuracy}",
+                    stage.stage, stage.linear.value, stage.quadratic_per_w.value
+                )
             });
             each.collect::<Vec<String>>().join("; ")
         });
@@ -132,7 +141,12 @@ impl Learned {
         let predicted = |cut: &Cut| learned.model.predict(&cut.conditions).power_w;
         let dots = learned.cuts.iter().map(|cut| Dot { x: cut.cutting_power_w, y: predicted(cut), sd: 0.0 });
         self.pictures.push(Picture::agreement("Cutting power of the wear model 磨损模型", "W", dots.collect()));
-        let key = Key { machine: machine.to_owned(), tool: String::new(), work_material: String::new(), operation: String::new() };
+        let key = Key {
+            machine: machine.to_owned(),
+            tool: String::new(),
+            work_material: String::new(),
+            operation: String::new(),
+        };
         let origin = ("commission".to_owned(), learned.cuts.len(), learned.r2);
         self.wear = Some(WearRecord::new(key, learned.criterion_mm, origin, learned.model));
     }
@@ -140,21 +154,29 @@ impl Learned {
     /// The recording with cutting power separated by the coefficients that were just learned.
     fn separated(&self, recording: &Recording) -> Result<Recording, Refusal> {
         let loss = self.load_loss.as_ref().ok_or_else(|| {
-            Refusal::new(RefusalKind::Missing, "load loss is not known yet", "do load-loss first: wear is seen in cutting power")
+            Refusal::new(
+                RefusalKind::Missing,
+                "load loss is not known yet",
+                "do load-loss first: wear is seen in cutting power",
+            )
         })?;
         let mut recording = recording.clone();
         if recording.numbers("flank_wear_mm").is_none() {
             let what = "no flank wear has been annotated";
-            return Err(Refusal::new(RefusalKind::Missing, what, "annotate flank-wear 0.05 --unit mm --at now --of EDGE"));
+            return Err(Refusal::new(
+                RefusalKind::Missing,
+                what,
+                "annotate flank-wear 0.05 --unit mm --at now --of EDGE",
+            ));
         }
         let column = |name: &str, row: usize| recording.numbers(name).and_then(|it| it.get(row));
+        let inner = inner_rows(&recording);
         let one = |row: usize| {
             let excess_w = column("spindle_power_w", row)? - column("no_load_power_w", row)?;
-            let state = recording.words("state").and_then(|words| words.get(row))?;
             let stage = column("gear_stage", row).unwrap_or(0.0);
             let own = loss.stages.iter().find(|it| (it.stage as f64 - stage).abs() < 0.5).or(loss.stages.first())?;
             let split = balance(excess_w, own.linear.value, own.quadratic_per_w.value)?;
-            (state == "cutting").then_some(split.cutting_power_w)
+            inner[row].then_some(split.cutting_power_w)
         };
         let cutting = (0..recording.rows()).map(one).collect::<Numbers>();
         recording.set_column("cutting_power_w", Cells::Numbers(cutting));
@@ -162,7 +184,8 @@ impl Learned {
     }
 
     fn thermal(&mut self, recording: &Recording, machine: &str) {
-        let found = collect(recording).and_then(|collected| learn(&collected.course, SelectionSettings::default(), None));
+        let found =
+            collect(recording).and_then(|collected| learn(&collected.course, SelectionSettings::default(), None));
         let known = found.as_ref().map(|learned: &ThermalLearned| {
             let best = learned.best();
             format!("{} terms, {:.2} um in blocks left out", best.fit.law.terms.len(), best.held_out.rms_um)
@@ -178,6 +201,28 @@ impl Learned {
         let Ok(learned) = found else { return };
         self.thermal = Some(ThermalModel::new(machine.to_owned(), learned.best().fit.law.clone()));
     }
+}
+
+/// Left out after a cut begins and before it ends, s: the meter's window, the filter and the entry of the tool.
+const GUARD_S: f64 = 1.0;
+
+/// Which rows lie inside a cut, away from its ends.
+fn inner_rows(recording: &Recording) -> Vec<bool> {
+    let states = recording.words("state");
+    let cutting = |row: usize| states.and_then(|words| words.get(row)) == Some("cutting");
+    let mut inner = vec![false; recording.rows()];
+    let mut begin = 0;
+    while begin < inner.len() {
+        let end = (begin..inner.len()).find(|row| !cutting(*row)).unwrap_or(inner.len());
+        if end > begin {
+            let (from_s, to_s) = (recording.time_s[begin] + GUARD_S, recording.time_s[end - 1] - GUARD_S);
+            for row in begin..end {
+                inner[row] = (from_s..=to_s).contains(&recording.time_s[row]);
+            }
+        }
+        begin = end + 1;
+    }
+    inner
 }
 
 fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Refusal> {

@@ -66,20 +66,42 @@ impl Picture {
         );
         if self.diagonal {
             let (a, b) = (x.0.max(y.0), x.1.min(y.1));
-            let _ = write!(svg, "<path class=\"line\" d=\"M{:.1} {:.1} L{:.1} {:.1}\"/>", across(a), up(a), across(b), up(b));
+            let _ = write!(
+                svg,
+                "<path class=\"line\" d=\"M{:.1} {:.1} L{:.1} {:.1}\"/>",
+                across(a),
+                up(a),
+                across(b),
+                up(b)
+            );
         }
         for dot in &self.dots {
             let (cx, cy) = (across(dot.x), up(dot.y));
             if dot.sd > 0.0 {
-                let _ = write!(svg, "<path class=\"line\" d=\"M{cx:.1} {:.1} V{:.1}\"/>", up(dot.y - dot.sd), up(dot.y + dot.sd));
+                let _ = write!(
+                    svg,
+                    "<path class=\"line\" d=\"M{cx:.1} {:.1} V{:.1}\"/>",
+                    up(dot.y - dot.sd),
+                    up(dot.y + dot.sd)
+                );
             }
             let _ = write!(svg, "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3\"/>");
         }
         for value in [x.0, x.1] {
-            let _ = write!(svg, "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{value:.4}</text>", across(value), HEIGHT - 0.65 * MARGIN);
+            let _ = write!(
+                svg,
+                "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{value:.4}</text>",
+                across(value),
+                HEIGHT - 0.65 * MARGIN
+            );
         }
         for value in [y.0, y.1] {
-            let _ = write!(svg, "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{value:.4}</text>", MARGIN - 4.0, up(value));
+            let _ = write!(
+                svg,
+                "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{value:.4}</text>",
+                MARGIN - 4.0,
+                up(value)
+            );
         }
         let _ = write!(
             svg,
@@ -121,7 +143,11 @@ mod tests {
     #[test]
     fn a_picture_is_drawn_whatever_the_numbers_are() {
         let dots = vec![Dot { x: 1.0, y: 2.0, sd: 0.5 }, Dot { x: 3.0, y: 4.0, sd: 0.0 }];
-        let page = page("<lathe>", "all & known", &[Picture::agreement("Fit", "W", dots), Picture::curve("None", "", "", Vec::new())]);
+        let page = page(
+            "<lathe>",
+            "all & known",
+            &[Picture::agreement("Fit", "W", dots), Picture::curve("None", "", "", Vec::new())],
+        );
         assert_eq!(page.matches("<circle").count(), 2);
         assert!(page.contains("&lt;lathe&gt;") && !page.contains("NaN"));
         let one = Picture::curve("One", "rpm", "W", vec![Dot { x: 5.0, y: 5.0, sd: 0.0 }]).svg();

@@ -76,10 +76,24 @@ pub fn steps(which: Which, limits: &Limits) -> Result<Vec<Step>, String> {
             let feed_mm = limits.feeds_mm.get(1).copied().unwrap_or(0.2);
             let (least, greatest) = ends(&limits.depths_mm);
             // Lengths differ, so that the sensor's file fits in one place only.
-            let cuts = [(0.0, 11.0), (0.6, 15.0), (1.0, 12.0), (0.3, 19.0), (0.8, 14.0), (0.45, 23.0), (0.15, 13.0), (0.9, 17.0), (0.5, 10.0), (0.7, 21.0)];
+            let cuts = [
+                (0.0, 11.0),
+                (0.6, 15.0),
+                (1.0, 12.0),
+                (0.3, 19.0),
+                (0.8, 14.0),
+                (0.45, 23.0),
+                (0.15, 13.0),
+                (0.9, 17.0),
+                (0.5, 10.0),
+                (0.7, 21.0),
+            ];
             let pass = |(share, seconds): (f64, f64)| {
                 let depth = least + share * (greatest - least);
-                [idle(BETWEEN_S, limits.cut_rpm), Step { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) }]
+                [
+                    idle(BETWEEN_S, limits.cut_rpm),
+                    Step { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) },
+                ]
             };
             let last = idle(BETWEEN_S, limits.cut_rpm);
             cuts.into_iter().flat_map(pass).chain([last]).collect()
@@ -127,9 +141,14 @@ pub fn minutes(steps: &[Step]) -> f64 {
 /// The list for a person.
 #[must_use]
 pub fn text(steps: &[Step], diameter_mm: f64) -> String {
-    let mut text = format!("{} steps, {:.0} min, work of {diameter_mm} mm\n step   s    rpm  feed mm/min  depth mm\n", steps.len(), minutes(steps));
+    let mut text = format!(
+        "{} steps, {:.0} min, work of {diameter_mm} mm\n step   s    rpm  feed mm/min  depth mm\n",
+        steps.len(),
+        minutes(steps)
+    );
     for (index, step) in steps.iter().enumerate() {
-        let cut = step.cut.map_or_else(|| "idle, no feed".to_owned(), |(feed, depth)| format!("{feed:>11.1} {depth:>9.2}"));
+        let cut =
+            step.cut.map_or_else(|| "idle, no feed".to_owned(), |(feed, depth)| format!("{feed:>11.1} {depth:>9.2}"));
         let _ = writeln!(text, "{:>5} {:>3.0} {:>6.0}  {cut}", index + 1, step.seconds, step.rpm);
     }
     text
@@ -138,7 +157,8 @@ pub fn text(steps: &[Step], diameter_mm: f64) -> String {
 /// The plan as a recording of commanded inputs.
 #[must_use]
 pub fn csv(steps: &[Step], diameter_mm: f64) -> String {
-    let mut csv = String::from("time_s,run,spindle_programmed_rpm,feed_programmed_mm_min,depth_of_cut_mm,diameter_mm,engaged\n");
+    let mut csv =
+        String::from("time_s,run,spindle_programmed_rpm,feed_programmed_mm_min,depth_of_cut_mm,diameter_mm,engaged\n");
     let mut time_s = 0.0;
     let mut row = |time_s: f64, step: &Step| {
         let (feed, depth, engaged) = step.cut.map_or((0.0, 0.0, 0), |(feed, depth)| (feed, depth, 1));

@@ -157,7 +157,8 @@ const SENSOR_ERRORS_NM: (f64, f64) = (0.4, 0.1);
 impl Instruments {
     fn beside(machine: &Simulated, times_ns: impl Iterator<Item = TimeNs>, seed: u64) -> Self {
         let times: Vec<TimeNs> = times_ns.collect();
-        let (first_ns, last_ns) = (times.first().copied().unwrap_or(ORIGIN_NS), times.last().copied().unwrap_or(ORIGIN_NS));
+        let (first_ns, last_ns) =
+            (times.first().copied().unwrap_or(ORIGIN_NS), times.last().copied().unwrap_or(ORIGIN_NS));
         let worn = |at_ns| machine.truth(at_ns).flank_wear_mm;
         let before_mm = worn(first_ns);
         let mut noise = Noise(seed | 1);

@@ -61,15 +61,16 @@ impl Thermal {
         let text = std::fs::read_to_string(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let model = ThermalModel::read(&text, &config.gateway.name).map_err(refused)?;
         let names: Vec<&str> = model.law.terms.iter().map(|term| term.sensor.as_str()).collect();
-        let channel = |name: &&str| ChannelId::of(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")));
+        let channel =
+            |name: &&str| ChannelId::of(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")));
         let sensors = names.iter().map(channel).collect::<Result<Vec<_>, _>>()?;
         let error = ChannelId::of("thermal_error_um").ok_or_else(|| refused("needs thermal_error_um".to_owned()))?;
         let memory = config.gateway.data_dir.join(MEMORY);
         let (corrected, told) = remembered(&memory, &model);
         let bounds = FollowSettings { step_um: config.thermal.step_um, total_um: config.thermal.total_um };
         let follower = Follower::new(corrected, &names, bounds).map_err(|refusal| refused(refusal.to_string()))?;
-        let compensator =
-            Compensator::new(config.thermal.compensation).map_err(|error| CannotRun::new(error.to_string(), "see [thermal]"))?;
+        let compensator = Compensator::new(config.thermal.compensation)
+            .map_err(|error| CannotRun::new(error.to_string(), "see [thermal]"))?;
         Ok(Some(Self {
             settings: config.thermal.clone(),
             follower,
@@ -98,7 +99,12 @@ impl Thermal {
             um("thermal_predicted_sd_um", "Standard deviation of the predicted thermal error", "热误差预测标准差"),
             um("thermal_residual_um", "Measured minus predicted thermal error", "热误差残差"),
             um("thermal_offset_um", "Offset against the predicted thermal error", "热误差补偿量"),
-            ExtraSeries::number("thermal_pulses", "1", "Pulses to insert since the last reference return", "应插入脉冲总数"),
+            ExtraSeries::number(
+                "thermal_pulses",
+                "1",
+                "Pulses to insert since the last reference return",
+                "应插入脉冲总数",
+            ),
             ExtraSeries::number("thermal_readings", "1", "Readings that have corrected the law", "修正模型的读数次数"),
         ]
     }
@@ -194,7 +200,8 @@ fn remembered(memory: &Path, model: &ThermalModel) -> (Corrected, Option<Notice>
             (fresh(), Some(Notice::new(Severity::Info, "thermal_law_new", text)))
         }
         Err(error) => {
-            let text = format!("{} cannot be read ({error}): the thermal law begins as it was identified", memory.display());
+            let text =
+                format!("{} cannot be read ({error}): the thermal law begins as it was identified", memory.display());
             (fresh(), Some(Notice::new(Severity::Warning, "thermal_law_forgotten", text)))
         }
     }

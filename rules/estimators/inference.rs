@@ -131,7 +131,13 @@ impl Inference {
             near && bound.stage == stage
         })?;
         let sd_w = 0.5 * self.settings.c2_on * bound.power_w;
-        Some(NoLoad { power_w: bound.power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::UpperBound, supply_log: 0.0 })
+        Some(NoLoad {
+            power_w: bound.power_w,
+            sd_w,
+            noise_gain: 1.0,
+            origin: NoLoadOrigin::UpperBound,
+            supply_log: 0.0,
+        })
     }
 
     fn input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
@@ -204,7 +210,14 @@ impl Inference {
             return;
         };
         let rapid = verdict.state == State::Rapid;
-        let tick = IdleTick { at_ns: inputs.at_ns, power_w, speed_rpm, stage: memory.signals.stage(), rapid, supply_log: inputs.supply_log };
+        let tick = IdleTick {
+            at_ns: inputs.at_ns,
+            power_w,
+            speed_rpm,
+            stage: memory.signals.stage(),
+            rapid,
+            supply_log: inputs.supply_log,
+        };
         let known = no_load.ok().filter(|known| known.origin != NoLoadOrigin::UpperBound);
         let noise = &mut memory.signals.noise;
         let seen = if verdict.state == State::Cutting {

@@ -98,7 +98,11 @@ pub fn match_courses(first: &[(f64, f64)], second: &[(f64, f64)]) -> Result<Matc
     let (place, correlation, rival) = coarse(&one, &other)?;
     if correlation.abs() < CORRELATION_MIN {
         let what = format!("at no lag do the two courses agree: the best correlation is {:.2}", correlation.abs());
-        return Err(Refusal::new(RefusalKind::Contradiction, what, "check that both were recorded during the same cuts"));
+        return Err(Refusal::new(
+            RefusalKind::Contradiction,
+            what,
+            "check that both were recorded during the same cuts",
+        ));
     }
     if rival > correlation.abs() - RIVAL_MARGIN {
         let what = format!("two lags fit equally (correlation {:.3} and {rival:.3})", correlation.abs());
@@ -218,8 +222,10 @@ mod tests {
     fn a_lag_of_hours_and_a_drift_are_found() {
         let first = course(10.0, 200.0, |time_s| 80.0 * cuts(time_s) + 300.0);
         let drift = 2e-4;
-        let second: Vec<(f64, f64)> =
-            course(25.0, 190.0, |time_s| -cuts(time_s)).into_iter().map(|(at, v)| ((at - 5000.0) / (1.0 + drift), v)).collect();
+        let second: Vec<(f64, f64)> = course(25.0, 190.0, |time_s| -cuts(time_s))
+            .into_iter()
+            .map(|(at, v)| ((at - 5000.0) / (1.0 + drift), v))
+            .collect();
         let matched = match_courses(&first, &second).expect("the same cuts");
         for time_s in [25.0, 100.0, 165.0] {
             let error_s = matched.on_first_clock((time_s - 5000.0) / (1.0 + drift)) - time_s;

@@ -41,8 +41,8 @@ mod steady;
 #[cfg(test)]
 mod tests;
 
-pub use courses::{Matched, match_courses};
 pub use collect::{Collector, Gathered};
+pub use courses::{Matched, match_courses};
 pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, align};
 pub use fit::PowerModel;
 pub use follow::Follower;

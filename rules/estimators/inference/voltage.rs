@@ -37,8 +37,7 @@ impl InferenceState {
         }
         let NoLoadPoint { stage, speed_rpm, power_w } = seen.point;
         let (at_ns, sd_w, supply_log) = (seen.at_ns, seen.sd_w, seen.supply_log);
-        let change =
-            self.supply.learn(Measured { at_ns, stage, speed_rpm, power_w, sd_w, supply_log }, settings);
+        let change = self.supply.learn(Measured { at_ns, stage, speed_rpm, power_w, sd_w, supply_log }, settings);
         self.no_load.correct_exponent(change);
     }
 }

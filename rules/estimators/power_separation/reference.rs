@@ -85,7 +85,8 @@ fn oriented(rows: &[Row], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
     for backward in [false, true] {
         let mean = |state: State| {
             let own = rows.iter().zip(&power_w).filter(|(row, _)| row.backward == backward && row.state == state);
-            let (sum, n) = own.filter_map(|(_, power)| *power).fold((0.0, 0.0), |(sum, n), power| (sum + power, n + 1.0));
+            let (sum, n) =
+                own.filter_map(|(_, power)| *power).fold((0.0, 0.0), |(sum, n), power| (sum + power, n + 1.0));
             (n > 0.0).then(|| sum / n)
         };
         if mean(State::Cutting).is_some_and(|cutting| cutting < mean(State::Idle).unwrap_or(0.0)) {

@@ -9,15 +9,8 @@ use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
 const PERIOD_MAX_S: f64 = 5.0;
 
 /// Channels that the estimators look at.
-const LOOKED_AT: [&str; 7] = [
-    "spindle_power_w",
-    "total_power_w",
-    "spindle_speed_rpm",
-    "feed_mm_min",
-    "rapid",
-    "gear_stage",
-    "supply_voltage_v",
-];
+const LOOKED_AT: [&str; 7] =
+    ["spindle_power_w", "total_power_w", "spindle_speed_rpm", "feed_mm_min", "rapid", "gear_stage", "supply_voltage_v"];
 
 /// One row and what the machine was doing.
 #[derive(Debug, Clone, Copy, PartialEq)]

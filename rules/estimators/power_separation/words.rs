@@ -80,7 +80,10 @@ impl LoadLossLearned {
 /// E of every cut, in percent.
 fn table(f: &mut fmt::Formatter<'_>, accuracy: &Accuracy) -> fmt::Result {
     let [first, second] = FIXED_LOSSES;
-    writeln!(f, "  accuracy of cutting power, each cut with coefficients of the others; E = |estimated - measured| / measured")?;
+    writeln!(
+        f,
+        "  accuracy of cutting power, each cut with coefficients of the others; E = |estimated - measured| / measured"
+    )?;
     writeln!(f, "      rpm  measured W  estimated W     E %   fixed {first}: E %   fixed {second}: E %")?;
     for it in &accuracy.groups {
         let [a, b] = it.error_fixed.map(|error| 100.0 * error);

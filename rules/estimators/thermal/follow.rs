@@ -137,7 +137,8 @@ impl Follower {
         let full_um = through * residual.value;
         let step_um = full_um.clamp(-self.settings.step_um, self.settings.step_um);
         let total_um = self.settings.total_um;
-        let change_um = (moved_um + step_um).clamp(-total_um.max(moved_um.abs()), total_um.max(moved_um.abs())) - moved_um;
+        let change_um =
+            (moved_um + step_um).clamp(-total_um.max(moved_um.abs()), total_um.max(moved_um.abs())) - moved_um;
         let held = match () {
             () if (change_um - step_um).abs() > 1e-9 => Some(Held::Total),
             () if (step_um - full_um).abs() > 1e-9 => Some(Held::Step),
@@ -246,7 +247,8 @@ mod tests {
     fn all_readings_together_are_bounded_and_a_reading_outside_teaches_nothing() {
         let mut follower = follower(2.0, 5.0);
         read(&mut follower, 60, 1.0, 100.0);
-        let moved = follower.predictor().predict(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value - 30.0;
+        let moved =
+            follower.predictor().predict(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value - 30.0;
         assert!(moved < 7.0, "{moved}");
         let outside = follower.predictor().predict(70 * 600 * SECOND_NS, &[Ok(80.0)]).expect("there");
         assert_eq!(follower.take(&outside, Ok(0.0)).held, Some(Held::Outside));

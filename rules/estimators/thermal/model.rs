@@ -31,7 +31,8 @@ impl ThermalModel {
     /// # Errors
     /// Not such a file, of another machine, or a law that cannot be used, in words.
     pub fn read(text: &str, machine: &str) -> Result<Self, String> {
-        let model: Self = serde_json::from_str(text).map_err(|error| format!("is no thermal model ({SCHEMA}): {error}"))?;
+        let model: Self =
+            serde_json::from_str(text).map_err(|error| format!("is no thermal model ({SCHEMA}): {error}"))?;
         if model.schema != SCHEMA {
             return Err(format!("is {:?}, this gateway reads {SCHEMA}", model.schema));
         }

@@ -148,7 +148,15 @@ impl Predictor {
         };
         let sensor_of = law.terms.iter().map(|term| position(&term.sensor)).collect::<Result<Vec<usize>, _>>()?;
         let last = vec![(0.0, 0.0); law.terms.len()];
-        Ok(Self { law, sensor_of, sensors: sensors.len(), last, last_ns: None, unsettled: 1.0, point: Vec::with_capacity(TERMS_MAX + 1) })
+        Ok(Self {
+            law,
+            sensor_of,
+            sensors: sensors.len(),
+            last,
+            last_ns: None,
+            unsettled: 1.0,
+            point: Vec::with_capacity(TERMS_MAX + 1),
+        })
     }
 
     /// The law, to correct it by a reading.
