@@ -86,8 +86,9 @@ fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
         put(path, &instruments.torque_csv()).map_err(|problem| CannotRun::new(problem, ""))?;
     }
     eprintln!("{} rows of {machine} in {}", recording.rows(), out.display());
-    let (before_mm, after_mm) = instruments.flank_wear_mm;
-    eprintln!("a microscope shows a flank wear of {before_mm:.4} mm before and {after_mm:.4} mm after");
+    if let Some((before_mm, after_mm)) = instruments.flank_wear_mm {
+        eprintln!("a microscope shows a flank wear of {before_mm:.4} mm before and {after_mm:.4} mm after");
+    }
     Ok(Outcome::Fine)
 }
 

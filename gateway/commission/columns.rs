@@ -1,7 +1,7 @@
 //! The history as a recording, with what a person has measured as columns.
 
 use super::annotations::{Annotation, Quantity};
-use crate::history::{Query, Reader};
+use crate::history::{Query, Reader, STATE_SERIES};
 use adapters::Recording;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::recording::{Cells, Numbers};
@@ -22,7 +22,7 @@ const SERIES: [&str; 30] = [
     "depth_of_cut_mm",
     "diameter_mm",
     "supply_voltage_v",
-    "state",
+    STATE_SERIES,
     "no_load_power_w",
     "tool",
     "operation",
@@ -168,7 +168,7 @@ fn torque_like(recording: &Recording) -> Vec<(f64, f64)> {
     let one = |row: usize| {
         let (power, speed) = (number("spindle_power_w", row)?, number("spindle_speed_rpm", row)?.abs());
         let no_load = number("no_load_power_w", row).unwrap_or(0.0);
-        let state = recording.words("state").and_then(|words| words.get(row)).unwrap_or("");
+        let state = recording.words(STATE_SERIES).and_then(|words| words.get(row)).unwrap_or("");
         let cutting = state == "cutting" && speed > 1.0;
         let torque = if cutting { (power - no_load) * 60.0 / (std::f64::consts::TAU * speed) } else { 0.0 };
         Some((recording.time_s[row], torque))

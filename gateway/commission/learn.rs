@@ -2,6 +2,7 @@
 
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
+use crate::history::STATE_SERIES;
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
 use rules::estimators::balance;
@@ -208,7 +209,7 @@ const GUARD_S: f64 = 1.0;
 
 /// Which rows lie inside a cut, away from its ends.
 fn inner_rows(recording: &Recording) -> Vec<bool> {
-    let states = recording.words("state");
+    let states = recording.words(STATE_SERIES);
     let cutting = |row: usize| states.and_then(|words| words.get(row)) == Some("cutting");
     let mut inner = vec![false; recording.rows()];
     let mut begin = 0;

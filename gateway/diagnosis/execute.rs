@@ -6,7 +6,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::driver::Pull;
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{Cells, Numbers, Words};
-use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings};
+use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings, Truth};
 use adapters::{Recording, Sample, Value};
 use rules::twin::plan::TRANSITION;
 use std::fmt::Write as _;
@@ -132,9 +132,10 @@ pub fn execute(
     let machine = Simulated::experiment(name, settings, ORIGIN_NS, &steps.steps);
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut table = Table::new(name, &steps);
-    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz);
-    let times_ns = table.samples.iter().map(|(.., sample)| sample.at_ns);
-    let instruments = Instruments::beside(&machine, times_ns, settings.seed);
+    let mut instruments = Instruments::new(settings.seed);
+    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz, |at_ns| {
+        instruments.read(&machine.truth(at_ns), at_ns)
+    });
     Ok((table.finish(), instruments))
 }
 
@@ -144,37 +145,30 @@ pub struct Instruments {
     /// A torque sensor at the spindle: times on its own clock, s, and torques, N·m, with zero error and noise.
     pub torque: Vec<(f64, f64)>,
     /// Flank wear of the edge in use before and after, as a microscope shows it, mm.
-    pub flank_wear_mm: (f64, f64),
+    pub flank_wear_mm: Option<(f64, f64)>,
+    noise: Noise,
+    first_ns: Option<TimeNs>,
 }
 
-/// Samples of the torque sensor per second,
-const SENSOR_HZ: f64 = 25.0;
-/// its clock, which began at another time and runs fast,
+/// The sensor's clock began at another time and runs fast,
 const SENSOR_CLOCK: (f64, f64) = (4321.7, 40e-6);
 /// its zero error and its noise, N·m.
 const SENSOR_ERRORS_NM: (f64, f64) = (0.4, 0.1);
 
 impl Instruments {
-    fn beside(machine: &Simulated, times_ns: impl Iterator<Item = TimeNs>, seed: u64) -> Self {
-        let times: Vec<TimeNs> = times_ns.collect();
-        let (first_ns, last_ns) =
-            (times.first().copied().unwrap_or(ORIGIN_NS), times.last().copied().unwrap_or(ORIGIN_NS));
-        let worn = |at_ns| machine.truth(at_ns).flank_wear_mm;
-        let before_mm = worn(first_ns);
-        let mut noise = Noise(seed | 1);
-        let mut torque = Vec::new();
-        #[expect(clippy::cast_possible_truncation, reason = "a 25th of a second")]
-        let step_ns = (SECOND_NS as f64 / SENSOR_HZ) as i64;
-        let mut at_ns = first_ns;
-        while at_ns <= last_ns {
-            let truth = machine.truth(at_ns);
-            let rad_s = truth.spindle_speed_rpm.abs() * std::f64::consts::TAU / 60.0;
-            let cutting = if rad_s > 1.0 { truth.cutting_power_w / rad_s } else { 0.0 };
-            let own_s = (at_ns - first_ns) as f64 / SECOND_NS as f64 * (1.0 + SENSOR_CLOCK.1) + SENSOR_CLOCK.0;
-            torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * noise.normal()));
-            at_ns += step_ns;
-        }
-        Self { torque, flank_wear_mm: (before_mm, worn(last_ns)) }
+    fn new(seed: u64) -> Self {
+        Self { torque: Vec::new(), flank_wear_mm: None, noise: Noise(seed | 1), first_ns: None }
+    }
+
+    /// Reads the instruments at one moment of the experiment.
+    fn read(&mut self, truth: &Truth, at_ns: TimeNs) {
+        let first_ns = *self.first_ns.get_or_insert(at_ns);
+        let before_mm = self.flank_wear_mm.map_or(truth.flank_wear_mm, |(before_mm, _)| before_mm);
+        self.flank_wear_mm = Some((before_mm, truth.flank_wear_mm));
+        let rad_s = truth.spindle_speed_rpm.abs() * std::f64::consts::TAU / 60.0;
+        let cutting = if rad_s > 1.0 { truth.cutting_power_w / rad_s } else { 0.0 };
+        let own_s = (at_ns - first_ns) as f64 / SECOND_NS as f64 * (1.0 + SENSOR_CLOCK.1) + SENSOR_CLOCK.0;
+        self.torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * self.noise.normal()));
     }
 
     /// The file of the torque sensor.
@@ -189,6 +183,7 @@ impl Instruments {
 }
 
 /// Normal noise from a seed: a sum of twelve even numbers (Irwin-Hall), from a linear congruential generator.
+#[derive(Debug, Clone, PartialEq)]
 struct Noise(u64);
 
 impl Noise {
@@ -215,8 +210,8 @@ impl<'a> Table<'a> {
         Self { name, steps, on_the_way_ns: None, samples: Vec::new(), first_ns: None }
     }
 
-    /// Samples from the first step to the end of the last one.
-    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64) {
+    /// Samples from the first step to the end of the last one; `at` hears of each.
+    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64, mut at: impl FnMut(TimeNs)) {
         #[expect(clippy::cast_possible_truncation, reason = "between a millisecond and a thousand seconds")]
         let period_ns = (SECOND_NS as f64 / rate_hz.clamp(0.001, 1000.0)) as i64;
         let mut sample = Sample::empty(0);
@@ -228,6 +223,7 @@ impl<'a> Table<'a> {
             match step_of(&sample) {
                 Some(step) => {
                     begun = true;
+                    at(sample.at_ns);
                     self.add(&sample, step);
                 }
                 None if begun && ended(&sample) => break,
