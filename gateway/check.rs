@@ -9,6 +9,7 @@ use crate::sinks::broker::broker_files;
 use adapters::address::{FanucBackend, NcLinkTarget, Target};
 use adapters::recording::{RecordingError, read_path};
 use rules::estimators::StateBasis;
+use rules::estimators::thermal::ThermalModel;
 use rules::{script, twin};
 use serde::Serialize;
 use std::fmt;
@@ -67,6 +68,7 @@ pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String,
             check_scripts(&config, &mut report);
             check_operations(&config, &mut report);
             check_model(&config, &mut report);
+            check_thermal(&config, &mut report);
             check_sources(&name, &config, &mut report);
             report.read.extend(state_basis(&name, &config));
             check_sinks(&name, &config, &mut report);
@@ -181,6 +183,21 @@ fn check_model(config: &Config, report: &mut Report) {
             what: problem.text,
             next: String::new(),
         })),
+    }
+}
+
+fn check_thermal(config: &Config, report: &mut Report) {
+    let Some(path) = &config.thermal.model else { return };
+    let name = path.display().to_string();
+    let read = std::fs::read_to_string(path)
+        .map_err(|error| format!("the thermal law cannot be read: {error}"))
+        .and_then(|text| ThermalModel::read(&text, &config.gateway.name));
+    match read {
+        Ok(model) => report.read.push(format!("{name}: a thermal law of {} terms", model.law.terms.len())),
+        Err(what) => {
+            let next = "`model` under [thermal] names it; `identify thermal --model` writes one";
+            report.problems.push(Problem::of(name, what, next));
+        }
     }
 }
 

@@ -268,6 +268,7 @@ const FIRST: &[Channel] = &[
     ),
     number("single_block", "1", (0.0, 1.0), Kind::Held, "Single block is switched on", "单段开关"),
     number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关"),
+    number("torque_nm", "N·m", (-100000.0, 100000.0), Kind::Continuous, "Torque at the spindle", "主轴扭矩"),
 ];
 
 /// Index into [`CHANNELS`], and behind them into what a configuration has declared.

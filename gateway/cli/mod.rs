@@ -2,10 +2,12 @@
 //!
 //! Exit codes: 0 fine, 1 the answer is no, 2 could not run. Without a subcommand the box runs.
 
+mod annotate;
 mod arm;
 mod audit;
 mod bench;
 mod check;
+mod commission;
 mod devices;
 mod diagnose;
 mod diagnosis_child;
@@ -18,6 +20,7 @@ mod history;
 mod identify;
 mod metrics;
 mod person;
+mod pulses;
 mod replay;
 mod rules;
 mod run;
@@ -105,6 +108,12 @@ enum Command {
     Effects(effects::EffectsArguments),
     /// Learn a machine's numbers from recordings of it.
     Identify(identify::IdentifyArguments),
+    /// What is known of this machine, what is missing, which cut or idle run to make next and why.
+    Commission(commission::CommissionArguments),
+    /// Note what only a person can measure: flank wear, gauge, probe, the file of a torque sensor.
+    Annotate(annotate::AnnotateArguments),
+    /// Insert pulses into encoder lines, prove it with a decoder, write vectors to test a device against.
+    Pulses(pulses::PulsesArguments),
     /// What scripts can see, call and set.
     Rules(rules::RulesArguments),
     /// Try one address: who is there, what it answers, what is wrong and what to do next.
@@ -166,6 +175,9 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Diagnose(diagnose) => diagnose::diagnose(diagnose),
         Command::Effects(effects) => effects::effects(effects),
         Command::Identify(identify) => identify::identify(&identify),
+        Command::Commission(commission) => commission::run(&commission),
+        Command::Annotate(annotate) => annotate::run(annotate),
+        Command::Pulses(pulses) => pulses::run(&pulses),
         Command::Rules(rules) => rules::run(&rules),
         Command::Doctor(doctor) => doctor::doctor(&doctor),
         Command::Devices(devices) => devices::run(&devices),
@@ -201,17 +213,22 @@ fn print_json(document: &serde_json::Value) {
     print(&format!("{document:#}\n"));
 }
 
+/// The configuration in a file, or the built-in one.
+fn configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun> {
+    let environment =
+        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    crate::config::load(file, environment).map_err(|problems| {
+        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        CannotRun::new(lines.join("\n"), "")
+    })
+}
+
 /// The data directory that is meant: the one that is named, or that of a configuration, or the usual one.
 fn data_dir_of(config: Option<&Path>, data_dir: Option<&Path>) -> Result<PathBuf, CannotRun> {
     if let Some(directory) = data_dir {
         return Ok(directory.to_owned());
     }
-    let environment =
-        std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    let config = crate::config::load(config, environment).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-        CannotRun::new(lines.join("\n"), "")
-    })?;
+    let config = configuration(config)?;
     Ok(config.gateway.data_dir)
 }
 

@@ -32,6 +32,9 @@ pub(super) struct SimulateArguments {
     /// Where the simulated machine's recording goes.
     #[arg(long, value_name = "REC.csv")]
     out: Option<PathBuf>,
+    /// Write what a torque sensor at the spindle of the simulated machine shows, on a clock of its own.
+    #[arg(long, value_name = "SENSOR.csv", requires = "machine")]
+    torque: Option<PathBuf>,
     /// Rows per second of the simulated machine's recording.
     #[arg(long, value_name = "HZ", default_value_t = 2.0, value_parser = rate)]
     rate: f64,
@@ -75,11 +78,17 @@ fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
     let plan: Vec<String> = arguments.plan.iter().cloned().collect();
     let given = read_recordings(&plan).map_err(|wrong| problems.extend(wrong));
     let (Ok(settings), Ok(given)) = (settings, given) else { return Err(cannot_use(&problems)) };
-    let recording =
+    let (recording, instruments) =
         execute::execute(settings, &given.recording, arguments.rate).map_err(|wrong| cannot_use(&[wrong]))?;
     let out = arguments.out.as_deref().unwrap_or(Path::new("-"));
     put(out, &execute::csv(&recording)).map_err(|problem| CannotRun::new(problem, ""))?;
+    if let Some(path) = &arguments.torque {
+        put(path, &instruments.torque_csv()).map_err(|problem| CannotRun::new(problem, ""))?;
+    }
     eprintln!("{} rows of {machine} in {}", recording.rows(), out.display());
+    if let Some((before_mm, after_mm)) = instruments.flank_wear_mm {
+        eprintln!("a microscope shows a flank wear of {before_mm:.4} mm before and {after_mm:.4} mm after");
+    }
     Ok(Outcome::Fine)
 }
 

@@ -3,6 +3,7 @@
 use super::channel_keys;
 use super::keys_of_gate::GATE;
 use super::keys_of_outputs::OUTPUTS;
+use super::keys_of_thermal::THERMAL;
 pub use super::shown::{example, table};
 
 /// What a key accepts.
@@ -92,6 +93,7 @@ pub const SECTIONS: &[Section] = &[
     section("outbox", "what the sinks are sent, and how much of it waits for them during an outage"),
     section("http", "the page and the interface on the network"),
     section("twin", "the simulation that the machine is compared with"),
+    section("thermal", "the thermal law that the box runs: predicted error, residual, offset, pulses to insert"),
     section("log", "what is written to the standard error output"),
 ];
 
@@ -112,9 +114,9 @@ use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
 pub static KEYS: &[Key] = &ALL;
 
 /// The rows of every part of the table, one part behind the other.
-static ALL: [Key; CORE.len() + GATE.len() + OUTPUTS.len() + channel_keys::KEYS.len()] = {
-    let mut all = [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + channel_keys::KEYS.len()];
-    let parts: [&[Key]; 4] = [CORE, GATE, OUTPUTS, &channel_keys::KEYS];
+static ALL: [Key; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()] = {
+    let mut all = [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()];
+    let parts: [&[Key]; 5] = [CORE, GATE, OUTPUTS, THERMAL, &channel_keys::KEYS];
     let (mut part, mut filled) = (0, 0);
     while part < parts.len() {
         let mut index = 0;
@@ -128,7 +130,7 @@ static ALL: [Key; CORE.len() + GATE.len() + OUTPUTS.len() + channel_keys::KEYS.l
     all
 };
 
-/// Every key but those of the gate, of the outputs and of channels.
+/// Every key but those of the gate, of the outputs, of the thermal law and of channels.
 const CORE: &[Key] = &[
     key(
         ("gateway", "name"),

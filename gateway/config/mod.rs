@@ -13,6 +13,7 @@ mod in_force;
 pub mod keys;
 mod keys_of_gate;
 mod keys_of_outputs;
+mod keys_of_thermal;
 mod outputs;
 mod problem;
 mod read;
@@ -25,6 +26,7 @@ use crate::history::OutboxSettings;
 use crate::log::LogFormat;
 use crate::sinks::SinkAddress;
 use adapters::{Address, Axis};
+use rules::estimators::thermal::CompensationSettings;
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -65,6 +67,8 @@ pub struct Config {
     pub http: Http,
     /// The simulation.
     pub twin: Twin,
+    /// The thermal law.
+    pub thermal: Thermal,
     /// The log.
     pub log: Log,
     /// Every key with its value and where that was written.
@@ -276,6 +280,25 @@ pub struct Http {
 pub struct Twin {
     /// Model file.
     pub model: Option<PathBuf>,
+}
+
+/// `[thermal]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thermal {
+    /// Model file that `identify thermal --model` writes.
+    pub model: Option<PathBuf>,
+    /// Axis whose error it predicts.
+    pub axis: Axis,
+    /// Propose the offset to the gate?
+    pub propose: bool,
+    /// Do readings of the error correct the law?
+    pub learn: bool,
+    /// Greatest change of the prediction by one reading, um.
+    pub step_um: f64,
+    /// Greatest change of the prediction by all readings, um.
+    pub total_um: f64,
+    /// From prediction to offset and pulses.
+    pub compensation: CompensationSettings,
 }
 
 /// `[log]`.

@@ -6,7 +6,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::driver::Pull;
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::{Cells, Numbers, Words};
-use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings};
+use adapters::simulated::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep, Simulated, SimulatedSettings, Truth};
 use adapters::{Recording, Sample, Value};
 use rules::twin::plan::TRANSITION;
 use std::fmt::Write as _;
@@ -114,11 +114,16 @@ fn step(plan: &Recording, row: usize) -> ExperimentStep {
     }
 }
 
-/// The simulated machine runs the plan from a cold start; what a gateway at `rate_hz` records of it.
+/// The simulated machine runs the plan from a cold start; what a gateway at `rate_hz` records of it, and what instruments beside
+/// the gateway show.
 ///
 /// # Errors
 /// See [`Steps::of`].
-pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> Result<Recording, String> {
+pub fn execute(
+    settings: SimulatedSettings,
+    plan: &Recording,
+    rate_hz: f64,
+) -> Result<(Recording, Instruments), String> {
     let steps = Steps::of(plan)?;
     let name = match settings.machine {
         SimulatedMachine::Lathe => "simulated://lathe",
@@ -127,8 +132,68 @@ pub fn execute(settings: SimulatedSettings, plan: &Recording, rate_hz: f64) -> R
     let machine = Simulated::experiment(name, settings, ORIGIN_NS, &steps.steps);
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
     let mut table = Table::new(name, &steps);
-    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz);
-    Ok(table.finish())
+    let mut instruments = Instruments::new(settings.seed);
+    table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz, |at_ns| {
+        instruments.read(&machine.truth(at_ns), at_ns)
+    });
+    Ok((table.finish(), instruments))
+}
+
+/// What instruments that are no part of the gateway show of the simulated machine during an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instruments {
+    /// A torque sensor at the spindle: times on its own clock, s, and torques, N·m, with zero error and noise.
+    pub torque: Vec<(f64, f64)>,
+    /// Flank wear of the edge in use before and after, as a microscope shows it, mm.
+    pub flank_wear_mm: Option<(f64, f64)>,
+    noise: Noise,
+    first_ns: Option<TimeNs>,
+}
+
+/// The sensor's clock began at another time and runs fast,
+const SENSOR_CLOCK: (f64, f64) = (4321.7, 40e-6);
+/// its zero error and its noise, N·m.
+const SENSOR_ERRORS_NM: (f64, f64) = (0.4, 0.1);
+
+impl Instruments {
+    fn new(seed: u64) -> Self {
+        Self { torque: Vec::new(), flank_wear_mm: None, noise: Noise(seed | 1), first_ns: None }
+    }
+
+    /// Reads the instruments at one moment of the experiment.
+    fn read(&mut self, truth: &Truth, at_ns: TimeNs) {
+        let first_ns = *self.first_ns.get_or_insert(at_ns);
+        let before_mm = self.flank_wear_mm.map_or(truth.flank_wear_mm, |(before_mm, _)| before_mm);
+        self.flank_wear_mm = Some((before_mm, truth.flank_wear_mm));
+        let rad_s = truth.spindle_speed_rpm.abs() * std::f64::consts::TAU / 60.0;
+        let cutting = if rad_s > 1.0 { truth.cutting_power_w / rad_s } else { 0.0 };
+        let own_s = (at_ns - first_ns) as f64 / SECOND_NS as f64 * (1.0 + SENSOR_CLOCK.1) + SENSOR_CLOCK.0;
+        self.torque.push((own_s, cutting + SENSOR_ERRORS_NM.0 + SENSOR_ERRORS_NM.1 * self.noise.normal()));
+    }
+
+    /// The file of the torque sensor.
+    #[must_use]
+    pub fn torque_csv(&self) -> String {
+        let mut text = String::from("time_s,torque_nm\n");
+        for (time_s, torque) in &self.torque {
+            let _ = writeln!(text, "{time_s:.3},{torque:.4}");
+        }
+        text
+    }
+}
+
+/// Normal noise from a seed: a sum of twelve even numbers (Irwin-Hall), from a linear congruential generator.
+#[derive(Debug, Clone, PartialEq)]
+struct Noise(u64);
+
+impl Noise {
+    fn normal(&mut self) -> f64 {
+        let mut even = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| even()).sum::<f64>() - 6.0
+    }
 }
 
 /// The recording under construction.
@@ -145,8 +210,8 @@ impl<'a> Table<'a> {
         Self { name, steps, on_the_way_ns: None, samples: Vec::new(), first_ns: None }
     }
 
-    /// Samples from the first step to the end of the last one.
-    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64) {
+    /// Samples from the first step to the end of the last one; `at` hears of each.
+    fn fill(&mut self, mut lockstep: Lockstep, rate_hz: f64, mut at: impl FnMut(TimeNs)) {
         #[expect(clippy::cast_possible_truncation, reason = "between a millisecond and a thousand seconds")]
         let period_ns = (SECOND_NS as f64 / rate_hz.clamp(0.001, 1000.0)) as i64;
         let mut sample = Sample::empty(0);
@@ -158,6 +223,7 @@ impl<'a> Table<'a> {
             match step_of(&sample) {
                 Some(step) => {
                     begun = true;
+                    at(sample.at_ns);
                     self.add(&sample, step);
                 }
                 None if begun && ended(&sample) => break,

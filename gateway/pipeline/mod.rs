@@ -24,7 +24,7 @@ use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
 use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::{self, Estimated, Estimates};
-use rules::script::Host;
+use rules::script::{Host, OffsetProposal};
 
 /// Where a tick leaves what is to be remembered.
 pub trait Store {
@@ -61,6 +61,8 @@ pub struct Pipeline {
     journal: Journal,
     parts: Parts,
     tally: Tally,
+    /// What the box itself proposes at this tick.
+    proposal: Option<OffsetProposal>,
 }
 
 impl Pipeline {
@@ -82,7 +84,19 @@ impl Pipeline {
             journal: Journal::default(),
             parts: Parts::default(),
             tally: Tally::default(),
+            proposal: None,
         }
+    }
+
+    /// These series are stored by somebody else: a script's channel of the same name is not stored a second time. Before
+    /// [`Pipeline::series`].
+    pub fn leave(&mut self, names: &[ExtraSeries]) {
+        self.own.retain(|own| !names.iter().any(|known| known.name == own.name));
+    }
+
+    /// An offset that the box itself proposes at this tick, before [`Pipeline::decide`].
+    pub fn propose(&mut self, proposal: Option<OffsetProposal>) {
+        self.proposal = proposal;
     }
 
     /// What is stored beside the channels: estimates, then the channels of the scripts' own that were there at the start.
@@ -116,6 +130,9 @@ impl Pipeline {
         self.tally.step(sample.at_ns, estimates.state);
         let decision = self.scripts.tick(sample, &estimates);
         self.verdict = Some(self.gate.decide(decision.request.as_ref(), sample, &estimates));
+        if let Some(proposal) = self.proposal.take() {
+            self.scripts.propose(proposal);
+        }
     }
 
     /// What can wait until the decision is on its way to the machine: stores and records, where something was decided.

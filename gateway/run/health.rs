@@ -48,6 +48,7 @@ pub struct Health {
     lags: [ExtraValue<'static>; alignment::SERIES],
     /// Values that are stored after these.
     beside: Option<[ExtraValue<'static>; 2]>,
+    thermal: Vec<ExtraValue<'static>>,
 }
 
 impl Health {
@@ -76,6 +77,7 @@ impl Health {
             stores,
             lags: [ExtraValue::Missing("not_yet"); alignment::SERIES],
             beside: None,
+            thermal: Vec::new(),
         }
     }
 
@@ -113,6 +115,12 @@ impl Health {
     /// From now on these values are stored with every sample, after all others.
     pub fn beside(&mut self, values: [ExtraValue<'static>; 2]) {
         self.beside = Some(values);
+    }
+
+    /// From now on these values are stored with every sample, after those of the simulation.
+    pub fn thermal(&mut self, values: &[ExtraValue<'static>]) {
+        self.thermal.clear();
+        self.thermal.extend_from_slice(values);
     }
 
     /// Looks after everything, about once per second.
@@ -275,7 +283,7 @@ fn span(ns: i64) -> String {
 impl Store for Health {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         let beside: &[ExtraValue<'_>] = self.beside.as_ref().map_or(&[], |beside| beside);
-        self.history_store.sample(sample, &[extras, &self.lags, beside].concat());
+        self.history_store.sample(sample, &[extras, &self.lags, beside, &self.thermal].concat());
     }
 
     fn record(&mut self, record: Record) {

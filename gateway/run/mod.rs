@@ -18,6 +18,7 @@ pub mod report;
 pub mod rules;
 pub mod sample_feed;
 pub mod save;
+pub mod thermal;
 pub mod tick;
 mod verdict_mailbox;
 pub mod wear;
@@ -52,6 +53,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use thermal::Thermal;
 use tick::{Identity, RunFlags, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
@@ -160,7 +162,10 @@ fn ticker(
     }
     let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
-    let beside = [pipeline.series(), alignment::series(), beside].concat();
+    let mut thermal = Thermal::of(config)?;
+    let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
+    pipeline.leave(&of_thermal);
+    let beside = [pipeline.series(), alignment::series(), beside, of_thermal].concat();
     let outbox = outputs.map(|outputs| outputs.outbox.clone());
     let history_store =
         HistoryStore::open(&config.history, beside, outbox).map_err(|error| CannotRun::new(error.to_string(), ""))?;
@@ -186,6 +191,9 @@ fn ticker(
     if let Some(twin) = twin.as_ref().filter(|twin| !twin.series().is_empty()) {
         health.beside(twin.values());
     }
+    if let Some(thermal) = &mut thermal {
+        thermal.begin(&mut health, start_ns);
+    }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     let run_flags = run_flags.clone();
@@ -202,6 +210,7 @@ fn ticker(
             operations,
             twin,
             wear,
+            thermal,
             sinks: outputs.map(|outputs| outputs.board.clone()).unwrap_or_default(),
             scripts: watched,
             health,

@@ -8,6 +8,7 @@ use super::priority::{self, Granted};
 use super::report;
 use super::rules::Watched;
 use super::sample_feed::SampleFeed;
+use super::thermal::Thermal;
 use super::wear::Wear;
 use crate::config::GateMode;
 use crate::control::Wake;
@@ -74,6 +75,8 @@ pub struct Ticker {
     pub twin: Option<Twin>,
     /// The wear model of the tool in use, where the library has one.
     pub wear: Wear,
+    /// The thermal law, where one is configured.
+    pub thermal: Option<Thermal>,
     /// How the sinks are.
     pub sinks: Board,
     /// Keeps the scripts as they are on disk.
@@ -117,6 +120,9 @@ impl Ticker {
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
             self.health.aligned(sample.at_ns, self.feed.alignment_mut());
             self.pipeline.inform(self.wear.step(&sample, &inferred, &mut self.health));
+            if let Some(thermal) = &mut self.thermal {
+                self.pipeline.propose(thermal.step(&sample, &mut self.health));
+            }
             self.pipeline.decide(&sample);
             let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);

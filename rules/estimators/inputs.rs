@@ -14,6 +14,7 @@ pub(super) struct Channels {
     pub(super) feed: Option<ChannelId>,
     rapid: Option<ChannelId>,
     stage: Option<ChannelId>,
+    voltage: Option<ChannelId>,
 }
 
 /// A number, or the reason why there is none.
@@ -37,6 +38,12 @@ pub(super) struct Inputs {
     pub(super) rapid: bool,
     /// Gear stage; 0 where the machine has none.
     pub(super) stage: Result<usize, Absence>,
+    /// Supply voltage, V.
+    pub(super) voltage: Input,
+    /// Logarithm of that voltage over its reference; 0 where it is not known.
+    pub(super) supply_log: f64,
+    /// What was taken off the power because the voltage is not that of its reference, W.
+    pub(super) by_voltage_w: f64,
 }
 
 impl Channels {
@@ -48,6 +55,7 @@ impl Channels {
             feed: ChannelId::of("feed_mm_min"),
             rapid: ChannelId::of("rapid"),
             stage: ChannelId::of("gear_stage"),
+            voltage: ChannelId::of("supply_voltage_v"),
         }
     }
 
@@ -73,6 +81,9 @@ impl Channels {
             feed,
             rapid: flagged || fast,
             stage: stage(number(sample, self.stage)),
+            voltage: number(sample, self.voltage),
+            supply_log: 0.0,
+            by_voltage_w: 0.0,
         }
     }
 }

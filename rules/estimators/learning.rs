@@ -59,6 +59,15 @@ pub(super) struct Observation {
     confirmed: bool,
     /// Are all samples from rapid traverse?
     rapid: bool,
+    /// Logarithm of supply voltage over its reference, on the mean.
+    pub(super) supply_log: f64,
+}
+
+impl Observation {
+    /// Settled for certain: it agrees with the block before it, or comes from rapid traverse alone.
+    pub(super) fn settled(&self) -> bool {
+        self.confirmed || self.rapid
+    }
 }
 
 /// One tick of idle power.
@@ -69,6 +78,9 @@ pub(super) struct IdleTick {
     pub(super) speed_rpm: f64,
     pub(super) stage: usize,
     pub(super) rapid: bool,
+    /// Logarithm of supply voltage over its reference.
+    #[serde(default)]
+    pub(super) supply_log: f64,
 }
 
 /// Powers at one speed of one gear stage.
@@ -79,6 +91,8 @@ struct IdleBlock {
     /// The mean is that of the values between these quantiles.
     quantiles: (f64, f64),
     powers_w: Vec<f64>,
+    #[serde(default)]
+    supply_logs: f64,
     first: Option<IdleTick>,
     rapid: bool,
     /// Means of the blocks before, the latest first, and how many of the latest came without a pause.
@@ -105,6 +119,7 @@ impl IdleBlock {
             length,
             quantiles,
             powers_w,
+            supply_logs: 0.0,
             first: None,
             rapid: true,
             means_w: [0.0; 3],
@@ -117,6 +132,7 @@ impl IdleBlock {
 
     fn clear(&mut self) {
         self.powers_w.clear();
+        self.supply_logs = 0.0;
         self.first = None;
         self.rapid = true;
     }
@@ -146,6 +162,7 @@ impl IdleBlock {
         self.last_ns = tick.at_ns;
         let first = *self.first.get_or_insert(tick);
         self.powers_w.push(tick.power_w);
+        self.supply_logs += tick.supply_log;
         self.rapid &= tick.rapid;
         if self.powers_w.len() < self.length {
             return None;
@@ -171,8 +188,9 @@ impl IdleBlock {
         self.unbroken = if std::mem::take(&mut self.broken) { 0 } else { self.unbroken + 1 };
         let point = NoLoadPoint { stage: first.stage, speed_rpm: first.speed_rpm.abs(), power_w };
         let agreement_w = (AGREEMENT * power_w).max(0.5 * noise.resolution_w());
+        let supply_log = self.supply_logs / count(self.length);
         let confirmed = settling_w.is_some_and(|w| w.abs() <= agreement_w);
-        let seen = Observation { point, sd_w: variance.sqrt(), at_ns, confirmed, rapid: self.rapid };
+        let seen = Observation { point, sd_w: variance.sqrt(), at_ns, confirmed, rapid: self.rapid, supply_log };
         (power_w > 0.0).then_some(seen)
     }
 }

@@ -14,6 +14,7 @@
 //! | `evidence` | a small lasting step in noise |
 //! | `situation`, `detector` | the states and every transition between them |
 //! | `no_load`, `interpolation`, `learning` | no-load power over speed, per gear stage, learned from idle |
+//! | `supply` | no-load power over supply voltage, its exponent learned |
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `cutting` | power balance: cutting power and load loss |
 //! | `power_separation` | no-load power and load loss from recordings |
@@ -43,6 +44,7 @@ mod signals;
 mod situation;
 pub mod spindle_current;
 mod state;
+mod supply;
 pub mod thermal;
 mod visibility;
 pub mod wear;

@@ -53,6 +53,8 @@ pub struct NoLoad {
     pub noise_gain: f64,
     /// Measured, interpolated or extrapolated.
     pub origin: NoLoadOrigin,
+    /// Logarithm of supply voltage over its reference at which it was learned; 0 where no voltage is known.
+    pub supply_log: f64,
 }
 
 impl NoLoad {
@@ -68,6 +70,10 @@ impl NoLoad {
 pub(super) struct Stage {
     pub(super) speeds_rpm: Vec<f64>,
     pub(super) powers_w: Vec<f64>,
+    /// Logarithm of supply voltage over its reference at which each power was learned; shorter than the powers where the
+    /// voltage never was known.
+    #[serde(default)]
+    supply_logs: Vec<f64>,
     /// Row by row, W^2, as of `aged_ns`.
     covariance: Vec<f64>,
     aged_ns: Option<TimeNs>,
@@ -111,8 +117,9 @@ impl Stage {
         self.aged_ns = Some(now_ns);
     }
 
-    fn insert(&mut self, speed_rpm: f64, power_w: f64, variance_w2: f64) {
+    fn insert(&mut self, speed_rpm: f64, power_w: f64, variance_w2: f64, supply_log: f64) {
         let n = self.len();
+        self.supply_logs.resize(n, 0.0);
         let at = self.speeds_rpm.partition_point(|known| *known < speed_rpm);
         let old = std::mem::take(&mut self.covariance);
         let from = |k: usize| if k < at { Some(k) } else { k.checked_sub(1).filter(|_| k != at) };
@@ -124,6 +131,15 @@ impl Stage {
         }
         self.speeds_rpm.insert(at, speed_rpm);
         self.powers_w.insert(at, power_w);
+        self.supply_logs.insert(at, supply_log);
+    }
+
+    /// The exponent of the supply voltage is known better by `change`: powers were learned at a voltage, and are kept as they
+    /// would be at its reference.
+    fn correct(&mut self, change: f64) {
+        for (power_w, log) in self.powers_w.iter_mut().zip(&self.supply_logs) {
+            *power_w *= (-change * log).exp();
+        }
     }
 
     fn remove(&mut self, at: usize) {
@@ -133,6 +149,8 @@ impl Stage {
         self.covariance.extend((0..n * n).filter(kept).map(|k| old[k]));
         self.speeds_rpm.remove(at);
         self.powers_w.remove(at);
+        self.supply_logs.resize(n, 0.0);
+        self.supply_logs.remove(at);
     }
 
     fn make_room(&mut self) {
@@ -146,8 +164,10 @@ impl Stage {
         }
     }
 
-    fn update(&mut self, at: usize, power_w: f64, variance_w2: f64) {
+    fn update(&mut self, at: usize, power_w: f64, variance_w2: f64, supply_log: f64) {
         let n = self.len();
+        self.supply_logs.resize(n, 0.0);
+        let moved_w = (supply_log - self.supply_logs[at]) * self.powers_w[at];
         let innovation_w = power_w - self.powers_w[at];
         let expected_w2 = self.covariance[at * n + at] + variance_w2;
         if innovation_w * innovation_w > SURPRISE_SD * SURPRISE_SD * expected_w2 {
@@ -159,6 +179,7 @@ impl Stage {
         let total_w2 = column[at] + variance_w2;
         for i in 0..n {
             let gain = column[i] / total_w2;
+            self.supply_logs[i] += gain * moved_w / self.powers_w[i];
             self.powers_w[i] = (self.powers_w[i] + gain * innovation_w).max(0.1 * self.powers_w[i]);
             for (j, other) in column[..n].iter().enumerate() {
                 self.covariance[i * n + j] -= gain * other;
@@ -177,13 +198,22 @@ impl Stage {
         sum.max(0.0)
     }
 
+    /// At what supply voltage the powers behind these weights were learned, by their share.
+    fn supply_log(&self, weights: &Weights) -> f64 {
+        let total_w = weights.of(&self.powers_w);
+        let logs = weights.at.iter().zip(weights.weight);
+        let sum = logs.map(|(at, weight)| weight * self.powers_w[*at] * self.supply_logs.get(*at).unwrap_or(&0.0));
+        if total_w > 0.0 { sum.sum::<f64>() / total_w } else { 0.0 }
+    }
+
     /// The power law alone, and its uncertainty; `None` too far from any known speed.
-    fn rough(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64)> {
+    fn rough(&self, n: f64, now_ns: TimeNs, settings: &Settings) -> Option<(f64, f64, f64)> {
         let (_, distance) = self.nearest(n).filter(|(_, distance)| *distance <= ROUGH_SPAN)?;
         let weights = self.by_law(n);
         let power_w = weights.of(&self.powers_w);
         let law_w = EXPONENT_SD * distance * power_w;
-        Some((power_w, (self.variance_w2(&weights, now_ns, settings) + law_w * law_w).sqrt()))
+        let sd_w = (self.variance_w2(&weights, now_ns, settings) + law_w * law_w).sqrt();
+        Some((power_w, sd_w, self.supply_log(&weights)))
     }
 
     /// How far `n` lies outside the known speeds, relative to the span they cover.
@@ -210,7 +240,7 @@ impl NoLoadTable {
             let sd_w = CONFIGURED_SD * point.power_w;
             let stage = &mut table.stages[point.stage.min(STAGES - 1)];
             if stage.near(point.speed_rpm, settings.speed_tolerance).is_none() {
-                stage.insert(point.speed_rpm, point.power_w, sd_w * sd_w);
+                stage.insert(point.speed_rpm, point.power_w, sd_w * sd_w, 0.0);
             }
         }
         table
@@ -226,8 +256,9 @@ impl NoLoadTable {
 
     /// Takes a power measured at a speed without cutting. Within the speed tolerance of a known speed it improves that
     /// one (and by the shared drift the others), power going as speed over that small distance. Ignores what is not
-    /// positive and finite.
-    pub fn learn(&mut self, point: NoLoadPoint, sd_w: f64, now_ns: TimeNs, settings: &Settings) {
+    /// positive and finite. The power is that at the reference of the supply voltage, `supply_log` the logarithm of the
+    /// voltage over that reference while it was measured.
+    pub fn learn(&mut self, point: NoLoadPoint, sd_w: f64, supply_log: f64, now_ns: TimeNs, settings: &Settings) {
         let NoLoadPoint { stage, speed_rpm, power_w } = point;
         let usable = |x: f64| x.is_finite() && x > 0.0;
         let Some(stage) = self.stages.get_mut(stage).filter(|_| usable(speed_rpm) && usable(power_w) && usable(sd_w))
@@ -237,11 +268,16 @@ impl NoLoadTable {
         stage.age(now_ns, settings);
         if let Some(at) = stage.near(speed_rpm, settings.speed_tolerance) {
             let to_node = stage.speeds_rpm[at] / speed_rpm;
-            stage.update(at, power_w * to_node, sd_w * sd_w);
+            stage.update(at, power_w * to_node, sd_w * sd_w, supply_log);
         } else {
             stage.make_room();
-            stage.insert(speed_rpm, power_w, sd_w * sd_w);
+            stage.insert(speed_rpm, power_w, sd_w * sd_w, supply_log);
         }
+    }
+
+    /// The exponent of the supply voltage is known better by `change`.
+    pub(super) fn correct_exponent(&mut self, change: f64) {
+        self.stages.iter_mut().for_each(|stage| stage.correct(change));
     }
 
     /// No-load power at a speed of a gear stage. Extrapolation is flagged, and refused when it amplifies noise beyond
@@ -255,7 +291,8 @@ impl NoLoadTable {
         if let Some(at) = stage.near(n, settings.speed_tolerance) {
             let weights = Weights::one(at, n / stage.speeds_rpm[at]);
             let (power_w, sd_w) = (weights.of(&stage.powers_w), stage.variance_w2(&weights, now_ns, settings).sqrt());
-            return Ok(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::Measured });
+            let supply_log = stage.supply_log(&weights);
+            return Ok(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::Measured, supply_log });
         }
         let (weights, other) = stage.forms(n).ok_or(NoEstimate::NotLearned)?;
         let noise_gain = noise_gain(&weights.weight);
@@ -272,15 +309,15 @@ impl NoLoadTable {
         let beyond_w = BEYOND_SD * stage.beyond(n) * power_w;
         let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w + beyond_w * beyond_w).sqrt();
         let origin = if inside { NoLoadOrigin::Interpolated } else { NoLoadOrigin::Extrapolated };
-        Ok(NoLoad { power_w, sd_w, noise_gain, origin })
+        Ok(NoLoad { power_w, sd_w, noise_gain, origin, supply_log: stage.supply_log(&weights) })
     }
 
     /// A rough idea of no-load power where [`NoLoadTable::at`] refuses: good enough to tell a heavy cut from none, not to
     /// be called an estimate. `None` where the gear stage has no known power within a factor of two of the speed.
     #[must_use]
     pub fn rough(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Option<NoLoad> {
-        let (power_w, sd_w) = self.stages.get(stage)?.rough(speed_rpm.abs(), now_ns, settings)?;
-        Some(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::None })
+        let (power_w, sd_w, supply_log) = self.stages.get(stage)?.rough(speed_rpm.abs(), now_ns, settings)?;
+        Some(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::None, supply_log })
     }
 }
 
@@ -295,7 +332,7 @@ mod tests {
 
     fn learned(points: &[(f64, f64)], settings: &Settings) -> NoLoadTable {
         let mut table = NoLoadTable::new(settings);
-        points.iter().for_each(|(speed, power)| table.learn(point(*speed, *power), 2.0, 0, settings));
+        points.iter().for_each(|(speed, power)| table.learn(point(*speed, *power), 2.0, 0.0, 0, settings));
         table
     }
 
@@ -304,7 +341,7 @@ mod tests {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0), (1200.0, 800.0)], &settings);
         let later = 600 * SECOND_NS;
-        table.learn(point(600.0, 380.0), 2.0, later, &settings);
+        table.learn(point(600.0, 380.0), 2.0, 0.0, later, &settings);
         let other = table.at(0, 1200.0, later, &settings).expect("known");
         assert!(other.power_w < 780.0 && other.power_w > 760.0, "{other:?}");
         assert!(other.sd_w > 10.0, "less sure than a measurement: {other:?}");
@@ -323,7 +360,7 @@ mod tests {
     fn a_changed_machine_is_believed() {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0), (600.0, 401.0), (600.0, 399.0)], &settings);
-        table.learn(point(600.0, 520.0), 2.0, SECOND_NS, &settings);
+        table.learn(point(600.0, 520.0), 2.0, 0.0, SECOND_NS, &settings);
         assert!((table.at(0, 600.0, SECOND_NS, &settings).expect("known").power_w - 520.0).abs() < 6.0);
     }
 
@@ -333,9 +370,9 @@ mod tests {
         let mut table = NoLoadTable::new(&settings);
         for k in 0..SPEEDS_PER_STAGE {
             let speed = 200.0 * 1.15_f64.powi(i32::try_from(k).expect("small"));
-            table.learn(point(speed, speed / 2.0), if k == 3 { 30.0 } else { 1.0 }, 0, &settings);
+            table.learn(point(speed, speed / 2.0), if k == 3 { 30.0 } else { 1.0 }, 0.0, 0, &settings);
         }
-        table.learn(point(10_000.0, 9000.0), 5.0, 0, &settings);
+        table.learn(point(10_000.0, 9000.0), 5.0, 0.0, 0, &settings);
         assert_eq!(table.points().count(), SPEEDS_PER_STAGE);
         let gone = 200.0 * 1.15_f64.powi(3);
         assert!(table.points().all(|known| (known.speed_rpm - gone).abs() > 1.0));
@@ -346,7 +383,7 @@ mod tests {
         let settings = Settings::default();
         let mut table = learned(&[(600.0, 400.0)], &settings);
         for (speed, power) in [(0.0, 1.0), (-600.0, 400.0), (600.0, f64::NAN), (700.0, -1.0), (f64::INFINITY, 1.0)] {
-            table.learn(point(speed, power), 1.0, 0, &settings);
+            table.learn(point(speed, power), 1.0, 0.0, 0, &settings);
         }
         assert_eq!(table.points().count(), 1);
         let rough = table.rough(0, 900.0, 0, &settings).expect("within a factor of two");

@@ -238,6 +238,13 @@ impl Host {
         self.remembered = scripts.map(|(file, kept)| (file.clone(), kept.clone())).collect();
     }
 
+    /// Adds an offset that the box itself proposes to the decision of this tick, unless a script proposes one for its axis.
+    pub fn propose(&mut self, proposal: super::decision::OffsetProposal) {
+        if !self.decision.offsets.iter().any(|known| known.axis == proposal.axis) {
+            self.decision.offsets.push(proposal);
+        }
+    }
+
     /// The decision of the last tick.
     #[must_use]
     pub fn decision(&self) -> &Decision {

@@ -6,7 +6,7 @@ use crate::plain_reading::PlainReading;
 use crate::scoring::{Judged, Score};
 use adapters::clock::SECOND_NS;
 use adapters::merge::{Delay, Lockstep};
-use adapters::{ChannelId, Sample};
+use adapters::{Absence, ChannelId, Sample, Slot};
 use rules::estimators::{Inference, Settings};
 use std::sync::Arc;
 
@@ -25,11 +25,16 @@ const SCENARIOS: [Scenario; 8] = [
 ];
 
 const fn scenario(name: &'static str, tau_s: f64, cut_share: f64, speed_changes: bool, dropouts: bool) -> Scenario {
-    Scenario { name, tau_s, cut_share, speed_changes, dropouts }
+    Scenario { name, tau_s, cut_share, speed_changes, dropouts, supply_exponent: None }
 }
 
 /// Traces of the product and of the plain reading.
 fn run(scenario: &Scenario, seed: u64) -> (Vec<Judged>, Vec<Judged>) {
+    run_seeing(scenario, seed, true)
+}
+
+/// The same; `voltage`: does the product see the voltage, where the meter shows it?
+fn run_seeing(scenario: &Scenario, seed: u64, voltage: bool) -> (Vec<Judged>, Vec<Judged>) {
     let course = Arc::new(Course::run(scenario, seed));
     let sources = sources(&course, Disturbance::default(), scenario.dropouts, seed);
     let mut merge = Lockstep::new(sources, Delay::default());
@@ -37,9 +42,13 @@ fn run(scenario: &Scenario, seed: u64) -> (Vec<Judged>, Vec<Judged>) {
     let mut sample = Sample::empty(0);
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let inputs = ["spindle_speed_rpm", "spindle_power_w"].map(|name| ChannelId::of(name).expect("in the table"));
+    let supply = ChannelId::of("supply_voltage_v").expect("in the table");
     let mut now_ns = SECOND_NS;
     while merge.sample_into(&mut sample, now_ns) {
         now_ns += SECOND_NS / 10;
+        if !voltage {
+            sample.set(supply, Slot { value: Err(Absence::NotProvided), age_ns: 0 });
+        }
         let time_s = sample.at_ns as f64 / SECOND_NS as f64;
         let Some(moment) = course.at(time_s) else { break };
         let missing = inputs.iter().any(|channel| sample.number(*channel).is_err());
@@ -130,5 +139,28 @@ pub(crate) fn assert_better(name: &str, product: &Score, plain: &Score) {
     }
     for (figure, ours, theirs) in lower {
         assert!(ours <= theirs, "{name}: {figure} {ours} against {theirs}");
+    }
+}
+
+/// Mains that wander by 4 %, for drives whose no-load power follows them with these exponents.
+const EXPONENTS: [f64; 3] = [0.0, 1.0, 2.0];
+
+/// With the voltage at most this share of what is called cutting is false.
+const FALSE_CUT_MAX: f64 = 0.04;
+
+#[test]
+fn wandering_mains_are_not_taken_for_cuts() {
+    header(&format!("mains wander by 4 %, {SEEDS} courses each"));
+    for exponent in EXPONENTS {
+        for scenario in SCENARIOS.map(|scenario| Scenario { supply_exponent: Some(exponent), ..scenario }) {
+            let (mut seeing, mut blind) = (Score::default(), Score::default());
+            for seed in first_seed(0)..first_seed(0) + SEEDS {
+                seeing.add(&run_seeing(&scenario, seed, true).0);
+                blind.add(&run_seeing(&scenario, seed, false).0);
+            }
+            line(&format!("{}, U^{exponent}", scenario.name), "voltage", &seeing);
+            line("", "without", &blind);
+            assert!(seeing.false_cut() <= FALSE_CUT_MAX, "{} U^{exponent}: {}", scenario.name, seeing.false_cut());
+        }
     }
 }

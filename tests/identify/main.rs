@@ -44,6 +44,13 @@ impl Coverage {
         self.inside += u64::from(interval.0 <= truth && truth <= interval.1);
     }
 
+    /// Prints the share and asserts that it is 90 to 98 %; an interval that always holds the truth is wider than it says.
+    pub(crate) fn assert_neither_narrow_nor_wide(&self) {
+        self.assert();
+        let share = self.inside as f64 / self.repetitions as f64;
+        assert!(share <= 0.98, "{}: {share}", self.quantity);
+    }
+
     /// Prints the share and asserts that it is 90 % at least.
     pub(crate) fn assert(&self) {
         let share = self.inside as f64 / self.repetitions as f64;

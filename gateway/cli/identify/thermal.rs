@@ -1,12 +1,16 @@
 //! `identify thermal`: thermal error from temperatures, which sensors and which law.
 
 use super::{Learned, Reading};
-use crate::cli::CommandResult;
+use crate::cli::{CannotRun, CommandResult};
+use crate::diagnosis::put;
 use adapters::Recording;
 use clap::Args;
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalLearned, collect, learn};
+use rules::estimators::thermal::{
+    LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalLearned, ThermalModel, collect, learn,
+};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct ThermalArguments {
@@ -21,6 +25,12 @@ pub(super) struct ThermalArguments {
     /// Greatest variance inflation among chosen sensors.
     #[arg(long, value_name = "FACTOR", default_value_t = SelectionSettings::default().inflation_max)]
     inflation_max: f64,
+    /// Write the law as the model that the box runs (thermal/1, JSON; [thermal] model in the configuration).
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Machine that the model is for; without it any.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    machine: String,
     /// Resolution coefficient of the grey relational grades, above 0 and at most 1.
     #[arg(long, value_name = "RHO", default_value_t = RHO_USUAL)]
     rho: f64,
@@ -28,16 +38,25 @@ pub(super) struct ThermalArguments {
 
 pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
     let recording = arguments.reading.read()?;
-    let learned = identify(&recording, arguments);
+    let learned = identify(&recording, arguments).and_then(|(learned, model)| {
+        let text = model.text().map_err(|what| Refusal::new(RefusalKind::NotFinite, what, ""))?;
+        Ok((learned, text))
+    });
+    if let (Some(path), Ok((_, model))) = (&arguments.model, &learned) {
+        put(path, model).map_err(|problem| CannotRun::new(problem, ""))?;
+    }
+    let learned = learned.map(|(learned, _)| learned);
     arguments.reading.finish("thermal", learned)
 }
 
-fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<Learned, Refusal> {
+fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(Learned, ThermalModel), Refusal> {
     let settings = settings(arguments)?;
     let collected = collect(recording)?;
     let learned = learn(&collected.course, settings, arguments.sensors.as_deref())?;
     let text = format!("{}{learned}", left_out(&collected.left_out));
-    Ok(Learned { text, json: document(&learned, &collected.left_out), file: Some(learned.script()) })
+    let model = ThermalModel::new(arguments.machine.clone(), learned.best().fit.law.clone());
+    let json = document(&learned, &collected.left_out);
+    Ok((Learned { text, json, file: Some(learned.script()) }, model))
 }
 
 fn settings(arguments: &ThermalArguments) -> Result<SelectionSettings, Refusal> {

@@ -1,6 +1,7 @@
 //! From checked values to the configuration, and the rules that concern more than one key.
 
 mod http;
+mod thermal;
 
 use super::check_value::Scalar;
 use super::outputs;
@@ -46,6 +47,7 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
         outbox: outbox?,
         http: http::http(reading, base)?,
         twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
+        thermal: thermal::thermal(reading, base)?,
         log: log(reading)?,
         gateway,
         sources: sources?,
@@ -292,11 +294,11 @@ pub(super) fn number(reading: &Reading<'_>, section: &str, key: &str) -> Option<
     reading.get(section, key).and_then(as_number)
 }
 
-fn seconds(reading: &Reading<'_>, section: &str, key: &str) -> Option<Duration> {
+pub(super) fn seconds(reading: &Reading<'_>, section: &str, key: &str) -> Option<Duration> {
     number(reading, section, key).map(Duration::from_secs_f64)
 }
 
-fn flag(reading: &Reading<'_>, section: &str, key: &str) -> Option<bool> {
+pub(super) fn flag(reading: &Reading<'_>, section: &str, key: &str) -> Option<bool> {
     match reading.get(section, key).map(|found| &found.value) {
         Some(Scalar::Flag(flag)) => Some(*flag),
         _ => None,

@@ -18,6 +18,7 @@
 //! | `fit` | the power model at one lag and window, and its residual |
 //! | `profile` | the residual over lag and window, its minimum and its rivals |
 //! | `estimate` | [`align`]: lag, width, drift and window over all transients, or why they cannot be known |
+//! | `courses` | a file on a clock that nobody set, laid beside the history by its cuts |
 //! | `collect` | transients out of a running machine, without what was measured while it cut |
 //! | `follow` | the lag in force: follows the estimates slowly, stands still while the machine cuts |
 //!
@@ -29,6 +30,7 @@
 //! clock, it is zero within its width, for a device that streams by its own clock it is that clock's error.
 
 mod collect;
+mod courses;
 mod estimate;
 mod fit;
 mod follow;
@@ -40,6 +42,7 @@ mod steady;
 mod tests;
 
 pub use collect::{Collector, Gathered};
+pub use courses::{Matched, match_courses};
 pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, align};
 pub use fit::PowerModel;
 pub use follow::Follower;

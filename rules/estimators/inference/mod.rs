@@ -1,6 +1,7 @@
 //! From a sample to estimates.
 
 mod stand_in;
+mod voltage;
 
 use super::cutting::balance;
 use super::detector::{Detected, Detector};
@@ -12,6 +13,7 @@ use super::settings::Settings;
 use super::signals::{Feed, Pace, Signals};
 use super::situation::{Tick, visible_excess_w};
 use super::state::State;
+use super::supply::Supply;
 use adapters::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -49,12 +51,16 @@ struct InferenceState {
     /// What the no-load powers were learned from, as the word of a [`StateBasis`](super::StateBasis); empty before the first sample.
     #[serde(default)]
     basis: String,
+    /// How no-load power goes with the supply voltage.
+    #[serde(default)]
+    supply: Supply,
 }
 
 impl InferenceState {
     fn new(settings: &Settings) -> Self {
         Self {
             basis: String::new(),
+            supply: Supply::default(),
             signals: Signals::new(settings),
             no_load: NoLoadTable::new(settings),
             learner: Learner::new(settings),
@@ -76,7 +82,7 @@ impl Inference {
 
     /// Takes one sample; samples come in the order of time.
     pub fn infer(&mut self, sample: &Sample) -> &Estimates {
-        let inputs = self.channels.read(sample, self.memory.standby_w, &self.settings);
+        let mut inputs = self.channels.read(sample, self.memory.standby_w, &self.settings);
         self.follow_basis(inputs.basis);
         let broken = self.memory.signals.push(&inputs, &self.settings);
         if broken.gap {
@@ -88,6 +94,7 @@ impl Inference {
         if broken.gap || broken.stage {
             self.memory.learner.forget();
         }
+        self.to_reference_voltage(&mut inputs);
         let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power, &self.settings));
         let mut no_load = self.reference(&inputs);
         let tick =
@@ -114,7 +121,8 @@ impl Inference {
         let stage = memory.signals.stage();
         let learned = memory.no_load.at(stage, speed_rpm, inputs.at_ns, settings);
         let rough = || memory.no_load.rough(stage, speed_rpm, inputs.at_ns, settings);
-        learned.or_else(|reason| self.bound(stage, speed_rpm).or_else(rough).ok_or(reason))
+        let known = learned.or_else(|reason| self.bound(stage, speed_rpm).or_else(rough).ok_or(reason));
+        known.map(|known| memory.supply.doubted(known, inputs.supply_log))
     }
 
     fn bound(&self, stage: usize, speed_rpm: f64) -> Option<NoLoad> {
@@ -123,7 +131,13 @@ impl Inference {
             near && bound.stage == stage
         })?;
         let sd_w = 0.5 * self.settings.c2_on * bound.power_w;
-        Some(NoLoad { power_w: bound.power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::UpperBound })
+        Some(NoLoad {
+            power_w: bound.power_w,
+            sd_w,
+            noise_gain: 1.0,
+            origin: NoLoadOrigin::UpperBound,
+            supply_log: 0.0,
+        })
     }
 
     fn input(&self, channel: Option<ChannelId>, absence: adapters::Absence) -> NoEstimate {
@@ -136,7 +150,7 @@ impl Inference {
         let point = NoLoadPoint { stage: self.memory.signals.stage(), speed_rpm: speed.abs(), power_w };
         if feed == Feed::Off {
             let sd_w = power_w * self.settings.c2_on.hypot(self.memory.signals.noise.sd()) / 2.0;
-            self.memory.no_load.learn(point, sd_w, inputs.at_ns, &self.settings);
+            self.memory.no_load.learn(point, sd_w, inputs.supply_log, inputs.at_ns, &self.settings);
         } else if power_w > 0.0 {
             self.memory.upper_bound = Some(point);
         }
@@ -196,7 +210,14 @@ impl Inference {
             return;
         };
         let rapid = verdict.state == State::Rapid;
-        let tick = IdleTick { at_ns: inputs.at_ns, power_w, speed_rpm, stage: memory.signals.stage(), rapid };
+        let tick = IdleTick {
+            at_ns: inputs.at_ns,
+            power_w,
+            speed_rpm,
+            stage: memory.signals.stage(),
+            rapid,
+            supply_log: inputs.supply_log,
+        };
         let known = no_load.ok().filter(|known| known.origin != NoLoadOrigin::UpperBound);
         let noise = &mut memory.signals.noise;
         let seen = if verdict.state == State::Cutting {
@@ -209,7 +230,10 @@ impl Inference {
             known.and_then(|known| memory.learner.fed(tick, known, noise))
         };
         if let Some(seen) = seen {
-            memory.no_load.learn(seen.point, seen.sd_w, seen.at_ns, &self.settings);
+            memory.no_load.learn(seen.point, seen.sd_w, seen.supply_log, seen.at_ns, &self.settings);
+            if rested && verdict.state != State::Cutting {
+                memory.follow_voltage(&seen, &self.settings);
+            }
         }
     }
 
@@ -224,14 +248,15 @@ impl Inference {
         let steady = self.steady(inputs, verdict);
         let power = inputs.power.map_err(|absence| self.input(self.channels.power, absence));
         let filtered = power.and(filtered_w.ok_or(NoEstimate::NotSettled)).map(|value| Estimate {
-            value,
+            value: value + inputs.by_voltage_w,
             sd: self.memory.signals.filter.noise_gain() * self.memory.signals.noise.sd() * value.abs(),
         });
         let reference = match (steady, no_load) {
             (Err(NoEstimate::MachineOff), _) => Err(NoEstimate::MachineOff),
             (_, Ok(rough)) if !rough.is_estimate() => Err(self.refusal(inputs)),
             (_, known) => known,
-        };
+        }
+        .map(|known| self.at_voltage(known, inputs));
         let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference));
         let estimates = Estimates {
             at_ns: inputs.at_ns,

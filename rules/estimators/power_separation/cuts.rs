@@ -25,7 +25,7 @@ pub struct Point {
     pub at_s: f64,
     /// Spindle power.
     pub power: Level,
-    /// Cutting power by the reference, less what the reference shows while idling, W.
+    /// Cutting power by the reference, less what the reference shows on the mean of idling at this speed, W.
     pub cutting_power_w: f64,
     /// Is it a cut?
     pub cut: bool,
@@ -108,7 +108,9 @@ fn close(rows: &[Row], open: &[usize], reference: &Referenced) -> Option<Point> 
     })
 }
 
-/// A torque sensor's zero and the friction behind it are no cutting power.
+/// A torque sensor's zero and the friction behind it are no cutting power: what it shows while idling at a speed, on the mean of
+/// all idle stretches, is taken off every point of that speed. An idle stretch keeps its own difference from that mean, so
+/// that the sensor's noise counts in the fit as it does in the cuts.
 fn subtract_idle(points: &mut [Point], rows: &[Row], idle: &[Stretch], reference: &Referenced) {
     let shown = |stretch: &Stretch| {
         let inside = |row: &Row| row.time_s >= stretch.from_s && row.time_s <= stretch.to_s;
@@ -120,9 +122,16 @@ fn subtract_idle(points: &mut [Point], rows: &[Row], idle: &[Stretch], reference
             .collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / count(values.len()))
     };
+    let of_stretch: Vec<Option<f64>> = idle.iter().map(shown).collect();
+    // Idle stretches come first, in their order.
+    for (point, shown_w) in points.iter_mut().zip(&of_stretch) {
+        point.cutting_power_w = shown_w.unwrap_or(0.0);
+    }
+    let known = idle.iter().zip(&of_stretch);
     let shown: Vec<(usize, f64, f64)> =
-        idle.iter().filter_map(|stretch| Some((stretch.stage, stretch.speed_rpm, shown(stretch)?))).collect();
-    for point in points.iter_mut().filter(|point| point.cut) {
+        known.filter_map(|(stretch, shown_w)| Some((stretch.stage, stretch.speed_rpm, (*shown_w)?))).collect();
+    let with_reference = |at: usize| of_stretch.get(at).is_none_or(Option::is_some);
+    for (_, point) in points.iter_mut().enumerate().filter(|(at, _)| with_reference(*at)) {
         let near = |(stage, speed, _): &&(usize, f64, f64)| {
             *stage == point.stage && (speed / point.speed_rpm - 1.0).abs() <= SAME_SPEED
         };

@@ -2,6 +2,7 @@
 //!
 //! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals.
 
+use super::accuracy::{Accuracy, accuracy};
 use super::cuts::{Point, points};
 use super::reference::{Reference, ReferenceChoice, referenced};
 use super::rows::rows;
@@ -60,6 +61,8 @@ pub struct StageLearned {
     pub variance_inflation: f64,
     /// Does each speed want coefficients of its own?
     pub by_speed: Option<FTest>,
+    /// Accuracy of the separation in cuts that were left out; `None` for too few cuts.
+    pub accuracy: Option<Accuracy>,
 }
 
 /// What a recording tells about load loss.
@@ -139,6 +142,7 @@ fn of_stage(points: &[&Point], reference: Reference) -> Result<StageLearned, Ref
         residual_sd_w: regression.residual_sd,
         variance_inflation: regression.coefficients[speeds.len()].variance_inflation.unwrap_or(1.0),
         by_speed: by_speed(points, &speeds, &regression),
+        accuracy: accuracy(points, &speeds),
     };
     credible(&stage)?;
     Ok(stage)
@@ -163,7 +167,7 @@ fn speeds(points: &[&Point]) -> Vec<f64> {
     speeds
 }
 
-fn near(a: f64, b: f64) -> bool {
+pub(super) fn near(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
@@ -200,7 +204,7 @@ fn check_idle(points: &[&Point], speeds: &[f64]) -> Result<(), Refusal> {
 }
 
 /// Columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each.
-fn regression(points: &[&Point], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
+pub(super) fn regression(points: &[&Point], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
     let used: Vec<&&Point> = points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
     let column = |name: String, of: &dyn Fn(&Point) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
     let at = |speed: f64, point: &Point| f64::from(u8::from(near(speed, point.speed_rpm)));

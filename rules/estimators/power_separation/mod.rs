@@ -11,8 +11,10 @@
 //! | `reference` | what tells the power at the edge: torque, force, known removal |
 //! | `cuts` | steady cuts and idle stretches with power and reference |
 //! | `load_loss` | a0 and a1 per gear stage |
+//! | `accuracy` | error of the separation per cut, beside the fixed losses of practice |
 //! | `words` | the result as text, as JSON and as a script's settings |
 
+mod accuracy;
 mod cuts;
 mod load_loss;
 mod no_load;
@@ -21,6 +23,7 @@ mod rows;
 mod stretches;
 mod words;
 
+pub use accuracy::{Accuracy, FIXED_LOSSES, GroupAccuracy};
 pub use cuts::Point;
 pub use load_loss::{LoadLossLearned, StageLearned, Told, identify_load_loss};
 pub use no_load::{NoLoadLearned, SpeedLearned, identify_no_load};

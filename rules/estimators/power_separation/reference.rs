@@ -1,6 +1,10 @@
 //! What tells the power at the cutting edge besides the spindle power: torque, force, or a known removal.
+//!
+//! A sensor may count against the drive, so its sign is settled once per recording and direction of rotation, from the mean of
+//! all cuts less that of idling. Never row by row: the magnitude of noise about zero has a mean of its own.
 
 use super::rows::Row;
+use crate::estimators::State;
 use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
 use adapters::Recording;
 use serde::Serialize;
@@ -53,16 +57,16 @@ pub(super) fn referenced(recording: &Recording, rows: &[Row], choice: &Reference
         Plausible::TORQUE_NM
             .check(cutting(rows, |row| torque.get(row.row)))
             .map_err(|it| it.at(&choice.torque_column))?;
-        let power = |row: &Row| Some(torque.get(row.row)?.abs() * row.speed_rpm? * TAU / 60.0);
-        return Ok(Referenced { reference: Reference::Torque, power_w: per_row(&power) });
+        let power = |row: &Row| Some(torque.get(row.row)? * row.speed_rpm? * TAU / 60.0);
+        return Ok(Referenced { reference: Reference::Torque, power_w: oriented(rows, per_row(&power)) });
     }
     if let (Some(force), Some(diameter)) = (column("cutting_force_n"), column("diameter_mm")) {
         Plausible::CUTTING_FORCE_N
             .check(cutting(rows, |row| force.get(row.row)))
             .map_err(|it| it.at("cutting_force_n"))?;
         let power =
-            |row: &Row| Some(force.get(row.row)?.abs() * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
-        return Ok(Referenced { reference: Reference::Force, power_w: per_row(&power) });
+            |row: &Row| Some(force.get(row.row)? * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
+        return Ok(Referenced { reference: Reference::Force, power_w: oriented(rows, per_row(&power)) });
     }
     let removal = adapters::recording::with_derived(recording.clone());
     match (removal.numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
@@ -76,8 +80,25 @@ pub(super) fn referenced(recording: &Recording, rows: &[Row], choice: &Reference
     }
 }
 
+/// The same powers with the sign that makes cuts positive, settled for each direction of rotation.
+fn oriented(rows: &[Row], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
+    for backward in [false, true] {
+        let mean = |state: State| {
+            let own = rows.iter().zip(&power_w).filter(|(row, _)| row.backward == backward && row.state == state);
+            let (sum, n) =
+                own.filter_map(|(_, power)| *power).fold((0.0, 0.0), |(sum, n), power| (sum + power, n + 1.0));
+            (n > 0.0).then(|| sum / n)
+        };
+        if mean(State::Cutting).is_some_and(|cutting| cutting < mean(State::Idle).unwrap_or(0.0)) {
+            let own = rows.iter().zip(&mut power_w).filter(|(row, _)| row.backward == backward);
+            own.for_each(|(_, power)| *power = power.map(|power| -power));
+        }
+    }
+    power_w
+}
+
 fn cutting<'a>(rows: &'a [Row], of: impl Fn(&Row) -> Option<f64> + 'a) -> impl Iterator<Item = f64> + 'a {
-    rows.iter().filter(|row| row.state == crate::estimators::State::Cutting).filter_map(of)
+    rows.iter().filter(|row| row.state == State::Cutting).filter_map(of)
 }
 
 fn alone(why: &str) -> Refusal {

@@ -9,8 +9,8 @@ use adapters::{Absence, ChannelId, Recording, Sample, Slot, Value};
 const PERIOD_MAX_S: f64 = 5.0;
 
 /// Channels that the estimators look at.
-const LOOKED_AT: [&str; 6] =
-    ["spindle_power_w", "total_power_w", "spindle_speed_rpm", "feed_mm_min", "rapid", "gear_stage"];
+const LOOKED_AT: [&str; 7] =
+    ["spindle_power_w", "total_power_w", "spindle_speed_rpm", "feed_mm_min", "rapid", "gear_stage", "supply_voltage_v"];
 
 /// One row and what the machine was doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +23,8 @@ pub(super) struct Row {
     pub(super) power_w: Option<f64>,
     /// Magnitude of the spindle speed.
     pub(super) speed_rpm: Option<f64>,
+    /// Does the spindle turn backward (M4)?
+    pub(super) backward: bool,
     /// Gear stage; 0 where the recording has none.
     pub(super) stage: usize,
     /// Is an axis feeding?
@@ -114,6 +116,7 @@ fn seen(recording: &Recording, row: usize, time_s: f64, state: State, settings: 
         time_s,
         power_w: if own { number("spindle_power_w") } else { number("total_power_w") },
         speed_rpm: number("spindle_speed_rpm").map(f64::abs),
+        backward: number("spindle_speed_rpm").is_some_and(|speed| speed < 0.0),
         stage,
         feeding: feed > settings.get("feed_min_mm_min").unwrap_or(0.5) || number("rapid").unwrap_or(0.0) > 0.5,
         state,

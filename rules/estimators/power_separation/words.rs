@@ -1,5 +1,6 @@
 //! Results as text and as a script's settings.
 
+use super::accuracy::{Accuracy, FIXED_LOSSES};
 use super::load_loss::{LoadLossLearned, StageLearned};
 use super::no_load::{NoLoadLearned, SpeedLearned};
 use crate::estimators::{SPEEDS_PER_STAGE, STAGES};
@@ -76,6 +77,29 @@ impl LoadLossLearned {
     }
 }
 
+/// E of every cut, in percent.
+fn table(f: &mut fmt::Formatter<'_>, accuracy: &Accuracy) -> fmt::Result {
+    let [first, second] = FIXED_LOSSES;
+    writeln!(
+        f,
+        "  accuracy of cutting power, each cut with coefficients of the others; E = |estimated - measured| / measured"
+    )?;
+    writeln!(f, "      rpm  measured W  estimated W     E %   fixed {first}: E %   fixed {second}: E %")?;
+    for it in &accuracy.groups {
+        let [a, b] = it.error_fixed.map(|error| 100.0 * error);
+        let (measured, estimated, error) = (it.measured_w, it.estimated_w, 100.0 * it.error);
+        writeln!(f, "  {:>7.0} {measured:>11.1} {estimated:>12.1} {error:>7.2} {a:>17.2} {b:>17.2}", it.speed_rpm)?;
+    }
+    let [a, b] = accuracy.mean_fixed.map(|error| 100.0 * error);
+    writeln!(
+        f,
+        "  mean of {} cuts {:>25.2} {a:>17.2} {b:>17.2}   greatest {:.2}",
+        accuracy.groups.len(),
+        100.0 * accuracy.mean,
+        100.0 * accuracy.greatest
+    )
+}
+
 impl fmt::Display for LoadLossLearned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for stage in &self.stages {
@@ -92,6 +116,7 @@ impl fmt::Display for LoadLossLearned {
             ] {
                 writeln!(f, "  {name} = {:.6e}   95 % {:.6e} to {:.6e}", told.value, told.interval.0, told.interval.1)?;
             }
+            stage.accuracy.iter().try_for_each(|accuracy| table(f, accuracy))?;
         }
         self.refused.iter().try_for_each(|refusal| writeln!(f, "cannot tell: {refusal}"))?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))

@@ -18,6 +18,8 @@
 //! | `learn` | all of it, and which law to use |
 //! | `law` | which temperatures, with what weight, late by how much |
 //! | `predictor` | the law at work: error, uncertainty, residual, outside the range |
+//! | `follow` | a law that readings of a probe correct, by bounded steps |
+//! | `model` | the law as a file that the box runs |
 //! | `compensation` | clamp, dead band, slew, increments that add up |
 //! | `quadrature` | encoder lines A and B, and a decoder |
 //! | `pulse_insertion` | extra pulses between encoder and controller |
@@ -27,10 +29,12 @@ mod bed;
 mod compensation;
 mod course;
 mod cross_validation;
+mod follow;
 mod grey;
 mod lagged;
 mod law;
 mod learn;
+mod model;
 mod noise;
 mod predictor;
 mod pulse_insertion;
@@ -47,9 +51,11 @@ pub use compensation::{
 };
 pub use course::{Course, Sensor};
 pub use cross_validation::HeldOut;
+pub use follow::{Corrected, Correction, FollowSettings, Follower, Held};
 pub use grey::{Grade, Grades, Normalisation, RHO_USUAL, grades};
 pub use law::{POINTS_MAX, Path, TERMS_MAX, Term, ThermalLaw, first_order};
 pub use learn::{Candidate, ThermalLearned, learn};
+pub use model::{SCHEMA as MODEL_SCHEMA, ThermalModel};
 pub use predictor::{Comparison, NoPrediction, Outside, Prediction, Predictor};
 pub use pulse_insertion::{Edge, InsertionFault, PulseInserter};
 pub use quadrature::{Decoder, EDGES_PER_PULSE, IllegalTransition, Lines};

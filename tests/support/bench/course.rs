@@ -41,6 +41,7 @@ pub(crate) struct Moment {
     pub spindle_power_w: f64,
     pub total_power_w: f64,
     pub no_load_power_w: f64,
+    pub supply_v: f64,
 }
 
 /// A programme that has run.
@@ -52,6 +53,27 @@ pub(crate) struct Course {
     surge_w: f64,
     tau_s: f64,
     warm_up: f64,
+    mains: Mains,
+}
+
+/// Mains of 400 V: a slow swing of 3 %, and 1 % whenever a large consumer of the neighbourhood switches.
+struct Mains {
+    exponent: Option<f64>,
+    period_s: f64,
+    phase: f64,
+    consumer_s: f64,
+}
+
+impl Mains {
+    /// Voltage over 400 V.
+    fn at(&self, time_s: f64) -> f64 {
+        if self.exponent.is_none() {
+            return 1.0;
+        }
+        let slow = 0.03 * (std::f64::consts::TAU * time_s / self.period_s + self.phase).sin();
+        let consumer = if (time_s / self.consumer_s) as i64 % 2 == 0 { 0.01 } else { -0.01 };
+        1.0 + slow + consumer
+    }
 }
 
 impl Course {
@@ -59,6 +81,13 @@ impl Course {
     pub(crate) fn run(scenario: &Scenario, seed: u64) -> Self {
         let mut dice = Pcg64Mcg::seed_from_u64(seed);
         let warm_up = dice.random_range(0.04..0.10);
+        let programme = programme(scenario, &mut dice);
+        let mains = Mains {
+            exponent: scenario.supply_exponent,
+            period_s: dice.random_range(60.0..240.0),
+            phase: dice.random_range(0.0..std::f64::consts::TAU),
+            consumer_s: dice.random_range(20.0..60.0),
+        };
         let mut course = Self {
             moments: Vec::new(),
             speed_rpm: 0.0,
@@ -67,8 +96,9 @@ impl Course {
             surge_w: 0.0,
             tau_s: scenario.tau_s,
             warm_up,
+            mains,
         };
-        for step in programme(scenario, &mut dice) {
+        for step in programme {
             course.step(step);
         }
         course
@@ -77,6 +107,11 @@ impl Course {
     /// The truth at `time_s`.
     pub(crate) fn at(&self, time_s: f64) -> Option<&Moment> {
         self.moments.get((time_s / STEP_S).round().max(0.0) as usize)
+    }
+
+    /// Does the meter show the voltage of the mains?
+    pub(crate) fn tells_voltage(&self) -> bool {
+        self.mains.exponent.is_some()
     }
 
     /// Length, s.
@@ -118,11 +153,16 @@ impl Course {
         }
     }
 
+    fn mains_now(&self) -> f64 {
+        self.mains.at(self.moments.len() as f64 * STEP_S)
+    }
+
     fn no_load_w(&self) -> f64 {
         let n = self.speed_rpm.abs();
         let minutes = self.moments.len() as f64 * STEP_S / 60.0;
         let cold = 1.0 + self.warm_up * (-minutes / 3.0).exp();
-        if n < 1.0 { 0.0 } else { (90.0 + 0.3 * n + 0.006 * n.powf(1.5)) * cold }
+        let mains = self.mains_now().powf(self.mains.exponent.unwrap_or(0.0));
+        if n < 1.0 { 0.0 } else { (90.0 + 0.3 * n + 0.006 * n.powf(1.5)) * cold * mains }
     }
 
     fn rest(&mut self, state: State, total_power_w: f64) {
@@ -134,6 +174,7 @@ impl Course {
             spindle_power_w: 0.0,
             total_power_w,
             no_load_power_w: 0.0,
+            supply_v: 400.0 * self.mains_now(),
         });
     }
 
@@ -160,6 +201,7 @@ impl Course {
             spindle_power_w,
             total_power_w: 350.0 + spindle_power_w + if feed_mm_min > 0.0 { 80.0 } else { 0.0 },
             no_load_power_w,
+            supply_v: 400.0 * self.mains_now(),
         });
     }
 }

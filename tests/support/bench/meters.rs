@@ -44,10 +44,14 @@ struct Device {
 /// Controller and meter of a course. Silences are drawn when `dropouts` is set.
 pub(crate) fn sources(course: &Arc<Course>, disturbance: Disturbance, dropouts: bool, seed: u64) -> Vec<Box<dyn Pull>> {
     let controller = ["spindle_speed_rpm", "feed_mm_min", "rapid"];
-    let meter = ["spindle_power_w", "total_power_w"];
+    let meter: &[&str] = if course.tells_voltage() {
+        &["spindle_power_w", "total_power_w", "supply_voltage_v"]
+    } else {
+        &["spindle_power_w", "total_power_w"]
+    };
     vec![
         Box::new(Device::new("controller", &controller, course, disturbance, dropouts, 2 * seed)),
-        Box::new(Device::new("meter", &meter, course, disturbance, dropouts, 2 * seed + 1)),
+        Box::new(Device::new("meter", meter, course, disturbance, dropouts, 2 * seed + 1)),
     ]
 }
 
@@ -78,6 +82,7 @@ impl Device {
             "spindle_speed_rpm" => 0.0,
             "feed_mm_min" => moment.feed_mm_min,
             "rapid" => f64::from(u8::from(moment.rapid)),
+            "supply_voltage_v" => moment.supply_v + 0.1 * self.normal(),
             "spindle_power_w" => self.measured(time_s, |moment| moment.spindle_power_w),
             _ => self.measured(time_s, |moment| moment.total_power_w),
         }

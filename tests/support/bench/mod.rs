@@ -22,4 +22,6 @@ pub(crate) struct Scenario {
     pub speed_changes: bool,
     /// Do the meter and the controller fall silent now and then?
     pub dropouts: bool,
+    /// Where the mains wander by 4 %: the exponent with which no-load power follows them.
+    pub supply_exponent: Option<f64>,
 }

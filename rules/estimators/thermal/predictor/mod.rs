@@ -130,6 +130,8 @@ pub struct Predictor {
     last_ns: Option<i64>,
     /// What is left of a wrong beginning of the states, 1 to 0.
     unsettled: f64,
+    /// The point of the last prediction: one, then a temperature or a state per term.
+    pub(super) point: Vec<f64>,
 }
 
 impl Predictor {
@@ -146,7 +148,26 @@ impl Predictor {
         };
         let sensor_of = law.terms.iter().map(|term| position(&term.sensor)).collect::<Result<Vec<usize>, _>>()?;
         let last = vec![(0.0, 0.0); law.terms.len()];
-        Ok(Self { law, sensor_of, sensors: sensors.len(), last, last_ns: None, unsettled: 1.0 })
+        Ok(Self {
+            law,
+            sensor_of,
+            sensors: sensors.len(),
+            last,
+            last_ns: None,
+            unsettled: 1.0,
+            point: Vec::with_capacity(TERMS_MAX + 1),
+        })
+    }
+
+    /// The law, to correct it by a reading.
+    pub(super) fn law_mut(&mut self) -> &mut ThermalLaw {
+        &mut self.law
+    }
+
+    /// Standard deviation of a beginning of the lagged states that was guessed, as a share of what it was; 0 once forgotten.
+    #[must_use]
+    pub fn unsettled(&self) -> f64 {
+        if self.law.tau_s.is_some() { self.unsettled } else { 0.0 }
     }
 
     /// The law.
@@ -171,6 +192,8 @@ impl Predictor {
         let point = &mut point[..=self.law.terms.len()];
         let outside = self.outside(&point[1..]);
         self.follow(at_ns, &mut point[1..]);
+        self.point.clear();
+        self.point.extend_from_slice(point);
         Ok(self.at(point, outside))
     }
 

@@ -1,0 +1,237 @@
+//! What only a person can measure: flank wear under the microscope, a gauge, a probe, the file of a torque sensor.
+//!
+//! One line of JSON each in `annotations.jsonl` of the data directory; lines are added and never changed.
+
+use crate::moment;
+use adapters::clock::TimeNs;
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The file, in the data directory.
+pub const FILE: &str = "annotations.jsonl";
+/// More lines than this are not read: nobody measures so much by hand.
+const LINES_MAX: usize = 100_000;
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Flank wear of the edge in use, under the microscope.
+    FlankWear,
+    /// Displacement of the tool against the work, on a dial gauge.
+    Gauge,
+    /// The same, by a probe.
+    Probe,
+    /// The file of a torque sensor at the spindle, on its own clock.
+    Torque,
+}
+
+impl Quantity {
+    /// The word on the command line.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::FlankWear => "flank-wear",
+            Self::Gauge => "gauge",
+            Self::Probe => "probe",
+            Self::Torque => "torque",
+        }
+    }
+
+    /// Unit in which it is kept.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::FlankWear => "mm",
+            Self::Gauge | Self::Probe => "um",
+            Self::Torque => "N·m",
+        }
+    }
+
+    /// Values that can be, in that unit, and where the limits come from.
+    fn range(self) -> (f64, f64, &'static str) {
+        match self {
+            Self::FlankWear => (0.0, 2.0, "an edge with more flank wear than 2 mm has broken"),
+            Self::Gauge | Self::Probe => (-2000.0, 2000.0, "no machine tool grows by more than 2 mm"),
+            Self::Torque => (-100_000.0, 100_000.0, "the range of the channel torque_nm"),
+        }
+    }
+}
+
+/// One annotation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Annotation {
+    /// What was measured.
+    pub quantity: Quantity,
+    /// When, ns since 1970; for a file when it was given, its own clock says the rest.
+    pub at_ns: TimeNs,
+    /// The value in the unit of [`Quantity::unit`]; none for a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Standard deviation of the reading, same unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd: Option<f64>,
+    /// The file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Edge, axis or sensor, in the person's words.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub of: String,
+}
+
+/// What a person typed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Given {
+    /// The value.
+    pub value: Option<f64>,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// When.
+    pub at: Option<String>,
+    /// Standard deviation, same unit.
+    pub sd: Option<f64>,
+    /// The file.
+    pub file: Option<PathBuf>,
+    /// Edge, axis or sensor.
+    pub of: String,
+}
+
+/// An annotation of what a person typed; `newest_ns` is the time of the newest sample of the history.
+///
+/// # Errors
+/// What is missing or impossible, and what to write.
+pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
+    if quantity == Quantity::Torque {
+        return torque(given, newest_ns);
+    }
+    let name = quantity.word();
+    let value =
+        given.value.ok_or_else(|| format!("{name}: the value is missing: write annotate {name} 0.12 --unit mm"))?;
+    let unit = given.unit.as_deref().ok_or_else(|| {
+        format!("{name} {value}: the unit is missing, and 0.12 mm is not 0.12 um: add --unit mm or --unit um")
+    })?;
+    let factor = factor(unit, quantity.unit()).ok_or_else(|| {
+        format!("{name} {value} {unit}: {unit:?} is no unit of length that is known here: write mm, um or in")
+    })?;
+    let at = given.at.as_deref().ok_or_else(|| {
+        format!("{name} {value} {unit}: the time is missing: a reading without it belongs to no cut; add --at now, --at -10m or --at 2026-01-31T08:15:00Z")
+    })?;
+    let at_ns = moment::parse(at, newest_ns).map_err(|problem| format!("{name} --at {at}: {problem}"))?;
+    let value = value * factor;
+    let (least, greatest, why) = quantity.range();
+    if !(least..=greatest).contains(&value) {
+        let kept = quantity.unit();
+        return Err(format!(
+            "{name}: {value} {kept} lies outside {least} to {greatest} {kept}: {why}; is the unit right?"
+        ));
+    }
+    let sd = given.sd.map(|sd| sd * factor);
+    if sd.is_some_and(|sd| !(sd.is_finite() && sd > 0.0)) {
+        return Err(format!("{name}: the standard deviation of a reading is greater than 0"));
+    }
+    Ok(Annotation { quantity, at_ns, value: Some(value), sd, file: None, of: given.of })
+}
+
+fn torque(given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
+    let usage =
+        "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
+    let file = given.file.ok_or_else(|| format!("torque: the file is missing: {usage}"))?;
+    match given.unit.as_deref() {
+        None => return Err(format!("torque {}: the unit is missing: {usage}", file.display())),
+        Some("Nm" | "N·m" | "N*m" | "N m") => {}
+        Some(other) => return Err(format!("torque: {other:?} is not N·m: convert the file, then {usage}")),
+    }
+    let file = std::path::absolute(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    super::columns::torque_course(&file)?;
+    Ok(Annotation {
+        quantity: Quantity::Torque,
+        at_ns: newest_ns,
+        value: None,
+        sd: None,
+        file: Some(file),
+        of: given.of,
+    })
+}
+
+/// Lengths of `from` in those of `to`.
+fn factor(from: &str, to: &str) -> Option<f64> {
+    let in_um = match from {
+        "mm" => 1000.0,
+        "um" | "µm" | "μm" => 1.0,
+        "in" | "inch" => 25_400.0,
+        _ => return None,
+    };
+    Some(if to == "mm" { in_um / 1000.0 } else { in_um })
+}
+
+/// Adds a line.
+///
+/// # Errors
+/// What the system said, with the path.
+pub fn add(data_dir: &Path, annotation: &Annotation) -> Result<(), String> {
+    let path = data_dir.join(FILE);
+    let say = |error: std::io::Error| format!("{}: {error}", path.display());
+    let line = serde_json::to_string(annotation).map_err(|error| error.to_string())?;
+    std::fs::create_dir_all(data_dir).map_err(say)?;
+    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(&path).map_err(say)?;
+    file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data()).map_err(say)
+}
+
+/// Every annotation, by time.
+///
+/// # Errors
+/// A line that is none, with its number.
+pub fn read(data_dir: &Path) -> Result<Vec<Annotation>, String> {
+    let path = data_dir.join(FILE);
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(format!("{}: {error}", path.display())),
+    };
+    let lines = text.lines().take(LINES_MAX).enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let one = |(index, line): (usize, &str)| {
+        serde_json::from_str::<Annotation>(line).map_err(|error| {
+            format!("{}, line {}: {error}; put the line right or take it out", path.display(), index + 1)
+        })
+    };
+    let mut all = lines.map(one).collect::<Result<Vec<_>, _>>()?;
+    all.sort_by_key(|annotation| annotation.at_ns);
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn given(value: f64, unit: Option<&str>, at: Option<&str>) -> Given {
+        Given { value: Some(value), unit: unit.map(str::to_owned), at: at.map(str::to_owned), ..Given::default() }
+    }
+
+    #[test]
+    fn a_reading_needs_unit_and_time_and_must_be_possible() {
+        let refused = |given| annotation(Quantity::Gauge, given, 0).expect_err("refused");
+        assert!(refused(given(12.0, None, Some("now"))).contains("unit is missing"));
+        assert!(refused(given(12.0, Some("um"), None)).contains("time is missing"));
+        assert!(refused(given(12.0, Some("kg"), Some("now"))).contains("mm, um or in"));
+        assert!(refused(given(12.0, Some("mm"), Some("now"))).contains("is the unit right?"));
+        assert!(refused(Given::default()).contains("value is missing"));
+        let torque = annotation(Quantity::Torque, Given::default(), 0).expect_err("no file");
+        assert!(torque.contains("--file"), "{torque}");
+    }
+
+    #[test]
+    fn what_was_added_is_read_by_time() {
+        let directory = tempfile::tempdir().expect("a directory");
+        for (value, at) in [(0.2, "2026-01-02"), (0.1, "2026-01-01")] {
+            let one = annotation(Quantity::FlankWear, given(value, Some("mm"), Some(at)), 0).expect("fine");
+            add(directory.path(), &one).expect("written");
+        }
+        let all = read(directory.path()).expect("readable");
+        assert_eq!(all.iter().filter_map(|it| it.value).collect::<Vec<f64>>(), [0.1, 0.2]);
+        std::fs::write(directory.path().join(FILE), "{}\n").expect("written");
+        assert!(read(directory.path()).expect_err("not one").contains("line 1"));
+    }
+}

@@ -1,0 +1,190 @@
+//! The history as a recording, with what a person has measured as columns.
+
+use super::annotations::{Annotation, Quantity};
+use crate::history::{Query, Reader, STATE_SERIES};
+use adapters::Recording;
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::recording::{Cells, Numbers};
+use rules::estimators::alignment::{Matched, match_courses};
+use rules::estimators::regression::Refusal;
+use std::path::Path;
+
+/// Series that the identification looks at, where the history has them.
+const SERIES: [&str; 30] = [
+    "spindle_power_w",
+    "total_power_w",
+    "spindle_speed_rpm",
+    "feed_mm_min",
+    "feed_per_rev_mm",
+    "cutting_speed_m_min",
+    "rapid",
+    "gear_stage",
+    "depth_of_cut_mm",
+    "diameter_mm",
+    "supply_voltage_v",
+    STATE_SERIES,
+    "no_load_power_w",
+    "tool",
+    "operation",
+    "program",
+    "block",
+    "torque_nm",
+    "cutting_force_n",
+    "thermal_error_um",
+    "bearing_temperature_c",
+    "motor_temperature_c",
+    "ambient_temperature_c",
+    "coolant_temperature_c",
+    "temperature_1_c",
+    "temperature_2_c",
+    "temperature_3_c",
+    "temperature_4_c",
+    "temperature_5_c",
+    "temperature_6_c",
+];
+/// A wear is taken for that of a cut within so much time of the nearest microscope reading, ns: an edge is not left in the machine
+/// over a weekend and looked at again.
+const WEAR_REACHES_NS: i64 = 12 * 3600 * SECOND_NS;
+/// A gauge or probe reading belongs to the row nearest to it, within so much time, ns.
+const GAUGE_REACHES_NS: i64 = 30 * SECOND_NS;
+
+/// The history from a time on, of at most a day by default.
+///
+/// # Errors
+/// The history cannot be read, or is empty.
+pub fn read(history: &Path, from_ns: Option<TimeNs>) -> Result<Recording, String> {
+    let reader = Reader::open(history).map_err(|error| error.to_string())?;
+    let known: Vec<String> =
+        reader.series().map_err(|error| error.to_string())?.into_iter().map(|it| it.name.to_string()).collect();
+    let series: Vec<String> =
+        SERIES.iter().filter(|name| known.iter().any(|it| it == *name)).map(|name| (*name).to_owned()).collect();
+    reader.recording(&Query { from_ns, series, ..Query::default() }).map_err(|error| error.to_string())
+}
+
+/// Time of every row, ns.
+fn times_ns(recording: &Recording) -> Vec<TimeNs> {
+    let start_ns = recording.start_ns.unwrap_or(0);
+    #[expect(clippy::cast_possible_truncation, reason = "seconds of a history are far below 2^63 ns")]
+    recording.time_s.iter().map(|time_s| start_ns + (time_s * SECOND_NS as f64) as i64).collect()
+}
+
+/// Flank wear between the microscope readings of one edge, in a straight line over time.
+pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
+    let readings: Vec<(TimeNs, f64, &str)> = annotations
+        .iter()
+        .filter(|it| it.quantity == Quantity::FlankWear)
+        .filter_map(|it| Some((it.at_ns, it.value?, it.of.as_str())))
+        .collect();
+    if readings.is_empty() {
+        return;
+    }
+    let wear = |at_ns: TimeNs| {
+        let next = readings.partition_point(|(then_ns, ..)| *then_ns < at_ns);
+        let after = readings.get(next).filter(|(then_ns, ..)| then_ns - at_ns <= WEAR_REACHES_NS);
+        let before =
+            next.checked_sub(1).map(|at| &readings[at]).filter(|(then_ns, ..)| at_ns - then_ns <= WEAR_REACHES_NS);
+        match (before, after) {
+            (Some(one), Some(other)) if one.2 == other.2 && other.1 >= one.1 => {
+                let span = (other.0 - one.0).max(1) as f64;
+                Some(one.1 + (other.1 - one.1) * (at_ns - one.0) as f64 / span)
+            }
+            (Some(one), _) => Some(one.1),
+            (None, Some(other)) => Some(other.1),
+            (None, None) => None,
+        }
+    };
+    let column = times_ns(recording).into_iter().map(wear).collect::<Numbers>();
+    recording.set_column("flank_wear_mm", Cells::Numbers(column));
+}
+
+/// Readings of gauge and probe as thermal error, in the rows nearest to them.
+pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) {
+    let times_ns = times_ns(recording);
+    let mut values = vec![None; times_ns.len()];
+    for it in annotations.iter().filter(|it| matches!(it.quantity, Quantity::Gauge | Quantity::Probe)) {
+        let next = times_ns.partition_point(|at_ns| *at_ns < it.at_ns);
+        let near = [next.checked_sub(1), Some(next)].into_iter().flatten().filter(|at| *at < times_ns.len());
+        let nearest = near.min_by_key(|at| (times_ns[*at] - it.at_ns).abs());
+        if let Some(at) = nearest.filter(|at| (times_ns[*at] - it.at_ns).abs() <= GAUGE_REACHES_NS) {
+            values[at] = it.value;
+        }
+    }
+    if values.iter().any(Option::is_some) {
+        recording.set_column("thermal_error_um", Cells::Numbers(values.into_iter().collect::<Numbers>()));
+    }
+}
+
+/// A torque sensor's file: times on its own clock, s, and torques, N·m.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, String> {
+    let at = |what: &str| format!("{}: {what}", file.display());
+    let read =
+        crate::diagnosis::read_recordings(&[file.display().to_string()]).map_err(|problems| problems.join("\n"))?;
+    let torque = read.recording.numbers("torque_nm").ok_or_else(|| {
+        at("there is no column torque_nm; the file needs time_s, on the sensor's own clock, and torque_nm in N·m")
+    })?;
+    let rows = read.recording.time_s.iter().zip(torque.iter());
+    let course: Vec<(f64, f64)> = rows.filter_map(|(time_s, torque)| Some((*time_s, torque?))).collect();
+    if course.len() < 10 { Err(at("fewer than 10 torques")) } else { Ok(course) }
+}
+
+/// What became of a torque file.
+#[derive(Debug, Clone)]
+pub struct Merged {
+    /// The file.
+    pub file: String,
+    /// Where it lies in the history, or why it cannot be told.
+    pub matched: Result<Matched, Refusal>,
+}
+
+/// Lays torque files on the clock of the history, by their cuts, and adds them as `torque_nm`.
+///
+/// # Errors
+/// A file that can no longer be read.
+pub fn add_torque(recording: &mut Recording, annotations: &[Annotation]) -> Result<Vec<Merged>, String> {
+    let mut merged = Vec::new();
+    let mut sums = vec![(0.0, 0.0); recording.rows()];
+    let power = torque_like(recording);
+    for file in annotations.iter().filter_map(|it| it.file.as_deref()) {
+        let course = torque_course(file)?;
+        let matched = match_courses(&power, &course);
+        if let Ok(matched) = &matched {
+            spread(&mut sums, &recording.time_s, &course, matched);
+        }
+        merged.push(Merged { file: file.display().to_string(), matched });
+    }
+    if sums.iter().any(|(_, n)| *n > 0.0) {
+        let column = sums.iter().map(|(sum, n)| (*n > 0.0).then(|| sum / n)).collect::<Numbers>();
+        recording.set_column("torque_nm", Cells::Numbers(column));
+    }
+    Ok(merged)
+}
+
+/// What the torque must look like: spindle power over angular speed, while the spindle turns at a steady speed.
+fn torque_like(recording: &Recording) -> Vec<(f64, f64)> {
+    let number = |name: &str, row: usize| recording.numbers(name).and_then(|it| it.get(row));
+    let one = |row: usize| {
+        let (power, speed) = (number("spindle_power_w", row)?, number("spindle_speed_rpm", row)?.abs());
+        let no_load = number("no_load_power_w", row).unwrap_or(0.0);
+        let state = recording.words(STATE_SERIES).and_then(|words| words.get(row)).unwrap_or("");
+        let cutting = state == "cutting" && speed > 1.0;
+        let torque = if cutting { (power - no_load) * 60.0 / (std::f64::consts::TAU * speed) } else { 0.0 };
+        Some((recording.time_s[row], torque))
+    };
+    (0..recording.rows()).filter_map(one).collect()
+}
+
+/// Adds the torques of a file to the rows that they fall into.
+fn spread(sums: &mut [(f64, f64)], time_s: &[f64], course: &[(f64, f64)], matched: &Matched) {
+    for (second_s, torque) in course {
+        let at_s = matched.on_first_clock(*second_s);
+        let next = time_s.partition_point(|row_s| *row_s < at_s);
+        let near = [next.checked_sub(1), Some(next)].into_iter().flatten().filter(|at| *at < time_s.len());
+        let nearest = near.min_by(|a, b| (time_s[*a] - at_s).abs().total_cmp(&(time_s[*b] - at_s).abs()));
+        if let Some(at) = nearest.filter(|at| (time_s[*at] - at_s).abs() <= 0.5) {
+            sums[at] = (sums[at].0 + torque, sums[at].1 + 1.0);
+        }
+    }
+}

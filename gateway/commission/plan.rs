@@ -1,0 +1,176 @@
+//! The cuts and idle runs to make, as a list for a person and as a plan that the simulated machine carries out
+//! (`simulate --machine lathe --plan`).
+
+use clap::ValueEnum;
+use rules::estimators::wear::{Array, Factor, Levels, plan};
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+
+/// Which list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Which {
+    /// Idle runs.
+    NoLoad,
+    /// Cuts with a torque sensor.
+    LoadLoss,
+    /// The 9 cuts of the L27 list with a new edge.
+    #[value(name = "wear-1")]
+    Wear1,
+    /// ... with a half worn edge.
+    #[value(name = "wear-2")]
+    Wear2,
+    /// ... with a worn edge.
+    #[value(name = "wear-3")]
+    Wear3,
+}
+
+/// What the machine and the work allow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Spindle speeds to idle at, rpm.
+    pub speeds_rpm: Vec<f64>,
+    /// Speed of the cuts with the torque sensor, rpm.
+    pub cut_rpm: f64,
+    /// Three cutting speeds, m/min.
+    pub cutting_speeds_m_min: Vec<f64>,
+    /// Three feeds, mm/rev.
+    pub feeds_mm: Vec<f64>,
+    /// Three depths, mm.
+    pub depths_mm: Vec<f64>,
+    /// Diameter of the work, mm.
+    pub diameter_mm: f64,
+    /// Order of the L27.
+    pub seed: u64,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// How long, s.
+    pub seconds: f64,
+    /// Spindle speed, rpm.
+    pub rpm: f64,
+    /// Feed, mm/min, and depth, mm; none while idling.
+    pub cut: Option<(f64, f64)>,
+}
+
+const IDLE_S: f64 = 30.0;
+const WARM_UP_S: f64 = 600.0;
+const BETWEEN_S: f64 = 12.0;
+
+/// The steps of a list.
+///
+/// # Errors
+/// Levels that make no design.
+pub fn steps(which: Which, limits: &Limits) -> Result<Vec<Step>, String> {
+    let idle = |seconds: f64, rpm: f64| Step { seconds, rpm, cut: None };
+    Ok(match which {
+        Which::NoLoad => {
+            let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied().unwrap_or(limits.cut_rpm);
+            let each = limits.speeds_rpm.iter().map(|rpm| idle(IDLE_S, *rpm));
+            // There and back: what drifts with warmth shows as a difference of the two visits.
+            let back = limits.speeds_rpm.iter().rev().map(|rpm| idle(IDLE_S, *rpm));
+            std::iter::once(idle(WARM_UP_S, warm_rpm)).chain(each).chain(back).collect()
+        }
+        Which::LoadLoss => {
+            let feed_mm = limits.feeds_mm.get(1).copied().unwrap_or(0.2);
+            let (least, greatest) = ends(&limits.depths_mm);
+            // Lengths differ, so that the sensor's file fits in one place only.
+            let cuts = [
+                (0.0, 11.0),
+                (0.6, 15.0),
+                (1.0, 12.0),
+                (0.3, 19.0),
+                (0.8, 14.0),
+                (0.45, 23.0),
+                (0.15, 13.0),
+                (0.9, 17.0),
+                (0.5, 10.0),
+                (0.7, 21.0),
+            ];
+            let pass = |(share, seconds): (f64, f64)| {
+                let depth = least + share * (greatest - least);
+                [
+                    idle(BETWEEN_S, limits.cut_rpm),
+                    Step { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) },
+                ]
+            };
+            let last = idle(BETWEEN_S, limits.cut_rpm);
+            cuts.into_iter().flat_map(pass).chain([last]).collect()
+        }
+        Which::Wear1 => l27(limits, 1)?,
+        Which::Wear2 => l27(limits, 2)?,
+        Which::Wear3 => l27(limits, 3)?,
+    })
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    let of = |pick: fn(f64, f64) -> f64, from: f64| values.iter().copied().fold(from, pick);
+    (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY))
+}
+
+/// The nine cuts of one wear, in the order of the design.
+fn l27(limits: &Limits, wear: usize) -> Result<Vec<Step>, String> {
+    let factor = |symbol: &str, values: &[f64]| {
+        let factor = Factor::of(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
+        Ok::<_, String>(Levels { factor, values: values.to_vec() })
+    };
+    // The wears stand for the edges that come: what they are the microscope says.
+    let factors = [
+        factor("VB", &[0.05, 0.15, 0.25])?,
+        factor("vc", &limits.cutting_speeds_m_min)?,
+        factor("f", &limits.feeds_mm)?,
+        factor("ap", &limits.depths_mm)?,
+    ];
+    let design = plan(Array::L27, &factors, limits.seed).map_err(|problems| problems.join("; "))?;
+    let own = design.cuts.iter().filter(|cut| cut.levels.first() == Some(&wear));
+    let pass = |values: &[f64]| {
+        let rpm = (1000.0 * values[1] / (PI * limits.diameter_mm)).round();
+        let cut = Some((values[2] * rpm, values[3]));
+        [Step { seconds: BETWEEN_S, rpm, cut: None }, Step { seconds: BETWEEN_S, rpm, cut }]
+    };
+    Ok(own.flat_map(|cut| pass(&cut.values)).collect())
+}
+
+/// Minutes that the steps take.
+#[must_use]
+pub fn minutes(steps: &[Step]) -> f64 {
+    steps.iter().map(|step| step.seconds).sum::<f64>() / 60.0
+}
+
+/// The list for a person.
+#[must_use]
+pub fn text(steps: &[Step], diameter_mm: f64) -> String {
+    let mut text = format!(
+        "{} steps, {:.0} min, work of {diameter_mm} mm\n step   s    rpm  feed mm/min  depth mm\n",
+        steps.len(),
+        minutes(steps)
+    );
+    for (index, step) in steps.iter().enumerate() {
+        let cut =
+            step.cut.map_or_else(|| "idle, no feed".to_owned(), |(feed, depth)| format!("{feed:>11.1} {depth:>9.2}"));
+        let _ = writeln!(text, "{:>5} {:>3.0} {:>6.0}  {cut}", index + 1, step.seconds, step.rpm);
+    }
+    text
+}
+
+/// The plan as a recording of commanded inputs.
+#[must_use]
+pub fn csv(steps: &[Step], diameter_mm: f64) -> String {
+    let mut csv =
+        String::from("time_s,run,spindle_programmed_rpm,feed_programmed_mm_min,depth_of_cut_mm,diameter_mm,engaged\n");
+    let mut time_s = 0.0;
+    let mut row = |time_s: f64, step: &Step| {
+        let (feed, depth, engaged) = step.cut.map_or((0.0, 0.0, 0), |(feed, depth)| (feed, depth, 1));
+        let _ = writeln!(csv, "{time_s},1,{},{feed:.3},{depth:.4},{diameter_mm},{engaged}", step.rpm);
+    };
+    for step in steps {
+        row(time_s, step);
+        time_s += step.seconds;
+    }
+    // The last row ends the last step; as long as the one before is what the plan's reader takes it for.
+    if let Some(last) = steps.last() {
+        row(time_s - 0.5, last);
+    }
+    csv
+}

@@ -1,0 +1,409 @@
+//! Pulse insertion over a stream or recording of encoder lines, with the proof of a decoder, and vectors to test a device against.
+//!
+//! Input: CSV with `time_ns,a,b` and optionally `request` (pulses asked for from this row on, signed) and `bypass` (0 or 1);
+//! one row per change of a line, or any row with a request. Output: CSV with `time_ns,a,b`, one row per edge that leaves.
+//! The proof decodes both sides with a decoder that knows nothing of the inserter and counts.
+
+use rules::estimators::thermal::{Decoder, EDGES_PER_PULSE, Lines, PulseInserter};
+use std::fmt::Write as _;
+use std::io::{BufRead, Write};
+
+/// After the last row the device goes on so long, in spacings, to let out what waits.
+const TAIL_SPACINGS: u64 = 4096;
+
+/// One row that goes in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// When, ns.
+    pub at_ns: u64,
+    /// The levels from then on.
+    pub lines: Lines,
+    /// Pulses asked for from then on.
+    pub request: i64,
+    /// Switches the bypass.
+    pub bypass: Option<bool>,
+}
+
+/// What the decoder found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Proof {
+    /// Rows in.
+    pub rows: u64,
+    /// Edges out.
+    pub edges_out: u64,
+    /// Edges of position on the way in.
+    pub in_edges: i64,
+    /// ... and out.
+    pub out_edges: i64,
+    /// Pulses asked for, in sum.
+    pub asked: i64,
+    /// Pulses inserted.
+    pub inserted: i64,
+    /// Transitions of both lines at once on the way out; must be 0.
+    pub illegal: u64,
+    /// Least time between two edges on the way out, ns.
+    pub least_ns: Option<u64>,
+}
+
+impl Proof {
+    /// Is the position that leaves the one that came in and what was inserted, without an illegal transition and no closer than
+    /// the spacing?
+    #[must_use]
+    pub fn holds(&self, spacing_ns: u64) -> bool {
+        let counted = self.out_edges - self.in_edges == EDGES_PER_PULSE * self.inserted;
+        counted && self.illegal == 0 && self.least_ns.is_none_or(|least| least >= spacing_ns)
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn text(&self, spacing_ns: u64) -> String {
+        let least = self.least_ns.map_or_else(|| "-".to_owned(), |least| least.to_string());
+        format!(
+            "rows in {}, edges out {}\nposition in {} edges, out {} edges, difference {}\npulses asked for {}, inserted {}, \
+             {} edges each\nillegal transitions out {}, closest edges {least} ns (at least {spacing_ns})\nproof: {}\n",
+            self.rows,
+            self.edges_out,
+            self.in_edges,
+            self.out_edges,
+            self.out_edges - self.in_edges,
+            self.asked,
+            self.inserted,
+            EDGES_PER_PULSE,
+            self.illegal,
+            if self.holds(spacing_ns) { "holds" } else { "DOES NOT HOLD" }
+        )
+    }
+}
+
+/// The columns of an input.
+struct Heads {
+    time: usize,
+    a: usize,
+    b: usize,
+    request: Option<usize>,
+    bypass: Option<usize>,
+}
+
+impl Heads {
+    fn of(line: &str) -> Result<Self, String> {
+        let names: Vec<&str> = line.trim().split(',').map(str::trim).collect();
+        let at = |name: &str| names.iter().position(|it| *it == name);
+        let need = |name: &str| {
+            at(name)
+                .ok_or_else(|| format!("line 1: there is no column {name}; the head is time_ns,a,b[,request][,bypass]"))
+        };
+        Ok(Self { time: need("time_ns")?, a: need("a")?, b: need("b")?, request: at("request"), bypass: at("bypass") })
+    }
+
+    fn row(&self, line: &str, number: usize) -> Result<Row, String> {
+        let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
+        let cell = |at: usize| cells.get(at).copied().unwrap_or("");
+        let level = |at: usize, name: &str| match cell(at) {
+            "0" => Ok(false),
+            "1" => Ok(true),
+            other => Err(format!("line {number}: {name} is {other:?}; a level is 0 or 1")),
+        };
+        let at_ns = cell(self.time)
+            .parse()
+            .map_err(|_| format!("line {number}: {:?} is no time in whole ns", cell(self.time)))?;
+        let request = match self.request.map_or("", cell) {
+            "" => 0,
+            text => text.parse().map_err(|_| format!("line {number}: {text:?} is no whole number of pulses"))?,
+        };
+        let bypass = match self.bypass.map_or("", cell) {
+            "" => None,
+            "0" => Some(false),
+            "1" => Some(true),
+            other => return Err(format!("line {number}: bypass is {other:?}; write 0 or 1")),
+        };
+        Ok(Row { at_ns, lines: Lines { a: level(self.a, "a")?, b: level(self.b, "b")? }, request, bypass })
+    }
+}
+
+/// A device with the decoder behind it.
+struct Bench {
+    device: PulseInserter,
+    decoder: Decoder,
+    encoder: Decoder,
+    begun: (i64, i64),
+    last_ns: Option<u64>,
+    proof: Proof,
+}
+
+impl Bench {
+    fn new(first: &Row, spacing_ns: u64) -> Self {
+        let device = PulseInserter::new(first.lines, first.at_ns, spacing_ns);
+        let decoder = Decoder::new(device.lines(), 0);
+        Self {
+            device,
+            decoder,
+            encoder: Decoder::new(first.lines, 0),
+            begun: (0, 0),
+            last_ns: None,
+            proof: Proof::default(),
+        }
+    }
+
+    fn take(&mut self, row: &Row, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+        if let Some(bypass) = row.bypass {
+            self.device.set_bypass(bypass);
+        }
+        self.device.request(row.request);
+        self.proof.asked += row.request;
+        self.proof.rows += 1;
+        self.encoder.see(row.lines, row.at_ns).map_err(|error| error.to_string())?;
+        self.pass(row.at_ns, row.lines, out)
+    }
+
+    fn pass(&mut self, at_ns: u64, lines: Lines, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+        let Self { device, decoder, last_ns, proof, .. } = self;
+        let passed = device.advance(at_ns, lines, |edge| {
+            proof.illegal += u64::from(decoder.see(edge.lines, edge.at_ns).is_err());
+            let apart = last_ns.map(|last| edge.at_ns.saturating_sub(last));
+            proof.least_ns = match (proof.least_ns, apart) {
+                (Some(least), Some(apart)) => Some(least.min(apart)),
+                (least, apart) => least.or(apart),
+            };
+            *last_ns = Some(edge.at_ns);
+            proof.edges_out += 1;
+            out.push((edge.at_ns, edge.lines));
+        });
+        passed.map_err(|fault| fault.to_string())
+    }
+
+    fn finish(&mut self) -> Proof {
+        self.proof.in_edges = self.encoder.position_edges() - self.begun.0;
+        self.proof.out_edges = self.decoder.position_edges() - self.begun.1;
+        self.proof.inserted = self.device.inserted_pulses();
+        self.proof
+    }
+}
+
+/// Reads rows, writes edges as they leave; memory does not grow with the length of the stream.
+///
+/// # Errors
+/// A row that is none with its line, a fault of the device, or what the system said.
+pub fn stream(
+    input: impl BufRead,
+    mut output: impl Write,
+    spacing_ns: u64,
+    first_request: i64,
+) -> Result<Proof, String> {
+    let mut heads = None;
+    let mut bench: Option<Bench> = None;
+    let mut last: Option<Row> = None;
+    let mut out = Vec::new();
+    let io = |error: std::io::Error| error.to_string();
+    writeln!(output, "time_ns,a,b").map_err(io)?;
+    for (index, line) in input.lines().enumerate() {
+        let line = line.map_err(io)?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let Some(heads) = &heads else {
+            heads = Some(Heads::of(&line)?);
+            continue;
+        };
+        let mut row = heads.row(&line, index + 1)?;
+        let bench = bench.get_or_insert_with(|| {
+            row.request += first_request;
+            Bench::new(&row, spacing_ns)
+        });
+        bench.take(&row, &mut out).map_err(|what| format!("line {}: {what}", index + 1))?;
+        last = Some(row);
+        flush(&mut out, &mut output).map_err(io)?;
+    }
+    let (Some(mut bench), Some(last)) = (bench, last) else {
+        return Err("there is no row of encoder lines".to_owned());
+    };
+    let end_ns = last.at_ns.saturating_add(spacing_ns.saturating_mul(TAIL_SPACINGS));
+    bench.pass(end_ns, last.lines, &mut out)?;
+    flush(&mut out, &mut output).map_err(io)?;
+    Ok(bench.finish())
+}
+
+fn flush(out: &mut Vec<(u64, Lines)>, output: &mut impl Write) -> std::io::Result<()> {
+    if out.is_empty() {
+        return Ok(());
+    }
+    for (at_ns, lines) in out.drain(..) {
+        writeln!(output, "{at_ns},{},{}", u8::from(lines.a), u8::from(lines.b))?;
+    }
+    output.flush()
+}
+
+/// A vector: what goes in, what must come out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Vector {
+    /// Its name, also of its files.
+    pub name: &'static str,
+    /// What it shows.
+    pub shows: &'static str,
+    /// Least time between two edges, ns.
+    pub spacing_ns: u64,
+    /// Input.
+    pub input: String,
+    /// Output.
+    pub expected: String,
+    /// Proof of the output.
+    pub proof: Proof,
+}
+
+/// Every vector.
+///
+/// # Errors
+/// A vector that the device refuses: never, a test holds it.
+pub fn vectors() -> Result<Vec<Vector>, String> {
+    VECTORS.iter().map(Source::vector).collect()
+}
+
+/// How a vector is made: encoder edges at a pace, and requests.
+struct Source {
+    name: &'static str,
+    shows: &'static str,
+    spacing_ns: u64,
+    /// Pieces of motion: edges, signed, and ns from edge to edge; 0 edges is a rest of 1000 such times.
+    motion: &'static [(i64, u64)],
+    /// Before which piece how many pulses are asked for, and whether the bypass is switched.
+    requests: &'static [(usize, i64, Option<bool>)],
+}
+
+const VECTORS: &[Source] = &[
+    Source {
+        name: "rest_up",
+        shows: "three pulses up at rest, both lines low",
+        spacing_ns: 250,
+        motion: &[(0, 1000)],
+        requests: &[(0, 3, None)],
+    },
+    Source {
+        name: "rest_down",
+        shows: "three pulses down at rest",
+        spacing_ns: 250,
+        motion: &[(0, 1000)],
+        requests: &[(0, -3, None)],
+    },
+    Source {
+        name: "forward",
+        shows: "pulses up while the axis moves up: each waits for both lines low",
+        spacing_ns: 250,
+        motion: &[(40, 5000)],
+        requests: &[(0, 4, None)],
+    },
+    Source {
+        name: "forward_down",
+        shows: "pulses down while the axis moves up",
+        spacing_ns: 250,
+        motion: &[(40, 5000)],
+        requests: &[(0, -4, None)],
+    },
+    Source {
+        name: "backward",
+        shows: "pulses up while the axis moves down",
+        spacing_ns: 250,
+        motion: &[(-40, 5000)],
+        requests: &[(0, 4, None)],
+    },
+    Source {
+        name: "reversal",
+        shows: "the axis reverses within a period while pulses wait",
+        spacing_ns: 250,
+        motion: &[(13, 4000), (-17, 4000), (9, 4000)],
+        requests: &[(0, 2, None), (1, -3, None), (2, 2, None)],
+    },
+    Source {
+        name: "not_low",
+        shows: "the axis stands with a line high: nothing is inserted until it moves on",
+        spacing_ns: 250,
+        motion: &[(2, 4000), (0, 1000), (6, 4000)],
+        requests: &[(1, 1, None)],
+    },
+    Source {
+        name: "bypass",
+        shows: "bypass holds pulses back, and lets them go",
+        spacing_ns: 250,
+        motion: &[(16, 4000), (16, 4000)],
+        requests: &[(0, 2, Some(true)), (1, 0, Some(false))],
+    },
+    Source {
+        name: "burst",
+        shows: "a slow device: encoder edges wait their turn in order, none is lost",
+        spacing_ns: 3000,
+        motion: &[(8, 4000), (12, 1500), (8, 20000)],
+        requests: &[(0, 1, None)],
+    },
+    Source {
+        name: "there_and_back",
+        shows: "what is inserted up and taken back adds up to nothing",
+        spacing_ns: 250,
+        motion: &[(24, 4000), (-24, 4000)],
+        requests: &[(0, 5, None), (1, -5, None)],
+    },
+];
+
+impl Source {
+    fn vector(&self) -> Result<Vector, String> {
+        let input = self.input();
+        let mut expected = Vec::new();
+        let proof = stream(input.as_bytes(), &mut expected, self.spacing_ns, 0)?;
+        let expected = String::from_utf8(expected).map_err(|error| error.to_string())?;
+        let (name, shows, spacing_ns) = (self.name, self.shows, self.spacing_ns);
+        Ok(Vector { name, shows, spacing_ns, input, expected, proof })
+    }
+
+    fn input(&self) -> String {
+        let mut text = String::from("time_ns,a,b,request,bypass\n");
+        let (mut at_ns, mut position) = (1000_u64, 0_i64);
+        let mut row = |at_ns: u64, position: i64, request: i64, bypass: Option<bool>| {
+            let lines = Lines::at(position);
+            let bypass = bypass.map_or("", |on| if on { "1" } else { "0" });
+            let _ = writeln!(text, "{at_ns},{},{},{request},{bypass}", u8::from(lines.a), u8::from(lines.b));
+        };
+        row(at_ns, position, 0, None);
+        for (index, (edges, pace_ns)) in self.motion.iter().enumerate() {
+            for (_, pulses, bypass) in self.requests.iter().filter(|(piece, ..)| *piece == index) {
+                at_ns += pace_ns / 2;
+                row(at_ns, position, *pulses, *bypass);
+            }
+            for _ in 0..edges.abs() {
+                at_ns += pace_ns;
+                position += edges.signum();
+                row(at_ns, position, 0, None);
+            }
+            if *edges == 0 {
+                at_ns += 1000 * pace_ns;
+            }
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_vector_is_proved_and_bad_rows_are_told_with_their_line() {
+        let all = vectors().expect("every vector runs");
+        assert_eq!(all.len(), VECTORS.len());
+        for vector in &all {
+            assert!(vector.proof.holds(vector.spacing_ns), "{}: {:?}", vector.name, vector.proof);
+            assert_eq!(vector.proof.inserted, vector.proof.asked, "{}", vector.name);
+            assert!(vector.proof.edges_out > 0, "{}", vector.name);
+        }
+        let refused = |text: &str| stream(text.as_bytes(), Vec::new(), 250, 0).expect_err("refused");
+        assert!(refused("time_ns,a\n1,0\n").contains("no column b"));
+        assert!(refused("time_ns,a,b\n1,0,2\n").contains("line 2: b is"));
+        assert!(refused("time_ns,a,b\n1,0,0\n2,1,1\n").contains("both encoder lines"));
+        assert!(refused("time_ns,a,b\n5,0,0\n1,1,0\n").contains("time went back"));
+        assert!(refused("").contains("no row"));
+    }
+
+    #[test]
+    fn a_proof_that_does_not_hold_says_so() {
+        let proof = Proof { out_edges: 4, inserted: 2, ..Proof::default() };
+        assert!(!proof.holds(250) && proof.text(250).contains("DOES NOT HOLD"));
+        assert!(!Proof { illegal: 1, ..Proof::default() }.holds(250));
+        assert!(!Proof { least_ns: Some(100), ..Proof::default() }.holds(250));
+    }
+}

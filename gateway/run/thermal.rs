@@ -1,0 +1,208 @@
+//! The thermal law beside the running machine: predicted error, residual where a reading comes, the offset against it, and the
+//! pulses that a pulse inserter has to insert.
+//!
+//! The law comes from `identify thermal --model`; readings of `thermal_error_um` (a probe, a gauge, a displacement sensor) correct
+//! it by bounded steps, and what was learned is kept in `thermal.json` of the data directory. The offset is proposed to the gate
+//! only where the configuration says so; the gate decides, as about every offset.
+
+use super::health::Health;
+use crate::cli::CannotRun;
+use crate::config::{self, Config};
+use crate::history::{ExtraSeries, ExtraValue};
+use crate::log::{Notice, Severity};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{Absence, ChannelId, Sample};
+use rules::estimators::thermal::{
+    AxisSituation, Compensator, Corrected, FollowSettings, Follower, Held, Prediction, ThermalModel,
+};
+use rules::script::OffsetProposal;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Who writes the events.
+const SOURCE: &str = "thermal";
+/// What was learned from readings, in the data directory.
+const MEMORY: &str = "thermal.json";
+/// The law looks at the temperatures so often: heat is slow.
+const EVERY_NS: i64 = SECOND_NS;
+/// A sensor that reads all the time teaches so often at most: readings closer than this say the same.
+const READING_EVERY_NS: i64 = 60 * SECOND_NS;
+/// How many series there are.
+const COUNT: usize = 6;
+
+/// See the [module](self).
+pub struct Thermal {
+    settings: config::Thermal,
+    follower: Follower,
+    compensator: Compensator,
+    sensors: Vec<ChannelId>,
+    temperatures_c: Vec<Result<f64, Absence>>,
+    error: ChannelId,
+    memory: PathBuf,
+    told: Option<Notice>,
+    last_ns: Option<TimeNs>,
+    read_ns: Option<TimeNs>,
+    held: Option<Held>,
+    pulses: i64,
+    values: [ExtraValue<'static>; COUNT],
+    reason: Arc<str>,
+    script: Arc<str>,
+}
+
+impl Thermal {
+    /// The law of the configuration, with what readings have taught it before; `None` where none is configured.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a law of another machine, a sensor that no channel is.
+    pub fn of(config: &Config) -> Result<Option<Self>, CannotRun> {
+        let Some(path) = &config.thermal.model else { return Ok(None) };
+        let next = "write the model anew with `cnc-gateway identify thermal --model`";
+        let refused = |what: String| CannotRun::new(format!("{} {what}", path.display()), next);
+        let text = std::fs::read_to_string(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
+        let model = ThermalModel::read(&text, &config.gateway.name).map_err(refused)?;
+        let names: Vec<&str> = model.law.terms.iter().map(|term| term.sensor.as_str()).collect();
+        let channel =
+            |name: &&str| ChannelId::of(name).ok_or_else(|| refused(format!("names {name:?}, which no channel is")));
+        let sensors = names.iter().map(channel).collect::<Result<Vec<_>, _>>()?;
+        let error = ChannelId::of("thermal_error_um").ok_or_else(|| refused("needs thermal_error_um".to_owned()))?;
+        let memory = config.gateway.data_dir.join(MEMORY);
+        let (corrected, told) = remembered(&memory, &model);
+        let bounds = FollowSettings { step_um: config.thermal.step_um, total_um: config.thermal.total_um };
+        let follower = Follower::new(corrected, &names, bounds).map_err(|refusal| refused(refusal.to_string()))?;
+        let compensator = Compensator::new(config.thermal.compensation)
+            .map_err(|error| CannotRun::new(error.to_string(), "see [thermal]"))?;
+        Ok(Some(Self {
+            settings: config.thermal.clone(),
+            follower,
+            compensator,
+            temperatures_c: Vec::with_capacity(sensors.len()),
+            sensors,
+            error,
+            memory,
+            told,
+            last_ns: None,
+            read_ns: None,
+            held: None,
+            pulses: 0,
+            values: [ExtraValue::Missing("not_yet"); COUNT],
+            reason: "thermal law".into(),
+            script: "[thermal]".into(),
+        }))
+    }
+
+    /// What is stored beside the channels.
+    #[must_use]
+    pub fn series(&self) -> Vec<ExtraSeries> {
+        let um = |name, en, zh| ExtraSeries::number(name, "um", en, zh);
+        vec![
+            um("thermal_predicted_um", "Thermal error that the law predicts", "热误差预测值"),
+            um("thermal_predicted_sd_um", "Standard deviation of the predicted thermal error", "热误差预测标准差"),
+            um("thermal_residual_um", "Measured minus predicted thermal error", "热误差残差"),
+            um("thermal_offset_um", "Offset against the predicted thermal error", "热误差补偿量"),
+            ExtraSeries::number(
+                "thermal_pulses",
+                "1",
+                "Pulses to insert since the last reference return",
+                "应插入脉冲总数",
+            ),
+            ExtraSeries::number("thermal_readings", "1", "Readings that have corrected the law", "修正模型的读数次数"),
+        ]
+    }
+
+    /// What is to be said at the start.
+    pub fn begin(&mut self, health: &mut Health, at_ns: TimeNs) {
+        if let Some(notice) = self.told.take() {
+            health.event(at_ns, SOURCE, &notice);
+        }
+        health.thermal(&self.values);
+    }
+
+    /// Takes one tick; the offset to propose, where that is configured.
+    pub fn step(&mut self, sample: &Sample, health: &mut Health) -> Option<OffsetProposal> {
+        let dt_ns = self.last_ns.map(|last_ns| sample.at_ns - last_ns);
+        if dt_ns.is_none_or(|dt_ns| !(0..EVERY_NS).contains(&dt_ns)) {
+            self.last_ns = Some(sample.at_ns);
+            self.look(sample, dt_ns.unwrap_or(0).max(0), health);
+            health.thermal(&self.values);
+        }
+        let ExtraValue::Number(offset_um) = self.values[3] else { return None };
+        self.settings.propose.then(|| OffsetProposal {
+            axis: self.settings.axis,
+            offset_um,
+            reason: self.reason.clone(),
+            script: self.script.clone(),
+            version: 0,
+        })
+    }
+
+    fn look(&mut self, sample: &Sample, dt_ns: i64, health: &mut Health) {
+        self.temperatures_c.clear();
+        self.temperatures_c.extend(self.sensors.iter().map(|channel| sample.number(*channel)));
+        let predicted = self.follower.predictor().predict(sample.at_ns, &self.temperatures_c);
+        let residual = match &predicted {
+            Ok(prediction) => self.residual(prediction, sample, health),
+            Err(_) => ExtraValue::Missing("no_prediction"),
+        };
+        let dt_s = dt_ns as f64 / SECOND_NS as f64;
+        let step = self.compensator.step(dt_s, predicted.as_ref().ok(), AxisSituation::default());
+        self.pulses += step.increment_pulses;
+        let of = |value: fn(&Prediction) -> f64| match &predicted {
+            Ok(prediction) => ExtraValue::Number(value(prediction)),
+            Err(reason) => ExtraValue::Missing(reason.word()),
+        };
+        #[expect(clippy::cast_precision_loss, reason = "pulses and readings are few")]
+        let (pulses, readings) = (self.pulses as f64, self.follower.readings() as f64);
+        self.values = [
+            of(|it| it.error_um.value),
+            of(|it| it.error_um.sd),
+            residual,
+            ExtraValue::Number(step.value_um),
+            ExtraValue::Number(pulses),
+            ExtraValue::Number(readings),
+        ];
+    }
+
+    /// Measured less predicted at this moment; a reading corrects the law.
+    fn residual(&mut self, prediction: &Prediction, sample: &Sample, health: &mut Health) -> ExtraValue<'static> {
+        let measured_um = sample.number(self.error);
+        let residual = match prediction.beside(measured_um).residual_um {
+            Ok(residual) => ExtraValue::Number(residual.value),
+            Err(_) => return ExtraValue::Missing("no_reading"),
+        };
+        let soon = self.read_ns.is_some_and(|then_ns| (0..READING_EVERY_NS).contains(&(sample.at_ns - then_ns)));
+        if self.settings.learn && !soon {
+            self.read_ns = Some(sample.at_ns);
+            let correction = self.follower.take(prediction, measured_um);
+            if let Ok(text) = serde_json::to_string(&self.follower.corrected()) {
+                health.put(&self.memory, text);
+            }
+            if correction.held != self.held && correction.held == Some(Held::Total) {
+                let text = format!(
+                    "readings have moved the thermal law by {} um, as far as they may: run `cnc-gateway identify thermal` again",
+                    self.settings.total_um
+                );
+                health.event(sample.at_ns, SOURCE, &Notice::new(Severity::Warning, "thermal_law_outdated", text));
+            }
+            self.held = correction.held;
+        }
+        residual
+    }
+}
+
+/// What readings have taught the law before, if it is still the same law.
+fn remembered(memory: &Path, model: &ThermalModel) -> (Corrected, Option<Notice>) {
+    let fresh = || Corrected { identified: model.law.clone(), law: model.law.clone(), readings: 0 };
+    let Ok(text) = std::fs::read_to_string(memory) else { return (fresh(), None) };
+    match serde_json::from_str::<Corrected>(&text) {
+        Ok(corrected) if corrected.identified == model.law => (corrected, None),
+        Ok(_) => {
+            let text = "the thermal law is another one than before: corrections of the old one are dropped";
+            (fresh(), Some(Notice::new(Severity::Info, "thermal_law_new", text)))
+        }
+        Err(error) => {
+            let text =
+                format!("{} cannot be read ({error}): the thermal law begins as it was identified", memory.display());
+            (fresh(), Some(Notice::new(Severity::Warning, "thermal_law_forgotten", text)))
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! A law that goes on learning from a probe: every reading corrects it by a bounded step.
+//!
+//! Method: recursive least squares with the covariance of identification (Kalman update of intercept and coefficients), so a
+//! reading moves most what is known least. Between readings the level of the machine wanders (a chuck is changed, a probe is
+//! calibrated anew), so the variance of the intercept grows with every reading. A reading may be wrong - a chip under the
+//! probe - so one alone moves the prediction by [`FollowSettings::step_um`] at most, and all together by
+//! [`FollowSettings::total_um`]: beyond that the law is not corrected any more but has to be identified again.
+
+use super::law::ThermalLaw;
+use super::predictor::{Comparison, Prediction, Predictor};
+use adapters::Absence;
+use serde::{Deserialize, Serialize};
+
+/// The level wanders by this share of the residual deviation from reading to reading.
+const WANDERS: f64 = 0.5;
+/// Lagged states whose beginning was guessed teach nothing until so much of it is forgotten.
+const SETTLED: f64 = 0.05;
+
+/// How far readings may move the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FollowSettings {
+    /// Greatest change of the prediction by one reading, um.
+    pub step_um: f64,
+    /// Greatest change of the prediction by all readings, um.
+    pub total_um: f64,
+}
+
+/// A law as it was identified and as readings have corrected it. What is stored between runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Corrected {
+    /// As identified.
+    pub identified: ThermalLaw,
+    /// As corrected.
+    pub law: ThermalLaw,
+    /// Readings that corrected it.
+    pub readings: u64,
+}
+
+/// What became of a reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correction {
+    /// Measured, predicted and residual before the correction.
+    pub compared: Comparison,
+    /// Change of the prediction, um.
+    pub change_um: f64,
+    /// What held the change back, if something did.
+    pub held: Option<Held>,
+}
+
+/// Why a reading did not correct the law, or not in full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Held {
+    /// There is no reading.
+    NoReading,
+    /// The temperatures lie outside those of identification.
+    Outside,
+    /// The states of lagged temperatures still depend on how they were taken to begin.
+    Unsettled,
+    /// One reading moves the law by a step at most.
+    Step,
+    /// All readings together have moved the law as far as they may: identify it again.
+    Total,
+}
+
+impl Held {
+    /// The word used in JSON and events.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NoReading => "no_reading",
+            Self::Outside => "outside",
+            Self::Unsettled => "unsettled",
+            Self::Step => "step",
+            Self::Total => "total",
+        }
+    }
+}
+
+/// A predictor that readings correct.
+#[derive(Debug, Clone)]
+pub struct Follower {
+    predictor: Predictor,
+    identified: ThermalLaw,
+    readings: u64,
+    settings: FollowSettings,
+}
+
+impl Follower {
+    /// Goes on with a law that readings may have corrected before, for temperatures that arrive in the order of `sensors`.
+    ///
+    /// # Errors
+    /// A law that cannot be used, or a sensor of it that is not among `sensors`.
+    pub fn new(
+        corrected: Corrected,
+        sensors: &[&str],
+        settings: FollowSettings,
+    ) -> Result<Self, crate::estimators::regression::Refusal> {
+        corrected.identified.check()?;
+        let predictor = Predictor::new(corrected.law, sensors)?;
+        Ok(Self { predictor, identified: corrected.identified, readings: corrected.readings, settings })
+    }
+
+    /// The predictor, to take the temperatures of a tick.
+    pub fn predictor(&mut self) -> &mut Predictor {
+        &mut self.predictor
+    }
+
+    /// What is to be stored.
+    #[must_use]
+    pub fn corrected(&self) -> Corrected {
+        let law = self.predictor.law().clone();
+        Corrected { identified: self.identified.clone(), law, readings: self.readings }
+    }
+
+    /// Readings that corrected the law.
+    #[must_use]
+    pub fn readings(&self) -> u64 {
+        self.readings
+    }
+
+    /// Takes a reading of the error that belongs to `prediction`, the last one of the predictor.
+    pub fn take(&mut self, prediction: &Prediction, measured_um: Result<f64, Absence>) -> Correction {
+        let compared = prediction.beside(measured_um);
+        let nothing = |held| Correction { compared, change_um: 0.0, held: Some(held) };
+        let Ok(residual) = compared.residual_um else { return nothing(Held::NoReading) };
+        if !prediction.is_inside_range() {
+            return nothing(Held::Outside);
+        }
+        if self.predictor.unsettled() > SETTLED {
+            return nothing(Held::Unsettled);
+        }
+        let point = self.predictor.point.clone();
+        let law = self.predictor.law();
+        let moved_um = law.error_um(&point) - self.identified.error_um(&point);
+        let (gain, product, through) = gain(law, &point);
+        let full_um = through * residual.value;
+        let step_um = full_um.clamp(-self.settings.step_um, self.settings.step_um);
+        let total_um = self.settings.total_um;
+        let change_um =
+            (moved_um + step_um).clamp(-total_um.max(moved_um.abs()), total_um.max(moved_um.abs())) - moved_um;
+        let held = match () {
+            () if (change_um - step_um).abs() > 1e-9 => Some(Held::Total),
+            () if (step_um - full_um).abs() > 1e-9 => Some(Held::Step),
+            () => None,
+        };
+        let share = if through > 0.0 { change_um / through } else { 0.0 };
+        correct(self.predictor.law_mut(), &gain, &product, share);
+        self.readings += 1;
+        Correction { compared, change_um, held }
+    }
+}
+
+/// Gain of every coefficient, covariance times point, and the change of the prediction per micrometre of residual.
+fn gain(law: &ThermalLaw, point: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
+    let wander = WANDERS * law.residual_sd_um;
+    let product = |row: usize| {
+        let known: f64 = law.covariance[row].iter().zip(point).map(|(entry, x)| entry * x).sum();
+        known + if row == 0 { wander * wander } else { 0.0 }
+    };
+    let product: Vec<f64> = (0..point.len()).map(product).collect();
+    let of_law: f64 = product.iter().zip(point).map(|(entry, x)| entry * x).sum();
+    let total = (of_law + law.residual_sd_um * law.residual_sd_um).max(f64::MIN_POSITIVE);
+    let gain: Vec<f64> = product.iter().map(|entry| entry / total).collect();
+    (gain, product, of_law / total)
+}
+
+/// `residual_um` is that of the reading, or less of it where the step is bounded.
+fn correct(law: &mut ThermalLaw, gain: &[f64], product: &[f64], residual_um: f64) {
+    let wander = WANDERS * law.residual_sd_um;
+    law.intercept_um += gain[0] * residual_um;
+    for (term, gain) in law.terms.iter_mut().zip(&gain[1..]) {
+        term.um_per_k += gain * residual_um;
+    }
+    law.covariance[0][0] += wander * wander;
+    for (row, gain) in law.covariance.iter_mut().zip(gain) {
+        for (entry, product) in row.iter_mut().zip(product) {
+            *entry -= gain * product;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::law::{Path, Term};
+    use super::*;
+    use adapters::clock::SECOND_NS;
+
+    fn law() -> ThermalLaw {
+        let term = Term {
+            sensor: "bearing_temperature_c".to_owned(),
+            path: Path::Direct,
+            um_per_k: 2.0,
+            interval: (1.8, 2.2),
+            range_c: (20.0, 50.0),
+        };
+        ThermalLaw {
+            intercept_um: -40.0,
+            intercept_interval: (-42.0, -38.0),
+            tau_s: None,
+            tau_interval_s: None,
+            residual_sd_um: 1.0,
+            law_sd_max_um: 3.0,
+            lag_spread_k: 0.0,
+            terms: vec![term],
+            covariance: vec![vec![9.25, -0.35], vec![-0.35, 0.01]],
+        }
+    }
+
+    fn follower(step_um: f64, total_um: f64) -> Follower {
+        let corrected = Corrected { identified: law(), law: law(), readings: 0 };
+        let settings = FollowSettings { step_um, total_um };
+        Follower::new(corrected, &["bearing_temperature_c"], settings).expect("a law")
+    }
+
+    /// Readings of a machine whose error is `scale` times the law plus `shift_um`, at temperatures that go up and down.
+    fn read(follower: &mut Follower, readings: i64, scale: f64, shift_um: f64) -> f64 {
+        let mut last = 0.0;
+        for k in 0..readings {
+            let temperature_c = 35.0 + 10.0 * (k as f64 * 0.9).sin();
+            let prediction = follower.predictor().predict(k * 600 * SECOND_NS, &[Ok(temperature_c)]).expect("there");
+            let truth = scale * (2.0 * temperature_c - 40.0) + shift_um;
+            last = follower.take(&prediction, Ok(truth)).compared.residual_um.expect("a reading").value;
+        }
+        last
+    }
+
+    #[test]
+    fn readings_bring_a_shifted_and_scaled_machine_back() {
+        let mut follower = follower(2.0, 40.0);
+        let last = read(&mut follower, 40, 1.2, 6.0);
+        assert!(last.abs() < 1.0, "{last}");
+        assert_eq!(follower.readings(), 40);
+    }
+
+    #[test]
+    fn one_wrong_reading_moves_the_law_by_a_step() {
+        let mut follower = follower(2.0, 40.0);
+        let prediction = follower.predictor().predict(0, &[Ok(30.0)]).expect("there");
+        let correction = follower.take(&prediction, Ok(prediction.error_um.value + 500.0));
+        assert_eq!((correction.held, correction.change_um.round()), (Some(Held::Step), 2.0));
+        let after = follower.predictor().predict(SECOND_NS, &[Ok(30.0)]).expect("there");
+        assert!((after.error_um.value - prediction.error_um.value - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn all_readings_together_are_bounded_and_a_reading_outside_teaches_nothing() {
+        let mut follower = follower(2.0, 5.0);
+        read(&mut follower, 60, 1.0, 100.0);
+        let moved =
+            follower.predictor().predict(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value - 30.0;
+        assert!(moved < 7.0, "{moved}");
+        let outside = follower.predictor().predict(70 * 600 * SECOND_NS, &[Ok(80.0)]).expect("there");
+        assert_eq!(follower.take(&outside, Ok(0.0)).held, Some(Held::Outside));
+        assert_eq!(follower.take(&outside, Err(Absence::NotRecorded)).held, Some(Held::NoReading));
+    }
+}
