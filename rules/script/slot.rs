@@ -1,15 +1,16 @@
 //! One active script: its variables, its timers, its last good version.
 
 use super::collect::{Collected, Outcome};
-use super::compile::Script;
+use super::compiled::Script;
+use super::declared::Now;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{
     Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
 };
-use super::engine::{OPERATIONS_MAX, Shared};
+use super::engine::Shared;
 use super::events::Event;
 use super::notes::NoteLimit;
-use super::problem;
+use super::problem::{self, Problem};
 use super::running::Running;
 use super::script_memory::ScriptMemory;
 use super::status::{Condition, ScriptStatus};
@@ -21,10 +22,11 @@ use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rhai::{Engine, EvalAltResult, ImmutableString, Scope};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A new version that has run well for this long needs no older one behind it.
-const PROBATION_NS: i64 = 60 * SECOND_NS;
+pub(super) const PROBATION_NS: i64 = 60 * SECOND_NS;
 /// A longer time between two runs is a pause: `dt_s` is 0 after it and timers begin anew.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 
@@ -33,6 +35,8 @@ pub(super) struct Moment<'a> {
     pub(super) sample: &'a Sample,
     pub(super) estimates: &'a Estimates,
     pub(super) events: &'a [Event],
+    /// The channels of other scripts that this one reads, in its order.
+    pub(super) foreign: &'a [Option<f64>],
 }
 
 /// Where a run leaves its effects.
@@ -55,6 +59,7 @@ pub(super) struct Slot {
     base: usize,
     running: Running,
     timers: Timers,
+    now: Now,
     condition: Condition,
     request: Option<OverrideRequest>,
     reason: (ImmutableString, Arc<str>),
@@ -99,6 +104,7 @@ impl Slot {
             script,
             previous,
             timers: script_memory.timers,
+            now: Now::default(),
             condition: Condition::Running,
             request: None,
             reason: (ImmutableString::new(), Arc::from("")),
@@ -148,6 +154,16 @@ impl Slot {
         rows.map(|((name, unit), value)| Published { name, unit, script: &self.script.file, value: *value })
     }
 
+    /// The channels of other scripts that it reads: what those before it have published, or what a trial gives.
+    pub(super) fn look_at(&self, before: &[Self], given: &BTreeMap<String, Option<f64>>, foreign: &mut Vec<Option<f64>>) {
+        let value = |name: &ImmutableString| {
+            let published = before.iter().flat_map(Self::published).find(|it| *it.name == **name);
+            published.map_or_else(|| given.get(name.as_str()).copied().flatten(), |it| it.value)
+        };
+        foreign.clear();
+        foreign.extend(self.script.foreign.iter().map(value));
+    }
+
     /// Nothing is asked for any more.
     pub(super) fn withdraw(&mut self) {
         self.request = None;
@@ -177,8 +193,10 @@ impl Slot {
         }
         let dt_s = if due { self.elapsed_s(at_ns) } else { 0.0 };
         let view = View { sample: moment.sample, estimates: moment.estimates, dt_s };
-        fill(&mut self.scope, &self.script, &view);
+        let live = (!self.script.live.is_empty()).then(|| self.now.step(&self.script.live, moment.sample));
+        fill(&mut self.scope, &self.script, &view, (moment.foreign, live.as_deref().unwrap_or_default()));
         self.exchange(shared, at_ns);
+        shared.lock().live = live;
         let outcome = self.run(engine, moment.events, due);
         self.scope.rewind(self.base);
         let mut collected = shared.lock();
@@ -186,7 +204,7 @@ impl Slot {
         match outcome {
             Ok(()) => self.succeed(&mut collected, due, outputs),
             Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
-                self.wait(&error, &view, &collected);
+                self.wait(&error, &view, &collected, moment.foreign);
             }
             Err(error) if is_late(&error) && self.late + 1 < LATE_MAX => self.leave_out(&error, outputs),
             Err(error) => return self.fail(&error, outputs),
@@ -203,13 +221,13 @@ impl Slot {
                 for (name, value) in handler.parameters.iter().zip(event.values()) {
                     self.scope.push_dynamic(name.clone(), value);
                 }
-                self.running.run(engine, &mut self.scope, &handler.ast)?;
+                self.running.run(engine, &mut self.scope, &script.ast, handler.body.statements())?;
                 self.scope.rewind(self.base);
             }
         }
         if due {
             self.runs += 1;
-            self.running.run(engine, &mut self.scope, &script.ast)?;
+            self.running.run(engine, &mut self.scope, &script.ast, script.body.statements())?;
         }
         // `memory` lives on, so its size is checked after every run.
         self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
@@ -338,16 +356,20 @@ impl Slot {
         outputs.alarms.push(alarm);
     }
 
+    fn told(&self, error: &EvalAltResult) -> Problem {
+        problem::of_run_behind(&self.script.file, error, self.script.body.lines)
+    }
+
     /// The script worked on a value that is not there: it asks for nothing, publishes nothing and tries again; alarms stay
     /// as they are.
-    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected) {
+    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected, foreign: &[Option<f64>]) {
         self.withdraw();
         self.values.fill(None);
         if self.condition != Condition::Running {
             return;
         }
-        let mut problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
-        let absent: Vec<String> = why_absent(&self.script, view).chain(collected.refusals()).collect();
+        let mut problem = self.told(error);
+        let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
     }
@@ -357,14 +379,14 @@ impl Slot {
         self.withdraw();
         self.values.fill(None);
         self.late += 1;
-        outputs.decision.problems.push(problem::of_run(&self.script.file, error, OPERATIONS_MAX));
+        outputs.decision.problems.push(self.told(error));
     }
 
     /// The script failed. True when an older version has come into charge.
     fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
         self.withdraw();
         self.values.fill(None);
-        let problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
+        let problem = self.told(error);
         let at_ns = outputs.decision.at_ns;
         let previous = self.previous.take();
         let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };

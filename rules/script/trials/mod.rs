@@ -22,7 +22,7 @@ mod stage;
 
 pub use functions::TRIAL_FUNCTIONS;
 
-use super::compile::{Script, ScriptSet};
+use super::compiled::{Script, ScriptSet};
 use super::engine::{OPERATIONS_MAX, Shared, engine};
 use super::problem::{self, Problem};
 use super::running::Running;

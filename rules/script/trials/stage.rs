@@ -1,7 +1,7 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
-use crate::script::compile::{Script, ScriptSet};
+use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
 use crate::script::problem::Problem;
 use crate::script::settings::merge;
@@ -110,6 +110,9 @@ impl Stage {
                 }
             }
             None => {
+                if self.host.give(name, number(value)) {
+                    return Ok(());
+                }
                 let place = quantity_of(&mut self.estimates, name).ok_or_else(|| unknown(name))?;
                 *place = match number(value) {
                     Some(value) => Ok(Estimate { value, sd: SD_SHARE * value.abs() }),
