@@ -10,7 +10,6 @@ use super::problem::{self, Problem};
 use super::settings::{Choice, merge, read_choices};
 use super::trials::prove;
 use super::variables::{self, Body};
-use crate::estimators::Settings;
 use adapters::clock::SECOND_NS;
 use rhai::{AST, CallFnOptions, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;

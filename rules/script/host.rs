@@ -24,8 +24,8 @@ const ABSENT_MAX: usize = 64;
 
 /// The scripts in charge. Needs no clock: the time is that of the sample.
 ///
-/// A set that does not compile never gets here. A script that fails while it runs is replaced by its last good version,
-/// or suspended when there is none; either way its request ends at once and the others go on.
+/// A set that does not compile never gets here. A script that fails while it runs is replaced by its last good version, by the
+/// script of its name as it was delivered, or suspended where there is neither; either way its request ends at once and the others go on.
 pub struct Host {
     engine: Engine,
     shared: Shared,
@@ -103,7 +103,7 @@ impl Host {
     }
 
     /// Puts a compiled set in charge. Every script goes on with its memory and timers, also one whose text has changed; the
-    /// version before it stays ready, with what it remembered, until the new one has run well for a minute.
+    /// version before it stays ready, with what it remembered.
     pub fn install(&mut self, set: ScriptSet) {
         self.refused.clear();
         let mut old = std::mem::take(&mut self.slots);

@@ -1,6 +1,9 @@
 //! One active script: its variables, its timers, its last good version.
 
+mod alarms;
+
 use super::collect::{Collected, Outcome};
+use super::compile::{ScriptFile, compile};
 use super::compiled::Script;
 use super::declared::Now;
 use super::deadline::{LATE_MAX, is_late};
@@ -13,6 +16,7 @@ use super::notes::NoteLimit;
 use super::problem::{self, Problem};
 use super::running::Running;
 use super::script_memory::ScriptMemory;
+use super::shipped::shipped;
 use super::status::{Condition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill, has_absent, scope_of, why_absent};
@@ -25,8 +29,6 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A new version that has run well for this long needs no older one behind it.
-pub(super) const PROBATION_NS: i64 = 60 * SECOND_NS;
 /// A longer time between two runs is a pause: `dt_s` is 0 after it and timers begin anew.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 
@@ -45,7 +47,8 @@ pub(super) struct Outputs<'a> {
     pub(super) decision: &'a mut Decision,
 }
 
-/// The version before, with what it remembered when it was replaced.
+/// The version before, with what it remembered when it was replaced. It stays for as long as the new one: a branch that is taken once
+/// a month fails in that month.
 struct Previous {
     script: Arc<Script>,
     script_memory: ScriptMemory,
@@ -264,10 +267,7 @@ impl Slot {
         if matches!(self.condition, Condition::Waiting(_)) {
             self.condition = Condition::Running;
         }
-        let good_since_ns = *self.good_since_ns.get_or_insert(collected.now_ns);
-        if self.previous.is_some() && collected.now_ns - good_since_ns > PROBATION_NS {
-            self.previous = None;
-        }
+        self.good_since_ns.get_or_insert(collected.now_ns);
         if due {
             self.ask(collected);
             self.named.clear();
@@ -329,33 +329,6 @@ impl Slot {
         }
     }
 
-    /// Begins and ends alarms: those that the body named and those that stand until they are cleared.
-    fn alarms(&self, now_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        for (name, text) in self.named.iter().map(|(name, text)| (name, text)).chain(self.timers.latched()) {
-            let standing = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name == **name;
-            if !outputs.alarms.iter().any(standing) {
-                self.begin_alarm(name, text, now_ns, outputs);
-            }
-        }
-        let own = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name != *SCRIPT_STOPPED;
-        let asked = |alarm: &Alarm| {
-            let named = self.named.iter().any(|(name, _)| **name == *alarm.name);
-            named || self.timers.latched().contains_key(&*alarm.name)
-        };
-        let over = |alarm: &Alarm| own(alarm) && !asked(alarm);
-        let ended = outputs.alarms.iter().filter(|alarm| over(alarm)).map(|alarm| alarm.change(false));
-        outputs.decision.alarms.extend(ended);
-        outputs.alarms.retain(|alarm| !over(alarm));
-    }
-
-    fn begin_alarm(&self, name: &str, text: &AlarmText, since_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        let (en, zh) = (Arc::from(text.en.as_str()), Arc::from(text.zh.as_str()));
-        let script = self.script.file.clone();
-        let alarm = Alarm { name: Arc::from(name), script, level: text.level, en, zh, since_ns };
-        outputs.decision.alarms.push(alarm.change(true));
-        outputs.alarms.push(alarm);
-    }
-
     fn told(&self, error: &EvalAltResult) -> Problem {
         problem::of_run_behind(&self.script.file, error, self.script.body.lines)
     }
@@ -388,7 +361,7 @@ impl Slot {
         self.values.fill(None);
         let problem = self.told(error);
         let at_ns = outputs.decision.at_ns;
-        let previous = self.previous.take();
+        let previous = self.previous.take().or_else(|| self.as_delivered());
         let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
         let en = format!("{problem}; {next} until the file is changed");
         let zh = format!("脚本已停止：{problem}");
@@ -404,6 +377,15 @@ impl Slot {
         self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
         outputs.decision.problems.push(problem);
         replaced
+    }
+
+    /// The script of this name as it was delivered, where nothing else has ever been good. It goes on with empty memory: what an
+    /// edited one has remembered may mean something else.
+    fn as_delivered(&self) -> Option<Previous> {
+        let files: Vec<ScriptFile> = shipped().into_iter().filter(|file| *file.name == *self.script.file).collect();
+        let script = compile(&files).ok()?.scripts.first()?.clone();
+        let fits = |script: &Script| script.version != self.script.version && script.foreign.is_empty();
+        fits(&script).then(|| Previous { script, script_memory: ScriptMemory::default() })
     }
 
     pub(super) fn status(&self) -> ScriptStatus {

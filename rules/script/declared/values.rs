@@ -9,7 +9,7 @@ use std::fmt;
 use toml::de::{DeTable, DeValue};
 
 /// Bytes of the file.
-pub const TEXT_MAX: usize = 256 * 1024;
+const TEXT_MAX: usize = 256 * 1024;
 /// Values of the file.
 const VALUES_MAX: usize = 4096;
 

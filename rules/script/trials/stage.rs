@@ -207,6 +207,28 @@ impl Stage {
         self.decision().offsets.iter().find(|proposal| proposal.axis == axis).map(|proposal| proposal.offset_um)
     }
 
+    /// From now on the script sees a plain value of everything that it reads: the middle of the range of a channel, 100 of an
+    /// estimate and of another script's channel.
+    pub(super) fn give_all(&mut self, script: &Script) {
+        let text = |name: &str| Dynamic::from(ImmutableString::from(if name == "program" { "O1" } else { "T1" }));
+        let words = script.reads.iter().copied().chain(script.fields.iter().map(|field| field.word));
+        for word in words.filter(|word| !word.writable()) {
+            let value = match (ChannelId::of(word.name).map(ChannelId::channel), word.kind) {
+                (Some(channel), WordKind::Number) => {
+                    let (least, greatest) = channel.range;
+                    Dynamic::from_float(100.0_f64.clamp(least, greatest))
+                }
+                (Some(_), _) => text(word.name),
+                (None, _) => Dynamic::from_float(100.0),
+            };
+            // What cannot be given, such as the time, is there anyway.
+            let _given = self.give(word.name, &value);
+        }
+        for name in &script.foreign {
+            self.host.give(name, Some(100.0));
+        }
+    }
+
     /// The newest value of a channel of the script's own; `Err` where it has none of this name.
     pub(super) fn published(&self, name: &str) -> Result<Option<f64>, String> {
         let found = self.host.published().find(|it| it.name == name).map(|it| it.value);
