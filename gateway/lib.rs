@@ -27,6 +27,7 @@ pub mod reload;
 pub mod replay;
 pub mod run;
 pub mod samples;
+pub mod settings;
 pub mod signals;
 pub mod sinks;
 pub mod status;

@@ -29,6 +29,7 @@ mod route;
 mod rules;
 mod series;
 mod server;
+mod settings;
 mod sign_in;
 mod streams;
 mod twin;
@@ -162,6 +163,7 @@ const GROUPS: &[&[Route]] = &[
     wear::ROUTES,
     handbook::ROUTES,
     rules::ROUTES,
+    settings::ROUTES,
     backtests::ROUTES,
     sign_in::ROUTES,
     orders::ROUTES,

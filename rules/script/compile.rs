@@ -81,7 +81,12 @@ pub fn compile_one(file: &ScriptFile, files: &[ScriptFile], values: &SettingValu
 }
 
 /// The script of this file with other values of its settings, all of them in the text: what its trials are run with.
-pub(super) fn variant(set: &ScriptSet, script: &Script, values: &SettingValues, place: &Where) -> Result<Arc<Script>, Vec<Problem>> {
+pub(super) fn variant(
+    set: &ScriptSet,
+    script: &Script,
+    values: &SettingValues,
+    place: &Where,
+) -> Result<Arc<Script>, Vec<Problem>> {
     let Some(file) = set.files.iter().find(|file| file.name == *script.file) else { return Err(Vec::new()) };
     Compiler::new(&set.files).script(file, |found| Force::fixed(found, values, place)).map(Arc::new)
 }
@@ -141,18 +146,23 @@ impl Compiler {
             let what = format!("{} bytes; a script has at most {TEXT_MAX}", file.text.len());
             return Err(vec![Problem::new(name, Position::NONE, what, "split it into several files")]);
         }
-        let parse = |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
+        let parse =
+            |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
         // As written first: an error is told before any value stands in the text.
         parse(&self.checking, &file.text)?;
         let declarations = declared::find(file, &self.checking)?;
         let force = force(&declarations);
-        let filled = ScriptFile { name: file.name.clone(), text: declared::with_values(&file.text, &declarations, &force.texts) };
+        let filled = ScriptFile {
+            name: file.name.clone(),
+            text: declared::with_values(&file.text, &declarations, &force.texts),
+        };
         let plain = parse(&self.checking, &filled.text)?;
         let constants = constants(&plain);
         let mut problems = Vec::new();
         let called = called(&filled, &plain, &self.checking, &mut problems);
         let live: Vec<&str> = force.live.constants.iter().map(|(name, _)| name.as_str()).collect();
-        let mut found = self.examine(name, &plain, &called, constants.iter().map(|(name, _)| name.as_str()).chain(live));
+        let mut found =
+            self.examine(name, &plain, &called, constants.iter().map(|(name, _)| name.as_str()).chain(live));
         found.problems.append(&mut problems);
         let every_ns = every_ns(&filled, &plain).unwrap_or_else(|problem| {
             found.problems.push(problem);
@@ -164,12 +174,16 @@ impl Compiler {
         let ast = parse(&self.running, &filled.text)?;
         let choices = self.choices(&filled, &ast)?;
         let names = variables::names(&found, &constants, &force.live);
-        let body = Body::compile(&self.running, &filled.text, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
+        let body = Body::compile(&self.running, &filled.text, &names)
+            .map_err(|error| vec![problem::of_parse(name, &error)])?;
         let handlers = called.ready(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
         Ok(Script {
             file: file.name.as_str().into(),
-            text: file.text.as_str().into(),
-            version: if force.chosen { version(&format!("{}\n{:?}", file.text, force.texts)) } else { version(&file.text) },
+            version: if force.chosen {
+                version(&format!("{}\n{:?}", file.text, force.texts))
+            } else {
+                version(&file.text)
+            },
             every_ns,
             passive: plain.statements().is_empty(),
             choices,

@@ -16,8 +16,6 @@ use std::sync::Arc;
 /// A compiled script.
 pub(super) struct Script {
     pub(super) file: Arc<str>,
-    /// As written, without values of settings.
-    pub(super) text: Arc<str>,
     pub(super) version: u64,
     /// The functions of the script.
     pub(super) ast: AST,

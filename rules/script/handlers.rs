@@ -36,12 +36,7 @@ pub(super) struct Called {
 }
 
 /// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
-pub(super) fn called(
-    file: &ScriptFile,
-    whole: &AST,
-    checking: &Engine,
-    problems: &mut Vec<Problem>,
-) -> Called {
+pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems: &mut Vec<Problem>) -> Called {
     let mut called = Called::default();
     for function in whole.iter_fn_def() {
         if let Err(problem) = called.add(file, function, checking) {

@@ -2,9 +2,9 @@
 
 use super::compile::{ScriptFile, compile};
 use super::compiled::ScriptSet;
-use super::declared::{Declared, SettingValues};
 use super::deadline::{self, Deadline};
 use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
+use super::declared::{Declared, SettingValues};
 use super::engine::{Shared, engine};
 use super::events::Happenings;
 use super::problem::Problem;

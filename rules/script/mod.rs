@@ -37,8 +37,8 @@ mod collect;
 mod compile;
 mod compiled;
 mod deadline;
-mod declared;
 mod decision;
+mod declared;
 mod engine;
 mod events;
 mod examine;
@@ -66,11 +66,11 @@ pub use callable::{FUNCTIONS, Function};
 pub use compile::{ScriptFile, compile, compile_one, compile_with, declarations, prepare, prepare_with};
 pub use compiled::ScriptSet;
 pub use deadline::Deadline;
-pub use declared::{Declared, Per, Place, SettingValue, SettingValues};
 pub use decision::{
     Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
     StopRequest,
 };
+pub use declared::{Declared, Per, Place, SettingValue, SettingValues};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};
 pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};

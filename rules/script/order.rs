@@ -56,9 +56,8 @@ pub(super) fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<Problem>
 
 /// Whoever publishes stands before whoever reads it; otherwise the scripts stay in the order of their names, in which they come.
 pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<Problem>) -> Vec<Arc<Script>> {
-    let publisher = |channel: &str| {
-        scripts.iter().position(|script| script.channels.iter().any(|(name, _)| **name == *channel))
-    };
+    let publisher =
+        |channel: &str| scripts.iter().position(|script| script.channels.iter().any(|(name, _)| **name == *channel));
     let needs: Vec<BTreeSet<usize>> =
         scripts.iter().map(|script| script.foreign.iter().filter_map(|name| publisher(name)).collect()).collect();
     let mut order: Vec<usize> = Vec::with_capacity(scripts.len());
@@ -96,5 +95,10 @@ fn circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -
     let told: Vec<String> = path.iter().enumerate().map(step).collect();
     let first = path.first().map_or("scripts", |at| name(*at));
     let what = format!("the scripts read each other in a circle: {}", told.join(", "));
-    Problem::new(first, Position::NONE, what, "compute both channels in one of them, or keep the older value in memory there")
+    Problem::new(
+        first,
+        Position::NONE,
+        what,
+        "compute both channels in one of them, or keep the older value in memory there",
+    )
 }

@@ -5,11 +5,11 @@ mod alarms;
 use super::collect::{Collected, Outcome};
 use super::compile::{ScriptFile, compile};
 use super::compiled::Script;
-use super::declared::Now;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{
     Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
 };
+use super::declared::Now;
 use super::engine::Shared;
 use super::events::Event;
 use super::notes::NoteLimit;
@@ -158,7 +158,12 @@ impl Slot {
     }
 
     /// The channels of other scripts that it reads: what those before it have published, or what a trial gives.
-    pub(super) fn look_at(&self, before: &[Self], given: &BTreeMap<String, Option<f64>>, foreign: &mut Vec<Option<f64>>) {
+    pub(super) fn look_at(
+        &self,
+        before: &[Self],
+        given: &BTreeMap<String, Option<f64>>,
+        foreign: &mut Vec<Option<f64>>,
+    ) {
         let value = |name: &ImmutableString| {
             let published = before.iter().flat_map(Self::published).find(|it| *it.name == **name);
             published.map_or_else(|| given.get(name.as_str()).copied().flatten(), |it| it.value)

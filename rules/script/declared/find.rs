@@ -13,7 +13,8 @@ const SETTINGS_MAX: usize = 48;
 /// Longest name.
 const NAME_MAX: usize = 48;
 const KEYS: [&str; 8] = ["unit", "min", "max", "whole", "one_of", "per", "en", "zh"];
-const EXAMPLE: &str = "write setting(\"target_w\", 0.0, #{ unit: \"W\", min: 0, max: 50000, en: \"what it does\", zh: \"...\" })";
+const EXAMPLE: &str =
+    "write setting(\"target_w\", 0.0, #{ unit: \"W\", min: 0, max: 50000, en: \"what it does\", zh: \"...\" })";
 
 /// A declaration and where it stands.
 #[derive(Debug, Clone)]
@@ -118,13 +119,15 @@ fn name_of(name: &Dynamic) -> Result<String, Wrong> {
         && name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.len() <= NAME_MAX
         && !Per::ALL.iter().any(|per| per.word() == name);
-    let next = format!("use a to z, 0 to 9 and _, beginning with a letter, at most {NAME_MAX}, not `tool` or `operation`");
+    let next =
+        format!("use a to z, 0 to 9 and _, beginning with a letter, at most {NAME_MAX}, not `tool` or `operation`");
     if fits { Ok(name) } else { Err((format!("{name:?} cannot be the name of a setting"), next)) }
 }
 
 fn declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wrong> {
     if let Some(key) = map.keys().find(|key| !KEYS.contains(&key.as_str())) {
-        let near = nearest(key, KEYS).map_or_else(|| format!("these are: {}", KEYS.join(", ")), |near| format!("did you mean {near}?"));
+        let near = nearest(key, KEYS)
+            .map_or_else(|| format!("these are: {}", KEYS.join(", ")), |near| format!("did you mean {near}?"));
         return Err((format!("`{key}` says nothing of a setting"), near));
     }
     let missing = |key: &str| (format!("the setting {name} has no {key}"), EXAMPLE.to_owned());
@@ -133,13 +136,16 @@ fn declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wron
     let number = number(default);
     let (default, unit, range) = match number {
         Some(number) => {
-            let limit = |key: &str| map.get(key).and_then(self::number).filter(|it| it.is_finite()).ok_or_else(|| missing(key));
+            let limit =
+                |key: &str| map.get(key).and_then(self::number).filter(|it| it.is_finite()).ok_or_else(|| missing(key));
             let range = (limit("min")?, limit("max")?);
             (SettingValue::Number(number), text("unit").ok_or_else(|| missing("unit"))?, Some(range))
         }
         None => {
             let written = self::text(Some(default));
-            let kind = || (format!("the default of {name} is {}; it is a number or a text", spoken(default)), EXAMPLE.to_owned());
+            let kind = || {
+                (format!("the default of {name} is {}; it is a number or a text", spoken(default)), EXAMPLE.to_owned())
+            };
             (SettingValue::Text(written.ok_or_else(kind)?), String::new(), None)
         }
     };
@@ -151,14 +157,18 @@ fn declared(name: String, default: &Dynamic, map: &Map) -> Result<Declared, Wron
         return Err((format!("the range of {} is empty: {least} to {greatest}", declared.name), EXAMPLE.to_owned()));
     }
     match declared.refuse(&declared.default) {
-        Some((what, _)) => Err((format!("the default is not allowed: {}", what.trim_start_matches('.')), EXAMPLE.to_owned())),
+        Some((what, _)) => {
+            Err((format!("the default is not allowed: {}", what.trim_start_matches('.')), EXAMPLE.to_owned()))
+        }
         None => Ok(declared),
     }
 }
 
 fn per(name: &str, word: &str) -> Result<Per, Wrong> {
     let known = Per::ALL.into_iter().find(|per| per.word() == word);
-    known.ok_or_else(|| (format!("{name}: {word:?} has no settings of its own"), "write per: [\"tool\", \"operation\"]".to_owned()))
+    known.ok_or_else(|| {
+        (format!("{name}: {word:?} has no settings of its own"), "write per: [\"tool\", \"operation\"]".to_owned())
+    })
 }
 
 fn number(value: &Dynamic) -> Option<f64> {

@@ -30,8 +30,11 @@ impl Force {
             };
             let machine = allowed(&Place::Machine).unwrap_or_else(|| declared.default.clone());
             let places = values.places(declared.section()).into_iter();
-            let special: Vec<(Place, SettingValue)> =
-                places.filter(|place| place.per().is_some_and(|per| declared.per.contains(&per))).filter_map(|place| Some((allowed(&place)?, place))).map(|(value, place)| (place, value)).collect();
+            let special: Vec<(Place, SettingValue)> = places
+                .filter(|place| place.per().is_some_and(|per| declared.per.contains(&per)))
+                .filter_map(|place| Some((allowed(&place)?, place)))
+                .map(|(value, place)| (place, value))
+                .collect();
             force.chosen |= machine != declared.default || !special.is_empty();
             if special.is_empty() {
                 force.texts.push(Some(machine.clone()));
@@ -70,7 +73,13 @@ pub(in crate::script) struct Live {
 }
 
 impl Live {
-    fn add(&mut self, index: usize, constant: Option<&str>, machine: &SettingValue, special: Vec<(Place, SettingValue)>) {
+    fn add(
+        &mut self,
+        index: usize,
+        constant: Option<&str>,
+        machine: &SettingValue,
+        special: Vec<(Place, SettingValue)>,
+    ) {
         self.machine.push(if special.is_empty() { Dynamic::UNIT } else { dynamic(machine) });
         if let Some(constant) = constant.filter(|_| !special.is_empty()) {
             self.constants.push((constant.to_owned(), index));
@@ -88,7 +97,8 @@ impl Live {
     /// The values for this tool and this operation; the operation goes before the tool.
     fn values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
         let mut values = self.machine.clone();
-        let places = [tool.map(|tool| Place::Tool(tool.to_owned())), operation.map(|it| Place::Operation(it.to_owned()))];
+        let places =
+            [tool.map(|tool| Place::Tool(tool.to_owned())), operation.map(|it| Place::Operation(it.to_owned()))];
         for (index, value) in places.iter().flatten().filter_map(|place| self.special.get(place)).flatten() {
             values[*index] = value.clone();
         }

@@ -151,8 +151,7 @@ impl Declared {
                 if !(least..=greatest).contains(number) {
                     return Some((format!("{path} = {number} is outside {least} to {greatest}{unit}"), next));
                 }
-                (self.whole && number.fract() != 0.0)
-                    .then(|| (format!("{path} = {number} is no whole number"), next))
+                (self.whole && number.fract() != 0.0).then(|| (format!("{path} = {number} is no whole number"), next))
             }
             (SettingValue::Number(_), None) => Some((format!("{path} needs a text, not a number"), next)),
             (SettingValue::Text(_), Some(_)) => Some((format!("{path} needs a number, not a text"), next)),

@@ -116,7 +116,8 @@ mod tests {
 
     #[test]
     fn a_call_is_found_where_it_is_one() {
-        let text = "// setting(1)\nlet a = setting(\"a) \", 1, #{ en: \"(\" }); // ok\nlet b = my_setting(2) + `setting(3)`;";
+        let text =
+            "// setting(1)\nlet a = setting(\"a) \", 1, #{ en: \"(\" }); // ok\nlet b = my_setting(2) + `setting(3)`;";
         let found = calls(text, "setting");
         assert_eq!(found.len(), 1);
         assert_eq!(&text[found[0].inside.clone()], "\"a) \", 1, #{ en: \"(\" }");

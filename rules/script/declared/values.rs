@@ -232,12 +232,20 @@ impl Reader<'_> {
                 Some(section) => self.section(key.get_ref(), section),
                 None => {
                     let what = format!("`{}` stands outside of every section", key.get_ref());
-                    self.wrong(key.span().start, what, "write it below the section of its script, such as [constant_load]");
+                    self.wrong(
+                        key.span().start,
+                        what,
+                        "write it below the section of its script, such as [constant_load]",
+                    );
                 }
             }
         }
         if self.chosen.len() > VALUES_MAX {
-            self.wrong(0, format!("{} values; at most {VALUES_MAX} are read", self.chosen.len()), "drop tools that are gone");
+            self.wrong(
+                0,
+                format!("{} values; at most {VALUES_MAX} are read", self.chosen.len()),
+                "drop tools that are gone",
+            );
         }
     }
 
@@ -279,7 +287,13 @@ impl Reader<'_> {
         let value = match (number.filter(|number| number.is_finite()), value.as_str()) {
             (Some(number), _) => SettingValue::Number(number),
             (None, Some(text)) => SettingValue::Text(text.to_owned()),
-            (None, None) => return self.wrong(at, format!("{section}.{name} is neither a number nor a text"), "write a number, or a text in \"quotes\""),
+            (None, None) => {
+                return self.wrong(
+                    at,
+                    format!("{section}.{name} is neither a number nor a text"),
+                    "write a number, or a text in \"quotes\"",
+                );
+            }
         };
         let (line, column) = self.place(at);
         self.chosen.insert((section.to_owned(), name.to_owned(), place), Chosen { value, line, column });

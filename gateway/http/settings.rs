@@ -1,0 +1,95 @@
+//! The settings of the scripts over the API: every one that is declared, with what is in force; one changed by a setter.
+
+use super::Shared;
+use super::guard::told;
+use super::person::{JsonBody, SignedIn};
+use super::problem::ApiProblem;
+use super::route::Route;
+use super::rules::{aside, on_disk};
+use crate::access::Role;
+use crate::settings::{self, Wish};
+use axum::Json;
+use axum::extract::State;
+use axum::response::Response;
+use axum::routing::{get, put};
+use rules::script::{Place, Problem, SettingValue, declarations};
+use serde::Deserialize;
+use serde_json::Value;
+
+pub(super) const ROUTES: &[Route] = &[
+    Route::read("/api/v1/settings", || get(list)),
+    Route::put(Role::Setter, "/api/v1/settings", 4096, || put(change)),
+];
+
+/// A number, a text, or nothing: as elsewhere again.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Number(f64),
+    Text(String),
+}
+
+/// One setting that is to have another value.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Asked {
+    script: String,
+    name: String,
+    value: Option<Given>,
+    #[serde(default)]
+    tool: Option<String>,
+    #[serde(default)]
+    operation: Option<String>,
+}
+
+impl Asked {
+    fn wish(self) -> Result<Wish, ApiProblem> {
+        let place = match (self.tool, self.operation) {
+            (None, None) => Place::Machine,
+            (Some(tool), None) => Place::Tool(tool),
+            (None, Some(operation)) => Place::Operation(operation),
+            (Some(_), Some(_)) => {
+                return Err(ApiProblem::request("a tool and an operation are both named", "name one of them"));
+            }
+        };
+        let value = self.value.map(|value| match value {
+            Given::Number(number) => SettingValue::Number(number),
+            Given::Text(text) => SettingValue::Text(text),
+        });
+        let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
+        Ok(Wish { script, name: self.name, place, value })
+    }
+}
+
+fn refused(problems: &[Problem]) -> ApiProblem {
+    let what: Vec<&str> = problems.iter().map(|problem| problem.what.as_str()).collect();
+    let next = problems.iter().map(|problem| problem.next.as_str()).find(|next| !next.is_empty());
+    ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
+}
+
+/// `GET /api/v1/settings`
+async fn list(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+    aside(move || {
+        let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
+        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared))))
+    })
+    .await
+}
+
+/// `PUT /api/v1/settings`: tried with every script first; in force within a second.
+async fn change(
+    State(shared): State<Shared>,
+    SignedIn(person): SignedIn,
+    JsonBody(asked): JsonBody<Asked>,
+) -> Result<Response, ApiProblem> {
+    let wish = asked.wish()?;
+    aside(move || {
+        let files = on_disk(&shared)?;
+        let words =
+            settings::set(&shared.data_dir, &files, &wish, &person.name).map_err(|problems| refused(&problems))?;
+        let declared = declarations(&files).map_err(|problems| refused(&problems))?;
+        let answer = settings::document(declared.iter(), &super::rules::values(&shared));
+        Ok(told(Json(answer), words))
+    })
+    .await
+}
