@@ -2,6 +2,8 @@
 //! what comes into charge again after a start at which the directory holds something broken.
 
 use crate::history::Event;
+use crate::reload::prepared;
+use crate::settings;
 use adapters::clock::TimeNs;
 use rules::script::{Host, Problem, ScriptFile, ScriptSet, prepare};
 use serde_json::{Map, Value, json};
@@ -47,12 +49,13 @@ pub fn kept(data_dir: &Path) -> Option<Vec<ScriptFile>> {
     document["scripts"].as_object()?.iter().map(file).collect()
 }
 
-/// The set that was kept, compiled and tried; `None` where there is none.
+/// The set that was kept, compiled and tried with the settings of this machine, or with the defaults where those cannot be used;
+/// `None` where there is none.
 ///
 /// # Errors
 /// A newer program may find something wrong with it.
 pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<Problem>>> {
-    kept(data_dir).map(|files| prepare(&files))
+    kept(data_dir).map(|files| prepared(&files, Some(&settings::path(data_dir))).or_else(|_| prepare(&files)))
 }
 
 /// From `at_ns` on these scripts decide: what tells a backtest whose alarms the history holds.

@@ -135,10 +135,15 @@ fn check_scripts(config: &Config, report: &mut Report) {
         report.read.push(format!("{shown}: not there yet; the first start writes the shipped scripts into it"));
         Ok(script::shipped())
     };
-    match files.and_then(|files| script::prepare(&files)) {
+    let values = crate::settings::path(&config.gateway.data_dir);
+    match files.and_then(|files| crate::reload::prepared(&files, Some(&values))) {
         Ok(set) => {
             let trials = script::trials(&set).len();
             report.read.push(format!("{shown}: {} scripts, {trials} trials passed", set.len()));
+            let chosen = set.values().all().count();
+            if chosen > 0 {
+                report.read.push(format!("{}: {chosen} settings chosen", values.display()));
+            }
         }
         Err(problems) => report.problems.extend(problems.into_iter().map(|problem| below(directory, problem))),
     }

@@ -37,6 +37,7 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod samples;
+pub mod settings;
 pub mod signals;
 pub mod sinks;
 pub mod status;

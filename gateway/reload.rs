@@ -2,8 +2,9 @@
 //! of them compile and all their trials pass.
 
 use crate::files::{Lookout, Mark, Rest, advice, mark, read_text, replace};
+use crate::settings;
 use adapters::channel::nearest;
-use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, shipped};
+use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, prepare_with, shipped};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -143,24 +144,42 @@ pub struct Watch {
     directory: PathBuf,
     rest: Rest<Vec<Mark>>,
     content: Option<Result<Vec<ScriptFile>, Vec<Problem>>>,
+    /// The file with the values of the settings, and what stands in it.
+    settings: Option<PathBuf>,
+    values: String,
 }
 
 impl Watch {
     /// Nothing has been seen; the first look takes everything.
     #[must_use]
     pub fn new(directory: &Path) -> Self {
-        Self { directory: directory.to_owned(), rest: Rest::new(), content: None }
+        Self {
+            directory: directory.to_owned(),
+            rest: Rest::new(),
+            content: None,
+            settings: None,
+            values: String::new(),
+        }
+    }
+
+    /// The same, and the file with the values of the settings, where there is one.
+    #[must_use]
+    pub fn beside(directory: &Path, settings: Option<&Path>) -> Self {
+        Self { settings: settings.map(Path::to_owned), ..Self::new(directory) }
     }
 
     /// Everything, when it has changed and then stood still since the look before; at the first look, and with `now`,
     /// at once and whether it has changed or not.
     pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<Problem>>> {
-        let marks = paths(&self.directory).unwrap_or_default().iter().map(|path| mark(path)).collect();
+        let paths = paths(&self.directory).unwrap_or_default();
+        let marks = paths.iter().chain(&self.settings).map(|path| mark(path)).collect();
         if !(self.rest.look(marks, now) || now) {
             return None;
         }
         let content = read_directory(&self.directory);
-        let same = self.content.as_ref() == Some(&content);
+        let values = self.settings.as_ref().and_then(|path| settings::text(path).ok()).unwrap_or_default();
+        let same = self.content.as_ref() == Some(&content) && self.values == values;
+        self.values = values;
         let content = self.content.insert(content);
         (now || !same).then_some(content)
     }
@@ -178,10 +197,14 @@ impl Reloader {
     ///
     /// # Errors
     /// No thread could be started.
-    pub fn start(directory: &Path, poll: bool) -> std::io::Result<Self> {
-        let mut watch = Watch::new(directory);
+    pub fn start(directory: &Path, settings: Option<&Path>, poll: bool) -> std::io::Result<Self> {
+        let mut watch = Watch::beside(directory, settings);
         watch.look(false);
-        let look = move |asked| watch.look(asked).cloned().map(|found| found.and_then(|files| prepare(&files)));
+        let settings = settings.map(Path::to_owned);
+        let look = move |asked| {
+            let found = watch.look(asked).cloned()?;
+            Some(found.and_then(|files| prepared(&files, settings.as_deref())))
+        };
         Lookout::start("scripts", poll, look).map(Self)
     }
 
@@ -200,8 +223,17 @@ impl Reloader {
 ///
 /// # Errors
 /// Everything that is wrong; the host says so too, and whatever was in charge stays.
-pub fn load_now(directory: &Path, host: &mut Host) -> Result<usize, Vec<Problem>> {
-    put_in_charge(read_directory(directory).and_then(|files| prepare(&files)), host)
+pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> Result<usize, Vec<Problem>> {
+    put_in_charge(read_directory(directory).and_then(|files| prepared(&files, settings)), host)
+}
+
+/// These scripts with the values of this file, compiled and tried.
+///
+/// # Errors
+/// Everything that is wrong with the scripts or with the values.
+pub fn prepared(files: &[ScriptFile], settings: Option<&Path>) -> Loaded {
+    let values = settings.map_or_else(|| Ok(rules::script::SettingValues::default()), settings::read)?;
+    prepare_with(files, &values)
 }
 
 /// What is in charge after a start at which something was wrong.
@@ -217,14 +249,19 @@ pub enum Fallback {
 
 /// At the start: puts in charge the set that was in charge before, where there is one; or every file that is right by itself;
 /// or the shipped scripts, so that the box is never without its alarms. The host goes on saying what is wrong.
-pub fn load_rest(directory: &Path, last: Option<ScriptSet>, problems: &[Problem], host: &mut Host) -> Fallback {
+pub fn load_rest(
+    (directory, settings): (&Path, Option<&Path>),
+    last: Option<ScriptSet>,
+    problems: &[Problem],
+    host: &mut Host,
+) -> Fallback {
     if let Some(set) = last.filter(|set| !set.is_empty()) {
         let count = set.len();
         host.install(set);
         host.refuse(problems.to_vec());
         return Fallback::Last(count);
     }
-    let fallback = match right(directory, problems) {
+    let fallback = match right(directory, settings, problems) {
         Ok(set) if !set.is_empty() => {
             let count = set.len();
             host.install(set);
@@ -242,7 +279,9 @@ pub fn load_rest(directory: &Path, last: Option<ScriptSet>, problems: &[Problem]
 
 /// The scripts that can be read and have no problems. Where a file could not be read, nobody has looked at the others yet:
 /// those that are not right by themselves are left out too.
-fn right(directory: &Path, problems: &[Problem]) -> Loaded {
+fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> Loaded {
+    // Values that cannot be used leave every setting at its default.
+    let prepare = |files: &[ScriptFile]| prepared(files, settings).or_else(|_| prepare(files));
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
     let readable = paths(directory).unwrap_or_default().into_iter().filter_map(|path| read_script(&path).ok());
     let mut files: Vec<ScriptFile> = readable.filter(|file| !bad(file)).collect();

@@ -69,6 +69,7 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
     let reader = Reader::open(&history)?;
     let mut query = Query::between(from_ns.saturating_sub(LEAD_IN_NS), to_ns.unwrap_or(TimeNs::MAX));
     query.series = rows::channels(&reader)?;
+    let trials = rules::script::trials(&edited).into_iter().filter_map(|result| result.problem).collect();
     let concerned = Concerned::of(&running, &edited);
     let raced = race::race(from_ns, running, edited, |take| {
         if query.series.is_empty() {
@@ -100,6 +101,7 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
         }
         .differences(),
         recorded,
+        trials,
         running: raced.running,
         edited: raced.edited,
         took: began.elapsed(),

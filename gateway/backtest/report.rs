@@ -30,6 +30,8 @@ pub struct Report {
     pub differing_s: f64,
     /// Alarms and stops, in the order of time.
     pub differences: Vec<Difference>,
+    /// Trials of the edited scripts that fail: with them they would not come into charge.
+    pub trials: Vec<Problem>,
     /// The alarms that were raised then.
     pub recorded: Recorded,
     /// The scripts in charge.
@@ -44,7 +46,7 @@ impl Report {
     /// Did the edited scripts lose an alarm or a stop, or fail?
     #[must_use]
     pub fn worse(&self) -> bool {
-        !self.edited.problems().is_empty() || self.count("lost") > 0
+        !self.trials.is_empty() || !self.edited.problems().is_empty() || self.count("lost") > 0
     }
 
     fn count(&self, word: &str) -> usize {
@@ -72,6 +74,7 @@ impl Report {
             "recorded": recorded(&self.recorded),
             "running": lane(&self.running),
             "edited": lane(&self.edited),
+            "failing_trials": self.trials.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "lost": listed("lost"),
             "gained": listed("gained"),
             "shifted": listed("shifted"),
@@ -190,6 +193,12 @@ impl fmt::Display for Report {
         writeln!(f, "{from} to {to}: {} samples, {hours:.2} h ({:.0} samples/s)", self.rows, self.rows_per_s())?;
         let [lost, gained, shifted] = ["lost", "gained", "shifted"].map(|word| self.count(word));
         writeln!(f, "alarms and stops: {lost} lost, {gained} gained, {shifted} at another time")?;
+        for trial in &self.trials {
+            writeln!(f, "  FAILED  {}", trial.to_string().replace('\n', "\n  "))?;
+        }
+        if !self.trials.is_empty() {
+            writeln!(f, "  {} trials fail: the edited scripts would not come into charge", self.trials.len())?;
+        }
         write!(f, "{}", self.recorded)?;
         for difference in self.differences.iter().take(SHOWN) {
             match difference {

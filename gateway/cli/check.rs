@@ -3,8 +3,9 @@
 use super::{CannotRun, CommandResult, Outcome};
 use crate::check::check;
 use crate::config::{self, keys};
+use ::rules::script::{Declared, declarations, shipped};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Reads configuration, scripts, model and recordings and tells everything that is wrong at once.
 #[derive(Debug, Args)]
@@ -15,7 +16,7 @@ pub(super) struct CheckArguments {
     /// The result as JSON.
     #[arg(long)]
     json: bool,
-    /// Print every key of the configuration with default, range and meaning.
+    /// Print every key of the configuration, and every setting of the scripts, with default, range and meaning.
     #[arg(long, group = "print")]
     keys: bool,
     /// Print a complete configuration file to start from.
@@ -33,14 +34,24 @@ pub(super) struct CheckArguments {
 pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     if arguments.keys {
         print!("{}", keys::table());
+        print!("{}", crate::settings::table(&declared(arguments.config.as_deref())?));
     } else if arguments.example {
         print!("{}", keys::example());
     } else if arguments.vocabulary {
-        print!("{}", rules::script::vocabulary(arguments.language == "zh"));
+        print!("{}", ::rules::script::vocabulary(arguments.language == "zh"));
     } else {
         return tell(arguments);
     }
     Ok(Outcome::Fine)
+}
+
+/// The settings that the scripts of a configuration declare, or those that come with the gateway.
+fn declared(config: Option<&Path>) -> Result<Vec<Declared>, CannotRun> {
+    let files = match config {
+        Some(_) => super::rules::configured(&super::rules::configuration(config)?)?,
+        None => shipped(),
+    };
+    declarations(&files).map_err(super::refused)
 }
 
 fn tell(arguments: &CheckArguments) -> CommandResult {

@@ -8,7 +8,8 @@ use crate::config::{self, Config};
 use crate::history::Reader;
 use crate::moment;
 use crate::reload::{read_directory, read_file};
-use ::rules::script::{self, Problem, ScriptFile, ScriptSet, TrialResult};
+use crate::settings;
+use ::rules::script::{self, Problem, ScriptFile, ScriptSet, SettingValues, TrialResult};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -91,7 +92,7 @@ pub(super) fn run(arguments: &RulesArguments) -> CommandResult {
     Ok(Outcome::Fine)
 }
 
-fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
+pub(super) fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
     config::load(file, environment).map_err(|problems| {
@@ -101,7 +102,7 @@ fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
 }
 
 /// The scripts of the configuration, or those that come with the gateway where the directory is not there yet.
-fn configured(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> {
+pub(super) fn configured(config: &Config) -> Result<Vec<ScriptFile>, CannotRun> {
     let directory = &config.scripts.directory;
     if directory.is_dir() { read_directory(directory).map_err(refused) } else { Ok(script::shipped()) }
 }
@@ -119,12 +120,13 @@ fn named(files: &[PathBuf]) -> Result<Vec<ScriptFile>, CannotRun> {
 }
 
 fn test(arguments: &TestArguments) -> CommandResult {
-    let files = if arguments.files.is_empty() {
-        configured(&configuration(arguments.config.as_deref())?)?
+    let (files, values) = if arguments.files.is_empty() {
+        let config = configuration(arguments.config.as_deref())?;
+        (configured(&config)?, settings::read(&settings::path(&config.gateway.data_dir)).map_err(refused)?)
     } else {
-        named(&arguments.files)?
+        (named(&arguments.files)?, SettingValues::default())
     };
-    let (results, problems) = tried(&files);
+    let (results, problems) = tried(&files, &values);
     let fine = problems.is_empty() && results.iter().all(|result| result.problem.is_none());
     if arguments.json {
         print_json(&json!({
@@ -140,16 +142,16 @@ fn test(arguments: &TestArguments) -> CommandResult {
 }
 
 /// Each file by itself, so that one that does not compile leaves the others their trials; then all of them together.
-fn tried(files: &[ScriptFile]) -> (Vec<TrialResult>, Vec<Problem>) {
+fn tried(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec<Problem>) {
     let (mut results, mut problems) = (Vec::new(), Vec::new());
     for file in files {
-        match script::compile(std::slice::from_ref(file)) {
+        match script::compile_one(file, files, values) {
             Ok(set) => results.extend(script::trials(&set)),
             Err(found) => problems.extend(found),
         }
     }
     if problems.is_empty() {
-        problems.extend(script::compile(files).err().into_iter().flatten());
+        problems.extend(script::compile_with(files, values).err().into_iter().flatten());
     }
     (results, problems)
 }
@@ -236,14 +238,20 @@ fn running(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, 
         Some(directory) => read_directory(directory).map_err(refused)?,
         None => active_scripts::kept(&config.gateway.data_dir).unwrap_or_else(script::shipped),
     };
-    script::compile(&files).map_err(refused)
+    script::compile_with(&files, &values_for(&files, config)).map_err(refused)
 }
 
-/// Trials are not asked for: what a script does to the history is to be seen before they are rewritten.
+/// Failing trials do not end it: what a script does to the history may be looked at before they are rewritten. They are told.
 fn edited(arguments: &BacktestArguments, config: &Config) -> Result<ScriptSet, CannotRun> {
     let files = match &arguments.scripts {
         Some(directory) => read_directory(directory).map_err(refused)?,
         None => configured(config)?,
     };
-    script::compile(&files).map_err(refused)
+    script::compile_with(&files, &values_for(&files, config)).map_err(refused)
+}
+
+/// The settings of this machine, where these scripts declare them all; otherwise the defaults.
+fn values_for(files: &[ScriptFile], config: &Config) -> SettingValues {
+    let values = settings::read(&settings::path(&config.gateway.data_dir)).unwrap_or_default();
+    if script::compile_with(files, &values).is_ok() { values } else { SettingValues::default() }
 }

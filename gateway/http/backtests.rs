@@ -128,12 +128,13 @@ fn plan(shared: &Shared, name: &str, asked: &Asked) -> Result<Plan, ApiProblem> 
     let from_ns = moment::parse(&format!("-{}", asked.since), newest_ns).map_err(bad)?;
     let files = on_disk(shared)?;
     let running = active_scripts::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
+    let values = super::rules::values(shared);
     Ok(Plan {
         history: shared.history.clone(),
         from_ns,
         to_ns: None,
         every_ns: 0,
-        running: script::compile(&running).map_err(unusable)?,
-        edited: script::compile(&with(files, name, &asked.text)).map_err(unusable)?,
+        running: script::compile_with(&running, &values).or_else(|_| script::compile(&running)).map_err(unusable)?,
+        edited: script::compile_with(&with(files, name, &asked.text), &values).map_err(unusable)?,
     })
 }

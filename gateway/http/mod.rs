@@ -19,6 +19,7 @@ mod history;
 mod host;
 mod identified;
 mod live;
+mod maintenance;
 mod metrics;
 mod operations;
 mod orders;
@@ -46,7 +47,7 @@ pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
 pub use route::{Needs, Route, Verb};
 pub use server::{Server, bind, port_trouble};
-pub use settings::Configured;
+pub use maintenance::Configured;
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
@@ -174,7 +175,7 @@ const GROUPS: &[&[Route]] = &[
     history::ROUTES,
     twin::ROUTES,
     diagnoses::ROUTES,
-    settings::ROUTES,
+    maintenance::ROUTES,
     identified::ROUTES,
     operations::ROUTES,
     series::ROUTES,
@@ -182,6 +183,7 @@ const GROUPS: &[&[Route]] = &[
     wear::ROUTES,
     handbook::ROUTES,
     rules::ROUTES,
+    settings::ROUTES,
     backtests::ROUTES,
     sign_in::ROUTES,
     orders::ROUTES,

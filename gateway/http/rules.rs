@@ -10,12 +10,13 @@ use crate::access::Role;
 use crate::drafts::{Draft, Drafts, Version, digest_of, is_name};
 use crate::files::replace;
 use crate::reload::read_directory;
+use crate::settings;
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post, put};
-use rules::script::{self, Problem, ScriptFile, TEXT_MAX, TrialResult};
+use rules::script::{self, Problem, ScriptFile, SettingValues, TEXT_MAX, TrialResult};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -61,6 +62,11 @@ pub(super) fn named(name: &str) -> Result<(), ApiProblem> {
 pub(super) fn on_disk(shared: &Shared) -> Result<Vec<ScriptFile>, ApiProblem> {
     let problems = |found: Vec<Problem>| broken(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
     read_directory(&shared.scripts).map_err(problems)
+}
+
+/// The values of the settings in force; the defaults where the file cannot be used, which the status says.
+pub(super) fn values(shared: &Shared) -> SettingValues {
+    settings::read(&settings::path(&shared.data_dir)).unwrap_or_default()
 }
 
 /// The scripts of the directory with this text in the place of one of them.
@@ -124,22 +130,27 @@ async fn check(
     named(&name)?;
     aside(move || {
         let files = with(on_disk(&shared)?, &name, &edited.text);
-        let found = script::compile(&files).err().unwrap_or_default();
+        let found = script::compile_with(&files, &values(&shared)).err().unwrap_or_default();
         Ok(Json(json!({ "schema": "check/1", "fine": found.is_empty(), "problems": problems(&found, &name) })))
     })
     .await
 }
 
 /// `POST /api/v1/rules/{file}/trials`
-async fn trials(Path(name): Path<String>, JsonBody(edited): JsonBody<Edited>) -> Result<Json<Value>, ApiProblem> {
+async fn trials(
+    State(shared): State<Shared>,
+    Path(name): Path<String>,
+    JsonBody(edited): JsonBody<Edited>,
+) -> Result<Json<Value>, ApiProblem> {
     named(&name)?;
-    aside(move || Ok(Json(tried(&name, &edited.text)))).await
+    aside(move || Ok(Json(tried(&shared, &name, &edited.text)))).await
 }
 
 /// The trials of one text, as `rules test --json` tells them.
-fn tried(name: &str, text: &str) -> Value {
+fn tried(shared: &Shared, name: &str, text: &str) -> Value {
     let file = ScriptFile { name: name.to_owned(), text: text.to_owned() };
-    let (results, found) = match script::compile(std::slice::from_ref(&file)) {
+    let files = with(on_disk(shared).unwrap_or_default(), name, text);
+    let (results, found) = match script::compile_one(&file, &files, &values(shared)) {
         Ok(set) => (script::trials(&set), Vec::new()),
         Err(found) => (Vec::new(), found),
     };
@@ -235,8 +246,8 @@ async fn activate(
         let files = on_disk(&shared)?;
         still_newest(&drafts, &files, &name, &edited.digest)?;
         let before = files.iter().find(|file| file.name == name).map(|file| file.text.clone());
-        if let Err(found) = script::prepare(&with(files, &name, &edited.text)) {
-            return Ok(refused(&name, &edited.text, &found));
+        if let Err(found) = script::prepare_with(&with(files, &name, &edited.text), &values(&shared)) {
+            return Ok(refused(&shared, &name, &edited.text, &found));
         }
         let (at_ms, by) = (now_ms(&shared), person.name);
         if let Some(text) = before.clone().filter(|_| drafts.versions(&name).is_empty()) {
@@ -253,8 +264,8 @@ async fn activate(
     .await
 }
 
-fn refused(name: &str, text: &str, found: &[Problem]) -> Response {
-    let mut document = tried(name, text);
+fn refused(shared: &Shared, name: &str, text: &str, found: &[Problem]) -> Response {
+    let mut document = tried(shared, name, text);
     document["status"] = json!(422);
     document["title"] = json!("it does not come into charge: not every trial passes");
     document["hint"] = json!("it stays a draft; the version in charge goes on");

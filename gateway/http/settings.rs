@@ -1,207 +1,95 @@
-//! What an integrator needs of the box itself: the configuration in force, a doctor for each source, a backup and its way back, an
-//! archive for whoever helps from afar. None of it holds a token, a key or a password.
+//! The settings of the scripts over the API: every one that is declared, with what is in force; one changed by a setter.
 
 use super::Shared;
-use super::diagnoses::download;
 use super::guard::told;
-use super::history::trouble;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::aside;
+use super::rules::{aside, on_disk};
 use crate::access::Role;
-use crate::archive::{Entry, pack, unpack};
-use crate::backup::{self, Places};
-use crate::config::{Config, GateMode};
-use crate::history::{Reader, Span, audit_document};
-use crate::moment;
+use crate::settings::{self, Wish};
 use axum::Json;
-use axum::body::Bytes;
 use axum::extract::State;
 use axum::response::Response;
-use axum::routing::{get, post};
+use axum::routing::{get, put};
+use rules::script::{Place, Problem, SettingValue, declarations};
 use serde::Deserialize;
-use serde_json::{Value, json};
-use std::sync::Arc;
-
-/// The name of a source.
-const NAME_MAX: usize = 4096;
-/// A backup is some hundred kilobytes.
-const BACKUP_MAX: usize = 16 << 20;
-/// Rows of each kind in the archive for whoever helps.
-const ROWS: u32 = 2000;
+use serde_json::Value;
 
 pub(super) const ROUTES: &[Route] = &[
-    Route::read("/api/v1/configuration", || get(configuration)),
-    Route::post(Role::Setter, "/api/v1/doctor", NAME_MAX, || post(doctor)),
-    Route::read_by(Role::Admin, "/api/v1/backup", || get(take)),
-    Route::post(Role::Admin, "/api/v1/restore", BACKUP_MAX, || post(restore)),
-    Route::read_by(Role::Setter, "/api/v1/support", || get(support)),
+    Route::read("/api/v1/settings", || get(list)),
+    Route::put(Role::Setter, "/api/v1/settings", 4096, || put(change)),
 ];
 
-/// What the page knows of the configuration.
-#[derive(Debug, Clone)]
-pub struct Configured {
-    /// As it is in force.
-    pub config: Arc<Config>,
-    /// The file; `None`: the built-in one.
-    pub file: Option<std::path::PathBuf>,
+/// A number, a text, or nothing: as elsewhere again.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Number(f64),
+    Text(String),
 }
 
-impl Configured {
-    fn json(&self) -> Value {
-        json!({
-            "schema": "configuration/1",
-            "file": self.file.as_ref().map(|file| file.display().to_string()),
-            "keys": self.config.in_force,
-            "shifts": self.config.http.shifts.iter().map(|at| format!("{}:{:02}", at / 60, at % 60)).collect::<Vec<_>>(),
-            "sources": self.config.sources.iter().map(|source| &source.name).collect::<Vec<_>>(),
-            "operations": self.config.operations.path.is_some(),
-            "armed": self.config.gate.greatest_mode() == GateMode::Armed,
-        })
-    }
-
-    pub(super) fn places(&self) -> Places {
-        let config = &self.config;
-        Places {
-            data_dir: config.gateway.data_dir.clone(),
-            scripts: config.scripts.directory.clone(),
-            operations: config.operations.path.clone(),
-            model: config.twin.model.clone(),
-            configuration: self.file.clone(),
-        }
-    }
-}
-
-/// `GET /api/v1/configuration`
-async fn configuration(State(shared): State<Shared>) -> Json<Value> {
-    Json(shared.configured.json())
-}
-
-/// Which source is looked at.
-#[derive(Debug, Deserialize)]
+/// One setting that is to have another value.
+#[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Asked {
-    source: String,
+    script: String,
+    name: String,
+    value: Option<Given>,
+    #[serde(default)]
+    tool: Option<String>,
+    #[serde(default)]
+    operation: Option<String>,
 }
 
-/// `POST /api/v1/doctor`: what `doctor --config FILE NAME` finds, with a second connection beside the one that polls.
-async fn doctor(State(shared): State<Shared>, JsonBody(asked): JsonBody<Asked>) -> Result<Response, ApiProblem> {
-    let found = shared.configured.config.sources.iter().find(|it| it.name == asked.source);
-    let names = || shared.configured.config.sources.iter().map(|it| it.name.as_str()).collect::<Vec<_>>().join(", ");
-    let none = || {
-        ApiProblem::request(format!("there is no source {:?}", asked.source), format!("its sources are {}", names()))
-    };
-    let address = found.ok_or_else(none)?.address.clone();
-    if address.text().contains("/dev/") {
-        let hint = "stop the gateway and run `cnc-gateway doctor` at the box: a serial line has one master at a time";
-        return Err(ApiProblem::conflict("the gateway itself reads from this serial line", hint));
-    }
-    let busy = || ApiProblem::conflict("a source is being looked at already", "wait a few seconds");
-    let place = shared.doctor.clone().try_acquire_owned().map_err(|_| busy())?;
-    let report = aside(move || {
-        let _place = place;
-        crate::doctor::examine_address(&address).map_err(|what| ApiProblem::conflict(what, "look at the address"))
-    });
-    let report = report.await?;
-    let mut document = report.json();
-    document["schema"] = json!("doctor/1");
-    document["address"] = json!(crate::config::masked(&report.address));
-    Ok(told(Json(document), format!("looked at source {}", asked.source)))
-}
-
-fn now_s(shared: &Shared) -> Result<u64, ApiProblem> {
-    Ok(shared.status()?.at_ms.div_euclid(1000).unsigned_abs())
-}
-
-fn named(what: &str, at_s: u64) -> String {
-    #[expect(clippy::cast_possible_wrap, reason = "a time of these centuries")]
-    let at = moment::utc(at_s as i64 * 1_000_000_000);
-    format!("cnc-gateway-{what}-{}.tar.gz", at.replace([':', '.'], "-"))
-}
-
-fn packed(files: &[Entry], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
-    pack(files, at_s)
-        .map_err(|error| ApiProblem::unavailable(format!("no archive could be made: {error}"), "look at the disk"))
-}
-
-/// `GET /api/v1/backup`
-async fn take(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
-    let at_s = now_s(&shared)?;
-    let bytes = aside(move || packed(&backup::collect(&shared.configured.places()), at_s)).await?;
-    Ok(download("application/gzip", &named("backup", at_s), bytes))
-}
-
-/// `POST /api/v1/restore`: scripts, recipe and model of a backup take the place of those in force.
-async fn restore(State(shared): State<Shared>, SignedIn(_): SignedIn, body: Bytes) -> Result<Response, ApiProblem> {
-    let at_s = now_s(&shared)?;
-    let done = aside(move || {
-        let files = unpack(&body).map_err(|error| {
-            ApiProblem::request(format!("this is no backup: {error}"), "give the file that `Take a backup` has made")
-        })?;
-        let places = shared.configured.places();
-        let before = packed(&backup::collect(&places), at_s)?;
-        let cannot =
-            |what: String| ApiProblem::request(what, "nothing was changed; take the backup of a box of this version");
-        backup::restore(&places, &files, (&before, &named("before-restore", at_s))).map_err(cannot)
-    });
-    let done = done.await?;
-    Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
-}
-
-/// `GET /api/v1/support`
-async fn support(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
-    let (at_s, status) = (now_s(&shared)?, shared.status()?);
-    let bytes = aside(move || {
-        let text = |value: &Value| format!("{value:#}\n").into_bytes();
-        let mut files: Vec<Entry> = vec![("configuration.json".to_owned(), text(&shared.configured.json()))];
-        let status = serde_json::to_value(&*status).unwrap_or(Value::Null);
-        files.push(("status.json".to_owned(), text(&without_secrets(status))));
-        let reader = Reader::open(&shared.history).map_err(|error| trouble(&error))?;
-        for (name, found) in history_of(&reader) {
-            files.push((name.to_owned(), text(&found)));
-        }
-        files.push(("about.txt".to_owned(), about().into_bytes()));
-        packed(&files, at_s)
-    });
-    Ok(download("application/gzip", &named("support", at_s), bytes.await?))
-}
-
-/// Addresses in the status, masked as in the configuration.
-fn without_secrets(mut status: Value) -> Value {
-    for list in ["sources", "sinks"] {
-        for one in status[list].as_array_mut().into_iter().flatten() {
-            for key in ["name", "address"] {
-                if let Some(text) = one[key].as_str().map(crate::config::masked) {
-                    one[key] = json!(text);
-                }
+impl Asked {
+    fn wish(self) -> Result<Wish, ApiProblem> {
+        let place = match (self.tool, self.operation) {
+            (None, None) => Place::Machine,
+            (Some(tool), None) => Place::Tool(tool),
+            (None, Some(operation)) => Place::Operation(operation),
+            (Some(_), Some(_)) => {
+                return Err(ApiProblem::request("a tool and an operation are both named", "name one of them"));
             }
-        }
+        };
+        let value = self.value.map(|value| match value {
+            Given::Number(number) => SettingValue::Number(number),
+            Given::Text(text) => SettingValue::Text(text),
+        });
+        let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
+        Ok(Wish { script, name: self.name, place, value })
     }
-    status
 }
 
-/// The newest of everything that is told in words; what cannot be read says so in its place.
-fn history_of(reader: &Reader) -> [(&'static str, Value); 5] {
-    fn told<T: serde::Serialize, E: std::fmt::Display>(found: Result<T, E>) -> Value {
-        found.map_or_else(
-            |error| json!({ "error": error.to_string() }),
-            |it| serde_json::to_value(it).unwrap_or(Value::Null),
-        )
-    }
-    let newest = || Span::newest(ROWS);
-    [
-        ("history.json", told(reader.info())),
-        ("events.json", told(reader.events(newest()))),
-        ("alarms.json", told(reader.alarms(newest()))),
-        ("diagnoses.json", told(reader.diagnoses(Span::newest(5)))),
-        ("audit.json", told(reader.audit(0, i64::MAX, ROWS).map(|rows| audit_document(&rows)))),
-    ]
+fn refused(problems: &[Problem]) -> ApiProblem {
+    let what: Vec<&str> = problems.iter().map(|problem| problem.what.as_str()).collect();
+    let next = problems.iter().map(|problem| problem.next.as_str()).find(|next| !next.is_empty());
+    ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
 }
 
-fn about() -> String {
-    format!(
-        "cnc-gateway {}\n\nWhat a helper needs: the configuration in force (secrets masked), the status, the newest events, alarms, diagnoses\nand rows of the audit. No token, key, password, script or sample is in it. Names of persons, programs and tools are.\n",
-        env!("CARGO_PKG_VERSION")
-    )
+/// `GET /api/v1/settings`
+async fn list(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+    aside(move || {
+        let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
+        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared))))
+    })
+    .await
+}
+
+/// `PUT /api/v1/settings`: tried with every script first; in force within a second.
+async fn change(
+    State(shared): State<Shared>,
+    SignedIn(person): SignedIn,
+    JsonBody(asked): JsonBody<Asked>,
+) -> Result<Response, ApiProblem> {
+    let wish = asked.wish()?;
+    aside(move || {
+        let files = on_disk(&shared)?;
+        let words =
+            settings::set(&shared.data_dir, &files, &wish, &person.name).map_err(|problems| refused(&problems))?;
+        let declared = declarations(&files).map_err(|problems| refused(&problems))?;
+        let answer = settings::document(declared.iter(), &super::rules::values(&shared));
+        Ok(told(Json(answer), words))
+    })
+    .await
 }

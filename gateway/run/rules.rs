@@ -7,8 +7,9 @@ use crate::config::Config;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
+use crate::settings;
 use adapters::clock::TimeNs;
-use rules::script::{Host, Problem, shipped};
+use rules::script::{Host, Problem, SettingValues, shipped};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -18,6 +19,7 @@ use std::sync::atomic::Ordering;
 #[must_use]
 pub fn load(config: &Config) -> (Host, Watched) {
     let directory = &config.scripts.directory;
+    let values = settings::path(&config.gateway.data_dir);
     let mut told = Vec::new();
     if let Err(error) = furnish(directory) {
         let text = format!("{}: the shipped scripts cannot be written there: {error}", directory.display());
@@ -28,9 +30,9 @@ pub fn load(config: &Config) -> (Host, Watched) {
         host.restore(&remembered);
     }
     if directory.is_dir() {
-        if let Err(problems) = load_now(directory, &mut host) {
+        if let Err(problems) = load_now(directory, Some(&values), &mut host) {
             let last = active_scripts::last(&config.gateway.data_dir).and_then(Result::ok);
-            let consequence = match load_rest(directory, last, &problems, &mut host) {
+            let consequence = match load_rest((directory, Some(&values)), last, &problems, &mut host) {
                 Fallback::Last(count) => format!("the {count} that were in charge before are in charge again"),
                 Fallback::Others(1) => "the other script is in charge".to_owned(),
                 Fallback::Others(count) => format!("the other {count} are in charge"),
@@ -45,7 +47,7 @@ pub fn load(config: &Config) -> (Host, Watched) {
             "the shipped scripts are in charge as delivered",
         ));
     }
-    let reloader = Reloader::start(directory, config.scripts.reload);
+    let reloader = Reloader::start(directory, Some(&values), config.scripts.reload);
     if let Err(error) = &reloader {
         let text = format!("changed scripts will not be noticed ({error}); start the box again after a change");
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
@@ -115,6 +117,21 @@ impl Watched {
         }
     }
 
+    /// The history is told every setting that has another value: who, before, after.
+    fn tell_settings(&self, before: &SettingValues, host: &Host, health: &mut Health, now_ns: TimeNs) {
+        let declared: Vec<_> = host.declared().collect();
+        let changes = settings::changes(before, host.values(), &declared);
+        if changes.is_empty() {
+            return;
+        }
+        let by = settings::author(&settings::text(&settings::path(&self.data_dir)).unwrap_or_default());
+        for change in changes {
+            let text = format!("{}, by {by}", change.words());
+            let notice = Notice::new(Severity::Info, settings::KIND, text).detail(change.detail(&by).to_string());
+            health.event(now_ns, "scripts", &notice);
+        }
+    }
+
     fn take(&mut self, pipeline: &mut Pipeline, health: &mut Health, run_flags: &RunFlags, now_ns: TimeNs) {
         for notice in self.told.drain(..) {
             health.event(now_ns, "scripts", &notice);
@@ -123,11 +140,13 @@ impl Watched {
         if run_flags.reload.swap(false, Ordering::SeqCst) {
             reloader.ask();
         }
+        let before = pipeline.scripts().values().clone();
         let notice = match reloader.step(pipeline.scripts_mut()) {
             None => return,
             Some(Ok(count)) => {
                 self.failed.clear();
                 health.put(&active_scripts::path(&self.data_dir), active_scripts::text(pipeline.scripts().files()));
+                self.tell_settings(&before, pipeline.scripts(), health, now_ns);
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }

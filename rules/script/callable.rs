@@ -24,6 +24,12 @@ impl Function {
 
 /// The functions of the host.
 pub const FUNCTIONS: &[Function] = &[
+    function(
+        "setting(name, default, #{ unit, min, max, en, zh })",
+        "A number that the shop chooses: written in place of the number itself. Its value stands in settings.toml, or is the default. \
+         More may be said of it: whole: true; per: [\"tool\", \"operation\"]; for texts one_of: [\"x\", \"y\"] in place of unit and range",
+        "声明可由车间设定的参数；数值写在 settings.toml 中",
+    ),
     function("has(x)", "true when x has a value in this run", "x 当前有值"),
     function("x ?? y", "x, or y where x has no value", "x 无值时取 y"),
     function(

@@ -4,6 +4,7 @@ use super::decision::{Axis, Stop};
 use super::timers::{AlarmText, NAMES_MAX, Timers, too_many};
 use adapters::clock::TimeNs;
 use rhai::{Dynamic, EvalAltResult, ImmutableString};
+use std::sync::Arc;
 
 /// At most this many notes in one run.
 const NOTES_MAX: usize = 8;
@@ -27,6 +28,8 @@ pub(super) struct Collected {
     pub(super) alarms: Vec<(ImmutableString, AlarmText)>,
     pub(super) notes: Vec<ImmutableString>,
     pub(super) published: Vec<(ImmutableString, Option<f64>)>,
+    /// Settings whose value depends on tool and operation.
+    pub(super) live: Option<Arc<[Dynamic]>>,
     refusals: Vec<(&'static str, String)>,
     forgotten: usize,
 }

@@ -1,15 +1,15 @@
 //! From texts to a set of scripts that can run, or everything that is wrong with them.
 
+use super::compiled::{Script, ScriptSet};
+use super::declared::{self, Declared, Force, Found, Place as Where, SettingValues};
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
-use super::events::Event;
 use super::examine::{Findings, Place, Walk};
-use super::fields::Field;
-use super::handlers::{Called, Handling, called};
+use super::handlers::{Called, called};
+use super::order::{self, Channels};
 use super::problem::{self, Problem};
 use super::settings::{Choice, merge, read_choices};
-use super::trials::{Trial, prove};
-use super::vocabulary::Word;
-use crate::estimators::Settings;
+use super::trials::prove;
+use super::variables::{self, Body};
 use adapters::clock::SECOND_NS;
 use rhai::{AST, CallFnOptions, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
@@ -27,99 +27,24 @@ pub struct ScriptFile {
     pub text: String,
 }
 
-/// A compiled script.
-pub(super) struct Script {
-    pub(super) file: Arc<str>,
-    pub(super) version: u64,
-    pub(super) ast: AST,
-    pub(super) reads: Vec<&'static Word>,
-    pub(super) fields: Vec<Field>,
-    /// Channels of its own: name and unit.
-    pub(super) channels: Vec<(ImmutableString, ImmutableString)>,
-    pub(super) handlers: Vec<Handling>,
-    pub(super) trials: Vec<Trial>,
-    /// Constants that are written as plain values: what handlers see of the body.
-    pub(super) constants: Vec<(String, Dynamic)>,
-    /// 0: at every tick.
-    pub(super) every_ns: i64,
-    /// Nothing to run: the file only has settings.
-    pub(super) passive: bool,
-    pub(super) choices: Vec<Choice>,
-    pub(super) thresholds: Vec<(String, String)>,
-}
-
-impl Script {
-    /// Has it a handler for this?
-    pub(super) fn hears(&self, event: &Event) -> bool {
-        self.handlers.iter().any(|handler| handler.kind == event.kind())
-    }
-}
-
-/// Scripts that belong together; all of them compile and their settings agree.
-#[derive(Clone, Default)]
-pub struct ScriptSet {
-    pub(super) scripts: Vec<Arc<Script>>,
-    pub(super) settings: Settings,
-    pub(super) files: Arc<[ScriptFile]>,
-}
-
-impl ScriptSet {
-    /// The settings of the estimators that these scripts ask for.
-    #[must_use]
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// The texts that it was made from.
-    #[must_use]
-    pub fn files(&self) -> &[ScriptFile] {
-        &self.files
-    }
-
-    /// Every script with its version, which is another one for another text.
-    pub fn versions(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.scripts.iter().map(|script| (&*script.file, script.version))
-    }
-
-    /// How many scripts there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.scripts.len()
-    }
-
-    /// What this set and another have in common, what only this one has, and what only the other has. A script sees nothing of
-    /// the others, so the parts together decide what the whole does. Each part keeps the settings of its set; the common one
-    /// those of this set.
-    #[must_use]
-    pub fn split(self, other: Self) -> (Self, Self, Self) {
-        let has = |set: &Self, script: &Script| {
-            set.scripts.iter().any(|its| its.file == script.file && its.version == script.version)
-        };
-        let part = |set: &Self, which: &dyn Fn(&Script) -> bool| {
-            let scripts = set.scripts.iter().filter(|script| which(script)).cloned().collect();
-            Self { scripts, settings: set.settings.clone(), files: set.files.clone() }
-        };
-        let common = part(&self, &|script| has(&other, script));
-        (common, part(&self, &|script| !has(&other, script)), part(&other, &|script| !has(&self, script)))
-    }
-
-    /// No script at all.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.scripts.is_empty()
-    }
-}
-
-/// Compiles all files, or none: a set in which one script is broken is refused as a whole.
+/// Compiles all files, or none: a set in which one script is broken is refused as a whole. Every setting has its default.
 ///
 /// # Errors
 /// Everything that is wrong in any of the files.
 pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
-    let compiler = Compiler::new();
+    compile_with(files, &SettingValues::default())
+}
+
+/// Compiles all files with these values of their settings.
+///
+/// # Errors
+/// Everything that is wrong in any of the files, and every value that no script declares or that lies outside its range.
+pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+    let compiler = Compiler::new(files);
     let mut problems = Vec::new();
     let mut scripts: BTreeMap<&str, Arc<Script>> = BTreeMap::new();
     for file in files {
-        match compiler.script(file) {
+        match compiler.script(file, |found| Force::of(found, values)) {
             Ok(script) => drop(scripts.insert(&file.name, Arc::new(script))),
             Err(found) => problems.extend(found),
         }
@@ -128,10 +53,58 @@ pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
         let what = format!("{} scripts; at most {SCRIPTS_MAX} can run together", files.len());
         problems.push(Problem::new("scripts", Position::NONE, what, "join some of them"));
     }
+    // Where a script is broken its settings are not known, and a value of the file may be right.
+    if problems.is_empty() {
+        let declared: Vec<&Declared> = scripts.values().flat_map(|script| &script.declared).collect();
+        let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+        problems.extend(values.check(&declared, &names));
+    }
     let scripts: Vec<_> = scripts.into_values().collect();
     let settings = merge(&scripts, &mut problems);
-    one_publisher(&scripts, &mut problems);
-    if problems.is_empty() { Ok(ScriptSet { scripts, settings, files: files.into() }) } else { Err(problems) }
+    order::one_publisher(&scripts, &mut problems);
+    let scripts = order::ordered(scripts, &mut problems);
+    let set = ScriptSet { scripts, settings, files: files.into(), values: Arc::new(values.clone()) };
+    if problems.is_empty() { Ok(set) } else { Err(problems) }
+}
+
+/// Compiles one file beside the others, which may be broken: for its trials alone.
+///
+/// # Errors
+/// Everything that is wrong in this file.
+pub fn compile_one(file: &ScriptFile, files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+    let script = Compiler::new(files).script(file, |found| Force::of(found, values))?;
+    let scripts = vec![Arc::new(script)];
+    let mut problems = Vec::new();
+    let settings = merge(&scripts, &mut problems);
+    let set = ScriptSet { scripts, settings, files: files.into(), values: Arc::new(values.clone()) };
+    if problems.is_empty() { Ok(set) } else { Err(problems) }
+}
+
+/// The script of this file with other values of its settings, all of them in the text: what its trials are run with.
+pub(super) fn variant(
+    set: &ScriptSet,
+    script: &Script,
+    values: &SettingValues,
+    place: &Where,
+) -> Result<Arc<Script>, Vec<Problem>> {
+    let Some(file) = set.files.iter().find(|file| file.name == *script.file) else { return Err(Vec::new()) };
+    Compiler::new(&set.files).script(file, |found| Force::fixed(found, values, place)).map(Arc::new)
+}
+
+/// Every setting that these files declare.
+///
+/// # Errors
+/// Every declaration that cannot be read.
+pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<Problem>> {
+    let engine = engine::engine(&Shared::default(), false);
+    let (mut all, mut problems) = (Vec::new(), Vec::new());
+    for file in files.iter().filter(|file| file.text.len() <= TEXT_MAX) {
+        match declared::find(file, &engine) {
+            Ok(found) => all.extend(found.into_iter().map(|it| it.declared)),
+            Err(found) => problems.extend(found),
+        }
+    }
+    if problems.is_empty() { Ok(all) } else { Err(problems) }
 }
 
 /// Compiles all files and runs their trials: what has to be well before scripts come into charge.
@@ -142,78 +115,106 @@ pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
     compile(files).and_then(prove)
 }
 
-/// A channel has one publisher.
-fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<Problem>) {
-    let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
-    for script in scripts {
-        for (name, _) in &script.channels {
-            if let Some(other) = taken.insert(name, &script.file) {
-                let what = format!("the channel {name} is also published in {other}");
-                problems.push(Problem::new(&script.file, Position::NONE, what, "keep one of the two"));
-            }
-        }
-    }
+/// The same with these values of the settings. The trials run with the defaults, with the values of the machine, and with those of
+/// each tool and operation.
+///
+/// # Errors
+/// As [`prepare`], and every value that cannot be used.
+pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+    compile_with(files, values).and_then(prove)
 }
 
 struct Compiler {
     checking: Engine,
     running: Engine,
     callable: Vec<(String, usize)>,
+    /// The channels that any of the files publishes.
+    channels: Channels,
 }
 
 impl Compiler {
-    fn new() -> Self {
+    fn new(files: &[ScriptFile]) -> Self {
         let shared = Shared::default();
         let checking = engine::engine(&shared, false);
         let callable = engine::callable(&checking);
-        Self { running: engine::engine(&shared, true), checking, callable }
+        Self { running: engine::engine(&shared, true), checking, callable, channels: Channels::of(files) }
     }
 
-    fn script(&self, file: &ScriptFile) -> Result<Script, Vec<Problem>> {
+    fn script(&self, file: &ScriptFile, force: impl Fn(&[Found]) -> Force) -> Result<Script, Vec<Problem>> {
         let name = file.name.as_str();
         if file.text.len() > TEXT_MAX {
             let what = format!("{} bytes; a script has at most {TEXT_MAX}", file.text.len());
             return Err(vec![Problem::new(name, Position::NONE, what, "split it into several files")]);
         }
-        let parse = |engine: &Engine| engine.compile(&file.text).map_err(|error| vec![problem::of_parse(name, &error)]);
-        let plain = parse(&self.checking)?;
+        let parse =
+            |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
+        // As written first: an error is told before any value stands in the text.
+        parse(&self.checking, &file.text)?;
+        let declarations = declared::find(file, &self.checking)?;
+        let force = force(&declarations);
+        let filled = ScriptFile {
+            name: file.name.clone(),
+            text: declared::with_values(&file.text, &declarations, &force.texts),
+        };
+        let plain = parse(&self.checking, &filled.text)?;
         let constants = constants(&plain);
         let mut problems = Vec::new();
-        let called = called(file, &plain, (&self.checking, &self.running), &mut problems);
-        let mut found = self.examine(name, &plain, &called, &constants);
+        let called = called(&filled, &plain, &self.checking, &mut problems);
+        let live: Vec<&str> = force.live.constants.iter().map(|(name, _)| name.as_str()).collect();
+        let mut found =
+            self.examine(name, &plain, &called, constants.iter().map(|(name, _)| name.as_str()).chain(live));
         found.problems.append(&mut problems);
-        let every_ns = every_ns(file, &plain).unwrap_or_else(|problem| {
+        let every_ns = every_ns(&filled, &plain).unwrap_or_else(|problem| {
             found.problems.push(problem);
             0
         });
         if !found.problems.is_empty() {
             return Err(found.problems);
         }
-        let ast = parse(&self.running)?;
+        let ast = parse(&self.running, &filled.text)?;
+        let choices = self.choices(&filled, &ast)?;
+        let names = variables::names(&found, &constants, &force.live);
+        let body = Body::compile(&self.running, &filled.text, &names)
+            .map_err(|error| vec![problem::of_parse(name, &error)])?;
+        let handlers = called.ready(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
         Ok(Script {
             file: file.name.as_str().into(),
-            version: version(&file.text),
+            version: if force.chosen {
+                version(&format!("{}\n{:?}", file.text, force.texts))
+            } else {
+                version(&file.text)
+            },
             every_ns,
             passive: plain.statements().is_empty(),
-            choices: self.choices(file, &ast)?,
+            choices,
             thresholds: constants.iter().map(|(name, value)| (name.clone(), value.to_string())).collect(),
             reads: found.reads,
             fields: found.fields,
             channels: found.channels,
-            handlers: called.handlers,
+            foreign: found.foreign,
+            handlers,
             trials: called.trials,
+            declared: declarations.into_iter().map(|it| it.declared).collect(),
+            live: force.live,
             constants,
+            body,
             ast,
         })
     }
 
-    fn examine(&self, file: &str, plain: &AST, called: &Called, constants: &[(String, Dynamic)]) -> Findings {
-        let mut walk = Walk::new(file, plain, &self.callable);
+    fn examine<'c>(
+        &self,
+        file: &str,
+        plain: &AST,
+        called: &Called,
+        constants: impl Iterator<Item = &'c str>,
+    ) -> Findings {
+        let mut walk = Walk::new(file, plain, &self.callable, &self.channels);
         let mut body = plain.clone();
         body.clear_functions();
         walk.read(&body, Place::Body);
         walk.read(&called.others(plain), Place::Function);
-        let constants: Vec<ImmutableString> = constants.iter().map(|(name, _)| name.as_str().into()).collect();
+        let constants: Vec<ImmutableString> = constants.map(ImmutableString::from).collect();
         for handler in &called.handlers {
             let seen: Vec<ImmutableString> = handler.parameters.iter().chain(&constants).cloned().collect();
             walk.read(&handler.plain, Place::Handler(&seen));

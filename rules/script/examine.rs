@@ -4,6 +4,7 @@
 
 use super::callable::{FUNCTIONS, Function};
 use super::fields::{self, Field, Record};
+use super::order::Channels;
 use super::problem::Problem;
 use super::trials::TRIAL_FUNCTIONS;
 use super::vocabulary::{Word, find, words};
@@ -16,6 +17,16 @@ const CHANNEL_NAME_MAX: usize = 48;
 const OF_THE_BODY: [&str; 6] =
     ["request_feed_override", "propose_offset_um", "alarm", "alarm_when", "alarm_above", "alarm_below"];
 
+/// Functions that take numbers, and at which places.
+const NUMBERS: [(&str, &[usize]); 6] = [
+    ("request_feed_override", &[0]),
+    ("propose_offset_um", &[1]),
+    ("publish", &[1]),
+    ("alarm_when", &[2]),
+    ("alarm_above", &[1, 2, 3, 4]),
+    ("alarm_below", &[1, 2, 3, 4]),
+];
+
 /// What is known of a script before it runs.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
@@ -25,6 +36,8 @@ pub(super) struct Findings {
     pub(super) fields: Vec<Field>,
     /// The channels of its own: name and unit.
     pub(super) channels: Vec<(ImmutableString, ImmutableString)>,
+    /// Channels of other scripts that it looks at.
+    pub(super) foreign: Vec<ImmutableString>,
     /// Everything that is wrong.
     pub(super) problems: Vec<Problem>,
 }
@@ -47,14 +60,15 @@ pub(super) struct Walk<'a> {
     file: &'a str,
     callable: &'a [(String, usize)],
     own: Vec<(String, usize)>,
+    channels: &'a Channels,
     pub(super) found: Findings,
 }
 
 impl<'a> Walk<'a> {
     /// `whole` is the whole file.
-    pub(super) fn new(file: &'a str, whole: &AST, callable: &'a [(String, usize)]) -> Self {
+    pub(super) fn new(file: &'a str, whole: &AST, callable: &'a [(String, usize)], channels: &'a Channels) -> Self {
         let own = whole.iter_functions().map(|it| (it.name.to_owned(), it.params.len())).collect();
-        Self { file, callable, own, found: Findings::default() }
+        Self { file, callable, own, channels, found: Findings::default() }
     }
 
     /// Looks through everything that stands in this place.
@@ -104,6 +118,7 @@ impl<'a> Walk<'a> {
             let next = "raise_alarm and clear_alarm work here; or set memory.x here and ask for it in the body";
             self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
         }
+        self.wrong_literal(call);
         let known = |(known, count): &(String, usize)| known == name && *count == arguments;
         if let Some(function) = of_trials(name) {
             return self.trial_call(function, arguments, at, place);
@@ -127,6 +142,17 @@ impl<'a> Walk<'a> {
         let names = names.filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
         let next = suggestion(nearest(name, names));
         self.problem(at, format!("there is no function `{name}`"), next);
+    }
+
+    /// A text where a function takes a number: found here, and not when that branch is first taken.
+    fn wrong_literal(&mut self, call: &FnCallExpr) {
+        let Some((name, places)) = NUMBERS.iter().find(|(name, _)| *name == call.name) else { return };
+        for place in *places {
+            if let Some(Expr::StringConstant(text, at)) = call.args.get(*place) {
+                let next = "write the number without quotes and without its unit";
+                self.problem(*at, format!("`{name}` needs a number here, not the text \"{text}\""), next);
+            }
+        }
     }
 
     fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: Place<'_>) {
@@ -166,10 +192,31 @@ impl<'a> Walk<'a> {
                 let next = "a function sees its own arguments and variables only; hand over what it needs";
                 self.problem(at, format!("there is no variable `{name}`"), next);
             }
-            (None, _) => {
-                let next = suggestion(nearest(name, words().iter().map(|word| word.name)));
-                self.problem(at, format!("there is no variable `{name}`"), next);
-            }
+            (None, Place::Trial(_)) => self.no_variable(name, at),
+            (None, _) => match self.channels.publisher(name) {
+                Some(publisher) if publisher != self.file => self.reads_of_others(name),
+                Some(_) => {
+                    let next = format!("keep it: let my_{name} = ...; publish(\"{name}\", my_{name}, ...)");
+                    self.problem(at, format!("`{name}` is published by this script itself"), next);
+                }
+                None => self.no_variable(name, at),
+            },
+        }
+    }
+
+    fn no_variable(&mut self, name: &str, at: Position) {
+        let names = words().iter().map(|word| word.name).chain(self.channels.names());
+        let shipped = || Channels::of(&super::shipped()).publisher(name).map(str::to_owned);
+        let next = match (nearest(name, names), shipped()) {
+            (_, Some(file)) => format!("{file}, which comes with the gateway, publishes it: put it among the scripts"),
+            (near, None) => suggestion(near),
+        };
+        self.problem(at, format!("there is no variable `{name}`"), next);
+    }
+
+    fn reads_of_others(&mut self, name: &str) {
+        if !self.found.foreign.iter().any(|known| *known == *name) {
+            self.found.foreign.push(name.into());
         }
     }
 

@@ -8,35 +8,38 @@ use super::compile::ScriptFile;
 use super::events::{EventKind, handled};
 use super::problem::{self, Problem};
 use super::trials::{self, Trial};
-use rhai::{AST, Engine, ImmutableString, Position, ScriptFuncDef};
+use super::variables::Body;
+use rhai::{AST, Engine, ImmutableString, ParseError, Position, ScriptFuncDef};
 
 /// A handler, ready to run.
 pub(super) struct Handling {
     pub(super) kind: EventKind,
-    pub(super) name: ImmutableString,
     pub(super) parameters: Vec<ImmutableString>,
-    /// As written, to look through.
+    pub(super) body: Body,
+}
+
+/// A handler as it stands in a file.
+pub(super) struct Written {
+    kind: EventKind,
+    name: ImmutableString,
+    pub(super) parameters: Vec<ImmutableString>,
+    text: String,
+    /// To look through.
     pub(super) plain: AST,
-    pub(super) ast: AST,
 }
 
 /// The functions of a file that the host calls.
 #[derive(Default)]
 pub(super) struct Called {
-    pub(super) handlers: Vec<Handling>,
+    pub(super) handlers: Vec<Written>,
     pub(super) trials: Vec<Trial>,
 }
 
 /// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
-pub(super) fn called(
-    file: &ScriptFile,
-    whole: &AST,
-    (checking, running): (&Engine, &Engine),
-    problems: &mut Vec<Problem>,
-) -> Called {
+pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems: &mut Vec<Problem>) -> Called {
     let mut called = Called::default();
     for function in whole.iter_fn_def() {
-        if let Err(problem) = called.add(file, function, (checking, running)) {
+        if let Err(problem) = called.add(file, function, checking) {
             problems.push(problem);
         }
     }
@@ -45,12 +48,7 @@ pub(super) fn called(
 }
 
 impl Called {
-    fn add(
-        &mut self,
-        file: &ScriptFile,
-        function: &ScriptFuncDef,
-        (checking, running): (&Engine, &Engine),
-    ) -> Result<(), Problem> {
+    fn add(&mut self, file: &ScriptFile, function: &ScriptFuncDef, checking: &Engine) -> Result<(), Problem> {
         let (begin, end) = (function.body.start_position(), function.body.end_position());
         let (name, parameters) = (function.name.clone(), function.params.to_vec());
         let trial = name.starts_with(trials::PREFIX);
@@ -63,14 +61,24 @@ impl Called {
             return Err(Problem::new(&file.name, begin, format!("the trial `{name}` has parameters"), next));
         }
         let text = only(&file.text, begin, end);
-        let parse = |engine: &Engine| engine.compile(&text).map_err(|error| problem::of_parse(&file.name, &error));
-        let plain = parse(checking)?;
+        let plain = checking.compile(&text).map_err(|error| problem::of_parse(&file.name, &error))?;
         match kind {
-            Some(kind) => self.handlers.push(Handling { kind, name, parameters, plain, ast: parse(running)? }),
+            Some(kind) => self.handlers.push(Written { kind, name, parameters, text, plain }),
             // Compiled as written, so that an error is told at its very place.
             None => self.trials.push(Trial { name: name.to_string(), at: begin, ast: plain.clone(), plain }),
         }
         Ok(())
+    }
+
+    /// The handlers, compiled for the variables that they will find: `names`, then their own parameters.
+    pub(super) fn ready(&self, running: &Engine, names: &[String]) -> Result<Vec<Handling>, ParseError> {
+        let one = |handler: &Written| {
+            let parameters = handler.parameters.iter().map(ToString::to_string);
+            let names: Vec<String> = names.iter().cloned().chain(parameters).collect();
+            let body = Body::compile(running, &handler.text, &names)?;
+            Ok(Handling { kind: handler.kind, parameters: handler.parameters.clone(), body })
+        };
+        self.handlers.iter().map(one).collect()
     }
 
     fn has(&self, name: &str) -> bool {

@@ -1,8 +1,10 @@
 //! Runs the scripts, one tick at a time.
 
-use super::compile::{ScriptFile, ScriptSet, compile};
+use super::compile::{ScriptFile, compile};
+use super::compiled::ScriptSet;
 use super::deadline::{self, Deadline};
 use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
+use super::declared::{Declared, SettingValues};
 use super::engine::{Shared, engine};
 use super::events::Happenings;
 use super::problem::Problem;
@@ -22,8 +24,8 @@ const ABSENT_MAX: usize = 64;
 
 /// The scripts in charge. Needs no clock: the time is that of the sample.
 ///
-/// A set that does not compile never gets here. A script that fails while it runs is replaced by its last good version,
-/// or suspended when there is none; either way its request ends at once and the others go on.
+/// A set that does not compile never gets here. A script that fails while it runs is replaced by its last good version, by the
+/// script of its name as it was delivered, or suspended where there is neither; either way its request ends at once and the others go on.
 pub struct Host {
     engine: Engine,
     shared: Shared,
@@ -34,6 +36,10 @@ pub struct Host {
     refused: Vec<Problem>,
     settings: Settings,
     files: Arc<[ScriptFile]>,
+    values: Arc<SettingValues>,
+    foreign: Vec<Option<f64>>,
+    /// Channels that stand in for those of scripts that are not there, for trials.
+    given: BTreeMap<String, Option<f64>>,
     generation: u64,
     happenings: Happenings,
     deadline: Option<Arc<dyn Deadline>>,
@@ -62,6 +68,9 @@ impl Host {
             refused: Vec::new(),
             settings: Settings::default(),
             files: Arc::default(),
+            values: Arc::default(),
+            foreign: Vec::new(),
+            given: BTreeMap::new(),
             generation: 0,
             happenings: Happenings::default(),
             deadline: None,
@@ -94,7 +103,7 @@ impl Host {
     }
 
     /// Puts a compiled set in charge. Every script goes on with its memory and timers, also one whose text has changed; the
-    /// version before it stays ready, with what it remembered, until the new one has run well for a minute.
+    /// version before it stays ready, with what it remembered.
     pub fn install(&mut self, set: ScriptSet) {
         self.refused.clear();
         let mut old = std::mem::take(&mut self.slots);
@@ -105,6 +114,7 @@ impl Host {
         }
         self.settings = set.settings;
         self.files = set.files;
+        self.values = set.values;
         self.generation += 1;
         self.drop_alarms();
     }
@@ -137,6 +147,26 @@ impl Host {
         &self.files
     }
 
+    /// The settings that the scripts in charge declare.
+    pub fn declared(&self) -> impl Iterator<Item = &Declared> {
+        self.slots.iter().flat_map(|slot| &slot.script().declared)
+    }
+
+    /// The values that were chosen for them.
+    #[must_use]
+    pub fn values(&self) -> &Arc<SettingValues> {
+        &self.values
+    }
+
+    /// A script that is tried alone sees this in the place of another script's channel. False where it reads no such channel.
+    pub(super) fn give(&mut self, channel: &str, value: Option<f64>) -> bool {
+        let reads = self.slots.iter().any(|slot| slot.script().foreign.iter().any(|name| *name == *channel));
+        if reads {
+            self.given.insert(channel.to_owned(), value);
+        }
+        reads
+    }
+
     /// Every script with the version that is in charge, or was when it was suspended. They change together with
     /// [`Host::generation`].
     pub fn versions(&self) -> impl Iterator<Item = (&str, u64)> {
@@ -159,12 +189,15 @@ impl Host {
         decision.alarms.append(&mut self.pending);
         let mut outputs = Outputs { alarms: &mut self.alarms, decision };
         let events = self.happenings.step(sample, estimates);
-        let moment = Moment { sample, estimates, events };
         let mut replaced = false;
-        for slot in &mut self.slots {
+        for at in 0..self.slots.len() {
+            let (before, from_here) = self.slots.split_at_mut(at);
+            let Some(slot) = from_here.first_mut() else { break };
             if let Some(deadline) = &self.deadline {
                 deadline.begin();
             }
+            slot.look_at(before, &self.given, &mut self.foreign);
+            let moment = Moment { sample, estimates, events, foreign: &self.foreign };
             replaced |= slot.tick(&self.engine, &self.shared, &moment, &mut outputs);
         }
         self.gather();

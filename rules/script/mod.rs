@@ -22,7 +22,9 @@
 //! | `outcomes` | the functions through which a script leaves its effects |
 //! | `functions` | the methods that scripts call by name, one table per subject |
 //! | `api` | everything of it as a document |
-//! | `compile`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
+//! | `declared` | the settings that scripts declare, and their values |
+//! | `compile`, `compiled`, `examine`, `handlers`, `settings` | from text to a script, and everything that is wrong with it |
+//! | `order` | channels that one script reads of another, and the order of running |
 //! | `host`, `slot`, `variables`, `running`, `collect`, `notes` | running |
 //! | `timers`, `script_memory` | what a script remembers |
 //! | `trials` | given and expected, written in the script file itself |
@@ -33,8 +35,10 @@ mod api;
 mod callable;
 mod collect;
 mod compile;
+mod compiled;
 mod deadline;
 mod decision;
+mod declared;
 mod engine;
 mod events;
 mod examine;
@@ -43,6 +47,7 @@ pub mod functions;
 mod handlers;
 mod host;
 mod notes;
+mod order;
 mod outcomes;
 mod problem;
 mod running;
@@ -58,12 +63,14 @@ mod vocabulary;
 
 pub use api::{api, api_json};
 pub use callable::{FUNCTIONS, Function};
-pub use compile::{ScriptFile, ScriptSet, compile, prepare};
+pub use compile::{ScriptFile, compile, compile_one, compile_with, declarations, prepare, prepare_with};
+pub use compiled::ScriptSet;
 pub use deadline::Deadline;
 pub use decision::{
     Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
     StopRequest,
 };
+pub use declared::{Declared, Per, Place, SettingValue, SettingValues};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};
 pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};

@@ -17,12 +17,25 @@ pub(super) fn register(engine: &mut Engine, shared: &Shared) {
         let (least, greatest) = (number("clamp", &least)?, number("clamp", &greatest)?);
         Ok(number("clamp", &value)?.max(least).min(greatest))
     });
+    settings(engine, shared);
     memory(engine, shared);
     requests(engine, shared);
     alarms(engine, shared);
     alarm_when(engine, shared);
     threshold(engine, shared, "alarm_above", 1.0);
     threshold(engine, shared, "alarm_below", -1.0);
+}
+
+/// `setting` stands in a text only until its value is put in its place; `setting_now` is what is put there where the value depends
+/// on the tool or the operation.
+fn settings(engine: &mut Engine, shared: &Shared) {
+    engine.register_fn("setting", |_: Text, default: Dynamic, _: Dynamic| default);
+    let to = shared.clone();
+    engine.register_fn("setting_now", move |index: i64| {
+        let collected = to.lock();
+        let at = usize::try_from(index).ok();
+        at.zip(collected.live.as_ref()).and_then(|(at, live)| live.get(at).cloned()).unwrap_or(Dynamic::UNIT)
+    });
 }
 
 fn memory(engine: &mut Engine, shared: &Shared) {

@@ -71,6 +71,13 @@ fn reserved(word: &str) -> (String, String) {
     (format!("`{word}` cannot be used in a script"), next.to_owned())
 }
 
+/// The same in a text that was compiled behind `lines` lines of declarations.
+pub(super) fn of_run_behind(file: &str, error: &EvalAltResult, lines: usize) -> Problem {
+    let mut problem = of_run(file, error, super::OPERATIONS_MAX);
+    problem.line = problem.line.map(|line| line.saturating_sub(lines).max(1));
+    problem
+}
+
 /// An error while running. `file` is where it happened.
 pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> Problem {
     let (inner, at) = innermost(error);

@@ -1,7 +1,7 @@
 //! Runs of a compiled script, with what the interpreter may keep between two of them.
 
 use super::collect::Outcome;
-use rhai::{AST, Caches, Engine, GlobalRuntimeState, Scope};
+use rhai::{AST, Caches, Engine, GlobalRuntimeState, Scope, Stmt};
 
 /// What the interpreter keeps for one script: its functions, and which function each call means. Looking every call up
 /// anew costs more than half of a run.
@@ -23,7 +23,7 @@ impl Running {
         functions: &AST,
     ) -> Outcome<()> {
         self.begin(engine, functions);
-        self.run(engine, scope, ast)
+        self.run(engine, scope, functions, ast.statements())
     }
 
     /// Operations are counted from here on. `ast` holds the functions of the script.
@@ -33,13 +33,19 @@ impl Running {
     }
 
     /// Runs statements from top to bottom. After an error nothing is kept.
-    pub(super) fn run(&mut self, engine: &Engine, scope: &mut Scope<'_>, ast: &AST) -> Outcome<()> {
-        let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| begin(engine, ast));
+    pub(super) fn run(
+        &mut self,
+        engine: &Engine,
+        scope: &mut Scope<'_>,
+        functions: &AST,
+        statements: &[Stmt],
+    ) -> Outcome<()> {
+        let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| begin(engine, functions));
         #[expect(
             deprecated,
             reason = "the only call that takes caches; rhai offers no other before its next major version"
         )]
-        let _value = engine.eval_statements_raw(&mut global, &mut caches, scope, ast.statements())?;
+        let _value = engine.eval_statements_raw(&mut global, &mut caches, scope, statements)?;
         self.kept = Some((global, caches));
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The settings of the estimators, as scripts give them in `fn settings()`.
 
-use super::compile::{Script, ScriptFile, position_of};
+use super::compile::{ScriptFile, position_of};
+use super::compiled::Script;
 use super::problem::{Problem, spoken};
 use crate::estimators::{SettingError, Settings};
 use rhai::{Array, Dynamic, Map, Position};

@@ -1,17 +1,22 @@
 //! One active script: its variables, its timers, its last good version.
 
+mod alarms;
+
 use super::collect::{Collected, Outcome};
-use super::compile::Script;
+use super::compile::{ScriptFile, compile};
+use super::compiled::Script;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{
     Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
 };
-use super::engine::{OPERATIONS_MAX, Shared};
+use super::declared::Now;
+use super::engine::Shared;
 use super::events::Event;
 use super::notes::NoteLimit;
-use super::problem;
+use super::problem::{self, Problem};
 use super::running::Running;
 use super::script_memory::ScriptMemory;
+use super::shipped::shipped;
 use super::status::{Condition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill, has_absent, scope_of, why_absent};
@@ -21,10 +26,9 @@ use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rhai::{Engine, EvalAltResult, ImmutableString, Scope};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A new version that has run well for this long needs no older one behind it.
-const PROBATION_NS: i64 = 60 * SECOND_NS;
 /// A longer time between two runs is a pause: `dt_s` is 0 after it and timers begin anew.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 
@@ -33,6 +37,8 @@ pub(super) struct Moment<'a> {
     pub(super) sample: &'a Sample,
     pub(super) estimates: &'a Estimates,
     pub(super) events: &'a [Event],
+    /// The channels of other scripts that this one reads, in its order.
+    pub(super) foreign: &'a [Option<f64>],
 }
 
 /// Where a run leaves its effects.
@@ -41,7 +47,8 @@ pub(super) struct Outputs<'a> {
     pub(super) decision: &'a mut Decision,
 }
 
-/// The version before, with what it remembered when it was replaced.
+/// The version before, with what it remembered when it was replaced. It stays for as long as the new one: a branch that is taken once
+/// a month fails in that month.
 struct Previous {
     script: Arc<Script>,
     script_memory: ScriptMemory,
@@ -55,6 +62,7 @@ pub(super) struct Slot {
     base: usize,
     running: Running,
     timers: Timers,
+    now: Now,
     condition: Condition,
     request: Option<OverrideRequest>,
     reason: (ImmutableString, Arc<str>),
@@ -99,6 +107,7 @@ impl Slot {
             script,
             previous,
             timers: script_memory.timers,
+            now: Now::default(),
             condition: Condition::Running,
             request: None,
             reason: (ImmutableString::new(), Arc::from("")),
@@ -148,6 +157,21 @@ impl Slot {
         rows.map(|((name, unit), value)| Published { name, unit, script: &self.script.file, value: *value })
     }
 
+    /// The channels of other scripts that it reads: what those before it have published, or what a trial gives.
+    pub(super) fn look_at(
+        &self,
+        before: &[Self],
+        given: &BTreeMap<String, Option<f64>>,
+        foreign: &mut Vec<Option<f64>>,
+    ) {
+        let value = |name: &ImmutableString| {
+            let published = before.iter().flat_map(Self::published).find(|it| *it.name == **name);
+            published.map_or_else(|| given.get(name.as_str()).copied().flatten(), |it| it.value)
+        };
+        foreign.clear();
+        foreign.extend(self.script.foreign.iter().map(value));
+    }
+
     /// Nothing is asked for any more.
     pub(super) fn withdraw(&mut self) {
         self.request = None;
@@ -177,8 +201,10 @@ impl Slot {
         }
         let dt_s = if due { self.elapsed_s(at_ns) } else { 0.0 };
         let view = View { sample: moment.sample, estimates: moment.estimates, dt_s };
-        fill(&mut self.scope, &self.script, &view);
+        let live = (!self.script.live.is_empty()).then(|| self.now.step(&self.script.live, moment.sample));
+        fill(&mut self.scope, &self.script, &view, (moment.foreign, live.as_deref().unwrap_or_default()));
         self.exchange(shared, at_ns);
+        shared.lock().live = live;
         let outcome = self.run(engine, moment.events, due);
         self.scope.rewind(self.base);
         let mut collected = shared.lock();
@@ -186,7 +212,7 @@ impl Slot {
         match outcome {
             Ok(()) => self.succeed(&mut collected, due, outputs),
             Err(error) if problem::is_absence(&error) && self.any_absent(&collected) => {
-                self.wait(&error, &view, &collected);
+                self.wait(&error, &view, &collected, moment.foreign);
             }
             Err(error) if is_late(&error) && self.late + 1 < LATE_MAX => self.leave_out(&error, outputs),
             Err(error) => return self.fail(&error, outputs),
@@ -203,13 +229,13 @@ impl Slot {
                 for (name, value) in handler.parameters.iter().zip(event.values()) {
                     self.scope.push_dynamic(name.clone(), value);
                 }
-                self.running.run(engine, &mut self.scope, &handler.ast)?;
+                self.running.run(engine, &mut self.scope, &script.ast, handler.body.statements())?;
                 self.scope.rewind(self.base);
             }
         }
         if due {
             self.runs += 1;
-            self.running.run(engine, &mut self.scope, &script.ast)?;
+            self.running.run(engine, &mut self.scope, &script.ast, script.body.statements())?;
         }
         // `memory` lives on, so its size is checked after every run.
         self.scope.get("memory").map_or(Ok(()), |memory| engine.ensure_data_size_within_limits(memory))
@@ -246,10 +272,7 @@ impl Slot {
         if matches!(self.condition, Condition::Waiting(_)) {
             self.condition = Condition::Running;
         }
-        let good_since_ns = *self.good_since_ns.get_or_insert(collected.now_ns);
-        if self.previous.is_some() && collected.now_ns - good_since_ns > PROBATION_NS {
-            self.previous = None;
-        }
+        self.good_since_ns.get_or_insert(collected.now_ns);
         if due {
             self.ask(collected);
             self.named.clear();
@@ -311,43 +334,20 @@ impl Slot {
         }
     }
 
-    /// Begins and ends alarms: those that the body named and those that stand until they are cleared.
-    fn alarms(&self, now_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        for (name, text) in self.named.iter().map(|(name, text)| (name, text)).chain(self.timers.latched()) {
-            let standing = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name == **name;
-            if !outputs.alarms.iter().any(standing) {
-                self.begin_alarm(name, text, now_ns, outputs);
-            }
-        }
-        let own = |alarm: &Alarm| *alarm.script == *self.script.file && *alarm.name != *SCRIPT_STOPPED;
-        let asked = |alarm: &Alarm| {
-            let named = self.named.iter().any(|(name, _)| **name == *alarm.name);
-            named || self.timers.latched().contains_key(&*alarm.name)
-        };
-        let over = |alarm: &Alarm| own(alarm) && !asked(alarm);
-        let ended = outputs.alarms.iter().filter(|alarm| over(alarm)).map(|alarm| alarm.change(false));
-        outputs.decision.alarms.extend(ended);
-        outputs.alarms.retain(|alarm| !over(alarm));
-    }
-
-    fn begin_alarm(&self, name: &str, text: &AlarmText, since_ns: TimeNs, outputs: &mut Outputs<'_>) {
-        let (en, zh) = (Arc::from(text.en.as_str()), Arc::from(text.zh.as_str()));
-        let script = self.script.file.clone();
-        let alarm = Alarm { name: Arc::from(name), script, level: text.level, en, zh, since_ns };
-        outputs.decision.alarms.push(alarm.change(true));
-        outputs.alarms.push(alarm);
+    fn told(&self, error: &EvalAltResult) -> Problem {
+        problem::of_run_behind(&self.script.file, error, self.script.body.lines)
     }
 
     /// The script worked on a value that is not there: it asks for nothing, publishes nothing and tries again; alarms stay
     /// as they are.
-    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected) {
+    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected, foreign: &[Option<f64>]) {
         self.withdraw();
         self.values.fill(None);
         if self.condition != Condition::Running {
             return;
         }
-        let mut problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
-        let absent: Vec<String> = why_absent(&self.script, view).chain(collected.refusals()).collect();
+        let mut problem = self.told(error);
+        let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
     }
@@ -357,16 +357,16 @@ impl Slot {
         self.withdraw();
         self.values.fill(None);
         self.late += 1;
-        outputs.decision.problems.push(problem::of_run(&self.script.file, error, OPERATIONS_MAX));
+        outputs.decision.problems.push(self.told(error));
     }
 
     /// The script failed. True when an older version has come into charge.
     fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
         self.withdraw();
         self.values.fill(None);
-        let problem = problem::of_run(&self.script.file, error, OPERATIONS_MAX);
+        let problem = self.told(error);
         let at_ns = outputs.decision.at_ns;
-        let previous = self.previous.take();
+        let previous = self.previous.take().or_else(|| self.as_delivered());
         let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
         let en = format!("{problem}; {next} until the file is changed");
         let zh = format!("脚本已停止：{problem}");
@@ -382,6 +382,15 @@ impl Slot {
         self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
         outputs.decision.problems.push(problem);
         replaced
+    }
+
+    /// The script of this name as it was delivered, where nothing else has ever been good. It goes on with empty memory: what an
+    /// edited one has remembered may mean something else.
+    fn as_delivered(&self) -> Option<Previous> {
+        let files: Vec<ScriptFile> = shipped().into_iter().filter(|file| *file.name == *self.script.file).collect();
+        let script = compile(&files).ok()?.scripts.first()?.clone();
+        let fits = |script: &Script| script.version != self.script.version && script.foreign.is_empty();
+        fits(&script).then(|| Previous { script, script_memory: ScriptMemory::default() })
     }
 
     pub(super) fn status(&self) -> ScriptStatus {

@@ -1,16 +1,59 @@
 //! The variables of one script: made once, filled before every run.
+//!
+//! The names that a script finds are known before it runs, so its text is compiled behind declarations of them: each variable is
+//! then a place that the interpreter knows, and no name is searched at run time. The declarations themselves are never run, nor
+//! are the constants at the head of the script, whose values stand in the scope once and for all.
 
-use super::compile::Script;
+use super::compiled::Script;
+use super::declared::Live;
+use super::examine::Findings;
 use super::vocabulary::{Seen, View};
-use rhai::{Dynamic, ImmutableString, Map, Scope};
+use rhai::{AST, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
+
+/// The variables that the body and every handler find, in the order of [`scope_of`].
+pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &Live) -> Vec<String> {
+    let mut names = vec!["memory".to_owned()];
+    names.extend(found.reads.iter().filter(|word| !word.writable()).map(|word| word.name.to_owned()));
+    let records = super::fields::RECORDS.iter().map(|record| record.name);
+    names.extend(records.filter(|name| found.fields.iter().any(|it| it.record.name == *name)).map(str::to_owned));
+    names.extend(found.foreign.iter().map(ToString::to_string));
+    names.extend(live.constants.iter().map(|(name, _)| name.clone()));
+    names.extend(constants.iter().map(|(name, _)| name.clone()));
+    names
+}
+
+/// Statements that run with the variables of [`names`] in the scope.
+pub(super) struct Body {
+    ast: AST,
+    /// Declarations before the first statement of the script.
+    skip: usize,
+    /// Lines before its first line.
+    pub(super) lines: usize,
+}
+
+impl Body {
+    /// Compiles a text behind declarations of these names.
+    pub(super) fn compile(engine: &Engine, text: &str, names: &[String]) -> Result<Self, ParseError> {
+        let head: String = names.iter().map(|name| format!("let {name};")).collect();
+        let ast = engine.compile(format!("{head}\n{text}"))?;
+        let declared = |(stmt, name): (&Stmt, &String)| matches!(stmt, Stmt::Var(it, ..) if it.0.name == *name);
+        if ast.statements().len() >= names.len() && ast.statements().iter().zip(names).all(declared) {
+            return Ok(Self { ast, skip: names.len(), lines: 1 });
+        }
+        // The text ends where the declarations do: nothing is left of it to run.
+        Ok(Self { ast: engine.compile(text)?, skip: 0, lines: 0 })
+    }
+
+    /// What runs.
+    pub(super) fn statements(&self) -> &[Stmt] {
+        &self.ast.statements()[self.skip.min(self.ast.statements().len())..]
+    }
+}
 
 /// Only what the script reads; a variable that nobody looks at costs nothing. Its constants stand here too, for handlers.
 pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
-    let mut scope = Scope::with_capacity(8 + script.reads.len());
+    let mut scope = Scope::with_capacity(16 + script.reads.len() + script.constants.len());
     scope.push("memory", memory);
-    for (name, value) in &script.constants {
-        scope.push_constant_dynamic(name.clone(), value.clone());
-    }
     for word in script.reads.iter().filter(|word| !word.writable()) {
         scope.push_dynamic(word.name, Dynamic::UNIT);
     }
@@ -21,11 +64,25 @@ pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
             scope.push(record.name, map);
         }
     }
+    for name in &script.foreign {
+        scope.push_dynamic(name.clone(), Dynamic::UNIT);
+    }
+    for (name, _) in &script.live.constants {
+        scope.push_dynamic(name.clone(), Dynamic::UNIT);
+    }
+    for (name, value) in &script.constants {
+        scope.push_constant_dynamic(name.clone(), value.clone());
+    }
     scope
 }
 
-/// Sets every variable to what is seen now.
-pub(super) fn fill(scope: &mut Scope<'static>, script: &Script, view: &View<'_>) {
+/// Sets every variable to what is seen now. `foreign` are the channels of other scripts, `live` the settings of this tool.
+pub(super) fn fill(
+    scope: &mut Scope<'static>,
+    script: &Script,
+    view: &View<'_>,
+    (foreign, live): (&[Option<f64>], &[Dynamic]),
+) {
     for word in script.reads.iter().filter(|word| !word.writable()) {
         if let Some(place) = scope.get_mut(word.name) {
             set(place, &word.see(view));
@@ -36,6 +93,16 @@ pub(super) fn fill(scope: &mut Scope<'static>, script: &Script, view: &View<'_>)
         let Some(mut map) = record.write_lock::<Map>() else { continue };
         if let Some(place) = map.get_mut(field.word.name) {
             set(place, &field.see(view));
+        }
+    }
+    for (name, value) in script.foreign.iter().zip(foreign) {
+        if let Some(place) = scope.get_mut(name) {
+            set(place, &value.map_or(Seen::Absent, Seen::Number));
+        }
+    }
+    for (name, index) in &script.live.constants {
+        if let (Some(place), Some(value)) = (scope.get_mut(name), live.get(*index)) {
+            place.clone_from(value);
         }
     }
 }
@@ -57,22 +124,30 @@ fn set_text(place: &mut Dynamic, text: &str) {
 
 /// Is anything that the script reads without a value?
 pub(super) fn has_absent(scope: &Scope<'_>, script: &Script) -> bool {
-    let absent = |name| scope.get(name).is_some_and(Dynamic::is_unit);
+    let absent = |name: &str| scope.get(name).is_some_and(Dynamic::is_unit);
     let field = |record, name| {
         let map = scope.get(record).and_then(|record| record.read_lock::<Map>());
         map.is_some_and(|map| map.get(name).is_some_and(Dynamic::is_unit))
     };
     script.reads.iter().any(|word| !word.writable() && absent(word.name))
+        || script.foreign.iter().any(|name| absent(name))
         || script.fields.iter().any(|it| field(it.record.name, it.word.name))
 }
 
 /// Everything that the script reads and that has no value, with the reason.
-pub(super) fn why_absent<'a>(script: &'a Script, view: &'a View<'_>) -> impl Iterator<Item = String> {
+pub(super) fn why_absent<'a>(
+    script: &'a Script,
+    view: &'a View<'_>,
+    foreign: &'a [Option<f64>],
+) -> impl Iterator<Item = String> {
     let fields = script.fields.iter().map(|field| field.word);
     let mut told: Vec<&str> = Vec::new();
-    script.reads.iter().copied().chain(fields).filter_map(move |word| {
+    let of_others = script.foreign.iter().zip(foreign).filter(|(_, value)| value.is_none());
+    let of_others = of_others.map(|(name, _)| format!("{name} has no value (its script publishes none now)"));
+    let own = script.reads.iter().copied().chain(fields).filter_map(move |word| {
         let why = word.why_absent(view).filter(|_| !told.contains(&word.name))?;
         told.push(word.name);
         Some(format!("{} has no value ({why})", word.name))
-    })
+    });
+    own.chain(of_others)
 }

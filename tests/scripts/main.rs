@@ -2,6 +2,7 @@
 
 mod backtest;
 mod deciding;
+mod declared;
 mod failing;
 mod mad;
 mod methods;

@@ -94,8 +94,8 @@ fn a_running_host_follows_the_directory_and_keeps_the_last_good_scripts() {
     let directory = tempfile::tempdir().expect("a directory");
     write(directory.path(), "a.rhai", "request_feed_override(90, \"first\");");
     let mut host = Host::new();
-    assert_eq!(load_now(directory.path(), &mut host), Ok(1));
-    let reloader = Reloader::start(directory.path(), true).expect("a thread");
+    assert_eq!(load_now(directory.path(), None, &mut host), Ok(1));
+    let reloader = Reloader::start(directory.path(), None, true).expect("a thread");
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
 
     std::thread::sleep(Duration::from_millis(100));
@@ -121,7 +121,7 @@ fn a_running_host_follows_the_directory_and_keeps_the_last_good_scripts() {
 #[test]
 fn a_directory_that_is_gone_is_told_and_changes_nothing() {
     let mut host = host("request_feed_override(90, \"good\");");
-    let problems = load_now(Path::new("/nowhere/scripts"), &mut host).expect_err("it is not there");
+    let problems = load_now(Path::new("/nowhere/scripts"), None, &mut host).expect_err("it is not there");
     assert!(told(&problems).contains("name another one as `directory` under [scripts]"), "{}", told(&problems));
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
 }
@@ -132,16 +132,16 @@ fn a_start_with_a_broken_file_puts_the_others_in_charge_and_with_none_left_the_s
     write(directory.path(), "a.rhai", "request_feed_override(90, \"good\");");
     write(directory.path(), "b.rhai", "request_feed_override(70, ");
     let mut host = Host::new();
-    let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
-    assert_eq!(load_rest(directory.path(), None, &problems, &mut host), Fallback::Others(1));
+    let problems = load_now(directory.path(), None, &mut host).expect_err("b does not compile");
+    assert_eq!(load_rest((directory.path(), None), None, &problems, &mut host), Fallback::Others(1));
     assert_eq!(request(&mut host, 0.0, &[]), Some(90.0));
     assert_eq!(host.status().refused, problems, "and this is said");
 
     fs::write(directory.path().join("c.rhai"), [0xff, 0xfe]).expect("written");
     let mut host = Host::new();
-    let unreadable = load_now(directory.path(), &mut host).expect_err("c is no text");
+    let unreadable = load_now(directory.path(), None, &mut host).expect_err("c is no text");
     assert_eq!(
-        load_rest(directory.path(), None, &unreadable, &mut host),
+        load_rest((directory.path(), None), None, &unreadable, &mut host),
         Fallback::Others(1),
         "a, and neither b nor c"
     );
@@ -149,13 +149,13 @@ fn a_start_with_a_broken_file_puts_the_others_in_charge_and_with_none_left_the_s
     fs::remove_file(directory.path().join("c.rhai")).expect("removed");
 
     let last = compile(&[file("a.rhai", "request_feed_override(95, \"before\");")]).expect("it compiles");
-    assert_eq!(load_rest(directory.path(), Some(last), &problems, &mut host), Fallback::Last(1));
+    assert_eq!(load_rest((directory.path(), None), Some(last), &problems, &mut host), Fallback::Last(1));
     assert_eq!(request(&mut host, 0.1, &[]), Some(95.0), "what was in charge before goes first");
 
     fs::remove_file(directory.path().join("a.rhai")).expect("removed");
     let mut host = Host::new();
-    let problems = load_now(directory.path(), &mut host).expect_err("b does not compile");
-    assert_eq!(load_rest(directory.path(), None, &problems, &mut host), Fallback::Shipped);
+    let problems = load_now(directory.path(), None, &mut host).expect_err("b does not compile");
+    assert_eq!(load_rest((directory.path(), None), None, &problems, &mut host), Fallback::Shipped);
     assert_eq!(host.status().scripts.len(), shipped().len());
     assert!(!host.status().well());
 }

@@ -75,6 +75,8 @@ pub struct FeedCurves {
     pub feed: String,
     /// Column of the feature.
     pub feature: String,
+    /// Material of the work, where the recording names one and only one.
+    pub material: Option<String>,
     /// By speed and depth.
     pub curves: Vec<CurveLearned>,
     /// The plateaus they rest on.
@@ -119,6 +121,7 @@ pub fn identify_feed_curve(recording: &Recording, feed: &str, feature: &str) -> 
     let mut learned = FeedCurves {
         feed: feed.to_owned(),
         feature: feature.to_owned(),
+        material: one_word(recording, "work_material"),
         curves: Vec::new(),
         plateaus: Vec::new(),
         refused: Vec::new(),
@@ -142,6 +145,14 @@ pub fn identify_feed_curve(recording: &Recording, feed: &str, feature: &str) -> 
     }
     learned.plateaus = plateaus;
     Ok(learned)
+}
+
+/// The word that every row of a column has that has one.
+fn one_word(recording: &Recording, column: &str) -> Option<String> {
+    let words = recording.words(column)?;
+    let mut found = (0..recording.rows()).filter_map(|row| words.get(row)).filter(|word| !word.is_empty());
+    let first = found.next()?;
+    found.all(|word| word == first).then(|| first.to_owned())
 }
 
 fn nothing() -> Refusal {

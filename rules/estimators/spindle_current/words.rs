@@ -1,65 +1,77 @@
 //! Feed curves as text and as a script.
 
+use super::family::Family;
 use super::feed_curve::{CurveLearned, FeedCurves, Scatter};
+use super::plateaus::SAME;
 use std::fmt::{self, Write as _};
 
+/// The script that holds the curves: one law for all of them, and for none.
+const LAW: &str = include_str!("../../scripts/constant_load.rhai");
+/// How the curves begin in it.
+const CURVES: &str = "const CURVES = ";
+
 impl FeedCurves {
-    /// A script that holds the curves, infers the equivalent depth of cut and asks for the feed that gives the wanted
-    /// feature; it asks only, the gate decides. One speed: that with the most curves.
+    /// The shipped script of constant load with these curves in it, and with the quantity, unit, speed, tool and material that
+    /// they hold for; it asks only, the gate decides. One speed: that with the most curves. The target is the mean of the
+    /// recording.
     ///
     /// `None` where no speed has a usable family.
     #[must_use]
     pub fn script(&self) -> Option<String> {
         let usable = self.speeds_rpm().into_iter().filter_map(|speed| Some((speed, self.family(speed).ok()?)));
         let (speed_rpm, family) = usable.max_by_key(|(_, family)| family.curves().len())?;
+        let begin = LAW.find(CURVES)?;
+        let end = begin + LAW[begin..].find(";\n")?;
+        let text = format!("{}{CURVES}{}{}", &LAW[..begin], self.map(speed_rpm, &family), &LAW[end..]);
+        Some(self.with_target(&text))
+    }
+
+    /// The curves of a speed as the map that the script holds.
+    #[must_use]
+    pub fn map(&self, speed_rpm: f64, family: &Family) -> String {
         let mut rows = String::new();
         for it in family.curves() {
             let [c0, c1, c2, c3] = it.curve.coefficients;
-            let (low, high) = (it.curve.feed_min, it.curve.feed_max);
-            let _ = writeln!(
-                rows,
-                "    [{:.4}, {}, {}, {}, {}, {}, {}, {}],",
-                it.depth_mm,
-                float(low),
-                float(high),
-                float(c0),
-                float(c1),
-                float(c2),
-                float(c3),
-                float(it.sd)
-            );
+            let numbers = [it.depth_mm, it.curve.feed_min, it.curve.feed_max, c0, c1, c2, c3, it.sd].map(float);
+            let _infallible = writeln!(rows, "    [{}],", numbers.join(", "));
         }
+        let near = |plateau: &&super::plateaus::Plateau| (plateau.speed_rpm / speed_rpm - 1.0).abs() <= SAME;
+        let mut tools: Vec<&str> = self.plateaus.iter().filter(near).filter_map(|it| it.tool.as_deref()).collect();
+        tools.sort_unstable();
+        tools.dedup();
+        let tool = if let [tool] = tools[..] { tool } else { "" };
+        let material = self.material.as_deref().unwrap_or("");
+        format!(
+            "#{{ quantity: {:?}, unit: {:?}, feed: {:?}, speed_rpm: {}, tool: {tool:?}, material: {material:?}, rows: [\n{rows}] }}",
+            self.feature,
+            unit(&self.feature),
+            self.feed,
+            float(speed_rpm),
+        )
+    }
+
+    /// The mean of the recording as the default of the target in the unit of the curves.
+    fn with_target(&self, text: &str) -> String {
         let levels = self.plateaus.iter().map(|plateau| plateau.level.mean);
         let wanted = levels.clone().sum::<f64>() / crate::statistics::count(levels.count().max(1));
-        let (feed, feature) = (&self.feed, &self.feature);
-        Some(format!(
-            "// Constant load by {feature}: curves over {feed}, identified from recordings. 由主轴电流的恒负荷进给\n\
-             // This only asks. The gate decides. 仅请求，由闸门决定\n\n\
-             const EVERY_S = 0.5;\n\
-             // The curves hold for this speed alone. 曲线适用的转速\n\
-             const SPEED_RPM = {speed};\n\
-             // What to aim at: here the mean of the recording; find the best by trial. 目标值\n\
-             const WANTED = {wanted};\n\
-             // Depth of cut in mm, least and greatest feed, c0 to c3, standard deviation of one cut. 曲线族\n\
-             const CURVES = [\n{rows}];\n\
-             // What to ask for at least and at most. 请求范围\n\
-             const MIN_PCT = 60.0;\nconst MAX_PCT = 110.0;\n\n\
-             let here = has(spindle_speed_rpm) && spindle_speed_rpm > 0.98 * SPEED_RPM && spindle_speed_rpm < 1.02 * SPEED_RPM;\n\
-             if here && state == \"cutting\" && state_s >= 1.0 && has({feed}) && has({feature}) && has(feed_override_pct) {{\n    \
-                 let depth_mm = {depth};\n    \
-                 let feed = feed_curve_feed(CURVES, depth_mm, WANTED);\n    \
-                 if has(feed) && {feed} > 0.0 {{\n        \
-                     let pct = clamp(feed_override_pct * feed / {feed}, MIN_PCT, MAX_PCT);\n        \
-                     request_feed_override(pct, \"constant load by current\");\n    \
-                 }}\n}}\n",
-            speed = float(speed_rpm),
-            wanted = float(wanted),
-            depth = if family.curves().len() > 1 {
-                format!("feed_curve_depth_mm(CURVES, {feed}, {feature})")
-            } else {
-                float(family.curves()[0].depth_mm)
-            },
-        ))
+        let (setting, default) = match unit(&self.feature) {
+            "W" => ("target_w", "0.0"),
+            "A" => ("target_a", "0.0"),
+            _ => ("target_load_pct", "70.0"),
+        };
+        // Three digits: a target is no measurement.
+        let rounded = format!("{:.1}", wanted.max(0.1));
+        text.replacen(&format!("setting(\"{setting}\", {default},"), &format!("setting(\"{setting}\", {rounded},"), 1)
+    }
+}
+
+/// The unit at the end of a column's name.
+fn unit(column: &str) -> &'static str {
+    match column.rsplit('_').next() {
+        Some("w") => "W",
+        Some("a") => "A",
+        Some("pct") => "%",
+        _ => "1",
     }
 }
 

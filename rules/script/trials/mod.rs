@@ -15,20 +15,27 @@
 //! | file | what |
 //! |---|---|
 //! | `functions` | what a trial can call |
+//! | `smoke` | a script without trials: does it run at all? |
 //! | `stage` | the script, its inputs, its clock |
 
 mod functions;
+mod smoke;
 mod stage;
 
 pub use functions::TRIAL_FUNCTIONS;
 
-use super::compile::{Script, ScriptSet};
+use super::compile::variant;
+use super::compiled::{Script, ScriptSet};
+use super::declared::{Place, SettingValues};
 use super::engine::{OPERATIONS_MAX, Shared, engine};
 use super::problem::{self, Problem};
 use super::running::Running;
 use rhai::{AST, Engine, Position, Scope};
 use stage::{Stage, Theatre};
 use std::sync::Arc;
+
+/// Tools and operations with values of their own whose trials are run; more of them take the same path through the script.
+const PLACES_MAX: usize = 16;
 
 /// How the name of a trial begins.
 pub(super) const PREFIX: &str = "trial_";
@@ -59,10 +66,12 @@ pub struct TrialResult {
     pub problem: Option<Problem>,
 }
 
-/// Every trial of every script, in the order of files and lines.
+/// Every trial of every script, in the order of files and lines: with the values of the settings that are in force, and where
+/// values were chosen also with the defaults and with the values of each tool and operation. A script without a trial is run for
+/// a few seconds with and without values: it must come to an end and not fail.
 #[must_use]
 pub fn trials(set: &ScriptSet) -> Vec<TrialResult> {
-    set.scripts.iter().flat_map(of_script).collect()
+    set.scripts.iter().flat_map(|script| of_script(set, script)).collect()
 }
 
 /// May these scripts come into charge?
@@ -74,15 +83,55 @@ pub fn prove(set: ScriptSet) -> Result<ScriptSet, Vec<Problem>> {
     if problems.is_empty() { Ok(set) } else { Err(problems) }
 }
 
-fn of_script(script: &Arc<Script>) -> Vec<TrialResult> {
+/// A script with other values of its settings, and which they are.
+type Variant = (Option<String>, Arc<Script>);
+
+fn variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<Variant> {
+    let section = script.file.strip_suffix(".rhai").unwrap_or(&script.file);
+    let own = |place: &Place| {
+        let all = set.values.all().filter(|(its, _, at, _)| *its == section && *at == place);
+        all.map(|(_, name, _, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
+    };
+    let places = set.values.places(section);
+    if own(&Place::Machine).is_empty() && places.is_empty() {
+        return vec![(None, script.clone())];
+    }
+    let machine = format!("with {} in force", own(&Place::Machine));
+    let mut wanted = vec![
+        ("with the defaults".to_owned(), SettingValues::default(), Place::Machine),
+        (machine, (*set.values).clone(), Place::Machine),
+    ];
+    let special = |place: &Place| (format!("with {} for {place}", own(place)), (*set.values).clone(), place.clone());
+    wanted.extend(places.iter().take(PLACES_MAX).map(special));
+    let ready = |(told, values, place): &(String, SettingValues, Place)| {
+        // It has compiled with these values already; a set without texts is tried as it is.
+        variant(set, script, values, place).ok().map(|script| (Some(told.clone()), script))
+    };
+    let found: Vec<Variant> = wanted.iter().filter_map(ready).collect();
+    if found.is_empty() { vec![(None, script.clone())] } else { found }
+}
+
+fn of_script(set: &ScriptSet, script: &Arc<Script>) -> Vec<TrialResult> {
+    variants(set, script).into_iter().flat_map(|(with, script)| of_variant(&script, with.as_deref())).collect()
+}
+
+fn of_variant(script: &Arc<Script>, with: Option<&str>) -> Vec<TrialResult> {
     if script.trials.is_empty() {
-        return Vec::new();
+        return smoke::run(script).into_iter().collect();
     }
     let theatre = Theatre::default();
     let mut engine = engine(&Shared::default(), false);
     functions::register(&mut engine, &theatre);
     let mut results: Vec<TrialResult> =
         script.trials.iter().map(|trial| perform(&engine, &theatre, script, trial)).collect();
+    for result in &mut results {
+        if let (Some(with), Some(problem)) = (with, &mut result.problem) {
+            problem.what = format!("{with}: {}", problem.what);
+        }
+        if let Some(with) = with {
+            result.name = format!("{} ({with})", result.name);
+        }
+    }
     results.sort_by_key(|result| result.line);
     results
 }

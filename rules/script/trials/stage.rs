@@ -1,7 +1,7 @@
 //! What a trial is played on: one script, what it sees, and a clock of its own.
 
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
-use crate::script::compile::{Script, ScriptSet};
+use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
 use crate::script::problem::Problem;
 use crate::script::settings::merge;
@@ -110,6 +110,9 @@ impl Stage {
                 }
             }
             None => {
+                if self.host.give(name, number(value)) {
+                    return Ok(());
+                }
                 let place = quantity_of(&mut self.estimates, name).ok_or_else(|| unknown(name))?;
                 *place = match number(value) {
                     Some(value) => Ok(Estimate { value, sd: SD_SHARE * value.abs() }),
@@ -202,6 +205,28 @@ impl Stage {
     /// The offset proposed for an axis.
     pub(super) fn offset_um(&self, axis: Axis) -> Option<f64> {
         self.decision().offsets.iter().find(|proposal| proposal.axis == axis).map(|proposal| proposal.offset_um)
+    }
+
+    /// From now on the script sees a plain value of everything that it reads: the middle of the range of a channel, 100 of an
+    /// estimate and of another script's channel.
+    pub(super) fn give_all(&mut self, script: &Script) {
+        let text = |name: &str| Dynamic::from(ImmutableString::from(if name == "program" { "O1" } else { "T1" }));
+        let words = script.reads.iter().copied().chain(script.fields.iter().map(|field| field.word));
+        for word in words.filter(|word| !word.writable()) {
+            let value = match (ChannelId::of(word.name).map(ChannelId::channel), word.kind) {
+                (Some(channel), WordKind::Number) => {
+                    let (least, greatest) = channel.range;
+                    Dynamic::from_float(100.0_f64.clamp(least, greatest))
+                }
+                (Some(_), _) => text(word.name),
+                (None, _) => Dynamic::from_float(100.0),
+            };
+            // What cannot be given, such as the time, is there anyway.
+            let _given = self.give(word.name, &value);
+        }
+        for name in &script.foreign {
+            self.host.give(name, Some(100.0));
+        }
     }
 
     /// The newest value of a channel of the script's own; `Err` where it has none of this name.

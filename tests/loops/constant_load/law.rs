@@ -66,7 +66,7 @@ pub(super) fn shipped(name: &str, constants: &[(&str, String)]) -> ScriptFile {
     let mut text = std::fs::read_to_string(path).expect("the shipped script");
     for (constant, value) in constants {
         let begin = text.find(&format!("const {constant} = ")).expect("a constant of the script");
-        let end = begin + text[begin..].find(';').expect("it ends");
+        let end = begin + text[begin..].find(";\n").expect("it ends");
         text.replace_range(begin..end, &format!("const {constant} = {value}"));
     }
     script(name, text)
@@ -81,7 +81,7 @@ pub(super) fn by_exponent(target_w: f64) -> ScriptFile {
 /// The shipped script by learned curves, aiming at this power of the whole spindle.
 pub(super) fn by_curves(learned: &FeedCurves, target_w: f64) -> ScriptFile {
     let [least, most] = [MIN_PCT, MAX_PCT].map(|pct| format!("{pct:.1}"));
-    let curves = format!("[{}]", rows(learned));
+    let curves = learned.map(SPEED_RPM, &learned.family(SPEED_RPM).expect("curves that do not cross"));
     let constants = [("TARGET_W", format!("{target_w:.1}")), ("MIN_PCT", least), ("MAX_PCT", most), ("CURVES", curves)];
     shipped("constant_load.rhai", &constants)
 }

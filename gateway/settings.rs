@@ -1,0 +1,244 @@
+//! The settings of the scripts: what they declare, what is in force on this machine, who has changed it.
+//!
+//! The values stand in `settings.toml` in the data directory. A person may edit it; the box reads it again within a second. The page
+//! and the interface change it through [`set`], which tries every script with the new values first and writes the name of the person
+//! into the first line, with a digest of the rest: a file that somebody has edited by hand afterwards is not taken for theirs.
+
+use crate::files::{read_text, replace};
+use crate::reload::digest;
+use rules::script::{Declared, Place, Problem, ScriptFile, SettingValue, SettingValues, prepare_with};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// Name of the file in the data directory.
+pub const FILE: &str = "settings.toml";
+/// Bytes that are read of it.
+const TEXT_MAX: usize = 256 * 1024;
+/// Kind of the events that tell a change.
+pub const KIND: &str = "setting_changed";
+/// Who has changed a file that no person was signed in for.
+const BY_HAND: &str = "the file settings.toml";
+
+/// Where the values stand.
+#[must_use]
+pub fn path(data_dir: &Path) -> PathBuf {
+    data_dir.join(FILE)
+}
+
+/// The text of the file; empty where it is not there.
+///
+/// # Errors
+/// It is there and cannot be read.
+pub fn text(path: &Path) -> Result<String, Vec<Problem>> {
+    match read_text(path, TEXT_MAX) {
+        Ok(text) => Ok(text),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
+        Err(error) => {
+            let (file, what) = (path.display().to_string(), format!("the settings cannot be read: {error}"));
+            let next = "save it as UTF-8 text, or take it away: then every setting has its default".to_owned();
+            Err(vec![Problem { file, line: None, column: None, what, next }])
+        }
+    }
+}
+
+/// The values of the file; none where it is not there.
+///
+/// # Errors
+/// Everything in it that is no value.
+pub fn read(path: &Path) -> Result<SettingValues, Vec<Problem>> {
+    SettingValues::parse(FILE, &text(path)?)
+}
+
+/// One setting that is to have another value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// Section: the name of the script without its ending.
+    pub script: String,
+    /// Name of the setting.
+    pub name: String,
+    /// For which tool or operation, or the machine.
+    pub place: Place,
+    /// The value; `None`: as everywhere else again, or the default.
+    pub value: Option<SettingValue>,
+}
+
+/// Changes one setting when every script compiles and every trial passes with it. Tells what was changed, from what to what.
+///
+/// # Errors
+/// Why the value cannot be used; nothing has been changed then.
+pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Result<String, Vec<Problem>> {
+    let path = path(data_dir);
+    let before = read(&path)?;
+    let mut after = before.clone();
+    let Wish { script, name, place, value } = wish;
+    after.put(script, name, place, value.clone());
+    // Read again, so that a message names the line on which the value would stand.
+    let body = after.text();
+    let after = SettingValues::parse(FILE, &body)?;
+    let set = prepare_with(files, &after)?;
+    let declared: Vec<&Declared> = set.declared().collect();
+    let words = changes(&before, &after, &declared).iter().map(Change::words).collect::<Vec<_>>().join(", ");
+    let digest = digest(body.as_bytes());
+    let text = format!("# set by {by:?} {digest:016x}\n{body}");
+    replace(&path, &text).map_err(|error| {
+        let (file, what) = (path.display().to_string(), format!("the settings cannot be written: {error}"));
+        vec![Problem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
+    })?;
+    Ok(if words.is_empty() { format!("{script}.{name} stays as it is") } else { words })
+}
+
+/// Who has written this text: the person whom the first line names, where the rest is still what that person has left.
+#[must_use]
+pub fn author(text: &str) -> String {
+    let named = || {
+        let (first, body) = text.split_once('\n')?;
+        let (by, its) = first.strip_prefix("# set by \"")?.rsplit_once("\" ")?;
+        (its == format!("{:016x}", digest(body.as_bytes()))).then(|| by.to_owned())
+    };
+    named().unwrap_or_else(|| BY_HAND.to_owned())
+}
+
+/// A setting that has another value than before.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// `constant_load.target_w`
+    pub path: String,
+    /// For what.
+    pub place: Place,
+    /// Unit symbol.
+    pub unit: String,
+    /// What held before.
+    pub before: String,
+    /// What holds now.
+    pub after: String,
+}
+
+impl Change {
+    /// In words, for the audit and the history.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let Self { path, place, unit, before, after } = self;
+        let place = if *place == Place::Machine { String::new() } else { format!(" for {place}") };
+        format!("{path}{place}: {before} -> {after} {unit}").trim_end().to_owned()
+    }
+
+    /// The detail of its event.
+    #[must_use]
+    pub fn detail(&self, by: &str) -> Value {
+        json!({ "setting": self.path, "place": self.place.to_string(), "unit": self.unit, "before": self.before,
+            "after": self.after, "by": by })
+    }
+}
+
+/// Every setting that has another value.
+#[must_use]
+pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<Change> {
+    let mut found = Vec::new();
+    for it in declared {
+        let mut places = vec![Place::Machine];
+        places.extend(before.places(it.section()).into_iter().chain(after.places(it.section())));
+        places.sort();
+        places.dedup();
+        for place in places {
+            let of = |values: &SettingValues| values.of(it.section(), &it.name, &place).cloned();
+            let (old, new) = (of(before), of(after));
+            if old == new {
+                continue;
+            }
+            let usual = if place == Place::Machine { it.default.to_string() } else { "as the machine".to_owned() };
+            let word = |value: Option<SettingValue>| value.map_or_else(|| usual.clone(), |value| value.to_string());
+            let (before, after) = (word(old), word(new));
+            found.push(Change { path: it.path(), place, unit: it.unit.clone(), before, after });
+        }
+    }
+    found
+}
+
+/// Every declared setting with what is in force: `settings/1`.
+#[must_use]
+pub fn document<'a>(declared: impl Iterator<Item = &'a Declared>, values: &SettingValues) -> Value {
+    let rows: Vec<Value> = declared.map(|it| row(it, values)).collect();
+    json!({ "schema": "settings/1", "settings": rows })
+}
+
+fn json_of(value: &SettingValue) -> Value {
+    match value {
+        SettingValue::Number(number) => json!(number),
+        SettingValue::Text(text) => json!(text),
+    }
+}
+
+fn row(it: &Declared, values: &SettingValues) -> Value {
+    let of = |place: &Place| values.of(it.section(), &it.name, place);
+    let special: Vec<Value> = values
+        .places(it.section())
+        .iter()
+        .filter_map(|place| {
+            let mut row = Map::new();
+            row.insert(place.per()?.word().to_owned(), json!(place.name()));
+            row.insert("value".to_owned(), json_of(of(place)?));
+            Some(Value::Object(row))
+        })
+        .collect();
+    json!({
+        "script": it.section(), "name": it.name, "value": json_of(of(&Place::Machine).unwrap_or(&it.default)),
+        "chosen": of(&Place::Machine).is_some(), "default": json_of(&it.default), "unit": it.unit,
+        "least": it.range.map(|range| range.0), "greatest": it.range.map(|range| range.1), "whole": it.whole,
+        "one_of": it.one_of, "per": it.per.iter().map(|per| per.word()).collect::<Vec<_>>(), "special": special,
+        "en": it.en, "zh": it.zh,
+    })
+}
+
+/// The settings as a table, as `check --keys` prints it.
+#[must_use]
+pub fn table(declared: &[Declared]) -> String {
+    let mut text = String::from("\nSettings of the scripts: settings.toml in the data directory\n");
+    let mut section = "";
+    for it in declared {
+        if it.section() != section {
+            section = it.section();
+            text += &format!("\n[{section}]\n");
+        }
+        let per: Vec<&str> = it.per.iter().map(|per| per.word()).collect();
+        let per = if per.is_empty() { String::new() } else { format!("; also per {}", per.join(" and ")) };
+        text += &format!("{} = {}\n    {}{per}. {}\n", it.name, it.default, it.takes(), it.en);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCRIPT: &str = "const X = setting(\"x_w\", 5.0, #{ unit: \"W\", min: 0, max: 10, per: [\"tool\"], en: \"a\", zh: \"b\" });\n\
+        alarm_when(\"over\", (cutting_power_w ?? 0.0) > X, 0.0, \"over\");";
+
+    #[test]
+    fn a_setting_is_tried_written_and_told_with_its_author() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let files = [ScriptFile { name: "one.rhai".to_owned(), text: SCRIPT.to_owned() }];
+        let mut wish = Wish {
+            script: "one".to_owned(),
+            name: "x_w".to_owned(),
+            place: Place::Machine,
+            value: Some(SettingValue::Number(7.0)),
+        };
+        assert_eq!(set(directory.path(), &files, &wish, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
+        let written = std::fs::read_to_string(path(directory.path())).expect("written");
+        assert_eq!(author(&written), "Li", "{written}");
+        assert_eq!(author(&written.replace("7.0", "8.0")), BY_HAND);
+        wish.place = Place::Tool("T 1".to_owned());
+        assert_eq!(
+            set(directory.path(), &files, &wish, "Wu").as_deref(),
+            Ok("one.x_w for tool T 1: as the machine -> 7.0 W")
+        );
+        wish.value = Some(SettingValue::Number(11.0));
+        let refused = set(directory.path(), &files, &wish, "Wu").expect_err("out of range");
+        assert!(refused[0].what.contains("outside 0 to 10 W"), "{refused:?}");
+        let values = read(&path(directory.path())).expect("readable");
+        let declared = rules::script::declarations(&files).expect("readable");
+        let document = document(declared.iter(), &values);
+        assert_eq!(document["settings"][0]["special"][0]["tool"], "T 1");
+        assert_eq!((&document["settings"][0]["value"], &document["settings"][0]["least"]), (&json!(7.0), &json!(0.0)));
+    }
+}

@@ -1,0 +1,138 @@
+//! The values in force for one script: which stand in its text, and which are looked up by tool and operation.
+
+use super::{Declared, Found, Place, SettingValue, SettingValues};
+use adapters::{ChannelId, Sample};
+use rhai::Dynamic;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// See the [module](self).
+#[derive(Debug, Clone, Default)]
+pub(in crate::script) struct Force {
+    /// The value of each declaration as it stands in the text; `None` where it is looked up.
+    pub(in crate::script) texts: Vec<Option<SettingValue>>,
+    /// What is looked up.
+    pub(in crate::script) live: Live,
+    /// Is anything else than the default in force?
+    pub(in crate::script) chosen: bool,
+}
+
+impl Force {
+    /// The values of this file for these declarations. One that the declaration does not allow is left out: it is a problem of
+    /// the file.
+    pub(in crate::script) fn of(found: &[Found], values: &SettingValues) -> Self {
+        let mut force = Self::default();
+        for (index, it) in found.iter().enumerate() {
+            let declared = &it.declared;
+            let allowed = |place: &Place| {
+                let value = values.of(declared.section(), &declared.name, place)?;
+                declared.refuse(value).is_none().then(|| value.clone())
+            };
+            let machine = allowed(&Place::Machine).unwrap_or_else(|| declared.default.clone());
+            let places = values.places(declared.section()).into_iter();
+            let special: Vec<(Place, SettingValue)> = places
+                .filter(|place| place.per().is_some_and(|per| declared.per.contains(&per)))
+                .filter_map(|place| Some((allowed(&place)?, place)))
+                .map(|(value, place)| (place, value))
+                .collect();
+            force.chosen |= machine != declared.default || !special.is_empty();
+            if special.is_empty() {
+                force.texts.push(Some(machine.clone()));
+            } else {
+                force.texts.push(None);
+            }
+            force.live.add(index, it.constant.as_deref(), &machine, special);
+        }
+        force
+    }
+
+    /// The values of the machine, or of one place, all of them in the text.
+    pub(in crate::script) fn fixed(found: &[Found], values: &SettingValues, place: &Place) -> Self {
+        let of = |declared: &Declared, place: &Place| {
+            let value = values.of(declared.section(), &declared.name, place)?;
+            (declared.refuse(value).is_none()).then(|| value.clone())
+        };
+        let text = |it: &Found| {
+            let declared = &it.declared;
+            of(declared, place).or_else(|| of(declared, &Place::Machine)).unwrap_or_else(|| declared.default.clone())
+        };
+        let texts: Vec<Option<SettingValue>> = found.iter().map(|it| Some(text(it))).collect();
+        let chosen = found.iter().zip(&texts).any(|(it, value)| value.as_ref() != Some(&it.declared.default));
+        Self { texts, live: Live::default(), chosen }
+    }
+}
+
+/// Values that depend on the tool or the operation.
+#[derive(Debug, Clone, Default)]
+pub(in crate::script) struct Live {
+    /// Value of the machine for every declaration; unit where it stands in the text.
+    machine: Vec<Dynamic>,
+    special: BTreeMap<Place, Vec<(usize, Dynamic)>>,
+    /// Constants whose value is looked up, with the number of their declaration.
+    pub(in crate::script) constants: Vec<(String, usize)>,
+}
+
+impl Live {
+    fn add(
+        &mut self,
+        index: usize,
+        constant: Option<&str>,
+        machine: &SettingValue,
+        special: Vec<(Place, SettingValue)>,
+    ) {
+        self.machine.push(if special.is_empty() { Dynamic::UNIT } else { dynamic(machine) });
+        if let Some(constant) = constant.filter(|_| !special.is_empty()) {
+            self.constants.push((constant.to_owned(), index));
+        }
+        for (place, value) in special {
+            self.special.entry(place).or_default().push((index, dynamic(&value)));
+        }
+    }
+
+    /// Is nothing looked up?
+    pub(in crate::script) fn is_empty(&self) -> bool {
+        self.special.is_empty()
+    }
+
+    /// The values for this tool and this operation; the operation goes before the tool.
+    fn values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
+        let mut values = self.machine.clone();
+        let places =
+            [tool.map(|tool| Place::Tool(tool.to_owned())), operation.map(|it| Place::Operation(it.to_owned()))];
+        for (index, value) in places.iter().flatten().filter_map(|place| self.special.get(place)).flatten() {
+            values[*index] = value.clone();
+        }
+        values.into()
+    }
+}
+
+fn dynamic(value: &SettingValue) -> Dynamic {
+    match value {
+        SettingValue::Number(number) => Dynamic::from_float(*number),
+        SettingValue::Text(text) => text.as_str().into(),
+    }
+}
+
+/// The values that hold now, looked up anew when the tool or the operation has changed.
+#[derive(Debug, Default)]
+pub(in crate::script) struct Now {
+    tool: Option<String>,
+    operation: Option<String>,
+    values: Option<Arc<[Dynamic]>>,
+}
+
+impl Now {
+    /// The values for this sample.
+    pub(in crate::script) fn step(&mut self, live: &Live, sample: &Sample) -> Arc<[Dynamic]> {
+        let text = |name: &str| ChannelId::of(name).and_then(|id| sample.text(id));
+        let (tool, operation) = (text("tool"), text("operation"));
+        match &self.values {
+            Some(values) if self.tool.as_deref() == tool && self.operation.as_deref() == operation => values.clone(),
+            _ => {
+                let values = live.values(tool, operation);
+                (self.tool, self.operation) = (tool.map(str::to_owned), operation.map(str::to_owned));
+                self.values.insert(values).clone()
+            }
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! The file with the values of settings, checked against what the scripts declare.
+
+use super::{Declared, Per, SettingValue};
+use crate::script::problem::Problem;
+use crate::script::shipped;
+use adapters::channel::nearest;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use toml::de::{DeTable, DeValue};
+
+/// Bytes of the file.
+const TEXT_MAX: usize = 256 * 1024;
+/// Values of the file.
+const VALUES_MAX: usize = 4096;
+
+/// What a value is for.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Place {
+    /// The machine, wherever nothing more special has a value.
+    Machine,
+    /// One tool, as the channel `tool` names it.
+    Tool(String),
+    /// One operation, as the channel `operation` names it. It goes before the tool.
+    Operation(String),
+}
+
+impl Place {
+    /// What it is a place of; `None` for the machine.
+    #[must_use]
+    pub fn per(&self) -> Option<Per> {
+        match self {
+            Self::Machine => None,
+            Self::Tool(_) => Some(Per::Tool),
+            Self::Operation(_) => Some(Per::Operation),
+        }
+    }
+
+    /// The tool or the operation.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Machine => "",
+            Self::Tool(name) | Self::Operation(name) => name,
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Machine => f.write_str("this machine"),
+            Self::Tool(name) => write!(f, "tool {name}"),
+            Self::Operation(name) => write!(f, "operation {name}"),
+        }
+    }
+}
+
+/// A value, and where it is written.
+#[derive(Debug, Clone, PartialEq)]
+struct Chosen {
+    value: SettingValue,
+    line: usize,
+    column: usize,
+}
+
+type Key = (String, String, Place);
+
+/// Every value of the file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SettingValues {
+    file: String,
+    chosen: BTreeMap<Key, Chosen>,
+}
+
+impl SettingValues {
+    /// Reads the file; `file` is its name in messages. An empty text chooses nothing.
+    ///
+    /// # Errors
+    /// Everything that is no value of a setting, each with line and column.
+    pub fn parse(file: &str, text: &str) -> Result<Self, Vec<Problem>> {
+        let mut reader = Reader { file, text, problems: Vec::new(), chosen: BTreeMap::new() };
+        reader.read();
+        match reader.problems.is_empty() {
+            true => Ok(Self { file: file.to_owned(), chosen: reader.chosen }),
+            false => Err(reader.problems),
+        }
+    }
+
+    /// Does the file choose nothing?
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.chosen.is_empty()
+    }
+
+    /// The value of a setting in this place, where the file has one.
+    #[must_use]
+    pub fn of(&self, section: &str, name: &str, place: &Place) -> Option<&SettingValue> {
+        self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| &chosen.value)
+    }
+
+    /// The line on which a value stands, from 1.
+    #[must_use]
+    pub fn line(&self, section: &str, name: &str, place: &Place) -> Option<usize> {
+        self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| chosen.line)
+    }
+
+    /// Every value: section, name, place, value.
+    pub fn all(&self) -> impl Iterator<Item = (&str, &str, &Place, &SettingValue)> {
+        self.chosen.iter().map(|((section, name, place), chosen)| (&**section, &**name, place, &chosen.value))
+    }
+
+    /// The places of one section that have values of their own, besides the machine.
+    #[must_use]
+    pub fn places(&self, section: &str) -> Vec<Place> {
+        let of = |key: &&Key| key.0 == section && key.2 != Place::Machine;
+        self.chosen.keys().filter(of).map(|key| key.2.clone()).collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// Puts a value into a place; `None` takes it out.
+    pub fn put(&mut self, section: &str, name: &str, place: &Place, value: Option<SettingValue>) {
+        let key = (section.to_owned(), name.to_owned(), place.clone());
+        match value {
+            Some(value) => drop(self.chosen.insert(key, Chosen { value, line: 0, column: 0 })),
+            None => drop(self.chosen.remove(&key)),
+        }
+    }
+
+    /// The file as the gateway writes it: sections and names in the order of the alphabet.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut open = None;
+        for ((section, name, place), chosen) in &self.sorted() {
+            let header = (section.clone(), place.clone());
+            if open.as_ref() != Some(&header) {
+                let below = place.per().map_or(String::new(), |per| format!(".{}.{:?}", per.word(), place.name()));
+                text += &format!("{}[{section}{below}]\n", if open.is_some() { "\n" } else { "" });
+                open = Some(header);
+            }
+            text += &format!("{name} = {}\n", chosen.value);
+        }
+        text
+    }
+
+    fn sorted(&self) -> Vec<(Key, Chosen)> {
+        let mut rows: Vec<(Key, Chosen)> = self.chosen.iter().map(|(key, it)| (key.clone(), it.clone())).collect();
+        rows.sort_by(|(a, _), (b, _)| (&a.0, &a.2, &a.1).cmp(&(&b.0, &b.2, &b.1)));
+        rows
+    }
+
+    /// Everything of the file that does not fit what is declared. `scripts` are all files, also those without settings.
+    #[must_use]
+    pub fn check(&self, declared: &[&Declared], scripts: &[&str]) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        for ((section, name, place), chosen) in &self.chosen {
+            if let Some((what, next)) = wrong((section, name, place), &chosen.value, declared, scripts) {
+                let (line, column) = (Some(chosen.line), Some(chosen.column));
+                problems.push(Problem { file: self.file.clone(), line, column, what, next });
+            }
+        }
+        problems.sort_by_key(|problem| problem.line);
+        problems
+    }
+}
+
+fn wrong(
+    (section, name, place): (&str, &str, &Place),
+    value: &SettingValue,
+    declared: &[&Declared],
+    scripts: &[&str],
+) -> Option<(String, String)> {
+    let own: Vec<&&Declared> = declared.iter().filter(|it| it.section() == section).collect();
+    let Some(found) = own.iter().find(|it| it.name == name) else {
+        let file = format!("{section}.rhai");
+        if !scripts.contains(&&*file) && shipped().iter().any(|script| script.name == file) {
+            return None; // A shipped script that was taken out: its settings wait for it.
+        }
+        if own.is_empty() {
+            let sections = declared.iter().map(|it| it.section());
+            let near = nearest(section, sections).map_or_else(
+                || "`cnc-gateway check --keys` lists every setting of the scripts".to_owned(),
+                |near| format!("did you mean [{near}]?"),
+            );
+            return Some((format!("no script {file} declares settings"), near));
+        }
+        let near = nearest(name, own.iter().map(|it| it.name.as_str()));
+        let all = || own.iter().map(|it| it.name.as_str()).collect::<Vec<_>>().join(", ");
+        let next = near.map_or_else(|| format!("{file} has {}", all()), |near| format!("did you mean {near}?"));
+        return Some((format!("{file} has no setting {name}"), next));
+    };
+    if let Some(per) = place.per().filter(|per| !found.per.contains(per)) {
+        let what = format!("{} has no values for a single {}", found.path(), per.word());
+        return Some((what, format!("write it in [{section}]")));
+    }
+    found.refuse(value)
+}
+
+struct Reader<'t> {
+    file: &'t str,
+    text: &'t str,
+    problems: Vec<Problem>,
+    chosen: BTreeMap<Key, Chosen>,
+}
+
+impl Reader<'_> {
+    fn wrong(&mut self, at: usize, what: impl Into<String>, next: &str) {
+        let (line, column) = self.place(at);
+        let (file, what, next) = (self.file.to_owned(), what.into(), next.to_owned());
+        self.problems.push(Problem { file, line: Some(line), column: Some(column), what, next });
+    }
+
+    fn place(&self, at: usize) -> (usize, usize) {
+        let before = self.text.get(..at).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+    }
+
+    fn read(&mut self) {
+        if self.text.len() > TEXT_MAX {
+            return self.wrong(0, format!("the file is longer than {TEXT_MAX} bytes"), "drop tools that are gone");
+        }
+        let (table, errors) = DeTable::parse_recoverable(self.text);
+        for error in &errors {
+            let next = "write one `name = value` per line, below the section of its script: [constant_load]";
+            self.wrong(error.span().map_or(0, |span| span.start), format!("not TOML: {}", error.message()), next);
+        }
+        if !errors.is_empty() {
+            return;
+        }
+        for (key, value) in table.get_ref().iter() {
+            match value.get_ref().as_table() {
+                Some(section) => self.section(key.get_ref(), section),
+                None => {
+                    let what = format!("`{}` stands outside of every section", key.get_ref());
+                    self.wrong(
+                        key.span().start,
+                        what,
+                        "write it below the section of its script, such as [constant_load]",
+                    );
+                }
+            }
+        }
+        if self.chosen.len() > VALUES_MAX {
+            self.wrong(
+                0,
+                format!("{} values; at most {VALUES_MAX} are read", self.chosen.len()),
+                "drop tools that are gone",
+            );
+        }
+    }
+
+    fn section(&mut self, section: &str, table: &DeTable<'_>) {
+        for (key, value) in table.iter() {
+            let per = Per::ALL.into_iter().find(|per| per.word() == key.get_ref().as_ref());
+            match (per, value.get_ref().as_table()) {
+                (Some(per), Some(names)) => self.names(section, per, names),
+                _ => self.value(section, key.get_ref(), Place::Machine, (key.span().start, value.get_ref())),
+            }
+        }
+    }
+
+    fn names(&mut self, section: &str, per: Per, names: &DeTable<'_>) {
+        for (name, values) in names.iter() {
+            let Some(values) = values.get_ref().as_table() else {
+                let what = format!("`{}` is no section", name.get_ref());
+                self.wrong(name.span().start, what, "write [constant_load.tool.T3] and the values below it");
+                continue;
+            };
+            let name = name.get_ref().to_string();
+            for (key, value) in values.iter() {
+                let place = match per {
+                    Per::Tool => Place::Tool(name.clone()),
+                    Per::Operation => Place::Operation(name.clone()),
+                };
+                self.value(section, key.get_ref(), place, (key.span().start, value.get_ref()));
+            }
+        }
+    }
+
+    fn value(&mut self, section: &str, name: &str, place: Place, (at, value): (usize, &DeValue<'_>)) {
+        let number = match value {
+            DeValue::Float(number) => number.as_str().replace('_', "").parse::<f64>().ok(),
+            DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix()).ok().map(|it| it as f64),
+            DeValue::Boolean(flag) => Some(f64::from(u8::from(*flag))),
+            _ => None,
+        };
+        let value = match (number.filter(|number| number.is_finite()), value.as_str()) {
+            (Some(number), _) => SettingValue::Number(number),
+            (None, Some(text)) => SettingValue::Text(text.to_owned()),
+            (None, None) => {
+                return self.wrong(
+                    at,
+                    format!("{section}.{name} is neither a number nor a text"),
+                    "write a number, or a text in \"quotes\"",
+                );
+            }
+        };
+        let (line, column) = self.place(at);
+        self.chosen.insert((section.to_owned(), name.to_owned(), place), Chosen { value, line, column });
+    }
+}
