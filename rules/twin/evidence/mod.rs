@@ -16,6 +16,7 @@ mod baseline;
 mod contributions;
 mod decision;
 mod families;
+mod follow;
 mod gram;
 mod hidden;
 mod inner;
