@@ -181,12 +181,36 @@ fn add_sequences(
         for share in MEMORY_SHARES {
             let memory = share * noise.share * noise.phi;
             let Some(sequence) = hidden::sequence(inputs, &left, &outliers.scale, memory) else { continue };
+            if !is_more_than_slow_noise(inputs, first, &left, &sequence) {
+                continue;
+            }
             if !known.iter().any(|other| is_same(inputs, other, &sequence.on)) {
                 known.push(sequence.on.clone());
                 add_sequence(inputs, second, sequence, known.len());
             }
         }
     }
+}
+
+/// Is a sequence likelier than noise that may be as slow as it likes? What switches has edges, slow noise has none; the
+/// memory of the noise is bounded everywhere else, so that levels stay levels, and a wandering meter would pass for one.
+fn is_more_than_slow_noise(
+    inputs: &Inputs<'_>,
+    first: &Comparison<'_>,
+    left: &[f64],
+    sequence: &hidden::Sequence,
+) -> bool {
+    let grid = Noise::grid(f64::INFINITY, inputs.period_s);
+    let (mut slow, mut switching) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    for noise in grid {
+        slow = slow.max(first.likelihood_of(left, noise));
+        let (x, y) = (first.whitened(&sequence.on, noise), first.whitened(left, noise));
+        let square: f64 = x.iter().map(|x| x * x).sum();
+        let step = x.iter().zip(&y).map(|(x, y)| x * y).sum::<f64>() / square.max(f64::MIN_POSITIVE);
+        let less = inputs.column(|row| left[row] - step * sequence.on[row]);
+        switching = switching.max(first.likelihood_of(&less, noise));
+    }
+    switching - slow + sequence.ln + search::NAMED > 0.0
 }
 
 fn is_same(inputs: &Inputs<'_>, a: &[f64], b: &[f64]) -> bool {
