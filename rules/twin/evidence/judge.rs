@@ -71,9 +71,10 @@ impl Judge<'_> {
         for group in near.take_while(|group| group.ln > first.ln - THRESHOLDS.looked_at) {
             let mut of = group.best;
             let (mut kept, mut gain) = self.carried_over(of);
-            if let Some(by_law) = group.by_law {
+            let falls_short = kept.len() < of.members.len() || gain <= THRESHOLDS.inner_gain;
+            if let Some(by_law) = group.by_law.filter(|_| falls_short) {
                 let (law_kept, law_gain) = self.carried_over(by_law);
-                if law_kept.len() == by_law.members.len() && (law_gain > gain || kept.len() < of.members.len()) {
+                if law_kept.len() == by_law.members.len() && law_gain > THRESHOLDS.inner_gain {
                     (of, kept, gain) = (by_law, law_kept, law_gain);
                 }
             }

@@ -158,7 +158,8 @@ pub(super) fn grouped(all: &[Explanation]) -> Vec<Group<'_>> {
             let best = of.iter().copied().max_by(|a, b| a.ln.total_cmp(&b.ln))?;
             let ln = ln_sum(of.iter().map(|of| of.ln).collect::<Vec<_>>());
             let by_law = of.into_iter().filter(|of| of.claims.iter().all(Option::is_none));
-            let by_law = by_law.max_by(|a, b| a.ln.total_cmp(&b.ln)).filter(|_| best.claims.iter().any(Option::is_some));
+            let by_law =
+                by_law.max_by(|a, b| a.ln.total_cmp(&b.ln)).filter(|_| best.claims.iter().any(Option::is_some));
             Some(Group { names, ln, best, by_law })
         })
         .collect();
