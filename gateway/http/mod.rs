@@ -43,11 +43,11 @@ mod wear;
 
 pub use connection::{Certificate, CertificateError};
 pub use description::{described, description};
+pub use maintenance::Configured;
 pub use metrics::render as render_metrics;
 pub use problem::ApiProblem;
 pub use route::{Needs, Route, Verb};
 pub use server::{Server, bind, port_trouble};
-pub use maintenance::Configured;
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;

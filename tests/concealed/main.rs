@@ -123,6 +123,17 @@ fn real_machines() {
     println!("{}", score::endurance::long_recordings());
 }
 
+/// A few cases in every test run: no measured share may be contradicted by them.
+#[test]
+fn a_few_cases_are_named_as_well_as_measured() {
+    let outcomes = score::run(&floors::guarded(), 2);
+    println!("{}", score::tally::table(&outcomes));
+    println!("{}", score::tally::failures(&outcomes));
+    let low = floors::contradicted(&outcomes);
+    assert!(low.is_empty(), "below what was measured:\n{}", low.join("\n"));
+    score::tool::clear();
+}
+
 /// Floors that every build must reach on a few cases of every kind.
 #[test]
 #[ignore = "2 minutes: floors of the concealed physics on 65 cases"]

@@ -126,6 +126,11 @@ pub(super) struct Variant {
     pub(super) largest: f64,
     /// A step that begins at this run, or at this row.
     pub(super) since: Option<Since>,
+    /// How many of its first columns are the law itself; the others are states of an edge or a lot.
+    pub(super) law: usize,
+    /// Columns that act in rows held out only, each with its relative deviation: hidden states of those rows, which may
+    /// be followed from earlier ones (`follow.rs`).
+    pub(super) followed: Vec<(Vec<f64>, f64)>,
 }
 
 /// Where a step begins.
@@ -180,6 +185,11 @@ impl Variant {
         }
     }
 
+    /// Columns of the law itself.
+    pub(super) fn law_columns(&self) -> Range<usize> {
+        self.columns.start..self.columns.end.min(self.columns.start.saturating_add(self.law))
+    }
+
     /// Would both together say the same twice: one kind, or a named and a nameless one over the same channel?
     pub(super) fn repeats(&self, other: &Self) -> bool {
         match (&self.owner, &other.owner) {
@@ -222,7 +232,17 @@ impl Bank {
 
     fn making(&mut self, owner: Owner, label: String, ln_prior: f64) -> Making<'_> {
         let columns = 0..0;
-        let variant = Variant { owner, label, columns, relative: Vec::new(), ln_prior, largest: 9.0, since: None };
+        let variant = Variant {
+            owner,
+            label,
+            columns,
+            relative: Vec::new(),
+            ln_prior,
+            largest: 9.0,
+            since: None,
+            law: usize::MAX,
+            followed: Vec::new(),
+        };
         Making { bank: self, variant, sized: false }
     }
 
@@ -262,6 +282,12 @@ impl Making<'_> {
         self
     }
 
+    /// So many of its first columns are the law itself; the others are states of an edge or a lot.
+    pub(super) fn law(mut self, columns: usize) -> Self {
+        self.variant.law = columns;
+        self
+    }
+
     /// Its columns keep the size they are given.
     pub(super) fn sized(mut self) -> Self {
         self.sized = true;
@@ -274,15 +300,25 @@ impl Making<'_> {
         let Self { bank, mut variant, sized } = self;
         let start = bank.columns.len();
         for (index, (mut column, relative)) in columns.into_iter().enumerate() {
-            let scale = if sized { largest_of(inputs, &column).map(|_| 1.0) } else { acting_size(inputs, &column) };
-            match scale {
+            let size = |held_out: bool| match (sized, held_out) {
+                (true, false) => largest_of(&column, inputs.taken(false)).map(|_| 1.0),
+                (true, true) => largest_of(&column, inputs.left_out()).map(|_| 1.0),
+                (false, false) => acting_size(&column, || inputs.taken(false)),
+                (false, true) => acting_size(&column, || inputs.left_out()),
+            };
+            match size(false) {
                 Some(scale) => {
                     column.iter_mut().for_each(|x| *x /= scale);
                     bank.columns.push(column);
                     variant.relative.push(relative);
                 }
                 None if index == 0 => return,
-                None => {}
+                None => {
+                    if let Some(scale) = size(true) {
+                        column.iter_mut().for_each(|x| *x /= scale);
+                        variant.followed.push((column, relative));
+                    }
+                }
             }
         }
         variant.columns = start..bank.columns.len();
@@ -297,15 +333,15 @@ impl Making<'_> {
     }
 }
 
-fn largest_of(inputs: &Inputs<'_>, column: &[f64]) -> Option<f64> {
+fn largest_of(column: &[f64], rows: impl Iterator<Item = usize>) -> Option<f64> {
     let finite = column.iter().all(|x| x.is_finite());
-    let largest = inputs.taken(false).map(|row| column[row].abs()).fold(0.0, f64::max);
+    let largest = rows.map(|row| column[row].abs()).fold(0.0, f64::max);
     (finite && largest > 0.0).then_some(largest)
 }
 
 /// Root mean square over the rows where a column acts: so that the prior deviation means the size there.
-fn acting_size(inputs: &Inputs<'_>, column: &[f64]) -> Option<f64> {
-    let largest = largest_of(inputs, column)?;
-    let acting: Vec<f64> = inputs.taken(false).map(|row| column[row]).filter(|x| x.abs() > ACTING * largest).collect();
+fn acting_size<R: Iterator<Item = usize>>(column: &[f64], rows: impl Fn() -> R) -> Option<f64> {
+    let largest = largest_of(column, rows())?;
+    let acting: Vec<f64> = rows().map(|row| column[row]).filter(|x| x.abs() > ACTING * largest).collect();
     Some(crate::statistics::rms(&acting).max(f64::MIN_POSITIVE))
 }

@@ -1,9 +1,12 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
 use super::bank::Since;
+use super::follow::Follower;
 use super::judge::{Judge, Named, UNKNOWN};
+use super::noise::Noise;
 use super::posterior::Explanation;
 use crate::statistics::rms;
+use std::ops::Range;
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.
 const BEGUN: f64 = 12.0;
@@ -44,7 +47,67 @@ impl Judge<'_> {
         for (kind, run) in steps {
             self.begin_earlier(&kind, run, &mut after, &mut all);
         }
+        self.follow(of, &mut after, &mut all);
         (after, all)
+    }
+
+    /// States that act in rows held out only, followed through each unit from its own earlier rows.
+    fn follow(&self, of: &Explanation, after: &mut [f64], all: &mut [Named]) {
+        let setting = &self.settings[of.noise];
+        let variance = setting.saturated.variance;
+        let mut states: Vec<(String, &[f64], f64)> = Vec::new();
+        for ((variant, size), claim) in of.members.iter().zip(&of.claims) {
+            let variant = &self.second.bank.variants[*variant];
+            let claimed = claim.as_ref().and_then(|claim| self.naming.kind(claim.laws[0].0));
+            let name = variant.kind().map(str::to_owned).or(claimed).unwrap_or_else(|| UNKNOWN.to_owned());
+            let deviation = super::marginal::SIZES[*size] * self.comparison.deviation;
+            let known = |d: f64| (deviation * d).powi(2) / variance;
+            states.extend(variant.followed.iter().map(|(column, d)| (name.clone(), column.as_slice(), known(*d))));
+        }
+        let units: std::collections::BTreeSet<usize> =
+            self.inputs.left_out().map(|row| self.inputs.unit[row]).collect();
+        for unit in units.into_iter().filter(|_| !states.is_empty()) {
+            let rows: Vec<usize> = self.inputs.left_out().filter(|row| self.inputs.unit[*row] == unit).collect();
+            let acts = |(_, column, _): &&(String, &[f64], f64)| rows.iter().any(|row| column[*row] != 0.0);
+            let here: Vec<&(String, &[f64], f64)> = states.iter().filter(acts).collect();
+            self.follow_unit(&rows, &here, (setting.gram.noise, variance.sqrt()), after, all);
+        }
+    }
+
+    fn follow_unit(
+        &self,
+        rows: &[usize],
+        states: &[&(String, &[f64], f64)],
+        (noise, deviation): (Noise, f64),
+        after: &mut [f64],
+        all: &mut [Named],
+    ) {
+        let mut blocks: Vec<Range<usize>> = Vec::new();
+        for at in 0..rows.len() {
+            let goes_on = at > 0 && self.inputs.block[rows[at]] == self.inputs.block[rows[at - 1]];
+            match blocks.last_mut() {
+                Some(last) if goes_on => last.end = at + 1,
+                _ => blocks.push(at..at + 1),
+            }
+        }
+        let white = |value: &dyn Fn(usize) -> f64| {
+            let mut white: Vec<f64> = rows.iter().map(|row| value(*row)).collect();
+            noise.whiten(&mut white, &blocks);
+            white
+        };
+        let left = white(&|row| self.recorded[row] - after[row]);
+        let columns: Vec<Vec<f64>> = states.iter().map(|(_, column, _)| white(&|row| column[row])).collect();
+        let mut follower = Follower::new(&states.iter().map(|(_, _, variance)| *variance).collect::<Vec<_>>());
+        for (at, row) in rows.iter().enumerate() {
+            for ((name, column, _), w) in states.iter().zip(follower.coefficients()) {
+                let step = deviation * w * column[*row];
+                after[*row] += step;
+                if let Some((_, own)) = all.iter_mut().find(|(known, _)| known == name) {
+                    own[*row] += step;
+                }
+            }
+            follower.learn(&columns.iter().map(|column| column[at]).collect(), left[at] / deviation);
+        }
     }
 
     fn sum_with(&self, mut after: Vec<f64>, all: &[Named]) -> Vec<f64> {

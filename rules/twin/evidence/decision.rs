@@ -12,6 +12,8 @@
 //! | `alone` | the second name holds at most 15 % | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |
 //! | `name_share` | a tenth of a curve is noise at usual sizes, another tenth is form | higher: `unknown` for known laws; lower: names for unlisted physics | laws left out of the catalogue |
 //! | `pair_more`, `pair_gain` | two laws with five columns make 12 % of a smooth curve by chance | lower: pairs of names for one unlisted law | the same |
+//! | `pair_whole` | noise alone leaves 3 % of a curve in large effects only; there a second law is a level, not chance | lower: second names for a form error | drives |
+//! | `of_each` | half of a curve is more than chance with five columns | lower: one name for two effects; higher: two names for one law of two channels | concealed pairs, laws of two channels |
 //! | `class_nats` | odds of 7 to 1 | higher: classes everywhere; lower: one of a class told as sure | concealed classes |
 //! | `unknown_share` | a third of the energy without a name is more than a form error of 15 % in three directions | higher: names beside unknown physics | unlisted beside listed effects |
 //! | `name_energy`, `size_noise`, `size_output` | below what a user would act on: a class 0.5 meter is wrong by as much | higher: lost small effects; lower: clutter | concealed pairs |
@@ -33,6 +35,10 @@ pub(super) struct Thresholds {
     /// What two laws together must make beyond that, and beyond one of them.
     pub(super) pair_more: f64,
     pub(super) pair_gain: f64,
+    /// What two laws together must make where one of them would do: nearly all of the curve.
+    pub(super) pair_whole: f64,
+    /// Share of each of several curves that one law must make to claim them all.
+    pub(super) of_each: f64,
     /// Nats that a law may lose in the place of another and still stand beside it.
     pub(super) class_nats: f64,
     /// Share of the energy from which a nameless part makes the whole unexplained.
@@ -57,6 +63,8 @@ pub(super) const THRESHOLDS: Thresholds = Thresholds {
     name_share: 0.8,
     pair_more: 0.05,
     pair_gain: 0.12,
+    pair_whole: 0.97,
+    of_each: 0.5,
     class_nats: 2.0,
     unknown_share: 0.35,
     name_energy: 0.02,

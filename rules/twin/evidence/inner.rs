@@ -4,6 +4,7 @@
 //! drown what is there. Only fitted units are asked; those that are held out stay out of it.
 
 use super::algebra::{Factor, add_gram, mirror};
+use super::follow::Follower;
 use super::gram::Comparison;
 use super::inputs::Inputs;
 use super::marginal::SIZES;
@@ -17,6 +18,8 @@ const PAIRED_S: f64 = 15.0;
 const PAIRED_ROWS: f64 = 10.0;
 /// Inner parts, at most: more units share them in turn.
 const PARTS_MAX: usize = 12;
+/// Share of a column's square below which it does not act in the other parts.
+const NEVER: f64 = 1e-9;
 
 /// The columns of one hypothesis, whitened, with their inner products in every part.
 pub(super) struct Inner<'a> {
@@ -26,6 +29,8 @@ pub(super) struct Inner<'a> {
     parts: Vec<Vec<usize>>,
     grams: Vec<Array2<f64>>,
     ridge: Vec<f64>,
+    /// Deviation of an innovation.
+    deviation: f64,
     /// Columns of each member, and those that every hypothesis has.
     members: Vec<std::ops::Range<usize>>,
     fixed: usize,
@@ -57,6 +62,7 @@ impl<'a> Inner<'a> {
             tall.column_mut(index).iter_mut().zip(white).for_each(|(cell, x)| *cell = x);
         }
         let parts = parts(inputs, comparison);
+        let deviation = setting.saturated.variance.sqrt();
         let of_part = |part: &Vec<usize>| {
             let mut gram = Array2::zeros((tall.ncols(), tall.ncols()));
             add_gram(&mut gram, tall.select(Axis(0), part).view());
@@ -64,7 +70,7 @@ impl<'a> Inner<'a> {
             gram
         };
         let grams = parts.iter().map(of_part).collect();
-        Self { comparison, inputs, tall, parts, grams, ridge, members: places, fixed: fixed.len() }
+        Self { comparison, inputs, tall, parts, grams, ridge, deviation, members: places, fixed: fixed.len() }
     }
 
     /// Gain of these members over those: in deviations of it, and in squares.
@@ -74,23 +80,41 @@ impl<'a> Inner<'a> {
         let mut gained: BTreeMap<usize, f64> = BTreeMap::new();
         for (part, gram) in self.parts.iter().zip(&self.grams) {
             let others = &whole - gram;
-            let (after, before) = (self.solved(&others, with), self.solved(&others, without));
-            for at in part {
-                let line = self.tall.row(*at);
-                let output = line[line.len() - 1];
-                let error = |w: &Array1<f64>| (output - line.slice(s![..line.len() - 1]).dot(w)).powi(2);
+            let after = self.errors(part, &others, &whole, with);
+            let before = self.errors(part, &others, &whole, without);
+            for ((at, after), before) in part.iter().zip(after).zip(before) {
                 #[expect(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
                     reason = "a share of a count of rows"
                 )]
                 let number = (count(self.comparison.rows[*at]) / stretch) as usize;
-                *gained.entry(number).or_default() += error(&before) - error(&after);
+                *gained.entry(number).or_default() += before * before - after * after;
             }
         }
         let sum: f64 = gained.values().sum();
         let squares: f64 = gained.values().map(|x| x * x).sum();
         (sum / (squares.sqrt() + 1e-30), sum)
+    }
+
+    /// Errors in the rows of a part, sizes from the others; columns that act in this part only are followed through it.
+    fn errors(&self, part: &[usize], others: &Array2<f64>, whole: &Array2<f64>, members: &[usize]) -> Vec<f64> {
+        let w = self.solved(others, members);
+        let own = members.iter().flat_map(|member| self.members[*member].clone());
+        let strange: Vec<usize> = own.filter(|at| others[[*at, *at]] <= NEVER * whole[[*at, *at]]).collect();
+        let variances: Vec<f64> = strange.iter().map(|at| 1.0 / self.ridge[*at]).collect();
+        let mut follower = Follower::new(&variances);
+        let error = |at: &usize| {
+            let line = self.tall.row(*at);
+            let left = line[line.len() - 1] - line.slice(s![..line.len() - 1]).dot(&w);
+            let columns: Array1<f64> = strange.iter().map(|at| line[*at]).collect();
+            let expected = follower.expected(&columns);
+            if columns.iter().any(|x| *x != 0.0) {
+                follower.learn(&columns, left / self.deviation);
+            }
+            left - self.deviation * expected
+        };
+        part.iter().map(error).collect()
     }
 
     /// Posterior means of some members, zero for the others; a run that is left out has no level.

@@ -212,6 +212,19 @@ impl<'a> Inputs<'a> {
         (0..self.rows).filter(move |row| self.fitted[*row] && (!in_cut || self.in_cut[*row]))
     }
 
+    /// Rows that are held out.
+    pub(super) fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows).filter(|row| self.held_out[*row])
+    }
+
+    /// A column for each member of a group, zero elsewhere: those with fitted rows first, then those of rows held out.
+    pub(super) fn of_members(&self, codes: &[usize], values: &[f64]) -> (usize, Vec<Vec<f64>>) {
+        let known: BTreeSet<usize> = self.taken(false).map(|row| codes[row]).collect();
+        let strange: BTreeSet<usize> = self.left_out().map(|row| codes[row]).filter(|c| !known.contains(c)).collect();
+        let of = |code: &usize| self.column(|row| if codes[row] == *code { values[row] } else { 0.0 });
+        (known.len(), known.iter().chain(&strange).map(of).collect())
+    }
+
     /// Seconds of the whole recording.
     pub(super) fn span_s(&self) -> f64 {
         self.clock_s.last().map_or(0.0, |last| last - self.clock_s[0]).max(self.period_s)

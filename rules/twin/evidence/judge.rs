@@ -69,13 +69,21 @@ impl Judge<'_> {
         let near = groups.iter().take(GROUPS).filter(|group| !group.names.is_empty());
         let mut debug = debug;
         for group in near.take_while(|group| group.ln > first.ln - THRESHOLDS.looked_at) {
-            let (kept, gain) = self.carried_over(group.best);
-            debug.push_str(&format!("\ninner {gain:.2} keeps {} of {}", kept.len(), group.best.members.len()));
+            let mut of = group.best;
+            let (mut kept, mut gain) = self.carried_over(of);
+            let falls_short = kept.len() < of.members.len() || gain <= THRESHOLDS.inner_gain;
+            if let Some(by_law) = group.by_law.filter(|_| falls_short) {
+                let (law_kept, law_gain) = self.carried_over(by_law);
+                if law_kept.len() == by_law.members.len() && law_gain > THRESHOLDS.inner_gain {
+                    (of, kept, gain) = (by_law, law_kept, law_gain);
+                }
+            }
+            debug.push_str(&format!("\ninner {gain:.2} keeps {} of {}", kept.len(), of.members.len()));
             if kept.is_empty() || gain <= THRESHOLDS.inner_gain {
                 continue;
             }
             let information = 2.0 * (group.ln - nothing);
-            let Some(best) = self.not_withdrawn(self.less(group.best, &kept)) else {
+            let Some(best) = self.not_withdrawn(self.less(of, &kept)) else {
                 return self.nothing(format!("{debug}; withdrawn: the held-out error does not fall"));
             };
             let mut answer = self.named(&best, &groups, information, debug);

@@ -11,6 +11,7 @@ use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
 use crate::statistics::count;
 use ndarray::{Array1, Array2};
+use std::ops::Range;
 
 /// Columns of a law that may claim a curve: wider ones could claim any.
 const COLUMNS_MAX: usize = 5;
@@ -59,7 +60,7 @@ impl<'a> Naming<'a> {
         };
         let may = |index: &usize| {
             let variant = &bank.variants[*index];
-            variant.kind().is_some() && variant.columns.len() <= COLUMNS_MAX && !variant.is_only_a_sign()
+            variant.kind().is_some() && variant.law_columns().len() <= COLUMNS_MAX && !variant.is_only_a_sign()
         };
         let named = (0..bank.variants.len()).filter(may).collect();
         Self { bank, first: comparison.first(), metrics: grams.iter().map(cleared).collect(), named }
@@ -74,6 +75,39 @@ impl<'a> Naming<'a> {
             key(b).partial_cmp(&key(a)).is_some_and(std::cmp::Ordering::is_gt)
         };
         claims.reduce(|best, next| if better(&best, &next) { next } else { best }).filter(accepted)
+    }
+
+    /// The one law that makes several curves at once, each of them for the greater part.
+    pub(super) fn one_law(&self, parts: &[(usize, &[f64])]) -> Option<Claim> {
+        let mut best: Option<Claim> = None;
+        for metric in &self.metrics {
+            let (along, square) = self.along(metric, parts);
+            let each: Vec<(Array1<f64>, f64)> =
+                parts.iter().map(|part| self.along(metric, std::slice::from_ref(part))).collect();
+            for variant in &self.named {
+                let of = |(along, square): &(Array1<f64>, f64)| self.regress(metric, along, *square, &[*variant]);
+                let Some(fit) = self.regress(metric, &along, square, &[*variant]) else { continue };
+                let enough = best.as_ref().map_or(THRESHOLDS.name_share + THRESHOLDS.pair_more, |best| best.share);
+                let makes_each = |own: &(Array1<f64>, f64)| of(own).is_some_and(|own| own.share >= THRESHOLDS.of_each);
+                if fit.share > enough && each.iter().all(makes_each) {
+                    best = Some(Claim { share: fit.share, laws: vec![(*variant, fit.coefficients)] });
+                }
+            }
+        }
+        best
+    }
+
+    /// Inner products of a curve with every column, and its square.
+    fn along(&self, metric: &Array2<f64>, parts: &[(usize, &[f64])]) -> (Array1<f64>, f64) {
+        let all: Vec<usize> = parts.iter().flat_map(|(variant, _)| self.columns(*variant)).collect();
+        let w = Array1::from_iter(parts.iter().flat_map(|(_, w)| w.iter().copied()));
+        let mut along = Array1::zeros(metric.nrows() - 1);
+        for (index, w) in all.iter().zip(&w) {
+            let column = metric.column(*index);
+            along.iter_mut().zip(column).for_each(|(sum, x)| *sum += w * x);
+        }
+        let square = all.iter().zip(&w).map(|(index, w)| w * along[*index]).sum();
+        (along, square)
     }
 
     /// The kind of a named variant.
@@ -91,16 +125,14 @@ impl<'a> Naming<'a> {
         (self.first + of.start..self.first + of.end).collect()
     }
 
+    /// Columns of the law of a variant.
+    fn law(&self, variant: usize) -> Range<usize> {
+        let of = self.bank.variants[variant].law_columns();
+        self.first + of.start..self.first + of.end
+    }
+
     fn claim_in(&self, metric: &Array2<f64>, parts: &[(usize, &[f64])]) -> Option<Claim> {
-        let all: Vec<usize> = parts.iter().flat_map(|(variant, _)| self.columns(*variant)).collect();
-        let w = Array1::from_iter(parts.iter().flat_map(|(_, w)| w.iter().copied()));
-        let last = metric.nrows() - 1;
-        let mut along = Array1::zeros(last);
-        for (index, w) in all.iter().zip(&w) {
-            let column = metric.column(*index);
-            along.iter_mut().zip(column).for_each(|(sum, x)| *sum += w * x);
-        }
-        let square: f64 = all.iter().zip(&w).map(|(index, w)| w * along[*index]).sum();
+        let (along, square) = self.along(metric, parts);
         if square <= 0.0 {
             return None;
         }
@@ -119,6 +151,11 @@ impl<'a> Naming<'a> {
         let levels = parts
             .iter()
             .any(|(variant, _)| self.bank.variants[*variant].drawn().is_some_and(|drawn| drawn.shape == "levels"));
+        let whole = THRESHOLDS.pair_whole.max(one.share + THRESHOLDS.pair_more);
+        if one.share >= THRESHOLDS.name_share && !levels && whole < 1.0 {
+            let pair = self.pair(metric, &along, square, &single);
+            return Some(pair.filter(|pair| pair.share > whole).unwrap_or(one));
+        }
         if one.share >= THRESHOLDS.name_share || levels {
             return Some(one);
         }
@@ -146,7 +183,7 @@ impl<'a> Naming<'a> {
             for second in self.named.iter().copied().filter(|second| kind(*second) != kind(first)) {
                 let Some(fit) = self.regress(metric, along, square, &[first, second]) else { continue };
                 if best.as_ref().is_none_or(|best| fit.share > best.share) {
-                    let size = self.bank.variants[first].columns.len();
+                    let size = self.law(first).len();
                     let (a, b) = fit.coefficients.split_at(size);
                     best = Some(Claim { share: fit.share, laws: vec![(first, a.to_vec()), (second, b.to_vec())] });
                 }
@@ -157,8 +194,8 @@ impl<'a> Naming<'a> {
 
     /// The curve on some laws; `None` where one of them has the wrong sign.
     fn regress(&self, metric: &Array2<f64>, along: &Array1<f64>, square: f64, laws: &[usize]) -> Option<Regression> {
-        let all: Vec<usize> = laws.iter().flat_map(|law| self.columns(*law)).collect();
-        let relative = laws.iter().flat_map(|law| self.bank.variants[*law].relative.iter());
+        let all: Vec<usize> = laws.iter().flat_map(|law| self.law(*law)).collect();
+        let relative = laws.iter().flat_map(|law| &self.bank.variants[*law].relative[..self.law(*law).len()]);
         let mut inner = block(metric, &all, &all);
         for (at, relative) in relative.enumerate() {
             let own = inner[[at, at]].abs();
@@ -172,7 +209,7 @@ impl<'a> Naming<'a> {
             if variant.sign() * w[at] < 0.0 {
                 return None;
             }
-            at += variant.columns.len();
+            at += self.law(*law).len();
         }
         let share = right.dot(&w) / square - PRICE * count(all.len() - 1);
         Some(Regression { share, coefficients: w.to_vec() })
@@ -185,7 +222,7 @@ impl<'a> Naming<'a> {
         for variant in &self.named {
             let of = &self.bank.variants[*variant];
             let Some(fit) = self.regress(&self.metrics[0], along, square, &[*variant]) else { continue };
-            let size = count(of.columns.len() - 1);
+            let size = count(of.law_columns().len() - 1);
             let left = square * (1.0 - fit.share - PRICE * size).max(0.0);
             let loss = nats * left + 0.7 * size - of.ln_prior.min(0.0);
             let kind = of.kind().unwrap_or_default().to_owned();

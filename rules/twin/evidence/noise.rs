@@ -45,10 +45,16 @@ impl Noise {
         Self { share, phi, theta, variance: at_1 / theta }
     }
 
-    /// Every setting worth trying for blocks of this median length.
+    /// Every setting worth trying for blocks of this median length; of endless ones every memory.
     pub(super) fn grid(median_block: f64, period_s: f64) -> Vec<Self> {
         let longest = (median_block / 4.0).max(3.0);
-        let bound = if period_s < 1.0 { MEMORY_MAX / period_s } else { MEMORY_MAX };
+        let bound = if longest.is_infinite() {
+            f64::INFINITY
+        } else if period_s < 1.0 {
+            MEMORY_MAX / period_s
+        } else {
+            MEMORY_MAX
+        };
         let memories = MEMORIES.into_iter().filter(|memory| *memory <= longest.min(bound));
         let settings = memories.flat_map(|memory| SHARES.map(|share| Self::of(share, (-1.0 / memory).exp())));
         std::iter::once(Self::WHITE).chain(settings).collect()

@@ -103,6 +103,16 @@ fn claims(
         return claims;
     }
     let solved = comparison.solve(&setting.gram.whole, setting.saturated.variance, &explanation.members);
+    if offered.len() > 1 {
+        let parts: Vec<(usize, &[f64])> = offered
+            .iter()
+            .filter_map(|member| source(*member).map(|of| (of, solved.members[*member].as_slice())))
+            .collect();
+        if let Some(claim) = naming.one_law(&parts) {
+            offered.iter().for_each(|member| claims[*member] = Some(claim.clone()));
+            return claims;
+        }
+    }
     let mut left = Vec::new();
     for member in offered {
         let Some(of) = source(member) else { continue };
@@ -146,7 +156,11 @@ pub(super) fn grouped(all: &[Explanation]) -> Vec<Group<'_>> {
         .into_iter()
         .filter_map(|(names, of)| {
             let best = of.iter().copied().max_by(|a, b| a.ln.total_cmp(&b.ln))?;
-            Some(Group { names, ln: ln_sum(of.iter().map(|of| of.ln).collect::<Vec<_>>()), best })
+            let ln = ln_sum(of.iter().map(|of| of.ln).collect::<Vec<_>>());
+            let by_law = of.into_iter().filter(|of| of.claims.iter().all(Option::is_none));
+            let by_law =
+                by_law.max_by(|a, b| a.ln.total_cmp(&b.ln)).filter(|_| best.claims.iter().any(Option::is_some));
+            Some(Group { names, ln, best, by_law })
         })
         .collect();
     groups.sort_by(|a, b| b.ln.total_cmp(&a.ln));
@@ -158,4 +172,7 @@ pub(super) struct Group<'a> {
     pub(super) names: &'a Vec<Option<String>>,
     pub(super) ln: f64,
     pub(super) best: &'a Explanation,
+    /// The likeliest that says the same by laws alone, where the likeliest of all has a curve that was named: a law holds
+    /// where a curve was never drawn.
+    pub(super) by_law: Option<&'a Explanation>,
 }

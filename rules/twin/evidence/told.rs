@@ -103,8 +103,9 @@ impl Told<'_, '_> {
         if self.answer.names.is_empty() {
             return (places, None);
         }
+        // Told as the inner split of the fitted runs wants it: much memory of the noise would swallow levels.
         let fit = self.case.with_data(|data| fit(data, &parts, START));
-        (places, fit)
+        (places, fit.map(|fit| self.case.checked(&fit, fit.noise).fit))
     }
 
     /// The form of a kind whose law, the baseline beside it, comes nearest to a contribution.

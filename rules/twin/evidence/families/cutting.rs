@@ -26,6 +26,8 @@ const CONSUMER: Family = Family::of("auxiliary_switch").signed(1.0);
 const COOLANT: Family = Family::of("coolant_regime").beside_catalogue();
 const OVERRIDE: Family = Family::of("override_delay").beside_catalogue().signed(1.0).rare(-2.0);
 
+/// Runs up to which each may be a lot of its own.
+const RUNS_MAX: usize = 30;
 /// Steps at a run that are tried at most.
 const STEPS_MAX: usize = 40;
 /// Rows of a run from which a step may fall within it, and runs up to which such steps are tried.
@@ -80,10 +82,14 @@ fn steps(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
     if let Some(lots) = inputs.scene.words("lot")
         && (2..=12).contains(&lots.words().len())
     {
-        let of = |code: usize| {
-            inputs.column(|row| if lots.code(row).is_some_and(|at| at as usize == code) { cut[row] } else { 0.0 })
-        };
-        bank.of(BATCH, "lot").columns(inputs, (0..lots.words().len()).map(|code| (of(code), 1.0)));
+        let codes: Vec<usize> =
+            (0..inputs.rows).map(|row| lots.code(row).map_or(usize::MAX, |code| code as usize)).collect();
+        let (_, columns) = inputs.of_members(&codes, cut);
+        bank.of(BATCH, "lot").columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
+    }
+    let (known, columns) = inputs.of_members(&inputs.run, cut);
+    if (3..=RUNS_MAX).contains(&known) {
+        bank.of(BATCH, "runs").prior(-0.5).columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
     }
     let runs = inputs.scene.runs();
     let is_fitted = |run: &usize| runs[*run].clone().any(|row| inputs.fitted[row]);

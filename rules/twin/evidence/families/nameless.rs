@@ -200,16 +200,13 @@ fn bumps(inputs: &Inputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Ve
 fn levels(inputs: &Inputs<'_>, carriers: &[Carrier], bank: &mut Bank) {
     for group in GROUPS {
         let Some(codes) = codes(inputs, group) else { continue };
-        let mut used: Vec<usize> = inputs.taken(false).map(|row| codes[row]).collect();
-        used.sort_unstable();
-        used.dedup();
-        if !(2..=LEVELS_MAX).contains(&used.len()) {
-            continue;
-        }
         for carrier in carriers.iter().filter(|carrier| ["1", "cut"].contains(&carrier.name)) {
-            let of = |code: usize| inputs.column(|row| if codes[row] == code { carrier.values[row] } else { 0.0 });
+            let (known, columns) = inputs.of_members(&codes, &carrier.values);
+            if !(2..=LEVELS_MAX).contains(&known) {
+                continue;
+            }
             let drawn = Drawn { over: group.to_owned(), times: carrier.name, shape: "levels" };
-            bank.nameless(drawn).columns(inputs, used.iter().map(|code| (of(*code), 1.0)));
+            bank.nameless(drawn).columns(inputs, columns.into_iter().map(|column| (column, 1.0)));
         }
     }
 }

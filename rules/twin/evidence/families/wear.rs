@@ -47,7 +47,7 @@ fn add_over(inputs: &Inputs<'_>, bank: &mut Bank, label: &str, load: &[f64], top
             columns.extend((0..inputs.edges).map(|edge| (of(edge, &law), RATE)));
             columns.extend((0..inputs.edges).map(|edge| (of(edge, load), STATE)));
         }
-        bank.of(WEAR, format!("{label}, {exponent}")).prior(ln).columns(inputs, columns);
+        bank.of(WEAR, format!("{label}, {exponent}")).prior(ln).law(3).columns(inputs, columns);
     }
 }
 
