@@ -85,7 +85,8 @@ impl Parts {
             self.energy_known = true;
         }
         let tool = sample.text(channels.tool).unwrap_or_default();
-        self.gathering.step(estimates, tool, power.ok(), step_s);
+        let operation = sample.text(channels.operation).unwrap_or_default();
+        self.gathering.step(estimates, (tool, operation), power.ok(), step_s);
     }
 
     fn close(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {
