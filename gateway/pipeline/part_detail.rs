@@ -142,6 +142,15 @@ impl Gathering {
         }
     }
 
+    /// Adds the energy of a short silence of the meter to the operation in which it ended.
+    pub(super) fn bridge(&mut self, name: &str, (energy_j, seconds): (f64, f64)) {
+        let operation = self.operations.iter_mut().find(|operation| operation.name == name);
+        if let Some(operation) = operation.filter(|_| energy_j > 0.0) {
+            operation.power.sum += energy_j;
+            operation.power.seconds += seconds;
+        }
+    }
+
     fn cut(&mut self, estimates: &Estimates, name: &str, step_s: f64) {
         let index = self.tools.iter().position(|tool| tool.name == name).or_else(|| {
             (self.tools.len() < TOOLS_MAX).then(|| {
