@@ -244,12 +244,15 @@ pub struct OperationsStatus {
     pub error: Option<String>,
 }
 
-/// Wear of the tool from the cutting power, where the library has a model for the cut. The numbers are those of the last
-/// moment of cutting.
+/// Wear of the edge in use, followed over its parts. The limit is that of the last moment of cutting, where the library has a
+/// model for the cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WearStatus {
-    /// `surface` or `physical`.
+    /// `surface` or `physical`; `relative` without a learned model.
     pub form: &'static str,
+    /// What of its key spoke for the model: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_by: Option<&'static str>,
     /// Flank wear at which the edge is worn, mm.
     pub criterion_mm: f64,
     /// Limit `[Pc]` of the cut, W.
@@ -260,6 +263,12 @@ pub struct WearStatus {
     pub flank_wear_mm: Option<f64>,
     /// Half its 95 % interval, mm.
     pub flank_wear_uncertainty_mm: Option<f64>,
+    /// Probability that the edge passes the criterion by the end of the next part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worn_probability: Option<f64>,
+    /// Parts until it does: the middle, and the ends of an 80 % interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parts_left: Option<[f64; 3]>,
     /// `observable` or `not_observable_here`.
     pub observability: Option<&'static str>,
     /// Factors in which the cut lies outside what the model was fitted on.

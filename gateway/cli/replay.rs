@@ -22,6 +22,9 @@ pub(super) struct ReplayArguments {
     /// Operations recipe: fills in depth of cut, diameter, tool and material where the recordings lack them.
     #[arg(long, value_name = "FILE")]
     operations: Option<PathBuf>,
+    /// History whose library of wear models is used; without it that of --history.
+    #[arg(long, value_name = "DB")]
+    wear_models: Option<PathBuf>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -29,9 +32,10 @@ pub(super) struct ReplayArguments {
 
 /// Replays and prints the summary.
 pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
-    let ReplayArguments { files, history, scripts, operations, json } = arguments;
+    let ReplayArguments { files, history, scripts, operations, wear_models, json } = arguments;
     let operations = operations.as_deref().map(recipe_from).transpose()?;
-    let plan = Plan { files, operations, history, progress: std::io::stderr().is_terminal(), talk: true };
+    let plan =
+        Plan { files, operations, models: wear_models, history, progress: std::io::stderr().is_terminal(), talk: true };
     let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
     let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
     if json {

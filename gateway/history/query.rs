@@ -9,6 +9,7 @@ use super::series::Series;
 use super::walk::{Stretch, Walk};
 use adapters::channel::nearest;
 use adapters::clock::TimeNs;
+use rules::estimators::wear::tool_of;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
@@ -79,7 +80,7 @@ impl Chunk<'_> {
 }
 
 /// A condition on text: series and the word it must hold.
-type Condition = (i64, String);
+type Condition = (i64, String, bool);
 
 impl Reader {
     /// Hands every stretch of rows that answers `query` to `each`, in the order of recording, until it breaks off. All of
@@ -154,7 +155,7 @@ fn conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, History
     set.map(|(name, word)| {
         let series = find(known, name)?;
         if series.kind == SeriesKind::Text {
-            return Ok((series.id, word.clone()));
+            return Ok((series.id, word.clone(), name == "tool"));
         }
         Err(HistoryError::Question(format!("the series {name} of this history holds numbers, not words")))
     })
@@ -164,9 +165,11 @@ fn conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, History
 /// The rows of `stretch` in the range that meet every condition.
 fn matching(walk: &mut Walk, stretch: &Stretch, conditions: &[Condition]) -> Result<Vec<usize>, HistoryError> {
     let mut rows: Vec<usize> = walk.rows_of(stretch).collect();
-    for (series, word) in conditions {
+    for (series, word, tool) in conditions {
         let Some(cells) = walk.cells(stretch, *series)? else { return Ok(Vec::new()) };
-        rows.retain(|row| cells.word(*row) == Some(word));
+        // Asked for a tool, every edge of it is meant.
+        let is = |found: &str| found == word || *tool && tool_of(found) == word;
+        rows.retain(|row| cells.word(*row).is_some_and(is));
     }
     Ok(rows)
 }

@@ -9,7 +9,7 @@ use rules::estimators::State;
 use serde_json::{Map, Value, json};
 
 /// Quantities that are inferred: name, unit, English, Chinese.
-pub const ESTIMATES: [(&str, &str, &str, &str); 7] = [
+pub const ESTIMATES: [(&str, &str, &str, &str); 10] = [
     ("filtered_power_w", "W", "Spindle power, filtered", "滤波后的主轴功率"),
     ("no_load_power_w", "W", "No-load power at this speed", "空载功率"),
     ("cutting_power_w", "W", "Cutting power", "切削功率"),
@@ -17,10 +17,13 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 7] = [
     ("visible_cutting_power_w", "W", "Least visible cutting power", "最小可见切削功率"),
     ("wear_limit_w", "W", "Limit of the cutting power for a worn edge", "磨损阈值功率"),
     ("tool_wear_mm", "mm", "Flank wear of the edge", "后刀面磨损量"),
+    ("tool_growth_pct", "%", "Rise of the cutting power by wear", "磨损引起的功率增量"),
+    ("tool_worn_probability", "1", "Probability that the edge is worn after the next part", "下一件后刀刃磨损概率"),
+    ("tool_parts_left", "1", "Parts until the edge is worn", "剩余可加工件数"),
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 22] = [
+const NO_ESTIMATES: [(&str, &str, &str); 23] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -34,6 +37,7 @@ const NO_ESTIMATES: [(&str, &str, &str); 22] = [
     ("cut_unknown", "depth or diameter not known", "切削参数未知"),
     ("outside_model", "outside the cuts of the model", "超出模型范围"),
     ("not_observable", "wear cannot be seen in this cut", "此切削中不可观测"),
+    ("no_part_yet", "no part of this edge finished yet", "该刀刃尚未完成一件"),
     ("not_cutting", "nothing is being cut", "未切削"),
     ("output_missing", "the measured value is missing", "缺少测量值"),
     ("too_few_transients", "too few changes of spindle speed without cutting", "未切削时的主轴变速次数不足"),

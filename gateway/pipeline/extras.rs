@@ -7,7 +7,7 @@ use rules::estimators::{Estimated, Estimates};
 use rules::script::Host;
 
 /// How many series there are.
-const COUNT: usize = 9;
+const COUNT: usize = 13;
 
 /// The series, in the order of [`values`].
 #[must_use]
@@ -23,6 +23,15 @@ pub fn series() -> Vec<ExtraSeries> {
         watts("wear_limit_w", "Limit of the cutting power for a worn edge", "磨损阈值功率"),
         ExtraSeries::number("tool_wear_mm", "mm", "Flank wear of the edge", "后刀面磨损量"),
         ExtraSeries::number("tool_wear_sd_mm", "mm", "Standard deviation of the flank wear", "磨损量标准差"),
+        ExtraSeries::number("tool_growth_pct", "%", "Rise of the cutting power by wear", "磨损引起的功率增量"),
+        ExtraSeries::number(
+            "tool_worn_probability",
+            "1",
+            "Probability that the edge is worn after the next part",
+            "磨损概率",
+        ),
+        ExtraSeries::number("tool_parts_left", "1", "Parts until the edge is worn", "剩余可加工件数"),
+        ExtraSeries::number("tool_parts_left_sd", "1", "Standard deviation of the parts left", "剩余件数标准差"),
     ]
 }
 
@@ -62,6 +71,10 @@ pub fn values(estimates: &Estimates) -> [ExtraValue<'static>; COUNT] {
         value(estimates.wear_limit_w),
         value(estimates.tool_wear_mm),
         sd(estimates.tool_wear_mm),
+        value(estimates.tool_growth_pct),
+        value(estimates.tool_worn_probability),
+        value(estimates.tool_parts_left),
+        sd(estimates.tool_parts_left),
     ]
 }
 

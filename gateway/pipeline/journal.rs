@@ -4,6 +4,7 @@ use super::channels::Channels;
 use crate::history::{Alarm, AlarmClear, Record, StateChange};
 use adapters::Sample;
 use adapters::clock::TimeNs;
+use rules::estimators::wear::tool_of;
 use rules::estimators::{Estimates, State};
 use std::sync::Arc;
 
@@ -44,7 +45,7 @@ impl Journal {
             at_ns,
             state: estimates.state.word().to_owned(),
             program: text(channels.program),
-            tool: text(channels.tool),
+            tool: tool_of(&text(channels.tool)).to_owned(),
         }
     }
 

@@ -16,13 +16,14 @@ pub use decide::{Change, Decisions};
 use extras::{own, own_value};
 pub use extras::{series as stored_series, values as stored_values};
 pub use journal::Journal;
-pub use part_detail::{PartDetail, ToolUse};
+pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::Parts;
 pub use tally::Tally;
 
 use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
 use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
+use rules::estimators::wear::WearEstimator;
 use rules::estimators::{self, Estimated, Estimates};
 use rules::script::{Host, OffsetProposal};
 
@@ -49,6 +50,7 @@ impl Store for NoStore {
 pub struct Pipeline {
     channels: Channels,
     estimators: estimators::Inference,
+    wear: WearEstimator,
     estimates: Estimates,
     scripts: Host,
     /// Channels of the scripts' own that are stored.
@@ -74,6 +76,7 @@ impl Pipeline {
             channels: Channels::new(),
             estimates: *estimators.estimates(),
             estimators,
+            wear: WearEstimator::default(),
             own: own(&scripts),
             extras: Vec::new(),
             generation: scripts.generation(),
@@ -116,12 +119,8 @@ impl Pipeline {
     pub fn infer(&mut self, sample: &Sample) -> &Estimates {
         self.follow_settings();
         self.estimates = *self.estimators.infer(sample);
+        self.wear.step(sample, &mut self.estimates);
         &self.estimates
-    }
-
-    /// Between the halves: what the library of wear models says of this cut, limit and wear.
-    pub fn inform(&mut self, (wear_limit_w, tool_wear_mm): (Estimated, Estimated)) {
-        (self.estimates.wear_limit_w, self.estimates.tool_wear_mm) = (wear_limit_w, tool_wear_mm);
     }
 
     /// The second half of a tick: decides.
@@ -156,6 +155,17 @@ impl Pipeline {
             self.generation = self.scripts.generation();
             self.estimators.reconfigure(self.scripts.settings().clone());
         }
+    }
+
+    /// The wear of the edges.
+    #[must_use]
+    pub fn wear(&self) -> &WearEstimator {
+        &self.wear
+    }
+
+    /// The wear of the edges, to give it models and what it remembered, and to fetch its news.
+    pub fn wear_mut(&mut self) -> &mut WearEstimator {
+        &mut self.wear
     }
 
     /// The scripts.

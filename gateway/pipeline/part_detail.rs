@@ -1,6 +1,7 @@
 //! What a finished part was made with: time in each machine state, greatest power, and, for each tool, how long it cut, with
 //! what mean cutting power, against what limit of the wear model.
 
+use rules::estimators::wear::tool_of;
 use rules::estimators::{Estimates, State};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,13 +18,43 @@ pub struct PartDetail {
     pub peak_power_w: Option<f64>,
     /// The tools that cut, in the order of their first cut.
     pub tools: Vec<ToolUse>,
+    /// The operations of the part, in the order in which they began; empty where none is named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub operations: Vec<OperationUse>,
+}
+
+/// One operation of one part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OperationUse {
+    /// As the process plan names it; empty for what is named by none.
+    pub operation: String,
+    /// Seconds in it.
+    pub seconds: f64,
+    /// Seconds of cutting.
+    pub cutting_s: f64,
+    /// Energy over the time in which the power was known, J: of the whole machine where it is measured, else of the spindle.
+    pub energy_j: Option<f64>,
+    /// Mean power over that time, W.
+    pub mean_power_w: Option<f64>,
+}
+
+/// An operation in progress.
+#[derive(Debug, Clone, Default)]
+struct Operation {
+    name: String,
+    seconds: f64,
+    cutting_s: f64,
+    power: Mean,
 }
 
 /// One tool in one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ToolUse {
-    /// Its name in the controller; empty where the controller has none.
+    /// The tool, without its edge; empty where the controller has none.
     pub tool: String,
+    /// The edge, as the controller names it; empty where it names none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub edge: String,
     /// Seconds of cutting.
     pub cutting_s: f64,
     /// Mean cutting power over the time in which it was known, W.
@@ -72,11 +103,19 @@ pub(super) struct Gathering {
     seconds: [f64; State::ALL.len()],
     peak_power_w: Option<f64>,
     tools: Vec<Tool>,
+    operations: Vec<Operation>,
 }
 
 impl Gathering {
     /// Takes `step_s` seconds of the part.
-    pub(super) fn step(&mut self, estimates: &Estimates, tool: &str, power_w: Option<f64>, step_s: f64) {
+    pub(super) fn step(
+        &mut self,
+        estimates: &Estimates,
+        (tool, operation): (&str, &str),
+        power_w: Option<f64>,
+        step_s: f64,
+    ) {
+        self.operate(estimates, operation, power_w, step_s);
         if let Some(index) = State::ALL.iter().position(|state| *state == estimates.state) {
             self.seconds[index] += step_s;
         }
@@ -85,6 +124,30 @@ impl Gathering {
         }
         if estimates.state == State::Cutting {
             self.cut(estimates, tool, step_s);
+        }
+    }
+
+    fn operate(&mut self, estimates: &Estimates, name: &str, power_w: Option<f64>, step_s: f64) {
+        let index = self.operations.iter().position(|operation| operation.name == name).or_else(|| {
+            (self.operations.len() < TOOLS_MAX).then(|| {
+                self.operations.push(Operation { name: name.to_owned(), ..Operation::default() });
+                self.operations.len() - 1
+            })
+        });
+        let Some(operation) = index.and_then(|index| self.operations.get_mut(index)) else { return };
+        operation.seconds += step_s;
+        operation.power.add(power_w, step_s);
+        if estimates.state == State::Cutting {
+            operation.cutting_s += step_s;
+        }
+    }
+
+    /// Adds the energy of a short silence of the meter to the operation in which it ended.
+    pub(super) fn bridge(&mut self, name: &str, (energy_j, seconds): (f64, f64)) {
+        let operation = self.operations.iter_mut().find(|operation| operation.name == name);
+        if let Some(operation) = operation.filter(|_| energy_j > 0.0) {
+            operation.power.sum += energy_j;
+            operation.power.seconds += seconds;
         }
     }
 
@@ -112,6 +175,10 @@ impl Gathering {
             seconds: named.map(|(state, seconds)| (state.word().to_owned(), rounded(seconds, 1.0))).collect(),
             peak_power_w: done.peak_power_w,
             tools: done.tools.into_iter().map(ToolUse::of).collect(),
+            operations: match &done.operations[..] {
+                [only] if only.name.is_empty() => Vec::new(),
+                _ => done.operations.into_iter().map(OperationUse::of).collect(),
+            },
         }
     }
 }
@@ -119,12 +186,26 @@ impl Gathering {
 impl ToolUse {
     fn of(tool: Tool) -> Self {
         Self {
-            tool: tool.name,
+            tool: tool_of(&tool.name).to_owned(),
+            edge: if tool_of(&tool.name) == tool.name { String::new() } else { tool.name },
             cutting_s: rounded(tool.cutting_s, 1.0),
             cutting_power_w: tool.power.value().map(|watts| rounded(watts, 1.0)),
             limit_w: tool.limit.value().map(|watts| rounded(watts, 1.0)),
             wear_mm: tool.wear.value().map(|mm| rounded(mm, 4.0)),
             wear_uncertainty_mm: tool.wear_uncertainty.value().map(|mm| rounded(mm, 4.0)),
+        }
+    }
+}
+
+impl OperationUse {
+    fn of(operation: Operation) -> Self {
+        let known = operation.power.seconds > 0.0;
+        Self {
+            operation: operation.name,
+            seconds: rounded(operation.seconds, 1.0),
+            cutting_s: rounded(operation.cutting_s, 1.0),
+            energy_j: known.then(|| rounded(operation.power.sum, 0.0)),
+            mean_power_w: operation.power.value().map(|watts| rounded(watts, 1.0)),
         }
     }
 }
@@ -148,10 +229,10 @@ mod tests {
     #[test]
     fn means_are_over_the_time_and_the_next_part_begins_anew() {
         let mut gathering = Gathering::default();
-        gathering.step(&Estimates { state: State::Idle, ..Estimates::none(0) }, "T1", Some(300.0), 4.0);
-        gathering.step(&cutting(1000.0), "T1", Some(1300.0), 1.0);
-        gathering.step(&cutting(400.0), "T2", Some(700.0), 1.0);
-        gathering.step(&cutting(1300.0), "T1", None, 2.0);
+        gathering.step(&Estimates { state: State::Idle, ..Estimates::none(0) }, ("T1", ""), Some(300.0), 4.0);
+        gathering.step(&cutting(1000.0), ("T1", ""), Some(1300.0), 1.0);
+        gathering.step(&cutting(400.0), ("T2", ""), Some(700.0), 1.0);
+        gathering.step(&cutting(1300.0), ("T1", ""), None, 2.0);
         let detail = gathering.finish();
         assert_eq!(detail.seconds, BTreeMap::from([("cutting".to_owned(), 4.0), ("idle".to_owned(), 4.0)]));
         assert_eq!(detail.peak_power_w, Some(1300.0));
@@ -165,7 +246,7 @@ mod tests {
     #[test]
     fn a_part_with_endless_tools_stays_small() {
         let mut gathering = Gathering::default();
-        (0..1000).for_each(|at| gathering.step(&cutting(1.0), &format!("T{at}"), None, 1.0));
+        (0..1000).for_each(|at| gathering.step(&cutting(1.0), (&format!("T{at}"), ""), None, 1.0));
         assert_eq!(gathering.finish().tools.len(), TOOLS_MAX);
     }
 }

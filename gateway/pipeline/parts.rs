@@ -11,6 +11,9 @@ use std::sync::Arc;
 /// Longer steps between two ticks are pauses in which nothing is integrated.
 const STEP_MAX_NS: i64 = 2 * SECOND_NS;
 
+/// A meter that is silent for no longer is bridged in the energy by a straight line, s.
+const BRIDGED_MAX_S: f64 = 10.0;
+
 /// Follows the cycle in progress.
 #[derive(Debug, Clone, Default)]
 pub struct Parts {
@@ -21,6 +24,9 @@ pub struct Parts {
     cutting_s: f64,
     energy_j: f64,
     energy_known: bool,
+    /// The last power, W, and for how long there has been none since, s.
+    last_power_w: Option<f64>,
+    silent_s: f64,
     /// The program that ran when something was last cut: a controller has often left it when it counts the part.
     program: Option<Arc<str>>,
     gathering: Gathering,
@@ -80,12 +86,24 @@ impl Parts {
             }
         }
         let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
-        if let Ok(power_w) = power {
-            self.energy_j += power_w * step_s;
-            self.energy_known = true;
-        }
         let tool = sample.text(channels.tool).unwrap_or_default();
-        self.gathering.step(estimates, tool, power.ok(), step_s);
+        let operation = sample.text(channels.operation).unwrap_or_default();
+        self.gathering.step(estimates, (tool, operation), power.ok(), step_s);
+        match power {
+            Ok(power_w) => {
+                let bridged_j = self.bridged_j(power_w);
+                self.gathering.bridge(operation, (bridged_j, self.silent_s));
+                self.energy_j += power_w * step_s + bridged_j;
+                (self.energy_known, self.last_power_w, self.silent_s) = (true, Some(power_w), 0.0);
+            }
+            Err(_) => self.silent_s += step_s,
+        }
+    }
+
+    /// Energy of the silence that ends with this power, J.
+    fn bridged_j(&self, power_w: f64) -> f64 {
+        let short = self.silent_s > 0.0 && self.silent_s <= BRIDGED_MAX_S;
+        self.last_power_w.filter(|_| short).map_or(0.0, |before_w| 0.5 * (before_w + power_w) * self.silent_s)
     }
 
     fn close(&mut self, channels: &Channels, sample: &Sample, began_ns: TimeNs, count: i64, part: String) -> Part {

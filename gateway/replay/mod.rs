@@ -13,7 +13,7 @@ pub use summary::{FileSummary, StoredRows, Summary};
 use crate::cannot_run::CannotRun;
 use crate::config;
 use crate::gate::Gate;
-use crate::history::{ExtraSeries, ExtraValue, Options, Record, WhenFull, Writer};
+use crate::history::{ExtraSeries, ExtraValue, Options, Reader, Record, WhenFull, Writer};
 use crate::pipeline::{Pipeline, Store};
 use adapters::clock::TimeNs;
 use adapters::merge::{Delay, Lockstep};
@@ -26,6 +26,7 @@ use rules::estimators::{self, VisibilityTally};
 use rules::operations::{Completion, Recipe};
 use rules::script::Host;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use summary::Counts;
 
@@ -39,6 +40,8 @@ pub struct Plan {
     pub files: Vec<PathBuf>,
     /// What the recordings do not say of the cut; fills in channels that they lack.
     pub operations: Option<Recipe>,
+    /// The history whose library of wear models is used where the recordings go into none.
+    pub models: Option<PathBuf>,
     /// The history they go into; without one nothing is stored.
     pub history: Option<PathBuf>,
     /// Show a progress bar on a terminal.
@@ -83,6 +86,7 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
     let began = Instant::now();
     let fresh = estimators::Inference::new(estimators::Settings::default());
     let mut pipeline = Pipeline::new(fresh, scripts, Gate::new(gate));
+    library(plan, &mut pipeline)?;
     let mut files = Vec::new();
     let mut counts = Counts::default();
     let mut visibility = VisibilityTally::default();
@@ -113,6 +117,23 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
         motion,
         took: began.elapsed(),
     })
+}
+
+/// Gives the pipeline the wear models of the history. A recording does not name its machine: a library of several machines is
+/// used for what names none.
+fn library(plan: &Plan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
+    let Some(path) = plan.models.as_ref().or(plan.history.as_ref()).filter(|path| path.exists()) else { return Ok(()) };
+    let cannot = |error: crate::history::HistoryError| CannotRun::new(error.to_string(), "");
+    let stored = Reader::open(path).and_then(|reader| reader.wear_models()).map_err(cannot)?;
+    let records: Vec<_> =
+        stored.into_iter().filter(|model| model.in_force).map(|model| Arc::new(model.record)).collect();
+    let mut machines: Vec<&str> =
+        records.iter().map(|record| &*record.key.machine).filter(|it| !it.is_empty()).collect();
+    machines.sort_unstable();
+    machines.dedup();
+    let machine = if let [only] = machines[..] { only.to_owned() } else { String::new() };
+    pipeline.wear_mut().set_models(&machine, records);
+    Ok(())
 }
 
 /// One recording on its way through the pipeline.

@@ -28,6 +28,8 @@ const DAY_NS: i64 = 86_400 * SECOND_NS;
 
 /// What the scripts remember, beside what the estimators have learned.
 pub(super) const SCRIPTS_MEMORY: &str = "scripts.json";
+/// What is known of the edges, beside the memory of the estimators.
+pub(super) const WEAR_MEMORY: &str = "wear.json";
 
 /// See the [module](self).
 pub struct Health {
@@ -192,12 +194,17 @@ impl Health {
         }
     }
 
-    /// Saves what the estimators have learned and what the scripts remember: new files in the place of the old ones.
+    /// Saves what the estimators have learned, what is known of the edges and what the scripts remember: new files in the place of the old ones.
     fn save(&mut self, pipeline: &Pipeline) {
         self.saved = Instant::now();
         let scripts = self.memory.with_file_name(SCRIPTS_MEMORY);
-        let both = [(&self.memory, pipeline.estimators().snapshot()), (&scripts, pipeline.scripts().snapshot())];
-        for (path, snapshot) in both {
+        let wear = self.memory.with_file_name(WEAR_MEMORY);
+        let all = [
+            (&self.memory, pipeline.estimators().snapshot()),
+            (&scripts, pipeline.scripts().snapshot()),
+            (&wear, pipeline.wear().snapshot()),
+        ];
+        for (path, snapshot) in all {
             self.saver.put(path, snapshot.to_string());
         }
     }

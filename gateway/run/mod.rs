@@ -161,6 +161,7 @@ fn ticker(
         scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
     }
     let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
+    remember_edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let mut thermal = Thermal::of(config)?;
     let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
@@ -284,6 +285,16 @@ fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs
         return now_ns;
     }
     newest_ns + SECOND_NS
+}
+
+/// The wear of the edges, as it was known before.
+fn remember_edges(pipeline: &mut Pipeline, memory: &Path) {
+    let Ok(text) = std::fs::read_to_string(memory) else { return };
+    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
+    if !pipeline.wear_mut().restore(snapshot) {
+        let text = format!("{} cannot be used: the wear of the edges is followed anew", memory.display());
+        Notice::new(Severity::Warning, "wear_forgotten", text).say();
+    }
 }
 
 /// The estimators, with what they had learned before.

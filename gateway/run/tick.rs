@@ -9,7 +9,7 @@ use super::report;
 use super::rules::Watched;
 use super::sample_feed::SampleFeed;
 use super::thermal::Thermal;
-use super::wear::Wear;
+use super::wear::{self, Wear};
 use crate::config::GateMode;
 use crate::control::Wake;
 use crate::gate::Ask;
@@ -73,7 +73,7 @@ pub struct Ticker {
     pub operations: Option<Operations>,
     /// The model beside the machine, where one is configured.
     pub twin: Option<Twin>,
-    /// The wear model of the tool in use, where the library has one.
+    /// The library of wear models.
     pub wear: Wear,
     /// The thermal law, where one is configured.
     pub thermal: Option<Thermal>,
@@ -116,10 +116,11 @@ impl Ticker {
             self.complete(&mut sample, now_ns);
             self.scripts.step(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
             self.commands.obey(self.pipeline.gate_mut(), &sample, &mut self.health);
+            self.wear.supply(&mut self.pipeline, sample.at_ns, &mut self.health);
             let inferred = *self.pipeline.infer(&sample);
             self.feed.alignment_mut().told(sample.at_ns, inferred.state);
             self.health.aligned(sample.at_ns, self.feed.alignment_mut());
-            self.pipeline.inform(self.wear.step(&sample, &inferred, &mut self.health));
+            self.wear.tell(&mut self.pipeline, sample.at_ns, &mut self.health);
             if let Some(thermal) = &mut self.thermal {
                 self.pipeline.propose(thermal.step(&sample, &mut self.health));
             }
@@ -222,7 +223,7 @@ impl Ticker {
             alignment: self.feed.alignment().status(),
             scripts: report::scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
-            wear: self.wear.status(),
+            wear: wear::status(&self.pipeline),
             sinks: self.sinks.status(),
             problems: self.problems(&history),
             history,
@@ -231,12 +232,7 @@ impl Ticker {
 
     fn alarms(&self) -> Vec<AlarmStatus> {
         let of_twin = self.twin.iter().flat_map(Twin::alarms);
-        report::alarms(&self.pipeline)
-            .into_iter()
-            .chain(of_twin)
-            .chain(self.wear.alarms())
-            .chain(self.commands.alarm())
-            .collect()
+        report::alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.commands.alarm()).collect()
     }
 
     fn problems(&self, history: &HistoryStatus) -> Vec<Problem> {

@@ -60,6 +60,8 @@ pub enum NoEstimate {
     OutsideModel,
     /// The wear cannot be seen in the power of this cut.
     NotObservable,
+    /// No part of this edge has been finished yet.
+    NoPartYet,
     /// Nothing is being cut.
     NotCutting,
     /// The power lies below the no-load power by more than the uncertainty: braking, or the no-load power is outdated.
@@ -86,6 +88,7 @@ impl NoEstimate {
             Self::CutUnknown => "cut_unknown",
             Self::OutsideModel => "outside_model",
             Self::NotObservable => "not_observable",
+            Self::NoPartYet => "no_part_yet",
             Self::NotCutting => "not_cutting",
             Self::BelowNoLoad => "below_no_load",
         }
@@ -124,6 +127,7 @@ impl fmt::Display for NoEstimate {
             }
             Self::OutsideModel => f.write_str("the cut lies outside those that the model was fitted on"),
             Self::NotObservable => f.write_str("the wear cannot be seen in the power of this cut"),
+            Self::NoPartYet => f.write_str("no part of this edge has been finished yet"),
             Self::NotCutting => f.write_str("nothing is being cut"),
             Self::BelowNoLoad => f.write_str("power is below no-load power: braking, or no-load power is outdated"),
         }
@@ -215,8 +219,14 @@ pub struct Estimates {
     pub visible_cutting_power_w: Estimated,
     /// Cutting power `[Pc]` at which the edge in use would be worn in this cut, W; from the library of wear models.
     pub wear_limit_w: Estimated,
-    /// Flank wear that the cutting power means, mm; from the library of wear models.
+    /// Flank wear of the edge in use after its last part, mm; only with a learned model.
     pub tool_wear_mm: Estimated,
+    /// Rise of the cutting power by the wear of the edge in use, at a feed of 0.2 mm/rev, %.
+    pub tool_growth_pct: Estimated,
+    /// Probability that the edge in use passes its criterion by the end of the next part.
+    pub tool_worn_probability: Estimated,
+    /// Parts until the edge in use passes its criterion.
+    pub tool_parts_left: Estimated,
     /// Where the no-load power comes from.
     pub no_load_origin: NoLoadOrigin,
     /// By how much the interpolation amplifies the noise of the learned powers; 0 where there is no no-load power.
@@ -244,7 +254,10 @@ impl Estimates {
             load_loss_w: Err(NoEstimate::NotYet),
             visible_cutting_power_w: Err(NoEstimate::NotYet),
             wear_limit_w: Err(NoEstimate::NoModel),
-            tool_wear_mm: Err(NoEstimate::NoModel),
+            tool_wear_mm: Err(NoEstimate::NoPartYet),
+            tool_growth_pct: Err(NoEstimate::NoPartYet),
+            tool_worn_probability: Err(NoEstimate::NoPartYet),
+            tool_parts_left: Err(NoEstimate::NoPartYet),
             no_load_origin: NoLoadOrigin::None,
             noise_gain: 0.0,
             visibility: Visibility::NotAsked,
@@ -253,7 +266,7 @@ impl Estimates {
     }
 
     /// Every quantity with its name (which ends in the unit), for scripts, storage and HTTP.
-    pub fn quantities(&self) -> [(&'static str, Estimated); 7] {
+    pub fn quantities(&self) -> [(&'static str, Estimated); 10] {
         [
             ("filtered_power_w", self.filtered_power_w),
             ("no_load_power_w", self.no_load_power_w),
@@ -262,6 +275,9 @@ impl Estimates {
             ("visible_cutting_power_w", self.visible_cutting_power_w),
             ("wear_limit_w", self.wear_limit_w),
             ("tool_wear_mm", self.tool_wear_mm),
+            ("tool_growth_pct", self.tool_growth_pct),
+            ("tool_worn_probability", self.tool_worn_probability),
+            ("tool_parts_left", self.tool_parts_left),
         ]
     }
 

@@ -255,13 +255,13 @@ impl Reader<'_> {
         if missing("name") {
             self.wrong(offset, "the operation has no name", "write name = \"rough turning\"");
         }
-        if !QUANTITIES.iter().any(|quantity| table.iter().any(|(name, _)| name.get_ref() == quantity.key))
+        if !table.iter().any(|(name, _)| says_of_cut(name.get_ref()))
             && table.iter().all(|(name, _)| meant(name.get_ref(), None).is_none())
         {
             self.wrong(
                 offset,
                 "the operation says nothing of the cut",
-                "write depth_of_cut_mm = ..., diameter_mm = ...",
+                "write depth_of_cut_mm = ..., diameter_mm = ..., or at least work_material = \"...\"",
             );
         }
     }
@@ -320,6 +320,11 @@ fn overlap(a: &Option<RangeInclusive<u32>>, b: &Option<RangeInclusive<u32>>) -> 
         (None, None) => true,
         _ => false,
     }
+}
+
+/// Does this key say anything of the cut?
+fn says_of_cut(name: &str) -> bool {
+    name == "work_material" || QUANTITIES.iter().any(|quantity| quantity.key == name)
 }
 
 fn plain_number(value: &DeValue<'_>) -> Option<f64> {

@@ -4,6 +4,7 @@ use super::callable::FUNCTIONS;
 use super::events::HANDLERS;
 use super::fields::RECORDS;
 use super::trials::TRIAL_FUNCTIONS;
+use crate::estimators::wear::tool_of;
 use crate::estimators::{Estimated, Estimates, SETTINGS};
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample};
@@ -40,6 +41,8 @@ pub struct Word {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Source {
     Channel(ChannelId),
+    /// The tool of a name that may name its edge.
+    Tool(ChannelId),
     Quantity(fn(&Estimates) -> Estimated),
     Deviation(fn(&Estimates) -> Estimated),
     Number(fn(&View<'_>) -> f64),
@@ -67,6 +70,7 @@ impl Word {
     pub(super) fn see<'a>(&self, view: &View<'a>) -> Seen<'a> {
         match self.source {
             Source::Channel(id) => channel(view.sample, id),
+            Source::Tool(id) => view.sample.text(id).map_or(Seen::Absent, |name| Seen::Text(tool_of(name))),
             Source::Quantity(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.value)),
             Source::Deviation(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.sd)),
             Source::Number(read) => Seen::Number(read(view)),
@@ -78,7 +82,9 @@ impl Word {
     /// Why there is no value, for the operator; `None` when there is one.
     pub(super) fn why_absent(&self, view: &View<'_>) -> Option<String> {
         match self.source {
-            Source::Channel(id) => view.sample.slot(id).value.as_ref().err().map(ToString::to_string),
+            Source::Channel(id) | Source::Tool(id) => {
+                view.sample.slot(id).value.as_ref().err().map(ToString::to_string)
+            }
             Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|why| why.to_string()),
             Source::Number(_) | Source::Text(_) | Source::Memory => None,
         }
@@ -100,7 +106,7 @@ fn channel(sample: &Sample, id: ChannelId) -> Seen<'_> {
 type Quantity = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
 
 /// The estimated quantities: name, name of the standard deviation, unit, texts, value.
-const QUANTITIES: [Quantity; 7] = [
+const QUANTITIES: [Quantity; 10] = [
     (
         "filtered_power_w",
         "filtered_power_sd_w",
@@ -148,9 +154,33 @@ const QUANTITIES: [Quantity; 7] = [
         "tool_wear_mm",
         "tool_wear_sd_mm",
         "mm",
-        "Flank wear that the cutting power means, from the library of wear models",
-        "由切削功率推算的后刀面磨损量",
+        "Flank wear of the edge in use after its last part; with a learned model of the wear only",
+        "当前刀刃的后刀面磨损量（需磨损模型）",
         |it| it.tool_wear_mm,
+    ),
+    (
+        "tool_growth_pct",
+        "tool_growth_sd_pct",
+        "%",
+        "Rise of the cutting power by the wear of the edge in use, at a feed of 0.2 mm/rev; also without a model",
+        "磨损引起的切削功率增量（进给量 0.2 mm/r）",
+        |it| it.tool_growth_pct,
+    ),
+    (
+        "tool_worn_probability",
+        "tool_worn_probability_sd",
+        "1",
+        "Probability that the edge in use passes its criterion by the end of the next part",
+        "当前刀刃在下一件结束前超过磨损标准的概率",
+        |it| it.tool_worn_probability,
+    ),
+    (
+        "tool_parts_left",
+        "tool_parts_left_sd",
+        "1",
+        "Parts until the edge in use passes its criterion",
+        "当前刀刃剩余可加工件数",
+        |it| it.tool_parts_left,
     ),
 ];
 
@@ -163,6 +193,9 @@ const fn word(
 ) -> Word {
     Word { name, unit, kind, en: texts.0, zh: texts.1, source }
 }
+
+/// The channel that names tool and edge.
+const TOOL: &str = "tool";
 
 /// Words that are neither channels nor quantities.
 const OWN: [Word; 7] = [
@@ -237,7 +270,14 @@ static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
     for id in ChannelId::all() {
         let row = id.channel();
         let kind = if row.kind == adapters::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
-        words.push(word(row.name, row.unit, kind, (row.en, row.zh), Source::Channel(id)));
+        if row.name != TOOL {
+            words.push(word(row.name, row.unit, kind, (row.en, row.zh), Source::Channel(id)));
+            continue;
+        }
+        let texts = ("Tool in use, without its edge: T1 for every edge of T1", "刀具（不含刀刃号）");
+        words.push(word(TOOL, "", kind, texts, Source::Tool(id)));
+        let texts = ("Edge in use, as the controller names it: T1-2 is the second edge of T1", "刀刃（控制器名称）");
+        words.push(word("edge", "", kind, texts, Source::Channel(id)));
     }
     words
 });
@@ -307,6 +347,6 @@ mod tests {
         let names: BTreeSet<_> = words().iter().map(|word| word.name).collect();
         assert_eq!(names.len(), words().len());
         assert!(words().iter().all(|word| !word.en.is_empty() && !word.zh.is_empty()));
-        assert_eq!(words().len(), ChannelId::count() + OWN.len() + 2 * QUANTITIES.len());
+        assert_eq!(words().len(), ChannelId::count() + 1 + OWN.len() + 2 * QUANTITIES.len());
     }
 }

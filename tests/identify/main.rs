@@ -13,6 +13,7 @@ mod thermal;
 mod thermal_machine;
 mod turning_wear;
 mod wear;
+mod wear_limits;
 
 /// Repetitions of the long form.
 pub(crate) const LONG: u64 = 200;

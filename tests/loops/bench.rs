@@ -7,7 +7,8 @@ use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Account, Book, Moved, OffsetOrder};
 use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
-use gateway::pipeline::{NoStore, Pipeline};
+use gateway::history::{ExtraValue, Part, Record};
+use gateway::pipeline::{Pipeline, Store};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use rules::estimators;
 use rules::script::{Host, ScriptFile};
@@ -37,6 +38,20 @@ pub(crate) fn script(name: &str, text: impl Into<String>) -> ScriptFile {
     ScriptFile { name: name.to_owned(), text: text.into() }
 }
 
+/// Keeps the finished parts.
+#[derive(Default)]
+struct Finished(Vec<Part>);
+
+impl Store for Finished {
+    fn sample(&mut self, _: &Sample, _: &[ExtraValue<'_>]) {}
+
+    fn record(&mut self, record: Record) {
+        if let Record::Part(part) = record {
+            self.0.push(part);
+        }
+    }
+}
+
 /// A machine, and the gateway beside it.
 pub(crate) struct Bench {
     pub(crate) machine: Simulated,
@@ -51,6 +66,8 @@ pub(crate) struct Bench {
     pub(crate) reactions: Vec<Reaction>,
     /// Offsets that were shifted, or could not be.
     pub(crate) moves: Vec<Moved>,
+    /// Finished parts, as they are stored.
+    pub(crate) parts: Vec<Part>,
     /// What went wrong on the way to the machine.
     pub(crate) faults: Vec<String>,
     /// Where the account of the offsets is kept.
@@ -94,6 +111,7 @@ impl Bench {
             period_ns: TICK_NS,
             reactions: Vec::new(),
             moves: Vec::new(),
+            parts: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -107,7 +125,9 @@ impl Bench {
     pub(crate) fn tick(&mut self) -> &Sample {
         self.now_ns += self.period_ns;
         self.lockstep.sample_into(&mut self.sample, self.now_ns);
-        self.pipeline.step(&self.sample, &mut NoStore);
+        let mut finished = Finished::default();
+        self.pipeline.step(&self.sample, &mut finished);
+        self.parts.append(&mut finished.0);
         let verdict = *self.pipeline.verdict().expect("decided");
         let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
         let gate = self.pipeline.gate_mut();

@@ -7,3 +7,5 @@ mod steps;
 mod stops;
 mod thermal;
 mod wear;
+mod wear_shift;
+mod work_done;

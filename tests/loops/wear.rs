@@ -79,7 +79,8 @@ fn over(bench: &Bench) -> bool {
     bench.now_s() > 40.0 && panel.program == 0
 }
 
-fn model() -> Physical {
+/// The model that a shop would learn from 36 cuts on this machine.
+pub(super) fn model() -> Physical {
     let wears = [0.03, 0.12, 0.22, 0.32];
     let cuts: Vec<Cut> =
         wears.into_iter().enumerate().flat_map(|(at, wear_mm)| design(wear_mm, 1000 + at as u64)).collect();

@@ -2,7 +2,7 @@
 
 use crate::history::Reader;
 use crate::log::{Notice, Severity};
-use rules::estimators::wear::{Key, WearRecord};
+use rules::estimators::wear::WearRecord;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, channel, sync_channel};
@@ -62,14 +62,9 @@ impl Library {
         Some(Notice::new(Severity::Warning, "wear_models_refused", text))
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.models.is_empty()
-    }
-
-    /// The model that names most of this cut; of equals the newest.
-    pub(super) fn best(&self, cut: &Key) -> Option<Arc<WearRecord>> {
-        let fitting = self.models.iter().filter_map(|model| Some((model.key.fits(cut)?, model)));
-        fitting.max_by_key(|(count, _)| *count).map(|(_, model)| model.clone())
+    /// The models in force, the newest last.
+    pub(super) fn models(&self) -> &[Arc<WearRecord>] {
+        &self.models
     }
 }
 

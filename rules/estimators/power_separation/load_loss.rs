@@ -107,7 +107,7 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
     if learned.stages.is_empty() {
         return Err(learned.refused.into_iter().next().unwrap_or_else(nothing));
     }
-    learned.notes = learned.stages.iter().filter_map(note).collect();
+    learned.notes = learned.stages.iter().flat_map(notes).collect();
     learned.points = points;
     Ok(learned)
 }
@@ -293,7 +293,26 @@ fn credible(stage: &StageLearned) -> Result<(), Refusal> {
     Err(Refusal::new(RefusalKind::Contradiction, what, "look at reference and meter, and record heavier cuts"))
 }
 
-fn note(stage: &StageLearned) -> Option<String> {
+fn notes(stage: &StageLearned) -> impl Iterator<Item = String> {
+    by_speed_told(stage).into_iter().chain(negative(stage))
+}
+
+/// A load takes power; a loss below 0 means that the cutting power of the reference is too great. Its doubt is not in the interval,
+/// where it is the same for all cuts.
+fn negative(stage: &StageLearned) -> Option<String> {
+    let share = stage.share_at_mean.value;
+    (share < 0.0).then(|| {
+        format!(
+            "gear stage {}: the load loss is negative ({:.1} % of the cutting power at the mean cut), which no machine has: the cutting \
+             power of the reference is too great. Lower the specific energy of the material by at least as much, or take a torque \
+             (torque_nm); do not set these coefficients",
+            stage.stage,
+            100.0 * share
+        )
+    })
+}
+
+fn by_speed_told(stage: &StageLearned) -> Option<String> {
     let test = stage.by_speed.filter(|test| test.p < 0.05)?;
     Some(format!(
         "gear stage {}: the speeds want coefficients of their own (F = {:.1}, p = {:.3}); the common ones are a mean over {} speeds",

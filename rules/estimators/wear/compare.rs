@@ -1,5 +1,9 @@
 //! Both forms against each other, on cuts that they have not seen.
 //!
+//! The form is chosen by evidence: Schwarz's criterion (1978), n ln(RSS/n) + k ln n, of both fits on the same cuts. It punishes the
+//! many terms of a surface, and the five numbers of a physical form that do not describe the cuts. Errors on cuts that were left out
+//! stand beside it:
+//!
 //! Inside: each cut is predicted by a fit of all the others. Outside: all cuts at the least or the greatest value of a factor
 //! are predicted by a fit of the rest, as happens when a machine is run beyond its design of experiments.
 
@@ -15,6 +19,8 @@ use serde::Serialize;
 pub struct FormErrors {
     /// `surface` or `physical`.
     pub form: &'static str,
+    /// Schwarz's criterion; the smaller one has the better evidence. `None` where a fit was not possible.
+    pub bic: Option<f64>,
     /// Of cuts within the design.
     pub inside_rms_w: Option<f64>,
     /// Of cuts at the edge of the design, from a fit without this edge.
@@ -26,7 +32,7 @@ pub struct FormErrors {
 pub struct Comparison {
     /// Surface, then physical form.
     pub forms: [FormErrors; 2],
-    /// The form with the smaller error inside; the physical one where they agree within a tenth, because it extrapolates.
+    /// The form with the better evidence.
     pub recommended: &'static str,
 }
 
@@ -38,8 +44,8 @@ pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> Comparison {
     let surface = |cuts: &[Cut]| largest(cuts, options);
     let physical = |cuts: &[Cut]| fit_physical(cuts, &options.held).ok().map(|fit| WearModel::Physical(fit.physical));
     let forms = [errors("surface", cuts, &surface), errors("physical", cuts, &physical)];
-    let recommended = match (forms[0].inside_rms_w, forms[1].inside_rms_w) {
-        (Some(surface), Some(physical)) if surface < 0.9 * physical => "surface",
+    let recommended = match (forms[0].bic, forms[1].bic) {
+        (Some(surface), Some(physical)) if surface < physical => "surface",
         (Some(_), None) => "surface",
         _ => "physical",
     };
@@ -58,9 +64,21 @@ fn errors(form: &'static str, cuts: &[Cut], fit: Fit<'_>) -> FormErrors {
     let one_by_one: Vec<Vec<usize>> = (0..cuts.len()).map(|at| vec![at]).collect();
     FormErrors {
         form,
+        bic: fit(cuts).map(|model| bic(&model, cuts)),
         inside_rms_w: left_out(cuts, &one_by_one, fit),
         outside_rms_w: left_out(cuts, &edges(cuts), fit),
     }
+}
+
+/// Schwarz's criterion of a fitted model, on the cuts that it was fitted on.
+fn bic(model: &WearModel, cuts: &[Cut]) -> f64 {
+    let count = cuts.len() as f64;
+    let (sd, df) = match model {
+        WearModel::Surface(it) => (it.residual_sd_w, it.degrees_of_freedom),
+        WearModel::Physical(it) => (it.residual_sd_w, it.degrees_of_freedom),
+    };
+    let mean_square = (sd * sd * df / count).max(f64::MIN_POSITIVE);
+    count * mean_square.ln() + (count - df) * count.ln()
 }
 
 /// The cuts at each end of each factor that has more than two values.

@@ -17,43 +17,63 @@
 //! | `compare` | both forms on cuts that they have not seen |
 //! | `model`, `predicted` | either form, and what it says of a cut |
 //! | `threshold` | the limit `[Pc]`, the wear from a power, observable here or not |
-//! | `alarm` | raised on repeated violation only |
+//! | `tool_name` | tool and edge in a name |
+//! | `choose` | the model of a library for a cut |
+//! | `work` | what an edge did in one part, against what a sharp one takes |
+//! | `gaussian`, `follow` | the wear of every edge, followed by a Kalman filter |
+//! | `prior` | what the filter believes beforehand |
+//! | `outlook` | probability of passing the criterion, parts left |
+//! | `live` | all of it beside the running machine |
 
-mod alarm;
 mod anova;
+mod choose;
 mod coding;
 mod compare;
 mod conditions;
 mod design;
 mod fit_surface;
+mod follow;
 mod gather;
+mod gaussian;
 mod identify;
+mod live;
 mod model;
 mod orthogonal_array;
+mod outlook;
 mod physical;
 mod predicted;
+mod prior;
 mod record;
 mod report;
 mod short;
 mod surface;
 mod term;
 mod threshold;
+mod tool_name;
+mod work;
 
-pub use alarm::{AlarmRule, Change, WearAlarm};
 pub use anova::{Anova, Source};
+pub use choose::{Choice, choose};
 pub use coding::{Coding, Range};
 pub use compare::{Comparison, FormErrors, compare};
 pub use conditions::{CUTTING_POWER, Conditions, Cut, FACTORS, Factor, WEAR, cutting_speed_m_min, unit_trouble};
 pub use design::{Alias, Design, Levels, PlannedCut, plan};
 pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
+pub use follow::{Follower, WearNews};
 pub use gather::{Columns, Gathered, gather};
 pub use identify::{LearnedWear, Place, WearOptions, identify_tool_wear};
+pub use live::{ModelInUse, WearEstimator};
 pub use model::WearModel;
 pub use orthogonal_array::Array;
+pub use outlook::{OBSERVED_SHARE, Outlook};
 pub use physical::{Fitted, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
 pub use predicted::Predicted;
 pub use record::{Key, WearRecord};
 pub use short::{SHORT_FORM, SHORT_LENGTH};
 pub use surface::{Surface, published, published_over};
 pub use term::{Term, second_order};
-pub use threshold::{OBSERVABLE_SHARE, Observability, Threshold, WearEstimate, estimate_wear, threshold};
+pub use threshold::{
+    OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, Threshold, WearEstimate, estimate_wear, threshold,
+};
+pub use tool_name::{edge_of, tool_of};
+pub use work::{CutMoment, Reference, Work, WorkKey};

@@ -19,22 +19,6 @@ pub struct Key {
     pub operation: String,
 }
 
-impl Key {
-    /// How well a model with this key fits a cut: the number of its texts that agree, `None` when one contradicts. An empty
-    /// text of the model fits everything.
-    #[must_use]
-    pub fn fits(&self, cut: &Self) -> Option<usize> {
-        let pairs = [
-            (&self.machine, &cut.machine),
-            (&self.tool, &cut.tool),
-            (&self.work_material, &cut.work_material),
-            (&self.operation, &cut.operation),
-        ];
-        let named = pairs.iter().filter(|(mine, _)| !mine.is_empty());
-        named.clone().all(|(mine, theirs)| mine == theirs).then(|| named.count())
-    }
-}
-
 /// A model, what it is for, and where it comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WearRecord {
@@ -115,13 +99,5 @@ mod tests {
             let told = WearRecord::parse(&text.replace(old, new)).expect_err(part);
             assert!(told.contains(part), "{part}: {told}");
         }
-    }
-
-    #[test]
-    fn the_model_that_names_more_of_the_cut_fits_better() {
-        let cut = key(["m", "T1", "steel", "rough"]);
-        assert_eq!(key(["m", "T1", "", ""]).fits(&cut), Some(2));
-        assert_eq!(key(["m", "T1", "steel", "rough"]).fits(&cut), Some(4));
-        assert_eq!(key(["m", "T2", "", ""]).fits(&cut), None);
     }
 }

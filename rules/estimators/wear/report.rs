@@ -13,10 +13,16 @@ impl fmt::Display for LearnedWear {
         f.write_str(&told(&self.surface, surface))?;
         writeln!(f, "\nphysical form   P = P0 (vc/vc0)^x (f/f0)^y (ap/ap0)^z + W VB vc ap")?;
         f.write_str(&told(&self.physical, physical))?;
-        writeln!(f, "\non cuts that were left out, rms: {:>12} {:>12}", "inside", "at the edge")?;
+        writeln!(
+            f,
+            "\non cuts that were left out, rms: {:>12} {:>12} {:>14}",
+            "inside", "at the edge", "evidence BIC"
+        )?;
         for form in &self.comparison.forms {
             let watts = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} W"));
-            writeln!(f, "  {:<30} {:>12} {:>12}", form.form, watts(form.inside_rms_w), watts(form.outside_rms_w))?;
+            let (inside, outside) = (watts(form.inside_rms_w), watts(form.outside_rms_w));
+            let bic = form.bic.map_or("-".to_owned(), |bic| format!("{bic:.1}"));
+            writeln!(f, "  {:<30} {inside:>12} {outside:>12} {bic:>14}", form.form)?;
         }
         writeln!(f, "taken: {}\n\nlimit [Pc] at VB = {} mm", self.model.form(), self.criterion_mm)?;
         writeln!(
@@ -47,8 +53,16 @@ fn line(place: &Place) -> String {
         place.feed_per_rev_mm,
         place.depth_of_cut_mm,
         limit.slope_w_per_mm,
-        limit.observability.word()
+        seen(limit)
     )
+}
+
+/// Where, or over how many parts, the wear can be seen.
+fn seen(limit: &super::Threshold) -> String {
+    match limit.parts_to_observe {
+        Some(parts) if parts > 1 => format!("observable over {parts} parts"),
+        _ => limit.observability.word().to_owned(),
+    }
 }
 
 fn surface(fit: &SurfaceFit) -> String {

@@ -2,6 +2,7 @@
 
 use super::conditions::{Conditions, Factor, WEAR};
 use super::model::WearModel;
+use super::predicted::Predicted;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 
@@ -9,6 +10,8 @@ use serde::Serialize;
 /// observable. Published case: at b = -1, c = 1 the power rises by 89 W per mm of wear and scatters by 37.6 W, so that one
 /// standard deviation is 0.42 mm; there the wear cannot be seen.
 pub const OBSERVABLE_SHARE: f64 = 0.5;
+/// Parts that are pooled at most: an edge that makes fewer would be worn before its wear is seen.
+pub const POOLED_PARTS_MAX: u32 = 30;
 
 /// Can the wear be seen in the power of this cut?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -16,6 +19,8 @@ pub const OBSERVABLE_SHARE: f64 = 0.5;
 pub enum Observability {
     /// The interval of a single estimate is narrow against the criterion.
     Observable,
+    /// Of a single part it is not, of the mean over [`Threshold::parts_to_observe`] parts it is.
+    ObservableOverParts,
     /// It is not: an alarm would be chance. Observe at another cut of the part.
     NotObservableHere,
 }
@@ -26,6 +31,7 @@ impl Observability {
     pub fn word(self) -> &'static str {
         match self {
             Self::Observable => "observable",
+            Self::ObservableOverParts => "observable_over_parts",
             Self::NotObservableHere => "not_observable_here",
         }
     }
@@ -46,6 +52,8 @@ pub struct Threshold {
     pub slope_w_per_mm: f64,
     /// Half the 95 % interval of the wear from a single power, mm; `None` where the power does not rise with the wear.
     pub wear_half_interval_mm: Option<f64>,
+    /// Over how many parts the wear can be seen: 1 where a single one tells it; `None` where as many as an edge makes do not.
+    pub parts_to_observe: Option<u32>,
     /// Can the wear be seen here?
     pub observability: Observability,
     /// Factors in which this cut lies outside what the model was fitted on.
@@ -94,6 +102,7 @@ pub fn threshold(model: &WearModel, cut: &Conditions, criterion_mm: f64) -> Resu
     let half = predicted.t() * sd_w;
     let slope_w_per_mm = model.wear_slope_w_per_mm(&worn);
     let wear_half_interval_mm = (slope_w_per_mm > 0.0).then(|| half / slope_w_per_mm).filter(|it| it.is_finite());
+    let parts_to_observe = parts_to_observe(&predicted, slope_w_per_mm, criterion_mm);
     Ok(Threshold {
         criterion_mm,
         power_w,
@@ -101,9 +110,22 @@ pub fn threshold(model: &WearModel, cut: &Conditions, criterion_mm: f64) -> Resu
         interval_w: (power_w - half, power_w + half),
         slope_w_per_mm,
         wear_half_interval_mm,
-        observability: observability(wear_half_interval_mm, criterion_mm),
+        parts_to_observe,
+        observability: match parts_to_observe {
+            Some(1) => Observability::Observable,
+            Some(_) => Observability::ObservableOverParts,
+            None => Observability::NotObservableHere,
+        },
         extrapolated: names(outside),
     })
+}
+
+/// The least number of parts whose mean power tells the wear. The scatter of single cuts becomes less with their number, the error
+/// of the law does not.
+fn parts_to_observe(predicted: &Predicted, slope_w_per_mm: f64, criterion_mm: f64) -> Option<u32> {
+    let narrow_w = OBSERVABLE_SHARE * criterion_mm * slope_w_per_mm / predicted.t();
+    let scatter = |parts: u32| predicted.residual_sd_w / f64::from(parts).sqrt();
+    (1..=POOLED_PARTS_MAX).find(|parts| predicted.law_sd_w.hypot(scatter(*parts)) <= narrow_w)
 }
 
 fn observability(half_mm: Option<f64>, criterion_mm: f64) -> Observability {

@@ -274,6 +274,9 @@ fn quantity_of<'a>(estimates: &'a mut Estimates, name: &str) -> Option<&'a mut E
         "visible_cutting_power_w" => Some(&mut estimates.visible_cutting_power_w),
         "wear_limit_w" => Some(&mut estimates.wear_limit_w),
         "tool_wear_mm" => Some(&mut estimates.tool_wear_mm),
+        "tool_growth_pct" => Some(&mut estimates.tool_growth_pct),
+        "tool_worn_probability" => Some(&mut estimates.tool_worn_probability),
+        "tool_parts_left" => Some(&mut estimates.tool_parts_left),
         _ => None,
     }
 }

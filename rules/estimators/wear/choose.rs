@@ -1,0 +1,90 @@
+//! Which model of a library is for this cut: the exact edge before its tool, then the operation, the work material, any.
+
+use super::record::{Key, WearRecord};
+use super::tool_name::tool_of;
+
+/// A model, and what speaks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice<'a, R> {
+    /// The model.
+    pub record: &'a R,
+    /// Of what it names most: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
+    pub by: &'static str,
+}
+
+impl Key {
+    /// How well a model with this key fits a cut; `None` when it names something else than the cut. An empty text of the model
+    /// fits everything; a model of a tool fits all edges of it.
+    #[must_use]
+    pub fn fits(&self, cut: &Self) -> Option<u8> {
+        let agrees = |mine: &str, theirs: &str| mine.is_empty() || mine == theirs;
+        let edge = !self.tool.is_empty() && self.tool == cut.tool;
+        let tool = edge || self.tool == tool_of(&cut.tool);
+        let others = [
+            (&self.machine, &cut.machine),
+            (&self.work_material, &cut.work_material),
+            (&self.operation, &cut.operation),
+        ];
+        if !(self.tool.is_empty() || tool) || !others.iter().all(|(mine, theirs)| agrees(mine, theirs)) {
+            return None;
+        }
+        let named = [edge, tool && !self.tool.is_empty(), !self.operation.is_empty(), !self.work_material.is_empty()];
+        let named = named.into_iter().chain([!self.machine.is_empty()]);
+        Some(named.fold(0, |sum, named| 2 * sum + u8::from(named)))
+    }
+}
+
+/// The best model for a cut; of equals the last, which is the newest. `key` reads what a model is for.
+pub fn choose<'a, R>(models: &'a [R], cut: &Key, key: impl Fn(&R) -> &WearRecord) -> Option<Choice<'a, R>> {
+    let fitting = models.iter().filter_map(|model| Some((key(model).key.fits(cut)?, model)));
+    let (rank, record) = fitting.max_by_key(|(rank, _)| *rank)?;
+    let words = ["any", "machine", "work material", "operation", "tool", "edge"];
+    let highest = usize::try_from(u8::BITS - rank.leading_zeros()).unwrap_or(0);
+    Some(Choice { record, by: words.get(highest).copied().unwrap_or("any") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::WearModel;
+    use super::super::surface::published;
+    use super::*;
+
+    fn key(texts: [&str; 4]) -> Key {
+        let [machine, tool, work_material, operation] = texts.map(str::to_owned);
+        Key { machine, tool, work_material, operation }
+    }
+
+    fn record(texts: [&str; 4]) -> WearRecord {
+        WearRecord::new(key(texts), 0.3, ("test".to_owned(), 27, 0.99), WearModel::Surface(published()))
+    }
+
+    #[test]
+    fn the_library_falls_back_from_edge_to_tool_operation_material_and_any() {
+        let models = [
+            ["m", "T1-2", "", ""],
+            ["m", "T1", "", ""],
+            ["m", "", "", "rough"],
+            ["m", "", "steel", ""],
+            ["m", "", "", ""],
+            ["", "", "", ""],
+        ]
+        .map(record);
+        let by = |models: &[WearRecord], tool: &str, material: &str, operation: &str| {
+            let found = choose(models, &key(["m", tool, material, operation]), |it| it).expect("a model");
+            (found.record.key.clone(), found.by)
+        };
+        let words: Vec<&str> = (0..6).map(|from| by(&models[from..], "T1-2", "steel", "rough").1).collect();
+        assert_eq!(words, ["edge", "tool", "operation", "work material", "machine", "any"]);
+        assert_eq!(by(&models, "T1-3", "steel", "rough").0.tool, "T1", "a new edge of a known tool");
+        assert_eq!(by(&models, "T2", "brass", "bore"), (key(["m", "", "", ""]), "machine"));
+        assert_eq!(choose(&models[..1], &key(["m", "T1", "", ""]), |it| it), None, "another edge is not this one");
+        assert_eq!(choose(&models[..5], &key(["n", "T1", "", ""]), |it| it), None, "another machine");
+    }
+
+    #[test]
+    fn of_equals_the_newest_counts() {
+        let models = [record(["", "T1", "", ""]), record(["", "T1", "", ""])];
+        let found = choose(&models, &key(["m", "T1", "", ""]), |it| it).expect("a model");
+        assert!(std::ptr::eq(found.record, &raw const models[1]));
+    }
+}

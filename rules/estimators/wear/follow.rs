@@ -1,0 +1,397 @@
+//! The wear of every edge as a state that is followed over cuts, parts and operations: a Kalman filter.
+//!
+//! What is measured is the logarithm of the cutting energy of an edge in one part over what a sharp edge would take:
+//!
+//! ```text
+//! ln(E / E0) = level of all tools + constant of the operation + hardness of the material + ln(1 + rise * wear) + noise
+//! ```
+//!
+//! Wear and its rate belong to an edge, the constant to a program, tool and operation, the hardness to all tools at once. So a
+//! harder lot, which makes every tool take more, is told from an edge that wears; a heavier cut of another operation is told from
+//! both; and what was learned of an operation with one edge serves the next. With a learned model the constants are known to be
+//! near 0 and the wear is in its millimetres; without one it is in typical millimetres, relative to the first cuts of the edges.
+//!
+//! Source: R. E. Kalman 1960, extended to the logarithm by its slope at the estimate. What happened between two parts is chosen
+//! among a few possibilities by likelihood: nothing, another hardness, a new edge that nobody announced.
+
+use super::gaussian::Gaussian;
+use super::outlook::{Known, Outlook};
+use super::prior::*;
+use super::tool_name::edge_of;
+use super::work::{Reference, Work, WorkKey};
+use serde::{Deserialize, Serialize};
+
+/// Something to tell once.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WearNews {
+    /// The wear of this edge is not known well enough any more to be acted upon.
+    NotObservable {
+        /// The edge.
+        edge: String,
+    },
+    /// It is known again.
+    Observable {
+        /// The edge.
+        edge: String,
+    },
+    /// The power fell as with a new edge, and nobody had announced one.
+    NewEdge {
+        /// The tool.
+        tool: String,
+    },
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Edge {
+    tool: String,
+    /// As the controller names it.
+    name: String,
+    /// Edges of this tool so far.
+    number: u32,
+    wear: usize,
+    rate: usize,
+    slide_m: f64,
+    parts: u32,
+    part_m: f64,
+    criterion_mm: f64,
+    reference: Reference,
+    blind: bool,
+    rates: Vec<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Group {
+    key: WorkKey,
+    at: usize,
+    path_mm: f64,
+    used: u64,
+}
+
+/// A measurement, with the states that it depends on.
+struct Measured {
+    group: usize,
+    edge: usize,
+    level: bool,
+    excess: f64,
+    rise: f64,
+    half_m: f64,
+    variance: f64,
+}
+
+/// Follows the edges of one machine. See the [module](self).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Follower {
+    joint: Gaussian,
+    hardness: usize,
+    level: usize,
+    edges: Vec<Edge>,
+    groups: Vec<Group>,
+    program: String,
+    work_material: String,
+    last_s: f64,
+    parts: u64,
+    /// The controller names edges: a new one is announced.
+    edges_named: bool,
+}
+
+impl Default for Follower {
+    fn default() -> Self {
+        let mut joint = Gaussian::default();
+        let hardness = joint.add(0.0, HARDNESS_SD.powi(2));
+        let level = joint.add(0.0, LEVEL_SD.powi(2));
+        Self {
+            joint,
+            hardness,
+            level,
+            edges: Vec::new(),
+            groups: Vec::new(),
+            program: String::new(),
+            work_material: String::new(),
+            last_s: 0.0,
+            parts: 0,
+            edges_named: false,
+        }
+    }
+}
+
+impl Follower {
+    /// Do its numbers belong together? It may come from a file.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let count = self.joint.len();
+        let own = [self.hardness, self.level].into_iter();
+        let edges = self.edges.iter().flat_map(|edge| [edge.wear, edge.rate]);
+        let groups = self.groups.iter().map(|group| group.at);
+        self.joint.is_sound() && own.chain(edges).chain(groups).all(|at| at < count)
+    }
+
+    /// Takes the work of one part, which ended at `end_s`.
+    pub fn part(&mut self, works: &[Work], end_s: f64) -> Vec<WearNews> {
+        let works: Vec<&Work> =
+            works.iter().filter(|work| work.seconds >= LEAST_S && work.excess().is_some()).collect();
+        let Some(first) = works.first() else { return Vec::new() };
+        self.parts += 1;
+        self.material(&first.key, end_s);
+        let mut news = Vec::new();
+        let wearing = self.grow(&works);
+        let measured: Vec<Measured> = works.iter().filter_map(|work| self.measured(work)).collect();
+        self.between(&measured, &mut news);
+        for one in &measured {
+            self.take(one);
+        }
+        for at in wearing {
+            self.tell(at, &mut news);
+        }
+        news
+    }
+
+    /// Another program, other material or a long pause may bring another hardness.
+    fn material(&mut self, key: &WorkKey, end_s: f64) {
+        let other = self.program != key.program || self.work_material != key.work_material;
+        if self.parts > 1 && (other || (end_s - self.last_s).abs() > OTHER_MATERIAL_S) {
+            self.joint.reset(self.hardness, 0.0, HARDNESS_SD.powi(2));
+        } else {
+            self.joint.spread(self.hardness, HARDNESS_STEP_SD.powi(2));
+        }
+        (self.program, self.work_material, self.last_s) = (key.program.clone(), key.work_material.clone(), end_s);
+    }
+
+    /// Lets the edges of this part wear by what has slid along them; which they are.
+    fn grow(&mut self, works: &[&Work]) -> Vec<usize> {
+        let mut wearing: Vec<(usize, f64)> = Vec::new();
+        for work in works {
+            let Some(at) = self.edge(work) else { continue };
+            match wearing.iter_mut().find(|(edge, _)| *edge == at) {
+                Some((_, slide_m)) => *slide_m += work.slide_m,
+                None => wearing.push((at, work.slide_m)),
+            }
+        }
+        for (at, slide_m) in &wearing {
+            let edge = &mut self.edges[*at];
+            edge.parts += 1;
+            edge.slide_m += slide_m;
+            let weight = 1.0 / f64::from(edge.parts.min(5));
+            edge.part_m = if edge.part_m > 0.0 { edge.part_m + weight * (slide_m - edge.part_m) } else { *slide_m };
+            let rate = self.joint.mean(edge.rate);
+            self.joint.grow(edge.wear, edge.rate, *slide_m);
+            let share = (self.joint.mean(edge.wear) / edge.criterion_mm).clamp(0.0, 1.5);
+            self.joint.scale(edge.rate, 1.0 + ACCELERATION * share * rate * slide_m / edge.criterion_mm);
+            self.joint.spread(edge.wear, (GROWTH_STEP * rate * slide_m).powi(2));
+            self.joint.spread(edge.rate, (RATE_STEP * rate).powi(2));
+        }
+        wearing.into_iter().map(|(at, _)| at).collect()
+    }
+
+    /// The edge of this work; a new one where it has another name than before.
+    fn edge(&mut self, work: &Work) -> Option<usize> {
+        self.edges_named |= edge_of(&work.edge).is_some();
+        let found = self.edges.iter().position(|edge| edge.tool == work.key.tool);
+        let at = match found {
+            Some(at) => at,
+            None => self.first_edge(work)?,
+        };
+        if self.edges[at].name != work.edge {
+            self.edges[at].name.clone_from(&work.edge);
+            self.renew(at);
+        }
+        (self.edges[at].criterion_mm, self.edges[at].reference) = (work.criterion_mm, work.key.reference);
+        Some(at)
+    }
+
+    fn first_edge(&mut self, work: &Work) -> Option<usize> {
+        if self.edges.len() >= TOOLS_MAX {
+            return None;
+        }
+        let (mean, sd) = if work.key.reference == Reference::Model { UNKNOWN_MODEL_MM } else { UNKNOWN_MM };
+        let wear = self.joint.add(mean, sd * sd);
+        let rate = self.joint.add(RATE.0, RATE.1 * RATE.1);
+        self.edges.push(Edge {
+            tool: work.key.tool.clone(),
+            name: work.edge.clone(),
+            number: 1,
+            wear,
+            rate,
+            slide_m: 0.0,
+            parts: 0,
+            part_m: 0.0,
+            criterion_mm: work.criterion_mm,
+            reference: work.key.reference,
+            blind: false,
+            rates: Vec::new(),
+        });
+        Some(self.edges.len() - 1)
+    }
+
+    /// The edge at this place is a new one; the rate of the one before counts for it.
+    fn renew(&mut self, at: usize) {
+        let edge = &mut self.edges[at];
+        let grown = self.joint.mean(edge.wear) - NEW_MM.0;
+        if edge.parts >= PARTS_OF_A_LIFE && edge.slide_m > 0.0 && grown > 0.0 {
+            edge.rates.push(grown / edge.slide_m);
+            let surplus = edge.rates.len().saturating_sub(RATES_MAX);
+            edge.rates.drain(..surplus);
+        }
+        (edge.number, edge.slide_m, edge.parts, edge.blind) = (edge.number + 1, 0.0, 0, false);
+        let (mean, sd) = pooled(&edge.rates);
+        self.joint.reset(edge.wear, NEW_MM.0, NEW_MM.1.powi(2));
+        self.joint.reset(edge.rate, mean, sd * sd);
+    }
+
+    fn measured(&mut self, work: &Work) -> Option<Measured> {
+        let edge = self.edges.iter().position(|edge| edge.tool == work.key.tool)?;
+        let excess = work.excess()?;
+        let group = self.group(work, excess);
+        let group_path = &mut self.groups[group].path_mm;
+        if work.key.reference == Reference::Feed && (work.path_mm / *group_path - 1.0).abs() > SAME_PATH {
+            // What is longer from now on is learned slowly, what was cut short is left out.
+            *group_path += 0.2 * (work.path_mm - *group_path);
+            return None;
+        }
+        self.groups[group].used = self.parts;
+        Some(Measured {
+            group: self.groups[group].at,
+            edge,
+            level: work.key.reference == Reference::Typical,
+            excess,
+            rise: work.rise_per_mm(),
+            half_m: 0.5 * work.slide_m,
+            variance: REPEAT_SD.powi(2) + (CHANGING_SHARE * work.energy_doubt()).powi(2),
+        })
+    }
+
+    fn group(&mut self, work: &Work, excess: f64) -> usize {
+        if let Some(at) = self.groups.iter().position(|group| group.key == work.key) {
+            return at;
+        }
+        let (mean, sd) = match work.key.reference {
+            Reference::Model => (0.0, work.reference_doubt().max(MODEL_SD_LEAST)),
+            Reference::Typical => (0.0, OPERATION_SD),
+            Reference::Feed => (excess, LEVEL_SD),
+        };
+        let (key, path_mm, used) = (work.key.clone(), work.path_mm, self.parts);
+        if self.groups.len() < GROUPS_MAX {
+            let at = self.joint.add(mean, sd * sd);
+            self.groups.push(Group { key, at, path_mm, used });
+            return self.groups.len() - 1;
+        }
+        let oldest = (0..self.groups.len()).min_by_key(|at| self.groups[*at].used).unwrap_or(0);
+        let at = self.groups[oldest].at;
+        self.joint.reset(at, mean, sd * sd);
+        self.groups[oldest] = Group { key, at, path_mm, used };
+        oldest
+    }
+
+    /// What happened between the parts: the likeliest of nothing, another hardness, and a new edge of one tool.
+    fn between(&mut self, measured: &[Measured], news: &mut Vec<WearNews>) {
+        let nothing = self.likelihood(measured);
+        let mut harder = self.clone();
+        harder.joint.reset(harder.hardness, 0.0, HARDNESS_SD.powi(2));
+        let mut best = (nothing + OTHER_HARDNESS, None);
+        let found = harder.likelihood(measured);
+        if found > best.0 {
+            best = (found, Some((harder, None)));
+        }
+        let mut tools: Vec<usize> = measured.iter().map(|one| one.edge).collect();
+        tools.dedup();
+        for at in tools.into_iter().filter(|_| !self.edges_named) {
+            let mut renewed = self.clone();
+            renewed.renew(at);
+            let likely = renewed.likelihood(measured) - UNANNOUNCED_EDGE + OTHER_HARDNESS;
+            if likely > best.0 {
+                let tool = self.edges[at].tool.clone();
+                best = (likely, Some((renewed, Some(tool))));
+            }
+        }
+        if let Some((other, tool)) = best.1 {
+            *self = other;
+            news.extend(tool.map(|tool| WearNews::NewEdge { tool }));
+        }
+    }
+
+    fn likelihood(&self, measured: &[Measured]) -> f64 {
+        let mut trial = self.clone();
+        let mut sum = 0.0;
+        for one in measured {
+            let (gradient, above) = trial.expected(one);
+            sum += trial.joint.log_likelihood(&gradient, above, one.variance);
+            trial.joint.observe(&gradient, above, one.variance);
+        }
+        sum
+    }
+
+    /// The slope over the states, and how far the measurement lies above the estimate. The mean of a part is that of its middle.
+    fn expected(&self, one: &Measured) -> (Vec<(usize, f64)>, f64) {
+        let edge = &self.edges[one.edge];
+        let wear = (self.joint.mean(edge.wear) - one.half_m * self.joint.mean(edge.rate)).max(0.0);
+        let slope = one.rise / (1.0 + one.rise * wear);
+        let mut gradient =
+            vec![(one.group, 1.0), (self.hardness, 1.0), (edge.wear, slope), (edge.rate, -slope * one.half_m)];
+        let mut expected = self.joint.mean(one.group) + self.joint.mean(self.hardness) + (1.0 + one.rise * wear).ln();
+        if one.level {
+            gradient.push((self.level, 1.0));
+            expected += self.joint.mean(self.level);
+        }
+        (gradient, one.excess - expected)
+    }
+
+    fn take(&mut self, one: &Measured) {
+        let (gradient, above) = self.expected(one);
+        let sd = self.joint.variance_of(&gradient, one.variance).sqrt();
+        if above.abs() > OUTLIER_SD * sd {
+            return;
+        }
+        self.joint.observe(&gradient, above, one.variance);
+        let edge = &self.edges[one.edge];
+        self.joint.at_least(edge.wear, 0.0);
+        self.joint.at_least(edge.rate, 0.02 * RATE.0);
+    }
+
+    fn tell(&mut self, at: usize, news: &mut Vec<WearNews>) {
+        let Some(outlook) = self.outlook_at(at) else { return };
+        let edge = &mut self.edges[at];
+        if edge.blind != outlook.observed {
+            return;
+        }
+        edge.blind = !outlook.observed;
+        let name = edge.name.clone();
+        news.push(if edge.blind {
+            WearNews::NotObservable { edge: name }
+        } else {
+            WearNews::Observable { edge: name }
+        });
+    }
+
+    fn outlook_at(&self, at: usize) -> Option<Outlook> {
+        let edge = self.edges.get(at)?;
+        if edge.parts == 0 {
+            return None;
+        }
+        let of = |a, b| self.joint.covariance(a, b);
+        let known = Known {
+            wear: self.joint.mean(edge.wear),
+            rate: self.joint.mean(edge.rate),
+            covariance: [of(edge.wear, edge.wear), of(edge.wear, edge.rate), of(edge.rate, edge.rate)],
+            part_m: edge.part_m,
+            criterion_mm: edge.criterion_mm,
+        };
+        Some(known.outlook())
+    }
+
+    /// How the edge of this name stands after its last part; `None` before the first one.
+    #[must_use]
+    pub fn outlook(&self, edge: &str) -> Option<(Reference, Outlook)> {
+        let at = self.edges.iter().position(|known| known.name == edge)?;
+        Some((self.edges[at].reference, self.outlook_at(at)?))
+    }
+
+    /// The number of the edge of this tool that is in use, from 1.
+    #[must_use]
+    pub fn edge_number(&self, tool: &str) -> Option<u32> {
+        self.edges.iter().find(|edge| edge.tool == tool).map(|edge| edge.number)
+    }
+}
+
+#[cfg(test)]
+#[path = "follow_tests.rs"]
+mod tests;

@@ -1,0 +1,84 @@
+use super::*;
+
+/// A part that takes this share more than the reference.
+fn work(tool: &str, edge: &str, program: &str, ratio: f64) -> Work {
+    let key = WorkKey {
+        reference: Reference::Typical,
+        tool: tool.to_owned(),
+        program: program.to_owned(),
+        operation: String::new(),
+        work_material: String::new(),
+    };
+    let mut work = Work::new(key, edge.to_owned(), 0.3);
+    (work.seconds, work.path_mm, work.slide_m) = (100.0, 200.0, 300.0);
+    (work.energy_j, work.expected_j) = ((1e5 * ratio, 500.0), (1e5, 0.6e5));
+    work
+}
+
+/// Parts of an edge that wears by 0.01 mm each, and of a second tool that does not; hardness by part.
+fn parts(follower: &mut Follower, edge: &str, count: u32, hardness: &dyn Fn(u32) -> f64) -> Vec<WearNews> {
+    let mut news = Vec::new();
+    for part in 1..=count {
+        let wear = 0.01 * f64::from(part);
+        let noise = 1.0 + 0.004 * f64::from(i32::from(part % 2 == 0) * 2 - 1);
+        let of = |ratio: f64| ratio * hardness(part) * noise;
+        let works = [work("T1", edge, "O1", of(0.6 * (1.0 + 0.6 * wear))), work("T2", "T2", "O1", of(0.8))];
+        news.extend(follower.part(&works, 400.0 * f64::from(part)));
+    }
+    news
+}
+
+fn outlook(follower: &Follower, edge: &str) -> Outlook {
+    follower.outlook(edge).expect("followed").1
+}
+
+#[test]
+fn the_wear_of_a_known_new_edge_is_followed_without_a_model() {
+    let mut follower = Follower::default();
+    parts(&mut follower, "T1", 20, &|_| 1.0);
+    parts(&mut follower, "T1-2", 20, &|_| 1.0);
+    let found = outlook(&follower, "T1-2");
+    assert!((found.wear_mm - 0.2).abs() < 0.03 && found.observed, "{found:?}");
+    assert!(found.parts_left[1] <= 10.0 && found.parts_left[2] >= 10.0, "{found:?}");
+    assert!(found.worn_probability < 0.1);
+    assert!(outlook(&follower, "T2").wear_mm < 0.12, "the other tool has not worn");
+}
+
+#[test]
+fn a_harder_lot_is_no_wear() {
+    let mut follower = Follower::default();
+    parts(&mut follower, "T1", 20, &|_| 1.0);
+    parts(&mut follower, "T1-2", 12, &|part| if part > 6 { 1.1 } else { 1.0 });
+    let found = outlook(&follower, "T1-2");
+    assert!((found.wear_mm - 0.12).abs() < 0.05 && found.worn_probability < 0.05, "{found:?}");
+}
+
+#[test]
+fn a_new_edge_that_nobody_announced_is_noticed_and_told() {
+    let mut follower = Follower::default();
+    parts(&mut follower, "T1", 28, &|_| 1.0);
+    let before = outlook(&follower, "T1").wear_mm;
+    let news = parts(&mut follower, "T1", 3, &|_| 1.0);
+    assert!(news.contains(&WearNews::NewEdge { tool: "T1".to_owned() }), "{news:?}");
+    assert!(outlook(&follower, "T1").wear_mm < 0.3 * before);
+    assert_eq!(follower.edge_number("T1"), Some(2));
+}
+
+#[test]
+fn the_state_is_stored_and_nothing_odd_gets_in() {
+    let mut follower = Follower::default();
+    parts(&mut follower, "T1", 5, &|_| 1.0);
+    let text = serde_json::to_string(&follower).expect("JSON");
+    let back: Follower = serde_json::from_str(&text).expect("JSON");
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    assert!(back.is_sound() && near(outlook(&back, "T1").wear_mm, outlook(&follower, "T1").wear_mm));
+    let mut nothing = work("T1", "T1", "O1", f64::NAN);
+    assert!(follower.part(&[nothing.clone()], 1.0).is_empty());
+    nothing.energy_j = (-5.0, 1.0);
+    assert!(follower.part(&[nothing], 1.0).is_empty());
+    for tool in 0..100 {
+        let name = format!("T{tool}");
+        follower.part(&[work(&name, &name, &format!("O{tool}"), 0.7)], 1.0);
+    }
+    assert!(follower.is_sound() && follower.edges.len() <= TOOLS_MAX && follower.groups.len() <= GROUPS_MAX);
+}

@@ -1,0 +1,317 @@
+//! Wear beside the running machine: from samples and estimates to the state of the edge in use.
+//!
+//! It gathers the work of every edge until the part is finished, gives it to the filter, and holds what the filter says until the
+//! next part. Beside it stands the limit `[Pc]` of the cut of the moment, where a model was learned.
+
+use super::choose::choose;
+use super::conditions::Conditions;
+use super::follow::{Follower, WearNews};
+use super::outlook::Outlook;
+use super::record::{Key, WearRecord};
+use super::threshold::{Observability, Threshold, threshold};
+use super::tool_name::tool_of;
+use super::work::{CutMoment, Expected, Reference, Work, WorkKey};
+use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
+use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::{ChannelId, Sample};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Flank wear at which an edge is worn where no model says otherwise, mm (ISO 3685: mean land of a uniformly worn flank).
+const CRITERION_MM: f64 = 0.3;
+/// The first moments of a cut are not counted, s: the filtered power has not settled, the edge is not fully in the work.
+const SETTLE_NS: i64 = 3 * SECOND_NS / 2;
+/// Longer steps between two samples are pauses.
+const STEP_MAX_NS: i64 = 2 * SECOND_NS;
+/// A part that cuts for longer is judged in pieces, s.
+const PIECE_S: f64 = 1200.0;
+/// A pause so long ends what was gathered.
+const PAUSE_NS: i64 = 3600 * SECOND_NS;
+/// Works of one part that are told apart.
+const WORKS_MAX: usize = 64;
+/// The limit of the moment is computed this often at most.
+const LIMIT_EVERY_NS: i64 = SECOND_NS / 2;
+/// Rise of the cutting power per millimetre of wear at a feed of 0.2 mm/rev, typical numbers (`work.rs`), 1/mm.
+const TYPICAL_RISE_PER_MM: f64 = 0.59;
+/// News that wait to be fetched.
+const NEWS_MAX: usize = 32;
+
+struct Channels {
+    texts: [ChannelId; 4],
+    part_count: ChannelId,
+    numbers: [ChannelId; 6],
+}
+
+impl Channels {
+    fn new() -> Self {
+        let of = |name| ChannelId::of(name).expect("the name stands in the table, which a test checks");
+        Self {
+            texts: ["tool", "work_material", "operation", "program"].map(of),
+            part_count: of("part_count"),
+            numbers: ["spindle_speed_rpm", "feed_mm_min", "depth_of_cut_mm", "diameter_mm", "width_of_cut_mm", "teeth"]
+                .map(of),
+        }
+    }
+}
+
+/// What is remembered when the box starts again.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Memory {
+    follower: Follower,
+    works: Vec<Work>,
+    part_count: Option<f64>,
+}
+
+/// The model in use, and what spoke for it.
+#[derive(Debug, Clone)]
+pub struct ModelInUse {
+    /// The model.
+    pub record: Arc<WearRecord>,
+    /// What of its key spoke for it: see [`super::Choice`].
+    pub by: &'static str,
+}
+
+/// See the [module](self).
+pub struct WearEstimator {
+    machine: String,
+    models: Vec<Arc<WearRecord>>,
+    channels: Channels,
+    texts: [String; 3],
+    model: Option<ModelInUse>,
+    memory: Memory,
+    last_ns: Option<TimeNs>,
+    limit: Option<Result<Threshold, String>>,
+    limit_ns: Option<TimeNs>,
+    news: Vec<WearNews>,
+}
+
+impl Default for WearEstimator {
+    fn default() -> Self {
+        Self {
+            machine: String::new(),
+            models: Vec::new(),
+            channels: Channels::new(),
+            texts: Default::default(),
+            model: None,
+            memory: Memory::default(),
+            last_ns: None,
+            limit: None,
+            limit_ns: None,
+            news: Vec::new(),
+        }
+    }
+}
+
+impl WearEstimator {
+    /// The models in force, the newest last, and the name of the machine for which they are looked up.
+    pub fn set_models(&mut self, machine: &str, models: Vec<Arc<WearRecord>>) {
+        machine.clone_into(&mut self.machine);
+        self.models = models;
+        self.choose();
+    }
+
+    /// What was told since the last call.
+    pub fn take_news(&mut self) -> Vec<WearNews> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// The model for the cut of the moment.
+    #[must_use]
+    pub fn model(&self) -> Option<&ModelInUse> {
+        self.model.as_ref()
+    }
+
+    /// The limit of the last moment of cutting, or why there is none.
+    #[must_use]
+    pub fn limit(&self) -> Option<&Result<Threshold, String>> {
+        self.limit.as_ref()
+    }
+
+    /// How the edge in use stands after its last part.
+    #[must_use]
+    pub fn outlook(&self) -> Option<(Reference, Outlook)> {
+        self.memory.follower.outlook(&self.texts[0])
+    }
+
+    /// Everything remembered, for [`WearEstimator::restore`].
+    #[must_use]
+    pub fn snapshot(&self) -> serde_json::Value {
+        serde_json::to_value(&self.memory).unwrap_or(serde_json::Value::Null)
+    }
+
+    /// Goes on where a snapshot was taken; false when it is none of this version.
+    pub fn restore(&mut self, snapshot: serde_json::Value) -> bool {
+        let memory = serde_json::from_value(snapshot).ok().filter(|memory: &Memory| memory.follower.is_sound());
+        let known = memory.is_some();
+        self.memory = memory.unwrap_or_default();
+        known
+    }
+
+    /// Takes one tick and fills in what it knows of the wear.
+    pub fn step(&mut self, sample: &Sample, estimates: &mut Estimates) {
+        let step_ns = self.last_ns.map_or(0, |last_ns| sample.at_ns - last_ns);
+        self.last_ns = Some(sample.at_ns);
+        self.follow_texts(sample);
+        let count = sample.number(self.channels.part_count).ok();
+        let counted = count.is_some() && self.memory.part_count.is_some() && count != self.memory.part_count;
+        self.memory.part_count = count.or(self.memory.part_count);
+        if counted || !(0..=PAUSE_NS).contains(&step_ns) {
+            self.finish(sample.at_ns);
+        }
+        let moment = self.cutting(sample, estimates);
+        if let (Some(moment), 1..=STEP_MAX_NS) = (&moment, step_ns) {
+            self.gather(moment, sample, step_ns as f64 / SECOND_NS as f64);
+        }
+        self.fill(moment.as_ref(), estimates);
+    }
+
+    /// The cut of this moment, where its power is known.
+    fn cutting(&self, sample: &Sample, estimates: &Estimates) -> Option<CutMoment> {
+        let power = estimates.cutting_power_w.ok().filter(|_| estimates.state == State::Cutting)?;
+        if sample.at_ns - estimates.since_ns < SETTLE_NS {
+            return None;
+        }
+        let [speed, feed, depth, diameter, width, teeth] =
+            self.channels.numbers.map(|channel| sample.number(channel).ok().filter(|number| number.abs() > 0.0));
+        Some(CutMoment {
+            power_w: (power.value, power.sd),
+            speed_rpm: speed,
+            feed_mm_min: feed,
+            depth_mm: depth,
+            diameter_mm: diameter,
+            milling: width.zip(teeth),
+        })
+    }
+
+    /// Another tool, material or operation may have another model.
+    fn follow_texts(&mut self, sample: &Sample) {
+        let [tool, material, operation, _] = self.channels.texts;
+        let now = [tool, material, operation].map(|channel| sample.text(channel).unwrap_or_default());
+        if self.texts.iter().zip(now).any(|(before, now)| before != now) {
+            self.texts = now.map(str::to_owned);
+            self.choose();
+        }
+    }
+
+    fn choose(&mut self) {
+        let [tool, work_material, operation] = self.texts.clone();
+        let cut = Key { machine: self.machine.clone(), tool, work_material, operation };
+        let found = choose(&self.models, &cut, |model| model);
+        let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
+        let same = self.model.as_ref().map(|it| &it.record) == model.as_ref().map(|it| &it.record);
+        self.model = model;
+        if !same {
+            (self.limit, self.limit_ns) = (None, None);
+        }
+    }
+
+    fn gather(&mut self, moment: &CutMoment, sample: &Sample, step_s: f64) {
+        let program = sample.text(self.channels.texts[3]).unwrap_or_default();
+        let seconds: f64 = self.memory.works.iter().map(|work| work.seconds).sum();
+        if seconds > PIECE_S || self.memory.works.first().is_some_and(|work| work.key.program != program) {
+            self.finish(sample.at_ns);
+        }
+        let record = self.model.as_ref().map(|model| &*model.record);
+        let expected = moment.expected(record);
+        let criterion_mm = record.map_or(CRITERION_MM, |record| record.criterion_mm);
+        if let Some(work) = self.work(expected, program, criterion_mm) {
+            work.add(moment, &expected, step_s);
+        }
+    }
+
+    fn work(&mut self, expected: Expected, program: &str, criterion_mm: f64) -> Option<&mut Work> {
+        let [edge, material, operation] = &self.texts;
+        let same = |work: &Work| {
+            let key = &work.key;
+            key.reference == expected.reference
+                && work.edge == *edge
+                && key.operation == *operation
+                && key.program == program
+                && key.work_material == *material
+        };
+        let works = &mut self.memory.works;
+        let at = works.iter().position(same).or_else(|| {
+            let key = WorkKey {
+                reference: expected.reference,
+                tool: tool_of(edge).to_owned(),
+                program: program.to_owned(),
+                operation: operation.clone(),
+                work_material: material.clone(),
+            };
+            (works.len() < WORKS_MAX).then(|| {
+                works.push(Work::new(key, edge.clone(), criterion_mm));
+                works.len() - 1
+            })
+        })?;
+        works.get_mut(at)
+    }
+
+    /// The part is finished, or what can be judged of it.
+    fn finish(&mut self, at_ns: TimeNs) {
+        let works = std::mem::take(&mut self.memory.works);
+        let news = self.memory.follower.part(&works, at_ns as f64 / SECOND_NS as f64);
+        self.news.extend(news);
+        self.news.truncate(NEWS_MAX);
+    }
+
+    fn fill(&mut self, moment: Option<&CutMoment>, estimates: &mut Estimates) {
+        estimates.wear_limit_w = self.limit_of(moment, estimates.at_ns);
+        let (wear, growth, probability, parts) = match self.outlook() {
+            None => {
+                let none = || Err(NoEstimate::NoPartYet);
+                (none(), none(), none(), none())
+            }
+            Some((_, outlook)) if !outlook.observed => {
+                let none = || Err(NoEstimate::NotObservable);
+                (none(), none(), none(), none())
+            }
+            Some((reference, outlook)) => filled(reference, &outlook),
+        };
+        (estimates.tool_wear_mm, estimates.tool_growth_pct) = (wear, growth);
+        (estimates.tool_worn_probability, estimates.tool_parts_left) = (probability, parts);
+    }
+
+    fn limit_of(&mut self, moment: Option<&CutMoment>, at_ns: TimeNs) -> Estimated {
+        let record = self.model.as_ref().map(|model| model.record.clone()).ok_or(NoEstimate::NoModel)?;
+        let moment = moment.ok_or(NoEstimate::NotCutting)?;
+        let soon = self.limit_ns.is_some_and(|then_ns| (0..LIMIT_EVERY_NS).contains(&(at_ns - then_ns)));
+        if !soon || self.limit.is_none() {
+            self.limit_ns = Some(at_ns);
+            let found = moment.conditions().ok_or_else(|| NoEstimate::CutUnknown.to_string());
+            self.limit = Some(found.and_then(|cut: Conditions| {
+                threshold(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
+            }));
+        }
+        match &self.limit {
+            Some(Ok(limit)) if !limit.extrapolated.is_empty() => Err(NoEstimate::OutsideModel),
+            Some(Ok(limit)) if limit.observability == Observability::NotObservableHere => {
+                Err(NoEstimate::NotObservable)
+            }
+            Some(Ok(limit)) => Ok(Estimate { value: limit.power_w, sd: limit.sd_w }),
+            _ => Err(NoEstimate::CutUnknown),
+        }
+    }
+}
+
+fn filled(reference: Reference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
+    let learned = reference == Reference::Model;
+    let wear = Estimate { value: outlook.wear_mm, sd: outlook.wear_sd_mm };
+    let growth = Estimate {
+        value: 100.0 * TYPICAL_RISE_PER_MM * outlook.wear_mm,
+        sd: 100.0 * TYPICAL_RISE_PER_MM * outlook.wear_sd_mm,
+    };
+    let [middle, least, most] = outlook.parts_left;
+    // Half of an 80 % interval is 1.2816 standard deviations of a normal one.
+    let parts = Estimate { value: middle, sd: (most - least) / (2.0 * 1.2816) };
+    let probability = Estimate { value: outlook.worn_probability, sd: 0.0 };
+    (if learned { Ok(wear) } else { Err(NoEstimate::NoModel) }, Ok(growth), Ok(probability), Ok(parts))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_channel_stands_in_the_table() {
+        let _found = super::Channels::new();
+    }
+}

@@ -1,0 +1,64 @@
+//! What is believed of edges, material and cuts before anything is measured, and how much they may change from part to part. Each
+//! number says where it comes from. Too small a scatter makes the filter slow to believe what it measures, too great a one makes it
+//! follow every lot.
+
+/// Tools that are followed.
+pub(super) const TOOLS_MAX: usize = 12;
+/// Operations that are told apart.
+pub(super) const GROUPS_MAX: usize = 48;
+/// Less cutting in a part says nothing, s.
+pub(super) const LEAST_S: f64 = 5.0;
+/// Without depth, a part whose cut path differs by more was interrupted, or is another.
+pub(super) const SAME_PATH: f64 = 0.1;
+/// Hardness of a lot about the mean, as a share: a tolerance of +-15 HB about 200 HB is +-4 to +-8 % of specific force.
+pub(super) const HARDNESS_SD: f64 = 0.04;
+/// Its change from part to part within a lot.
+pub(super) const HARDNESS_STEP_SD: f64 = 0.003;
+/// Scatter of the same cut from part to part.
+pub(super) const REPEAT_SD: f64 = 0.008;
+/// Share of the uncertainty of the no-load power that changes from part to part; the rest is a constant.
+pub(super) const CHANGING_SHARE: f64 = 0.3;
+/// What typical numbers may be wrong for one operation, against another, and for all.
+pub(super) const OPERATION_SD: f64 = 0.10;
+pub(super) const LEVEL_SD: f64 = 0.5;
+/// Least uncertainty of a learned model for one operation.
+pub(super) const MODEL_SD_LEAST: f64 = 0.01;
+/// A new edge, mm: the land of the first minutes, which wears in quickly.
+pub(super) const NEW_MM: (f64, f64) = (0.015, 0.010);
+/// An edge of which nothing is known, mm: shops do not begin to record with edges at their end.
+pub(super) const UNKNOWN_MM: (f64, f64) = (0.04, 0.04);
+/// The same where a model tells the wear by itself: anything up to the criterion.
+pub(super) const UNKNOWN_MODEL_MM: (f64, f64) = (0.10, 0.10);
+/// Rate of an edge of which nothing is known, mm per m of work: 0.3 mm in 3 to 30 km.
+pub(super) const RATE: (f64, f64) = (4.0e-5, 4.0e-5);
+/// Change of the rate from part to part, and of the wear beside it, as shares of rate and growth.
+pub(super) const RATE_STEP: f64 = 0.15;
+pub(super) const GROWTH_STEP: f64 = 0.2;
+/// Growth of the rate towards the end of an edge: by so many times its own, per criterion of wear, at the criterion. The rapid
+/// stage of the wear curve (ISO 3685, annex) is taken up early by it instead of late by the filter.
+pub(super) const ACCELERATION: f64 = 1.0;
+/// Rates of edges that were used up, remembered for each tool.
+pub(super) const RATES_MAX: usize = 8;
+/// An edge must have slid so far for its rate to count for the next ones, in parts.
+pub(super) const PARTS_OF_A_LIFE: u32 = 4;
+/// How much likelier than nothing another hardness, or a new edge that nobody announced, must make what was measured
+/// (logarithms).
+pub(super) const OTHER_HARDNESS: f64 = 4.0;
+pub(super) const UNANNOUNCED_EDGE: f64 = 7.0;
+/// A measurement so many standard deviations off is none.
+pub(super) const OUTLIER_SD: f64 = 5.0;
+/// A gap so long may bring other material, s.
+pub(super) const OTHER_MATERIAL_S: f64 = 3600.0;
+
+/// Mean and standard deviation of the rate of the next edge.
+pub(super) fn pooled(rates: &[f64]) -> (f64, f64) {
+    if rates.is_empty() {
+        return RATE;
+    }
+    let count = rates.len() as f64;
+    let mean = rates.iter().sum::<f64>() / count;
+    let scatter = (rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>() / count).sqrt();
+    // One edge tells of the next within a third; more of them tell it better, never better than a sixth.
+    let least = mean * if rates.len() == 1 { 0.33 } else { 0.17 };
+    (mean, scatter.max(least))
+}
