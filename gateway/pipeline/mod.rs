@@ -24,7 +24,7 @@ use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
 use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::wear::WearEstimator;
-use rules::estimators::{self, Estimated, Estimates};
+use rules::estimators::{self, Estimates};
 use rules::script::{Host, OffsetProposal};
 
 /// Where a tick leaves what is to be remembered.
