@@ -108,6 +108,16 @@ impl Client {
         request(&self.address, &text)
     }
 
+    /// Only announces a body of so many bytes. A server that refuses it reads none of it and closes, which a client that is still
+    /// sending megabytes would see as a broken line.
+    pub(crate) fn announce(&self, verb: &str, path: &str, head: &str, length: usize) -> Answer {
+        let cookie = if self.cookie.is_empty() { String::new() } else { format!("Cookie: {}\r\n", self.cookie) };
+        let address = &self.address;
+        let text =
+            format!("{verb} {path} HTTP/1.0\r\nHost: {address}\r\n{cookie}{head}Content-Length: {length}\r\n\r\n");
+        request(address, &text)
+    }
+
     /// The same with a body of JSON.
     pub(crate) fn json(&self, verb: &str, path: &str, body: &Value) -> Answer {
         self.send(verb, path, "Content-Type: application/json\r\n", &body.to_string())

@@ -106,7 +106,7 @@ function told({ part, tool }) {
 }
 
 function drawModels(root, models) {
-  if (!models.length) return fill(root, [make("p", "empty", t("no_wear_model_words"))]);
+  if (!models.length) return fill(root, [make("p", "empty", t("no_models_yet"))]);
   const any = (text) => text || t("any");
   const rows = models.map((m) => [any(m.machine), any(m.tool), any(m.work_material), any(m.operation), t(`form_${m.form}`), { num: quantity(m.criterion_mm, "mm") }, { num: String(m.cuts) }, { num: `${number(100 * m.r2)} %` }, m.in_force ? t("in_charge") : t("replaced")]);
   fill(root, [table([t("machine"), t("tool"), t("material"), t("operation"), t("wear_form"), { num: t("criterion_short") }, { num: t("cuts") }, { num: "R²" }, ""], rows, { caption: t("wear_models") }), ...models.filter((m) => m.in_force).map((m) => make("pre", "note", m.formula))]);
