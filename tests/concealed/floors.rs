@@ -65,7 +65,7 @@ fn drawn(groups: &[(&str, usize)]) -> Vec<Order> {
     sample
 }
 
-/// Groups and how many of their cases every test run takes: under a minute in a debug build.
+/// Groups and how many of their cases are held against the measured shares.
 const GUARDED: [(&str, usize); 4] =
     [("single-rich-rho2", 8), ("single-rich-rho1", 6), ("nothing-", 6), ("drive-rho1", 3)];
 
@@ -82,7 +82,7 @@ const MEASURED: [(&str, Figure, f64); 4] = [
 /// Probability with which a build as good as the measured one misses a floor by the choice of the cases.
 const BY_CHANCE: f64 = 0.01;
 
-/// The cases of every test run.
+/// The cases that are held against the measured shares.
 pub(crate) fn guarded() -> Vec<Order> {
     drawn(&GUARDED)
 }

@@ -123,8 +123,9 @@ fn real_machines() {
     println!("{}", score::endurance::long_recordings());
 }
 
-/// A few cases in every test run: no measured share may be contradicted by them.
+/// A few cases against the shares that the campaign measured: none may be contradicted by them.
 #[test]
+#[ignore = "1 minute: 23 concealed cases against the measured shares"]
 fn a_few_cases_are_named_as_well_as_measured() {
     let outcomes = score::run(&floors::guarded(), 2);
     println!("{}", score::tally::table(&outcomes));
