@@ -248,7 +248,7 @@ pub struct OperationsStatus {
 /// model for the cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WearStatus {
-    /// `surface` or `physical`; `relative` without a learned model.
+    /// `surface` or `physical`.
     pub form: &'static str,
     /// What of its key spoke for the model: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
     #[serde(skip_serializing_if = "Option::is_none")]

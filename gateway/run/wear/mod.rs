@@ -70,14 +70,12 @@ fn notice(news: &WearNews) -> Notice {
     Notice::new(Severity::Info, kind, text)
 }
 
-/// What the page shows of the edge in use; `None` before its first part without a model.
+/// What the page shows of the edge in use; `None` without a model for its cut. What is known without one stands with the estimates.
 #[must_use]
 pub fn status(pipeline: &Pipeline) -> Option<WearStatus> {
     let wear = pipeline.wear();
     let (model, outlook) = (wear.model(), wear.outlook());
-    if model.is_none() && outlook.is_none() {
-        return None;
-    }
+    let model = model?;
     let limit = wear.limit().and_then(|limit| limit.as_ref().ok());
     let learned = outlook.filter(|(reference, _)| *reference == Reference::Model).map(|(_, outlook)| outlook);
     let outlook = outlook.map(|(_, outlook)| outlook);
@@ -85,13 +83,13 @@ pub fn status(pipeline: &Pipeline) -> Option<WearStatus> {
         (Some(Err(why)), _) => Some(why.clone()),
         (_, None) => Some("no part with this edge yet".to_owned()),
         (_, Some(outlook)) if !outlook.observed => Some("the wear is not known well enough here".to_owned()),
-        (None, _) if model.is_some() => Some("no cut with this tool, material and operation yet".to_owned()),
+        (None, _) => Some("no cut with this tool, material and operation yet".to_owned()),
         _ => None,
     };
     Some(WearStatus {
-        form: model.map_or("relative", |model| model.record.model.form()),
-        model_by: model.map(|model| model.by),
-        criterion_mm: model.map(|model| model.record.criterion_mm).or(outlook.map(|it| it.criterion_mm)).unwrap_or(0.3),
+        form: model.record.model.form(),
+        model_by: Some(model.by),
+        criterion_mm: model.record.criterion_mm,
         limit_w: limit.map(|limit| limit.power_w),
         limit_uncertainty_w: limit.map(|limit| limit.interval_w.1 - limit.power_w),
         flank_wear_mm: learned.map(|outlook| outlook.wear_mm),

@@ -14,69 +14,13 @@
 //! Source: R. E. Kalman 1960, extended to the logarithm by its slope at the estimate. What happened between two parts is chosen
 //! among a few possibilities by likelihood: nothing, another hardness, a new edge that nobody announced.
 
+use super::followed::{Edge, Group, Measured, WearNews};
 use super::gaussian::Gaussian;
 use super::outlook::{Known, Outlook};
 use super::prior::*;
 use super::tool_name::edge_of;
 use super::work::{Reference, Work, WorkKey};
 use serde::{Deserialize, Serialize};
-
-/// Something to tell once.
-#[derive(Debug, Clone, PartialEq)]
-pub enum WearNews {
-    /// The wear of this edge is not known well enough any more to be acted upon.
-    NotObservable {
-        /// The edge.
-        edge: String,
-    },
-    /// It is known again.
-    Observable {
-        /// The edge.
-        edge: String,
-    },
-    /// The power fell as with a new edge, and nobody had announced one.
-    NewEdge {
-        /// The tool.
-        tool: String,
-    },
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Edge {
-    tool: String,
-    /// As the controller names it.
-    name: String,
-    /// Edges of this tool so far.
-    number: u32,
-    wear: usize,
-    rate: usize,
-    slide_m: f64,
-    parts: u32,
-    part_m: f64,
-    criterion_mm: f64,
-    reference: Reference,
-    blind: bool,
-    rates: Vec<f64>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Group {
-    key: WorkKey,
-    at: usize,
-    path_mm: f64,
-    used: u64,
-}
-
-/// A measurement, with the states that it depends on.
-struct Measured {
-    group: usize,
-    edge: usize,
-    level: bool,
-    excess: f64,
-    rise: f64,
-    half_m: f64,
-    variance: f64,
-}
 
 /// Follows the edges of one machine. See the [module](self).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -218,6 +162,7 @@ impl Follower {
             criterion_mm: work.criterion_mm,
             reference: work.key.reference,
             blind: false,
+            odd: 0,
             rates: Vec::new(),
         });
         Some(self.edges.len() - 1)
@@ -297,6 +242,7 @@ impl Follower {
         for at in tools.into_iter().filter(|_| !self.edges_named) {
             let mut renewed = self.clone();
             renewed.renew(at);
+            renewed.edges[at].parts = 1;
             let likely = renewed.likelihood(measured) - UNANNOUNCED_EDGE + OTHER_HARDNESS;
             if likely > best.0 {
                 let tool = self.edges[at].tool.clone();
@@ -309,11 +255,15 @@ impl Follower {
         }
     }
 
+    /// Logarithm of how likely the measurements are, one after the other; nothing that leaves one of them odd explains them.
     fn likelihood(&self, measured: &[Measured]) -> f64 {
         let mut trial = self.clone();
         let mut sum = 0.0;
         for one in measured {
             let (gradient, above) = trial.expected(one);
+            if trial.is_odd(&gradient, above, one) {
+                return f64::NEG_INFINITY;
+            }
             sum += trial.joint.log_likelihood(&gradient, above, one.variance);
             trial.joint.observe(&gradient, above, one.variance);
         }
@@ -335,11 +285,23 @@ impl Follower {
         (gradient, one.excess - expected)
     }
 
+    fn is_odd(&self, gradient: &[(usize, f64)], above: f64, one: &Measured) -> bool {
+        above.abs() > OUTLIER_SD * self.joint.variance_of(gradient, one.variance).sqrt()
+    }
+
     fn take(&mut self, one: &Measured) {
         let (gradient, above) = self.expected(one);
-        let sd = self.joint.variance_of(&gradient, one.variance).sqrt();
-        if above.abs() > OUTLIER_SD * sd {
-            return;
+        let odd = self.is_odd(&gradient, above, one);
+        let edge = &mut self.edges[one.edge];
+        edge.odd = if odd { edge.odd + 1 } else { 0 };
+        match edge.odd {
+            0 => {}
+            // What stays is no error of measurement: the edge has chipped, or was exchanged.
+            ODD_IN_A_ROW.. => {
+                edge.odd = 0;
+                self.joint.spread(edge.wear, edge.criterion_mm.powi(2));
+            }
+            _ => return,
         }
         self.joint.observe(&gradient, above, one.variance);
         let edge = &self.edges[one.edge];

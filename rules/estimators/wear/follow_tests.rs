@@ -54,6 +54,20 @@ fn a_harder_lot_is_no_wear() {
 }
 
 #[test]
+fn a_chipped_edge_is_believed_after_three_parts_and_one_odd_part_is_not() {
+    let mut follower = Follower::default();
+    parts(&mut follower, "T1", 8, &|_| 1.0);
+    let part = |follower: &mut Follower, ratio: f64| {
+        follower.part(&[work("T1", "T1", "O1", ratio), work("T2", "T2", "O1", 0.8)], 4000.0);
+        outlook(follower, "T1").worn_probability
+    };
+    assert!(part(&mut follower, 1.0) < 0.2);
+    assert!(part(&mut follower, 0.63) < 0.2);
+    let odd: Vec<f64> = (0..4).map(|_| part(&mut follower, 1.0)).collect();
+    assert!(odd[1] < 0.2 && odd[3] > 0.5, "{odd:?}");
+}
+
+#[test]
 fn a_new_edge_that_nobody_announced_is_noticed_and_told() {
     let mut follower = Follower::default();
     parts(&mut follower, "T1", 28, &|_| 1.0);

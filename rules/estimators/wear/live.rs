@@ -5,7 +5,8 @@
 
 use super::choose::choose;
 use super::conditions::Conditions;
-use super::follow::{Follower, WearNews};
+use super::follow::Follower;
+use super::followed::WearNews;
 use super::outlook::Outlook;
 use super::record::{Key, WearRecord};
 use super::threshold::{Observability, Threshold, threshold};

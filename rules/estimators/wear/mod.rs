@@ -20,7 +20,7 @@
 //! | `tool_name` | tool and edge in a name |
 //! | `choose` | the model of a library for a cut |
 //! | `work` | what an edge did in one part, against what a sharp one takes |
-//! | `gaussian`, `follow` | the wear of every edge, followed by a Kalman filter |
+//! | `gaussian`, `followed`, `follow` | the wear of every edge, followed by a Kalman filter |
 //! | `prior` | what the filter believes beforehand |
 //! | `outlook` | probability of passing the criterion, parts left |
 //! | `live` | all of it beside the running machine |
@@ -33,6 +33,7 @@ mod conditions;
 mod design;
 mod fit_surface;
 mod follow;
+mod followed;
 mod gather;
 mod gaussian;
 mod identify;
@@ -59,7 +60,8 @@ pub use compare::{Comparison, FormErrors, compare};
 pub use conditions::{CUTTING_POWER, Conditions, Cut, FACTORS, Factor, WEAR, cutting_speed_m_min, unit_trouble};
 pub use design::{Alias, Design, Levels, PlannedCut, plan};
 pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
-pub use follow::{Follower, WearNews};
+pub use follow::Follower;
+pub use followed::WearNews;
 pub use gather::{Columns, Gathered, gather};
 pub use identify::{LearnedWear, Place, WearOptions, identify_tool_wear};
 pub use live::{ModelInUse, WearEstimator};

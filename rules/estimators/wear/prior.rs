@@ -47,6 +47,8 @@ pub(super) const OTHER_HARDNESS: f64 = 4.0;
 pub(super) const UNANNOUNCED_EDGE: f64 = 7.0;
 /// A measurement so many standard deviations off is none.
 pub(super) const OUTLIER_SD: f64 = 5.0;
+/// So many in a row are an edge that has suddenly changed.
+pub(super) const ODD_IN_A_ROW: u32 = 3;
 /// A gap so long may bring other material, s.
 pub(super) const OTHER_MATERIAL_S: f64 = 3600.0;
 
