@@ -70,7 +70,7 @@ fn times_ns(recording: &Recording) -> Vec<TimeNs> {
 
 /// Flank wear between the microscope readings of one edge, in a straight line over time.
 pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
-    let readings: Vec<(TimeNs, f64, &str)> = annotations
+    let readings: Vec<Wear<'_>> = annotations
         .iter()
         .filter(|it| it.quantity == Quantity::FlankWear)
         .filter_map(|it| Some((it.at_ns, it.value?, it.of.as_str())))
@@ -79,22 +79,28 @@ pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
         return;
     }
     let wear = |at_ns: TimeNs| {
-        let next = readings.partition_point(|(then_ns, ..)| *then_ns < at_ns);
-        let after = readings.get(next).filter(|(then_ns, ..)| then_ns - at_ns <= WEAR_REACHES_NS);
-        let before =
-            next.checked_sub(1).map(|at| &readings[at]).filter(|(then_ns, ..)| at_ns - then_ns <= WEAR_REACHES_NS);
-        match (before, after) {
-            (Some(one), Some(other)) if one.2 == other.2 && other.1 >= one.1 => {
-                let span = (other.0 - one.0).max(1) as f64;
-                Some(one.1 + (other.1 - one.1) * (at_ns - one.0) as f64 / span)
-            }
-            (Some(one), _) => Some(one.1),
-            (None, Some(other)) => Some(other.1),
-            (None, None) => None,
-        }
+        let between = bracket(&readings, at_ns).map(|(one, other)| {
+            let share = (at_ns - one.0) as f64 / (other.0 - one.0).max(1) as f64;
+            one.1 + share * (other.1 - one.1)
+        });
+        let next = readings.partition_point(|(then_ns, ..)| *then_ns <= at_ns);
+        let before = next.checked_sub(1).map(|at| readings[at]).filter(|it| at_ns - it.0 <= WEAR_REACHES_NS);
+        let after = readings.get(next).copied().filter(|it| it.0 - at_ns <= WEAR_REACHES_NS);
+        between.or_else(|| before.or(after).map(|it| it.1))
     };
     let column = times_ns(recording).into_iter().map(wear).collect::<Numbers>();
     recording.set_column("flank_wear_mm", Cells::Numbers(column));
+}
+
+/// A microscope reading: when, mm, of which edge.
+type Wear<'a> = (TimeNs, f64, &'a str);
+
+/// The closest two readings of one edge with a time between them: an edge was in the machine from the one to the other.
+fn bracket<'a>(readings: &[Wear<'a>], at_ns: TimeNs) -> Option<(Wear<'a>, Wear<'a>)> {
+    let (before, after): (Vec<Wear<'_>>, Vec<Wear<'_>>) = readings.iter().copied().partition(|it| it.0 <= at_ns);
+    let pair = |one: &Wear<'a>| Some((*one, *after.iter().find(|it| it.2 == one.2 && it.1 >= one.1)?));
+    let pairs = before.iter().filter_map(pair).filter(|(one, other)| other.0 - one.0 <= WEAR_REACHES_NS);
+    pairs.min_by_key(|(one, other)| other.0 - one.0)
 }
 
 /// Readings of gauge and probe as thermal error, in the rows nearest to them.
@@ -186,5 +192,29 @@ fn spread(sums: &mut [(f64, f64)], time_s: &[f64], course: &[(f64, f64)], matche
         if let Some(at) = nearest.filter(|at| (time_s[*at] - at_s).abs() <= 0.5) {
             sums[at] = (sums[at].0 + torque, sums[at].1 + 1.0);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_takes_the_wear_of_the_edge_that_was_in_the_machine() {
+        let reading = |at_s: i64, value: f64, of: &str| Annotation {
+            quantity: Quantity::FlankWear,
+            at_ns: at_s * SECOND_NS,
+            value: Some(value),
+            sd: None,
+            file: None,
+            of: of.to_owned(),
+        };
+        // The second edge was noted a moment before the last reading of the first.
+        let noted = [reading(0, 0.02, "a"), reading(99, 0.14, "b"), reading(100, 0.04, "a"), reading(200, 0.16, "b")];
+        let mut recording = Recording::new("history", vec![50.0, 150.0, 300.0], Some(0));
+        add_wear(&mut recording, &noted);
+        let wears: Vec<f64> = recording.numbers("flank_wear_mm").expect("a column").present().collect();
+        let near = |at: usize, wear: f64| (wears[at] - wear).abs() < 1e-3;
+        assert!(near(0, 0.03) && near(1, 0.15) && near(2, 0.16), "{wears:?}");
     }
 }

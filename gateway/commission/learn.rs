@@ -133,7 +133,7 @@ impl Learned {
         self.part(
             "wear",
             known.map_err(Clone::clone),
-            "make the 27 cuts of the L27 list, 9 with each of three edges: new, half worn, worn; read the flank wear of each under the \
+            "make the 27 cuts of the L27 list, 9 with each of three edges: new, half worn, worn past the criterion; read the flank wear of each under the \
              microscope before and after and give it: `annotate flank-wear 0.05 --unit mm --at now --of EDGE`. \
              `commission --plan wear-1`, `wear-2`, `wear-3` write the lists",
             25.0,
@@ -232,6 +232,14 @@ fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Refu
     if gathered.cuts.len() < 20 || levels < 3 {
         let what = format!("{} cuts at {levels} wears are known; the list has 27 at 3", gathered.cuts.len());
         return Err(Refusal::new(RefusalKind::TooFew, what, "go on with the list"));
+    }
+    let most_mm = gathered.cuts.iter().map(|cut| cut.conditions.vector()[0]).fold(0.0, f64::max);
+    if most_mm < criterion_mm {
+        let what = format!(
+            "the most worn edge had {most_mm:.3} mm, an edge counts as worn at {criterion_mm} mm: the limit would lie outside the model"
+        );
+        let next = "make wear-3 with an edge that is worn past the criterion, or give a lower --criterion-mm";
+        return Err(Refusal::new(RefusalKind::OutOfRange, what, next));
     }
     identify_tool_wear(gathered.cuts, &WearOptions { criterion_mm, ..WearOptions::default() })
 }

@@ -74,7 +74,7 @@ impl Person<'_> {
 
     /// The three lists with three edges, each looked at before and after.
     fn wears(&mut self) {
-        for (list, wear_mm) in [("wear-1", 0.02), ("wear-2", 0.14), ("wear-3", 0.26)] {
+        for (list, wear_mm) in [("wear-1", 0.02), ("wear-2", 0.14), ("wear-3", 0.29)] {
             self.does(&format!("puts in an edge with about {wear_mm} mm"));
             let began = self.commission(&[], 1)["to"].as_str().expect("a time").to_owned();
             let (before, after) = self.makes(list, wear_mm, false);
@@ -110,6 +110,7 @@ fn part<'a>(told: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
+#[ignore = "10 minutes: commissioning of a machine from nothing to a wear alarm, through the command line only"]
 fn a_new_machine_is_commissioned_from_nothing_to_a_wear_alarm() {
     let directory = tempfile::tempdir().expect("a directory");
     let mut person = Person { directory: directory.path(), did: Vec::new() };
@@ -138,7 +139,7 @@ fn a_new_machine_is_commissioned_from_nothing_to_a_wear_alarm() {
     assert!(mean < 0.02 && fixed.iter().all(|it| it.as_f64().expect("a number") > mean), "{loss:#}");
 
     person.wears();
-    let told = person.commission(&["--write"], 1);
+    let told = person.commission(&["--write", "--criterion-mm", CRITERION], 1);
     println!("{told:#}");
     assert!(part(&told, "wear")["known"].is_string(), "{told:#}");
     assert!(told["next"].as_str().expect("a text").contains("warm the machine up"), "thermal is left: {told:#}");
@@ -149,8 +150,12 @@ fn a_new_machine_is_commissioned_from_nothing_to_a_wear_alarm() {
     let true_mm = true_wear_mm(alarm_s);
     println!("alarm after {alarm_s:.0} s: {text}; true wear then {true_mm:.3} mm");
     person.did.iter().enumerate().for_each(|(index, what)| println!("{:>3}. {what}", index + 1));
-    assert!((0.27..=0.33).contains(&true_mm), "{true_mm}");
+    let criterion_mm: f64 = CRITERION.parse().expect("a number");
+    assert!((true_mm / criterion_mm - 1.0).abs() <= 0.1, "{true_mm}");
 }
+
+/// Flank wear at which this shop changes an edge, mm; the simulated machine puts in edges of 0.29 mm at most.
+const CRITERION: &str = "0.28";
 
 /// How the machine is when it works: an edge that is half worn, in production.
 const WORKING: &str = "&wear_mm=0.2";

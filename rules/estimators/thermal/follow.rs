@@ -145,6 +145,9 @@ impl Follower {
             () => None,
         };
         let share = if through > 0.0 { change_um / through } else { 0.0 };
+        // The level that wanders is no sign of strange temperatures: what counts as outside is judged with its doubt added.
+        let known_um = self.identified.law_sd_max_um.hypot(self.identified.residual_sd_um);
+        self.predictor.law_mut().law_sd_max_um = known_um;
         correct(self.predictor.law_mut(), &gain, &product, share);
         self.readings += 1;
         Correction { compared, change_um, held }
@@ -231,6 +234,18 @@ mod tests {
         let last = read(&mut follower, 40, 1.2, 6.0);
         assert!(last.abs() < 1.0, "{last}");
         assert_eq!(follower.readings(), 40);
+    }
+
+    #[test]
+    fn a_law_that_is_known_exactly_follows_as_well() {
+        let mut exact = law();
+        exact.covariance = vec![vec![9.25e-4, -0.35e-4], vec![-0.35e-4, 0.01e-4]];
+        exact.law_sd_max_um = 0.03;
+        let corrected = Corrected { identified: exact.clone(), law: exact, readings: 0 };
+        let settings = FollowSettings { step_um: 3.0, total_um: 40.0 };
+        let mut follower = Follower::new(corrected, &["bearing_temperature_c"], settings).expect("a law");
+        let last = read(&mut follower, 20, 1.0, 12.0);
+        assert!(last.abs() < 1.0 && follower.readings() == 20, "{last} {}", follower.readings());
     }
 
     #[test]
