@@ -1,10 +1,17 @@
-//! Instants as users write them: RFC 3339, a date, `now`, or so long before the newest sample.
+//! Instants as users write them: RFC 3339, a date and a time of the clock on the wall, `now`, `today`, `yesterday`, or so long before
+//! the newest sample.
+//!
+//! A date or a time without a zone is that of the box: whoever stands before the machine reads it from the wall. The zone is that of
+//! the system (`TZ`, `/etc/localtime`).
 
 use adapters::clock::{SECOND_NS, TimeNs};
+use jiff::Timestamp;
+use jiff::civil::{Date, DateTime};
+use jiff::tz::TimeZone;
 
 /// How instants are written, for messages.
-pub const NOTATION: &str =
-    "write 2026-01-31T08:15:00Z, 2026-01-31, now, or a time before the newest sample such as -90s, -10m, -8h, -7d";
+pub const NOTATION: &str = "write 2026-01-31 08:15 (time of this box), 2026-01-31T08:15:00Z, 2026-01-31, today, yesterday, now, or a time \
+    before the newest sample such as -90s, -10m, -8h, -7d";
 
 /// The instant that `text` means; `newest_ns` is the time of the newest sample.
 ///
@@ -19,9 +26,34 @@ pub fn parse(text: &str, newest_ns: TimeNs) -> Result<TimeNs, String> {
         let span_ns = span(back).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
         return Ok(newest_ns.saturating_sub(span_ns));
     }
-    let utc = if text.len() == 10 { format!("{text}T00:00:00Z") } else { text.to_owned() };
-    let stamp: jiff::Timestamp = utc.parse().map_err(|_| format!("{text:?} is no time; {NOTATION}"))?;
+    let stamp = stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
     i64::try_from(stamp.as_nanosecond()).map_err(|_| format!("{text} is outside the years 1678 to 2261"))
+}
+
+/// With a zone as it says; without one in the zone of the box. The first of two moments where a clock is set back.
+fn stamp(text: &str, zone: &TimeZone, newest_ns: TimeNs) -> Option<Timestamp> {
+    if let Ok(stamp) = text.parse::<Timestamp>() {
+        return Some(stamp);
+    }
+    let newest = || Some(Timestamp::from_nanosecond(i128::from(newest_ns)).ok()?.to_zoned(zone.clone()).date());
+    let day = match text {
+        "today" => Some(newest()?),
+        "yesterday" => Some(newest()?.yesterday().ok()?),
+        _ => text.parse::<Date>().ok().filter(|_| text.len() == 10),
+    };
+    let moment = match day {
+        Some(day) => day.at(0, 0, 0, 0),
+        None => written(text)?,
+    };
+    Some(moment.to_zoned(zone.clone()).ok()?.timestamp())
+}
+
+/// `2026-11-24 20:00`, with or without seconds, with a blank or a `T`.
+fn written(text: &str) -> Option<DateTime> {
+    let (date, time) = text.split_once([' ', 'T'])?;
+    let time = time.trim_start();
+    let whole = if time.matches(':').count() == 1 { format!("{time}:00") } else { time.to_owned() };
+    format!("{date}T{whole}").parse::<DateTime>().ok().filter(|_| whole.len() >= 8 && date.len() == 10)
 }
 
 /// `90s`, `10m`, `8h`, `7d` in nanoseconds.
@@ -65,9 +97,26 @@ mod tests {
         assert_eq!(parse("now", newest), Ok(newest));
         assert_eq!(parse("-10m", newest), Ok(newest - 600 * SECOND_NS));
         assert_eq!(parse("-1.5h", newest), Ok(newest - 5400 * SECOND_NS));
-        assert_eq!(parse("1970-01-02", newest), Ok(86_400 * SECOND_NS));
+        let zone = TimeZone::system();
+        let here = |date: Date| date.at(20, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS;
+        let day = jiff::civil::date(2026, 11, 24);
+        assert_eq!(parse("2026-11-24 20:00", newest), Ok(here(day)));
+        assert_eq!(parse("2026-11-24T20:00:00", newest), Ok(here(day)));
+        assert_eq!(parse("2026-11-24", newest), Ok(day.at(0, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS));
+        assert!(parse("today", newest) > parse("yesterday", newest) && parse("today", newest) <= Ok(newest));
         assert_eq!(parse("1970-01-01T00:00:01.5+00:00", newest), Ok(SECOND_NS * 3 / 2));
         assert_eq!(utc(SECOND_NS * 3 / 2), "1970-01-01T00:00:01.500Z");
+    }
+
+    #[test]
+    fn a_time_of_the_wall_is_that_of_the_zone() {
+        let shanghai = TimeZone::fixed(jiff::tz::offset(8));
+        let stamp = |text: &str| stamp(text, &shanghai, 0).map(|stamp| utc(stamp.as_second() * SECOND_NS));
+        assert_eq!(stamp("2026-11-24 20:00").as_deref(), Some("2026-11-24T12:00:00.000Z"));
+        assert_eq!(stamp("2026-11-24 20:00:30").as_deref(), Some("2026-11-24T12:00:30.000Z"));
+        assert_eq!(stamp("2026-11-24").as_deref(), Some("2026-11-23T16:00:00.000Z"));
+        assert_eq!(stamp("2026-11-24T20:00:00Z").as_deref(), Some("2026-11-24T20:00:00.000Z"));
+        assert_eq!(stamp("2026-11-24 20"), None);
     }
 
     #[test]

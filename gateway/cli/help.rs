@@ -2,22 +2,30 @@
 
 use super::{Arguments, CannotRun, CommandResult, Outcome, print};
 use crate::handbook::{chapter, contents, nearest_topic};
+use ::rules::script::{RECIPES, recipe};
+use adapters::channel::nearest;
 use clap::{Args, CommandFactory};
 
 /// Arguments of `help`.
 #[derive(Debug, Args)]
 pub(super) struct HelpArguments {
-    /// Topic of a chapter, or name of a command; without one the chapters are listed.
+    /// Topic of a chapter, name of a recipe or of a command; without one the chapters are listed.
     topic: Option<String>,
+    /// Of a recipe only the script, to write it into a file.
+    #[arg(long, requires = "topic")]
+    script: bool,
 }
 
 /// Prints the list of chapters, a chapter, or what a command takes. A chapter goes before a command of the same name.
 pub(super) fn help(arguments: &HelpArguments) -> CommandResult {
     let text = match arguments.topic.as_deref() {
         None => list(),
-        Some(topic) => match chapter(topic) {
-            Some(chapter) => chapter.text.to_owned(),
-            None => of_command(topic).ok_or_else(|| unknown(topic))?,
+        Some(topic) => match (chapter(topic), recipe(topic)) {
+            (_, Some(recipe)) if arguments.script => recipe.text.to_owned(),
+            (Some(chapter), _) if chapter.topic == "rules" => format!("{}\n{}", chapter.text, recipes()),
+            (Some(chapter), _) => chapter.text.to_owned(),
+            (None, Some(recipe)) => recipe.page(),
+            (None, None) => of_command(topic).ok_or_else(|| unknown(topic))?,
         },
     };
     print(&text);
@@ -31,6 +39,13 @@ fn list() -> String {
     )
 }
 
+/// One line for each recipe.
+fn recipes() -> String {
+    let width = RECIPES.iter().map(|recipe| recipe.name.len()).max().unwrap_or(0);
+    let lines: String = RECIPES.iter().map(|recipe| format!("  {:width$}  {}\n", recipe.name, recipe.title())).collect();
+    format!("Recipes (cnc-gateway help NAME) 配方:\n\n{lines}")
+}
+
 fn of_command(name: &str) -> Option<String> {
     let mut arguments = Arguments::command();
     // The usage of a command then begins with the name of the program.
@@ -40,7 +55,8 @@ fn of_command(name: &str) -> Option<String> {
 }
 
 fn unknown(topic: &str) -> CannotRun {
-    let guess = nearest_topic(topic).map(|near| format!("did you mean {near}? ")).unwrap_or_default();
+    let near = nearest_topic(topic).or_else(|| nearest(topic, RECIPES.iter().map(|recipe| recipe.name)));
+    let guess = near.map(|near| format!("did you mean {near}? ")).unwrap_or_default();
     CannotRun::new(
         format!("the handbook has no chapter {topic}"),
         format!("{guess}cnc-gateway help lists every chapter"),

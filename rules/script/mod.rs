@@ -29,7 +29,7 @@
 //! | `timers`, `script_memory` | what a script remembers |
 //! | `trials` | given and expected, written in the script file itself |
 //! | `decision`, `status`, `problem` | what comes out |
-//! | `shipped` | the scripts that come with the gateway |
+//! | `shipped`, `recipes` | the scripts that come with the gateway |
 
 mod api;
 mod callable;
@@ -50,6 +50,7 @@ mod notes;
 mod order;
 mod outcomes;
 mod problem;
+mod recipes;
 mod running;
 mod script_memory;
 mod settings;
@@ -76,6 +77,7 @@ pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};
 pub use host::Host;
 pub use problem::Problem;
+pub use recipes::{RECIPES, Recipe, recipe};
 pub use shipped::shipped;
 pub use status::{Condition, ScriptStatus, Status};
 pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove, trials};

@@ -1,13 +1,13 @@
 //! One active script: its variables, its timers, its last good version.
 
 mod alarms;
+mod failure;
 
 use super::collect::{Collected, Outcome};
-use super::compile::{ScriptFile, compile};
 use super::compiled::Script;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{
-    Alarm, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
+    Alarm, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
 };
 use super::declared::Now;
 use super::engine::Shared;
@@ -16,7 +16,6 @@ use super::notes::NoteLimit;
 use super::problem::{self, Problem};
 use super::running::Running;
 use super::script_memory::ScriptMemory;
-use super::shipped::shipped;
 use super::status::{Condition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill, has_absent, scope_of, why_absent};
@@ -350,47 +349,6 @@ impl Slot {
         let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
         self.condition = Condition::Waiting(problem);
-    }
-
-    /// The clock has stopped this run: it asks for nothing, and the next one begins anew.
-    fn leave_out(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) {
-        self.withdraw();
-        self.values.fill(None);
-        self.late += 1;
-        outputs.decision.problems.push(self.told(error));
-    }
-
-    /// The script failed. True when an older version has come into charge.
-    fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
-        self.withdraw();
-        self.values.fill(None);
-        let problem = self.told(error);
-        let at_ns = outputs.decision.at_ns;
-        let previous = self.previous.take().or_else(|| self.as_delivered());
-        let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
-        let en = format!("{problem}; {next} until the file is changed");
-        let zh = format!("脚本已停止：{problem}");
-        let replaced = previous.is_some();
-        if let Some(Previous { script, script_memory }) = previous {
-            *self =
-                Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, script_memory) };
-        } else {
-            self.condition = Condition::Suspended(Some(problem.clone()));
-        }
-        outputs.alarms.retain(|alarm| *alarm.script != *self.script.file || *alarm.name != *SCRIPT_STOPPED);
-        let text = AlarmText { level: Level::Critical, en: en.into(), zh: zh.into() };
-        self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
-        outputs.decision.problems.push(problem);
-        replaced
-    }
-
-    /// The script of this name as it was delivered, where nothing else has ever been good. It goes on with empty memory: what an
-    /// edited one has remembered may mean something else.
-    fn as_delivered(&self) -> Option<Previous> {
-        let files: Vec<ScriptFile> = shipped().into_iter().filter(|file| *file.name == *self.script.file).collect();
-        let script = compile(&files).ok()?.scripts.first()?.clone();
-        let fits = |script: &Script| script.version != self.script.version && script.foreign.is_empty();
-        fits(&script).then(|| Previous { script, script_memory: ScriptMemory::default() })
     }
 
     pub(super) fn status(&self) -> ScriptStatus {

@@ -8,7 +8,7 @@ use super::compiled::Script;
 use super::declared::Live;
 use super::examine::Findings;
 use super::vocabulary::{Seen, View};
-use rhai::{AST, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
+use rhai::{AST, ASTFlags, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
 
 /// The variables that the body and every handler find, in the order of [`scope_of`].
 pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &Live) -> Vec<String> {
@@ -37,10 +37,14 @@ impl Body {
         let head: String = names.iter().map(|name| format!("let {name};")).collect();
         let ast = engine.compile(format!("{head}\n{text}"))?;
         let declared = |(stmt, name): (&Stmt, &String)| matches!(stmt, Stmt::Var(it, ..) if it.0.name == *name);
-        if ast.statements().len() >= names.len() && ast.statements().iter().zip(names).all(declared) {
-            return Ok(Self { ast, skip: names.len(), lines: 1 });
+        let (heads, rest) = ast.statements().split_at(names.len().min(ast.statements().len()));
+        let behind = heads.len() == names.len() && heads.iter().zip(names).all(declared);
+        // A name that is declared again at the top takes the place of the first one, and would be left there for the next run.
+        let again = |stmt: &Stmt| matches!(stmt, Stmt::Var(it, ..) if names.iter().any(|name| it.0.name == *name));
+        if behind && !rest.iter().any(|stmt| again(stmt) && !is_constant(stmt)) {
+            let constants = rest.iter().take_while(|stmt| again(stmt) && is_constant(stmt)).count();
+            return Ok(Self { skip: names.len() + constants, ast, lines: 1 });
         }
-        // The text ends where the declarations do: nothing is left of it to run.
         Ok(Self { ast: engine.compile(text)?, skip: 0, lines: 0 })
     }
 
@@ -48,6 +52,11 @@ impl Body {
     pub(super) fn statements(&self) -> &[Stmt] {
         &self.ast.statements()[self.skip.min(self.ast.statements().len())..]
     }
+}
+
+/// A constant that is written as a plain value; the scope has it already.
+fn is_constant(stmt: &Stmt) -> bool {
+    matches!(stmt, Stmt::Var(it, flags, _) if flags.contains(ASTFlags::CONSTANT) && it.1.is_constant())
 }
 
 /// Only what the script reads; a variable that nobody looks at costs nothing. Its constants stand here too, for handlers.

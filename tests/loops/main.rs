@@ -3,6 +3,7 @@
 
 mod bench;
 mod constant_load;
+mod recipe;
 mod steps;
 mod stops;
 mod thermal;

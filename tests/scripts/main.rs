@@ -6,6 +6,7 @@ mod declared;
 mod failing;
 mod mad;
 mod methods;
+mod recipes;
 mod reload;
 mod shipped;
 mod trials;

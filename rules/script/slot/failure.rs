@@ -1,0 +1,53 @@
+//! A run that failed or was stopped, and who is in charge then.
+
+use super::{Condition, Outputs, Previous, Slot};
+use crate::script::compile::{ScriptFile, compile};
+use crate::script::compiled::Script;
+use crate::script::decision::{Level, SCRIPT_STOPPED};
+use crate::script::script_memory::ScriptMemory;
+use crate::script::shipped::shipped;
+use crate::script::timers::AlarmText;
+use rhai::EvalAltResult;
+
+impl Slot {
+    /// The clock has stopped this run: it asks for nothing, and the next one begins anew.
+    pub(super) fn leave_out(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) {
+        self.withdraw();
+        self.values.fill(None);
+        self.late += 1;
+        outputs.decision.problems.push(self.told(error));
+    }
+
+    /// The script failed. True when an older version has come into charge.
+    pub(super) fn fail(&mut self, error: &EvalAltResult, outputs: &mut Outputs<'_>) -> bool {
+        self.withdraw();
+        self.values.fill(None);
+        let problem = self.told(error);
+        let at_ns = outputs.decision.at_ns;
+        let previous = self.previous.take().or_else(|| self.as_delivered());
+        let next = if previous.is_some() { "the version before it is in charge" } else { "it is suspended" };
+        let en = format!("{problem}; {next} until the file is changed");
+        let zh = format!("脚本已停止：{problem}");
+        let replaced = previous.is_some();
+        if let Some(Previous { script, script_memory }) = previous {
+            *self =
+                Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, script_memory) };
+        } else {
+            self.condition = Condition::Suspended(Some(problem.clone()));
+        }
+        outputs.alarms.retain(|alarm| *alarm.script != *self.script.file || *alarm.name != *SCRIPT_STOPPED);
+        let text = AlarmText { level: Level::Critical, en: en.into(), zh: zh.into() };
+        self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
+        outputs.decision.problems.push(problem);
+        replaced
+    }
+
+    /// The script of this name as it was delivered, where nothing else has ever been good. It goes on with empty memory: what an
+    /// edited one has remembered may mean something else.
+    fn as_delivered(&self) -> Option<Previous> {
+        let files: Vec<ScriptFile> = shipped().into_iter().filter(|file| *file.name == *self.script.file).collect();
+        let script = compile(&files).ok()?.scripts.first()?.clone();
+        let fits = |script: &Script| script.version != self.script.version && script.foreign.is_empty();
+        fits(&script).then(|| Previous { script, script_memory: ScriptMemory::default() })
+    }
+}
