@@ -26,7 +26,8 @@ pub fn parse(text: &str, newest_ns: TimeNs) -> Result<TimeNs, String> {
         let span_ns = span(back).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
         return Ok(newest_ns.saturating_sub(span_ns));
     }
-    let stamp = stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
+    let stamp =
+        stamp(text, &TimeZone::system(), newest_ns).ok_or_else(|| format!("{text:?} is no time; {NOTATION}"))?;
     i64::try_from(stamp.as_nanosecond()).map_err(|_| format!("{text} is outside the years 1678 to 2261"))
 }
 
@@ -98,11 +99,16 @@ mod tests {
         assert_eq!(parse("-10m", newest), Ok(newest - 600 * SECOND_NS));
         assert_eq!(parse("-1.5h", newest), Ok(newest - 5400 * SECOND_NS));
         let zone = TimeZone::system();
-        let here = |date: Date| date.at(20, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS;
+        let here = |date: Date| {
+            date.at(20, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS
+        };
         let day = jiff::civil::date(2026, 11, 24);
         assert_eq!(parse("2026-11-24 20:00", newest), Ok(here(day)));
         assert_eq!(parse("2026-11-24T20:00:00", newest), Ok(here(day)));
-        assert_eq!(parse("2026-11-24", newest), Ok(day.at(0, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS));
+        assert_eq!(
+            parse("2026-11-24", newest),
+            Ok(day.at(0, 0, 0, 0).to_zoned(zone.clone()).expect("a time").timestamp().as_second() * SECOND_NS)
+        );
         assert!(parse("today", newest) > parse("yesterday", newest) && parse("today", newest) <= Ok(newest));
         assert_eq!(parse("1970-01-01T00:00:01.5+00:00", newest), Ok(SECOND_NS * 3 / 2));
         assert_eq!(utc(SECOND_NS * 3 / 2), "1970-01-01T00:00:01.500Z");

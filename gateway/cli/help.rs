@@ -42,7 +42,8 @@ fn list() -> String {
 /// One line for each recipe.
 fn recipes() -> String {
     let width = RECIPES.iter().map(|recipe| recipe.name.len()).max().unwrap_or(0);
-    let lines: String = RECIPES.iter().map(|recipe| format!("  {:width$}  {}\n", recipe.name, recipe.title())).collect();
+    let lines: String =
+        RECIPES.iter().map(|recipe| format!("  {:width$}  {}\n", recipe.name, recipe.title())).collect();
     format!("Recipes (cnc-gateway help NAME) 配方:\n\n{lines}")
 }
 

@@ -6,9 +6,7 @@ mod failure;
 use super::collect::{Collected, Outcome};
 use super::compiled::Script;
 use super::deadline::{LATE_MAX, is_late};
-use super::decision::{
-    Alarm, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest,
-};
+use super::decision::{Alarm, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest};
 use super::declared::Now;
 use super::engine::Shared;
 use super::events::Event;

@@ -14,7 +14,9 @@ fn run(seed: u64) -> ([u32; 3], [u32; 3]) {
     settings.meter.dropouts_per_h = 0.0;
     settings.change = LaterChange { after_s: CHANGE_S, cut: HARDER, ..settings.change };
     let text = recipe("above_learned").expect("a recipe").text;
-    let every = text.replace("\"program\", \"O1234\"", "\"program\", \"\"").replace("\"tool_name\", \"T3\"", "\"tool_name\", \"\"");
+    let every = text
+        .replace("\"program\", \"O1234\"", "\"program\", \"\"")
+        .replace("\"tool_name\", \"T3\"", "\"tool_name\", \"\"");
     let teach = shipped().into_iter().find(|file| file.name == "teach.rhai").expect("shipped");
     let teach = script("teach.rhai", teach.text.replace("setting(\"ask\", 1,", "setting(\"ask\", 0,"));
     let mut bench = Bench::at_work(settings, &[script("above_learned.rhai", every), teach], &limits(50.0, 110.0));
@@ -40,7 +42,9 @@ fn run(seed: u64) -> ([u32; 3], [u32; 3]) {
 fn more_power_than_was_learned_lowers_the_feed_of_the_simulated_machine_and_is_told() {
     for seed in 1..=3 {
         let (before, after) = run(seed);
-        println!("seed {seed}: ticks asked for, ticks in force, alarms: {before:?} before the change, {after:?} after it");
+        println!(
+            "seed {seed}: ticks asked for, ticks in force, alarms: {before:?} before the change, {after:?} after it"
+        );
         assert!(after[0] > 50 && after[1] > 50 && after[2] > 0, "it is lowered and told: {after:?}");
         assert!(after[0] > 5 * before[0], "and hardly before: {before:?}");
     }

@@ -17,7 +17,8 @@ fn at_least_twelve_recipes_pass_their_trials_at_every_end_of_their_settings() {
     let (mut count, mut failed) = (0, Vec::new());
     for recipe in RECIPES {
         let files = beside_teach(recipe.name);
-        let set = compile_with(&files, &SettingValues::default()).unwrap_or_else(|problems| panic!("{}", told(&problems)));
+        let set =
+            compile_with(&files, &SettingValues::default()).unwrap_or_else(|problems| panic!("{}", told(&problems)));
         let own = trials(&set).iter().filter(|it| *it.file == files[0].name && it.met > 0).count();
         assert!(own > 0, "{} has a trial", recipe.name);
         count += own;
