@@ -217,9 +217,8 @@ fn inner_rows(recording: &Recording) -> Vec<bool> {
         let end = (begin..inner.len()).find(|row| !cutting(*row)).unwrap_or(inner.len());
         if end > begin {
             let (from_s, to_s) = (recording.time_s[begin] + GUARD_S, recording.time_s[end - 1] - GUARD_S);
-            for row in begin..end {
-                inner[row] = (from_s..=to_s).contains(&recording.time_s[row]);
-            }
+            let of_the_cut = inner.iter_mut().zip(&recording.time_s).skip(begin).take(end - begin);
+            of_the_cut.for_each(|(inner, time_s)| *inner = (from_s..=to_s).contains(time_s));
         }
         begin = end + 1;
     }

@@ -35,24 +35,7 @@ fn a_chosen_time_is_diagnosed_ended_read_and_its_model_taken_over() {
     let mut browser = Browser::start(place);
     browser.open(&format!("http://{address}/twin?lang=en"));
     browser.wait_until("document.body?.dataset.fresh === 'yes' && document.querySelector('.card .primary')");
-    let stretch = json!({ "from": "-1h", "to": "-0s" });
-    let (status, _) = ask(&mut browser, "POST", "/api/v1/diagnosis", &stretch);
-    assert_eq!(status, 401, "nobody is signed in");
-    sign_in(&mut browser, "Li", &token);
-    let (status, told) = ask(&mut browser, "POST", "/api/v1/diagnosis", &json!({ "from": "-10s", "to": "-0s" }));
-    assert_eq!(status, 400, "{told}");
-    let (status, told) = ask(&mut browser, "POST", "/api/v1/diagnosis", &stretch);
-    assert_eq!(status, 200, "{told}");
-    let (status, told) = ask(&mut browser, "POST", "/api/v1/diagnosis", &stretch);
-    assert_eq!(status, 409, "one at a time: {told}");
-    wait_for("the work", Duration::from_secs(60), || (run_of(&address)["stage"] == "reading").then_some(()));
-    let status = browser.value("fetch('/api/v1/diagnosis', { method: 'DELETE' }).then((answer) => answer.status)");
-    assert_eq!(status, 200);
-    let ended = wait_for("its end", Duration::from_secs(20), || {
-        let run = run_of(&address);
-        (run["state"] != "running").then_some(run)
-    });
-    assert_eq!((&ended["state"], &ended["by"]), (&json!("cancelled"), &json!("Li")));
+    asked_and_ended(&mut browser, &address, &token);
 
     browser.open(&format!("http://{address}/twin?lang=en"));
     browser
@@ -99,6 +82,28 @@ fn a_chosen_time_is_diagnosed_ended_read_and_its_model_taken_over() {
     for words in ["a diagnosis of ", "the diagnosis is ended", "in the place of"] {
         assert!(rows.contains(words), "{rows}");
     }
+}
+
+/// Who may ask, for what, how many at once; and the end of what is under way.
+fn asked_and_ended(browser: &mut Browser, address: &str, token: &str) {
+    let stretch = json!({ "from": "-1h", "to": "-0s" });
+    let (status, _) = ask(browser, "POST", "/api/v1/diagnosis", &stretch);
+    assert_eq!(status, 401, "nobody is signed in");
+    sign_in(browser, "Li", token);
+    let (status, told) = ask(browser, "POST", "/api/v1/diagnosis", &json!({ "from": "-10s", "to": "-0s" }));
+    assert_eq!(status, 400, "{told}");
+    let (status, told) = ask(browser, "POST", "/api/v1/diagnosis", &stretch);
+    assert_eq!(status, 200, "{told}");
+    let (status, told) = ask(browser, "POST", "/api/v1/diagnosis", &stretch);
+    assert_eq!(status, 409, "one at a time: {told}");
+    wait_for("the work", Duration::from_secs(60), || (run_of(address)["stage"] == "reading").then_some(()));
+    let status = browser.value("fetch('/api/v1/diagnosis', { method: 'DELETE' }).then((answer) => answer.status)");
+    assert_eq!(status, 200);
+    let ended = wait_for("its end", Duration::from_secs(20), || {
+        let run = run_of(address);
+        (run["state"] != "running").then_some(run)
+    });
+    assert_eq!((&ended["state"], &ended["by"]), (&json!("cancelled"), &json!("Li")));
 }
 
 /// The report is a page that reads as it was drawn, with nothing that its policy refuses.

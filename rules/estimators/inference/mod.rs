@@ -95,7 +95,7 @@ impl Inference {
         if broken.gap || broken.stage {
             self.memory.learner.forget();
         }
-        self.to_reference_voltage(&mut inputs);
+        self.take_to_reference_voltage(&mut inputs);
         let filtered_w = inputs.power.ok().and_then(|power| self.memory.signals.push_power(power, &self.settings));
         let mut no_load = self.reference(&inputs);
         let tick =

@@ -10,7 +10,7 @@ use crate::estimators::supply::Measured;
 impl Inference {
     /// Takes off the power what the supply voltage does to no-load power, so that all that follows compares like with like; no
     /// effect without a voltage. Where no-load power is not known yet, the whole power is taken for it.
-    pub(super) fn to_reference_voltage(&mut self, inputs: &mut Inputs) {
+    pub(super) fn take_to_reference_voltage(&mut self, inputs: &mut Inputs) {
         if !inputs.basis.in_watts() {
             return;
         }
