@@ -14,6 +14,7 @@ pub mod outputs;
 pub mod pace;
 pub mod priority;
 pub mod recent;
+pub mod remembered;
 pub mod report;
 pub mod rules;
 pub mod sample_feed;
@@ -35,7 +36,6 @@ use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
 use crate::signals::{Request, Signals};
-use ::rules::estimators;
 use actuator_worker::{ActuatorWorker, Tools};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::{Actuator, OffsetSink};
@@ -49,7 +49,7 @@ use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -160,8 +160,8 @@ fn ticker(
     if plan.speed == MachineSpeed::Real {
         scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
     }
-    let mut pipeline = Pipeline::new(estimators(&memory), scripts, Gate::new(config.gate.clone()));
-    remember_edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
+    let mut pipeline = Pipeline::new(remembered::estimators(&memory), scripts, Gate::new(config.gate.clone()));
+    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let mut thermal = Thermal::of(config)?;
     let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
@@ -285,28 +285,6 @@ fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs
         return now_ns;
     }
     newest_ns + SECOND_NS
-}
-
-/// The wear of the edges, as it was known before.
-fn remember_edges(pipeline: &mut Pipeline, memory: &Path) {
-    let Ok(text) = std::fs::read_to_string(memory) else { return };
-    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
-    if !pipeline.wear_mut().restore(snapshot) {
-        let text = format!("{} cannot be used: the wear of the edges is followed anew", memory.display());
-        Notice::new(Severity::Warning, "wear_forgotten", text).say();
-    }
-}
-
-/// The estimators, with what they had learned before.
-fn estimators(memory: &Path) -> estimators::Inference {
-    let settings = estimators::Settings::default();
-    let fresh = || estimators::Inference::new(settings.clone());
-    let Ok(text) = std::fs::read_to_string(memory) else { return fresh() };
-    let snapshot = serde_json::from_str(&text).unwrap_or(serde_json::Value::Null);
-    estimators::Inference::restore(settings.clone(), snapshot).unwrap_or_else(|error| {
-        Notice::new(Severity::Warning, "nothing_learned", error.to_string()).say();
-        fresh()
-    })
 }
 
 /// Serves until a signal says stop, or the tick has ended by itself.
