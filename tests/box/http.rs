@@ -28,11 +28,15 @@ fn every_described_address_answers_with_what_is_described() {
         if path.ends_with("/live") || item["get"].is_null() || item["get"]["security"].is_array() {
             continue;
         }
-        // An earlier version of a script is there only after somebody has changed one.
-        if path.contains("{digest}") {
+        // An earlier version of a script is there only after somebody has changed one, the files of a diagnosis only after one.
+        if path.contains("{digest}") || path.contains("{key}") {
             continue;
         }
         let answer = get(&address, &path.replace("{file}", "page.js").replace("{chapter}", "page"));
+        // What the delivered box has not been given, such as a recipe, is said with a described conflict.
+        if answer.status == 409 && item["get"]["responses"]["409"].is_object() {
+            continue;
+        }
         assert_eq!(answer.status, 200, "{path}: {}", answer.body);
         let described = item["get"]["responses"]["200"]["content"].as_object().expect("content");
         let kind = described.keys().next().expect("a type");
@@ -57,7 +61,7 @@ fn whatever_is_asked_is_answered_and_the_tick_goes_on() {
     let (_directory, gateway, address) = started();
     let asked = [
         ("/api/v1/samples?channels=spindel_power_w", 400, "did you mean spindle_power_w?"),
-        ("/api/v1/samples?from=yesterday", 400, "RFC"),
+        ("/api/v1/samples?from=some%20time%20ago", 400, "2026-01-31 08:15"),
         ("/api/v1/samples?from=now&to=-10m", 400, "swap"),
         ("/api/v1/samples?resolution_s=NaN", 400, "number"),
         ("/api/v1/samples?resolution_s=-1", 400, "number"),

@@ -102,7 +102,7 @@ fn archives(browser: &mut Browser, place: &Path) {
     std::fs::write(scripts.join("mine.rhai"), "// lost").expect("written");
     std::fs::write(scripts.join("other.rhai"), "// of later").expect("written");
     let restored = browser.value(
-        "fetch('/api/v1/restore', { method: 'POST', headers: { 'content-type': 'application/gzip' }, body: taken })
+        "fetch('/api/v1/restore', { method: 'POST', headers: { 'content-type': 'application/octet-stream' }, body: taken })
             .then(async (answer) => [answer.status, (await answer.json()).text])",
     );
     assert_eq!(restored[0], 200, "{restored}");

@@ -120,7 +120,7 @@ function warned(file, note) {
   dialog.addEventListener("close", async () => {
     dialog.remove();
     if (dialog.returnValue !== "yes") return;
-    try { say(note, (await ask("/api/v1/restore", { method: "POST", headers: { "content-type": "application/gzip" }, body: file })).text); } catch (error) { say(note, error.message); }
+    try { say(note, (await ask("/api/v1/restore", { method: "POST", headers: { "content-type": "application/octet-stream" }, body: file })).text); } catch (error) { say(note, error.message); }
   });
   document.body.append(dialog);
   dialog.showModal();

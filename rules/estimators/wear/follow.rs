@@ -79,7 +79,8 @@ impl Follower {
         self.material(&first.key, end_s);
         let mut news = Vec::new();
         let wearing = self.grow(&works);
-        let measured: Vec<Measured> = works.iter().filter_map(|work| self.measured(work)).collect();
+        let measured: Vec<Measured> =
+            works.iter().filter(|work| leads(work, &works)).filter_map(|work| self.measured(work)).collect();
         self.between(&measured, &mut news);
         for one in &measured {
             self.take(one);
@@ -352,6 +353,15 @@ impl Follower {
     pub fn edge_number(&self, tool: &str) -> Option<u32> {
         self.edges.iter().find(|edge| edge.tool == tool).map(|edge| edge.number)
     }
+}
+
+/// Is this what most of its operation is compared with? The rest of the operation are entries, exits and corners that the model does
+/// not cover; their mixture differs from part to part.
+fn leads(work: &Work, works: &[&Work]) -> bool {
+    works
+        .iter()
+        .filter(|other| other.key.is_of_the_same_operation(&work.key))
+        .all(|other| other.seconds <= work.seconds)
 }
 
 #[cfg(test)]

@@ -24,6 +24,10 @@ pub(super) const LEVEL_SD: f64 = 0.5;
 /// Least uncertainty of a learned model for one operation, as a share: other tool paths than the cuts it was learned from differ by
 /// 4 to 7 % on the simulated lathe. Too small, the difference is taken for wear and a good edge is alarmed.
 pub(super) const MODEL_SD_LEAST: f64 = 0.05;
+/// The same of a model that names no work material: the specific cutting force of steels is 1400 to 2800 N/mm2, so a model of another
+/// material would take a good edge in a hard part for a worn one. Its shape over the cut counts, hardly its level; the wear is
+/// followed by its growth.
+pub(super) const ANY_MATERIAL_SD: f64 = 0.3;
 /// A new edge, mm: the land of the first minutes, which wears in quickly.
 pub(super) const NEW_MM: (f64, f64) = (0.015, 0.010);
 /// An edge of which nothing is known, mm: shops do not begin to record with edges at their end.

@@ -5,6 +5,7 @@
 //! feed alone. Whatever the reference leaves over is a constant of the operation, which the filter learns.
 
 use super::conditions::{Conditions, cutting_speed_m_min};
+use super::prior::ANY_MATERIAL_SD;
 use super::record::WearRecord;
 use serde::{Deserialize, Serialize};
 
@@ -79,12 +80,7 @@ impl CutMoment {
         of_model().or_else(|| self.typical()).unwrap_or_else(|| self.of_feed())
     }
 
-    /// Of a model that names the work material. The specific cutting force of steels is 1400 to 2800 N/mm2, so a model of another
-    /// material takes a good edge in a hard part for a worn one.
     fn of_model(&self, record: &WearRecord) -> Option<Expected> {
-        if record.key.work_material.is_empty() {
-            return None;
-        }
         let sharp = self.conditions()?;
         let worn = sharp.with_wear(record.criterion_mm);
         if !record.model.outside(&worn).is_empty() {
@@ -94,7 +90,8 @@ impl CutMoment {
         let wear_w_per_mm = (at_worn.power_w - at_none.power_w) / record.criterion_mm;
         // A model whose power does not rise with the wear here says nothing of it.
         let stands = at_none.power_w > 0.0 && wear_w_per_mm > 0.0;
-        let doubt = at_worn.observation_sd_w() / at_none.power_w;
+        let of_material = if record.key.work_material.is_empty() { ANY_MATERIAL_SD } else { 0.0 };
+        let doubt = of_material.hypot(at_worn.observation_sd_w() / at_none.power_w);
         stands.then_some(Expected { reference: Reference::Model, sharp_w: at_none.power_w, wear_w_per_mm, doubt })
     }
 
@@ -139,6 +136,15 @@ pub struct WorkKey {
     pub operation: String,
     /// Work material, empty where none is named.
     pub work_material: String,
+}
+
+impl WorkKey {
+    /// The same tool in the same operation of the same program, whatever it is compared with?
+    #[must_use]
+    pub fn is_of_the_same_operation(&self, other: &Self) -> bool {
+        (&self.tool, &self.program, &self.operation, &self.work_material)
+            == (&other.tool, &other.program, &other.operation, &other.work_material)
+    }
 }
 
 /// The work of one edge in one part, with one reference.
