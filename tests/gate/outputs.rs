@@ -18,7 +18,7 @@ if kind == 2.0 { request_feed_override(1.0 / 0.0, "infinite"); }
 if kind == 3.0 { request_feed_override(-1.0 / 0.0, "infinite the other way"); }
 if kind == 4.0 { request_feed_override(-1, "minus one"); }
 if kind == 5.0 { request_feed_override(300, "three hundred"); }
-if kind == 6.0 { request_feed_override("80", "a string"); }
+if kind == 6.0 { let words = "80"; request_feed_override(words, "a string"); }
 if kind == 7.0 { request_feed_override(#{ pct: 80 }, "a map"); }
 if kind == 8.0 { request_feed_override([80], "an array"); }
 if kind == 9.0 { request_feed_override((), "nothing"); }
