@@ -87,14 +87,16 @@ impl Field {
 }
 
 fn age<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
-    let Source::Channel(id) = word.source else { return Seen::Absent };
+    let (Source::Channel(id) | Source::Tool(id)) = word.source else { return Seen::Absent };
     let slot = view.sample.slot(id);
     if slot.value.is_ok() { Seen::Number(slot.age_ns as f64 / SECOND_NS as f64) } else { Seen::Absent }
 }
 
 fn absence<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
     let reason = match word.source {
-        Source::Channel(id) => view.sample.slot(id).value.as_ref().err().map(|absence| absence.word()),
+        Source::Channel(id) | Source::Tool(id) => {
+            view.sample.slot(id).value.as_ref().err().map(|absence| absence.word())
+        }
         Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|reason| reason.word()),
         _ => None,
     };
@@ -103,7 +105,7 @@ fn absence<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
 
 impl Record {
     fn holds(&self, word: &Word) -> bool {
-        let channel = matches!(word.source, Source::Channel(_));
+        let channel = matches!(word.source, Source::Channel(_) | Source::Tool(_));
         let quantity = matches!(word.source, Source::Quantity(_) | Source::Deviation(_));
         match self.tells {
             Tells::Channel | Tells::Age => channel,

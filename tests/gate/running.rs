@@ -161,8 +161,11 @@ fn a_script_that_is_refused_or_stopped_is_told_in_the_log_too() {
     let said = gateway.wait_said("mad.rhai:1:4");
     assert!(said.contains("there is no variable `spindel_power_w`"), "{said}");
     gateway.wait_said("did you mean `spindle_power_w`?");
-    std::fs::write(&script, "loop { }").expect("written");
-    gateway.wait_said("a script was stopped: mad.rhai:1:6: the script did not come to an end");
+    // Its trial passes; it fails when the spindle turns.
+    let failing = "if (spindle_speed_rpm ?? 0.0) > 1.0 { let a = [1]; a[5] = 1; }\n\
+                   fn trial_a_standing_spindle() { given(#{ spindle_speed_rpm: 0.0 }); after_s(1.0); expect_no_alarms(); }";
+    std::fs::write(&script, failing).expect("written");
+    gateway.wait_said("a script was stopped: mad.rhai:1:");
     wait_for("the alarm in the status", Duration::from_secs(20), || {
         let status = get(&address, "/api/v1/status").json();
         let alarms = status["alarms"].as_array().expect("alarms").clone();

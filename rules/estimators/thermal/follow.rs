@@ -206,7 +206,7 @@ mod tests {
             law_sd_max_um: 3.0,
             lag_spread_k: 0.0,
             terms: vec![term],
-            covariance: vec![vec![9.25, -0.35], vec![-0.35, 0.01]],
+            covariance: vec![vec![12.5, -0.35], vec![-0.35, 0.01]],
         }
     }
 
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn a_law_that_is_known_exactly_follows_as_well() {
         let mut exact = law();
-        exact.covariance = vec![vec![9.25e-4, -0.35e-4], vec![-0.35e-4, 0.01e-4]];
+        exact.covariance = vec![vec![12.5e-4, -0.35e-4], vec![-0.35e-4, 0.01e-4]];
         exact.law_sd_max_um = 0.03;
         let corrected = Corrected { identified: exact.clone(), law: exact, readings: 0 };
         let settings = FollowSettings { step_um: 3.0, total_um: 40.0 };

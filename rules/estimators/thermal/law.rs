@@ -84,11 +84,26 @@ impl ThermalLaw {
         if all.into_iter().any(|number| !number.is_finite()) || self.residual_sd_um < 0.0 {
             return wrong(RefusalKind::NotFinite, "a number is none, or a deviation negative".to_owned(), "law");
         }
+        if !self.covariance_can_be() {
+            let what = "no coefficients can vary together like this".to_owned();
+            return wrong(RefusalKind::Mismatch, what, "covariance");
+        }
         let lagged = self.terms.iter().any(|term| term.path == Path::Lagged);
         if lagged && self.tau_s.is_none_or(|tau_s| tau_s <= 0.0) {
             return wrong(RefusalKind::Missing, "a term is lagged and there is no time constant".to_owned(), "tau_s");
         }
         Ok(())
+    }
+
+    /// Is every variance positive or zero, and no covariance greater than its two variances allow? Rounding of a copied file is let pass.
+    fn covariance_can_be(&self) -> bool {
+        let of = |row: usize, column: usize| self.covariance[row][column];
+        let all = 0..self.covariance.len();
+        all.clone().all(|row| {
+            let pairs =
+                all.clone().all(|column| of(row, column).powi(2) <= of(row, row) * of(column, column) * 1.000_001);
+            of(row, row) >= 0.0 && pairs
+        })
     }
 
     /// The standard deviation of the law at a point: one for the intercept, then one temperature or state per term.
