@@ -22,7 +22,7 @@ use super::tool_name::edge_of;
 use super::work::{Reference, Work, WorkKey};
 use serde::{Deserialize, Serialize};
 
-/// Follows the edges of one machine. See the [module](self).
+/// Follows the edges of one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Follower {

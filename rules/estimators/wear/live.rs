@@ -73,7 +73,7 @@ pub struct ModelInUse {
     pub by: &'static str,
 }
 
-/// See the [module](self).
+/// The wear of every edge, from samples and estimates. The numbers and the rules stand in `prior` and `follow`.
 pub struct WearEstimator {
     machine: String,
     models: Vec<Arc<WearRecord>>,
