@@ -113,20 +113,20 @@ pub fn restore(places: &Places, files: &[Entry], before: (&[u8], &str)) -> Resul
 
 fn check(scripts: &[ScriptFile], recipe: Option<&str>, model: Option<&str>) -> Result<(), String> {
     if !scripts.is_empty() {
-        let lines =
-            |all: Vec<rules::script::Problem>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
         rules::script::prepare(scripts).map_err(lines)?;
     }
     if let Some(recipe) = recipe {
-        let lines =
-            |all: Vec<rules::script::Problem>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
         rules::operations::parse("operations.toml", recipe).map_err(lines)?;
     }
     if let Some(model) = model {
-        let lines = |all: Vec<rules::twin::Problem>| all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
         rules::twin::parse_model(model).map_err(lines)?;
     }
     Ok(())
+}
+
+/// Every problem on a line of its own.
+fn lines<P: std::fmt::Display>(all: Vec<P>) -> String {
+    all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), String> {

@@ -6,14 +6,14 @@
 
 use crate::files::{read_text, replace};
 use crate::reload::digest;
-use rules::script::{Declared, Place, Problem, ScriptFile, SettingValue, SettingValues, prepare_with};
+use rules::script::{
+    Declared, Place, Problem, SETTINGS_TEXT_MAX, ScriptFile, SettingValue, SettingValues, prepare_with,
+};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
 /// Name of the file in the data directory.
 pub const FILE: &str = "settings.toml";
-/// Bytes that are read of it.
-const TEXT_MAX: usize = 256 * 1024;
 /// Kind of the events that tell a change.
 pub const KIND: &str = "setting_changed";
 /// Who has changed a file that no person was signed in for.
@@ -30,7 +30,7 @@ pub fn path(data_dir: &Path) -> PathBuf {
 /// # Errors
 /// It is there and cannot be read.
 pub fn text(path: &Path) -> Result<String, Vec<Problem>> {
-    match read_text(path, TEXT_MAX) {
+    match read_text(path, SETTINGS_TEXT_MAX) {
         Ok(text) => Ok(text),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
         Err(error) => {

@@ -1,4 +1,4 @@
-//! Counts, means, medians, quantiles: the few numbers that describe many.
+//! Counts, means, medians, quantiles: the few numbers that describe many; the normal distribution; correlation of pairs.
 
 /// A count as a number.
 #[must_use]
@@ -45,4 +45,56 @@ pub(crate) fn robust_deviation(values: impl IntoIterator<Item = f64>) -> Option<
 #[must_use]
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / count(values.len().max(1))).sqrt()
+}
+
+/// Correlation of pairs in one pass, and how many there were; 0 where one side is constant.
+#[must_use]
+pub(crate) fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        (n, sx, sy) = (n + 1.0, sx + x, sy + y);
+        (sxx, syy, sxy) = (sxx + x * x, syy + y * y, sxy + x * y);
+    }
+    let spread: f64 = (n * sxx - sx * sx) * (n * syy - sy * sy);
+    (if spread > 0.0 { (n * sxy - sx * sy) / spread.sqrt() } else { 0.0 }, n)
+}
+
+/// The complementary error function, relative error below 1.2e-7.
+/// Source: Press et al., Numerical Recipes, section 6.2 (Chebyshev fit).
+#[must_use]
+pub(crate) fn erfc(x: f64) -> f64 {
+    const TERMS: [f64; 10] = [
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
+    ];
+    let t = 1.0 / (1.0 + 0.5 * x.abs());
+    let sum = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
+    let tail = t * (-x * x + sum).exp();
+    if x >= 0.0 { tail } else { 2.0 - tail }
+}
+
+/// Share of the standard normal distribution below `x`.
+#[must_use]
+pub(crate) fn normal_share(x: f64) -> f64 {
+    0.5 * erfc(-x / std::f64::consts::SQRT_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_the_normal_distribution_are_those_of_the_tables() {
+        for (x, share) in [(0.0, 0.5), (1.0, 0.841_344_746), (-1.96, 0.024_997_895), (3.0, 0.998_650_102)] {
+            assert!((normal_share(x) - share).abs() < 1e-6, "{x}: {}", normal_share(x));
+        }
+    }
 }

@@ -109,8 +109,7 @@ pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) 
     let mut values = vec![None; times_ns.len()];
     for it in annotations.iter().filter(|it| matches!(it.quantity, Quantity::Gauge | Quantity::Probe)) {
         let next = times_ns.partition_point(|at_ns| *at_ns < it.at_ns);
-        let near = [next.checked_sub(1), Some(next)].into_iter().flatten().filter(|at| *at < times_ns.len());
-        let nearest = near.min_by_key(|at| (times_ns[*at] - it.at_ns).abs());
+        let nearest = neighbours(next, times_ns.len()).min_by_key(|at| (times_ns[*at] - it.at_ns).abs());
         if let Some(at) = nearest.filter(|at| (times_ns[*at] - it.at_ns).abs() <= GAUGE_REACHES_NS) {
             values[at] = it.value;
         }
@@ -118,6 +117,11 @@ pub fn add_thermal_error(recording: &mut Recording, annotations: &[Annotation]) 
     if values.iter().any(Option::is_some) {
         recording.set_column("thermal_error_um", Cells::Numbers(values.into_iter().collect::<Numbers>()));
     }
+}
+
+/// The rows before and after a place among so many rows.
+fn neighbours(next: usize, rows: usize) -> impl Iterator<Item = usize> {
+    [next.checked_sub(1), Some(next)].into_iter().flatten().filter(move |at| *at < rows)
 }
 
 /// A torque sensor's file: times on its own clock, s, and torques, N·m.
@@ -187,8 +191,8 @@ fn spread(sums: &mut [(f64, f64)], time_s: &[f64], course: &[(f64, f64)], matche
     for (second_s, torque) in course {
         let at_s = matched.on_first_clock(*second_s);
         let next = time_s.partition_point(|row_s| *row_s < at_s);
-        let near = [next.checked_sub(1), Some(next)].into_iter().flatten().filter(|at| *at < time_s.len());
-        let nearest = near.min_by(|a, b| (time_s[*a] - at_s).abs().total_cmp(&(time_s[*b] - at_s).abs()));
+        let nearest = neighbours(next, time_s.len())
+            .min_by(|a, b| (time_s[*a] - at_s).abs().total_cmp(&(time_s[*b] - at_s).abs()));
         if let Some(at) = nearest.filter(|at| (time_s[*at] - at_s).abs() <= 0.5) {
             sums[at] = (sums[at].0 + torque, sums[at].1 + 1.0);
         }

@@ -1,5 +1,6 @@
 //! The fits as pictures: dots in a frame, on one page that needs nothing else.
 
+use crate::report::escape;
 use std::fmt::Write as _;
 
 /// Size of a picture, in units of the picture.
@@ -59,7 +60,7 @@ impl Picture {
         let up = |value: f64| HEIGHT - MARGIN - (value - y.0) / (y.1 - y.0) * (HEIGHT - 1.6 * MARGIN);
         let mut svg = format!(
             "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\"><title>{}</title><path class=\"axis\" d=\"M{MARGIN} {} V{} H{}\"/>",
-            escaped(&self.title),
+            escape(&self.title),
             0.6 * MARGIN,
             HEIGHT - MARGIN,
             WIDTH - 0.4 * MARGIN
@@ -108,15 +109,11 @@ impl Picture {
             "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text><text x=\"4\" y=\"16\">{}</text></svg>",
             0.5 * WIDTH,
             HEIGHT - 0.25 * MARGIN,
-            escaped(&self.units.0),
-            escaped(&self.units.1)
+            escape(&self.units.0),
+            escape(&self.units.1)
         );
         svg
     }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// The page.
@@ -127,11 +124,11 @@ pub fn page(machine: &str, text: &str, pictures: &[Picture]) -> String {
          max-width:60rem;margin:2rem auto;padding:0 1rem}}svg{{width:30rem;max-width:100%}}.axis{{fill:none;stroke:#333}}\
          .line{{fill:none;stroke:#888}}circle{{fill:#1667a8}}text{{font-size:11px}}pre{{white-space:pre-wrap}}</style>\
          <h1>Commissioning of {0} 调试报告</h1><pre>{1}</pre>",
-        escaped(machine),
-        escaped(text)
+        escape(machine),
+        escape(text)
     );
     for picture in pictures.iter().filter(|picture| !picture.dots.is_empty()) {
-        let _ = write!(page, "<h2>{}</h2>{}", escaped(&picture.title), picture.svg());
+        let _ = write!(page, "<h2>{}</h2>{}", escape(&picture.title), picture.svg());
     }
     page + "</html>\n"
 }

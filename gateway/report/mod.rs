@@ -27,7 +27,7 @@ use data::Data;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::Diagnosis;
 use std::fmt::Write as _;
-use text::escape;
+pub(crate) use text::escape;
 
 /// Styles of the page.
 const STYLE: &str = include_str!("style.css");

@@ -6,7 +6,7 @@
 //! only where the configuration says so; the gate decides, as about every offset.
 
 use super::health::Health;
-use crate::cli::CannotRun;
+use crate::cannot_run::CannotRun;
 use crate::config::{self, Config};
 use crate::history::{ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};

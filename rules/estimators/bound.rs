@@ -8,6 +8,8 @@
 //! The level itself is not the quantity: under a light cut it lies above no-load power by the cut, and a cut that is
 //! learned as no-load power is never seen again.
 
+use crate::statistics::erfc;
+
 /// Mean and standard deviation of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Normal {
@@ -44,27 +46,6 @@ fn hazard(z: f64) -> f64 {
     }
     let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
     2.0 * density / erfc(-z / std::f64::consts::SQRT_2)
-}
-
-/// The complementary error function, relative error below 1.2e-7.
-/// Source: Press et al., Numerical Recipes, section 6.2 (Chebyshev fit).
-fn erfc(x: f64) -> f64 {
-    const TERMS: [f64; 10] = [
-        -1.265_512_23,
-        1.000_023_68,
-        0.374_091_96,
-        0.096_784_18,
-        -0.186_288_06,
-        0.278_868_07,
-        -1.135_203_98,
-        1.488_515_87,
-        -0.822_152_23,
-        0.170_872_77,
-    ];
-    let t = 1.0 / (1.0 + 0.5 * x.abs());
-    let sum = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
-    let tail = t * (-x * x + sum).exp();
-    if x >= 0.0 { tail } else { 2.0 - tail }
 }
 
 #[cfg(test)]

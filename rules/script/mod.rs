@@ -71,7 +71,7 @@ pub use decision::{
     Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
     StopRequest,
 };
-pub use declared::{Declared, Per, Place, SettingValue, SettingValues};
+pub use declared::{Declared, Per, Place, SETTINGS_TEXT_MAX, SettingValue, SettingValues};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};
 pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};

@@ -8,6 +8,7 @@
 //! fit in many places. Cuts of different length and power, or an idle stretch of its own length, tell them apart.
 
 use crate::estimators::regression::{Refusal, RefusalKind};
+use crate::statistics::correlation;
 
 /// Step of the coarse grid, s.
 const COARSE_S: f64 = 1.0;
@@ -70,17 +71,11 @@ impl Grid {
 
     /// Correlation with another grid of the same step whose beginning lies at this place, and how many points overlap.
     fn correlation(&self, other: &Self, place: i64) -> (f64, usize) {
-        let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for (index, y) in other.values.iter().enumerate() {
+        let pairs = other.values.iter().enumerate().filter_map(|(index, y)| {
             let at = i64::try_from(index).unwrap_or(i64::MAX).saturating_add(place);
-            let x = usize::try_from(at).ok().and_then(|at| self.values.get(at).copied().flatten());
-            if let (Some(x), Some(y)) = (x, *y) {
-                (n, sx, sy) = (n + 1.0, sx + x, sy + y);
-                (sxx, syy, sxy) = (sxx + x * x, syy + y * y, sxy + x * y);
-            }
-        }
-        let spread = (n * sxx - sx * sx) * (n * syy - sy * sy);
-        let correlation = if spread > 0.0 { (n * sxy - sx * sy) / spread.sqrt() } else { 0.0 };
+            Some((self.values.get(usize::try_from(at).ok()?).copied().flatten()?, (*y)?))
+        });
+        let (correlation, n) = correlation(pairs);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         (correlation, n as usize)
     }
@@ -169,14 +164,8 @@ fn coarse(one: &Grid, other: &Grid) -> Result<(i64, f64, f64), Refusal> {
 /// The lag about `about_s` at which the second course, looked up in the first, agrees best.
 fn fine(first: &[(f64, f64)], second: &[(f64, f64)], about_s: f64) -> f64 {
     let agreement = |lag_s: f64| {
-        let sums = second.iter().filter_map(|(time_s, y)| Some((interpolated(first, time_s + lag_s)?, *y)));
-        let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for (x, y) in sums {
-            (n, sx, sy) = (n + 1.0, sx + x, sy + y);
-            (sxx, syy, sxy) = (sxx + x * x, syy + y * y, sxy + x * y);
-        }
-        let spread: f64 = (n * sxx - sx * sx) * (n * syy - sy * sy);
-        if spread > 0.0 { ((n * sxy - sx * sy) / spread.sqrt()).abs() } else { 0.0 }
+        let pairs = second.iter().filter_map(|(time_s, y)| Some((interpolated(first, time_s + lag_s)?, *y)));
+        correlation(pairs).0.abs()
     };
     let mut best = (about_s, agreement(about_s));
     for step_s in [0.5, 0.1, 0.02] {

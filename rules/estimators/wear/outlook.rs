@@ -1,5 +1,6 @@
 //! From what is known of wear and rate: the probability that the criterion is passed, and the parts that remain.
 
+use crate::statistics::normal_share;
 use serde::Serialize;
 
 /// Share of the criterion that one standard deviation of the wear may have for an edge to count as observed. With a wider one an
@@ -78,37 +79,9 @@ impl Known {
     }
 }
 
-/// Share of a normal distribution below `x` (Press et al., Numerical Recipes, erfcc: relative error under 1.2e-7).
-fn normal_share(x: f64) -> f64 {
-    const COEFFICIENTS: [f64; 10] = [
-        -1.265_512_23,
-        1.000_023_68,
-        0.374_091_96,
-        0.096_784_18,
-        -0.186_288_06,
-        0.278_868_07,
-        -1.135_203_98,
-        1.488_515_87,
-        -0.822_152_23,
-        0.170_872_77,
-    ];
-    let z = x.abs() / std::f64::consts::SQRT_2;
-    let t = 1.0 / (1.0 + 0.5 * z);
-    let series = COEFFICIENTS.iter().rev().fold(0.0, |sum, coefficient| sum * t + coefficient);
-    let beyond = 0.5 * t * (-z * z + series).exp();
-    if x >= 0.0 { 1.0 - beyond } else { beyond }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shares_of_a_normal_distribution() {
-        for (x, share) in [(0.0, 0.5), (1.0, 0.841_344_7), (-1.96, 0.024_997_9), (3.0, 0.998_650_1)] {
-            assert!((normal_share(x) - share).abs() < 1e-6, "{x}: {}", normal_share(x));
-        }
-    }
 
     #[test]
     fn the_parts_left_are_those_of_a_straight_line_and_the_interval_holds_them() {

@@ -24,10 +24,7 @@ impl Force {
         let mut force = Self::default();
         for (index, it) in found.iter().enumerate() {
             let declared = &it.declared;
-            let allowed = |place: &Place| {
-                let value = values.of(declared.section(), &declared.name, place)?;
-                declared.refuse(value).is_none().then(|| value.clone())
-            };
+            let allowed = |place: &Place| allowed(declared, values, place);
             let machine = allowed(&Place::Machine).unwrap_or_else(|| declared.default.clone());
             let places = values.places(declared.section()).into_iter();
             let special: Vec<(Place, SettingValue)> = places
@@ -36,11 +33,7 @@ impl Force {
                 .map(|(value, place)| (place, value))
                 .collect();
             force.chosen |= machine != declared.default || !special.is_empty();
-            if special.is_empty() {
-                force.texts.push(Some(machine.clone()));
-            } else {
-                force.texts.push(None);
-            }
+            force.texts.push(special.is_empty().then(|| machine.clone()));
             force.live.add(index, it.constant.as_deref(), &machine, special);
         }
         force
@@ -48,18 +41,21 @@ impl Force {
 
     /// The values of the machine, or of one place, all of them in the text.
     pub(in crate::script) fn fixed(found: &[Found], values: &SettingValues, place: &Place) -> Self {
-        let of = |declared: &Declared, place: &Place| {
-            let value = values.of(declared.section(), &declared.name, place)?;
-            (declared.refuse(value).is_none()).then(|| value.clone())
-        };
         let text = |it: &Found| {
             let declared = &it.declared;
-            of(declared, place).or_else(|| of(declared, &Place::Machine)).unwrap_or_else(|| declared.default.clone())
+            let own = allowed(declared, values, place).or_else(|| allowed(declared, values, &Place::Machine));
+            own.unwrap_or_else(|| declared.default.clone())
         };
         let texts: Vec<Option<SettingValue>> = found.iter().map(|it| Some(text(it))).collect();
         let chosen = found.iter().zip(&texts).any(|(it, value)| value.as_ref() != Some(&it.declared.default));
         Self { texts, live: Live::default(), chosen }
     }
+}
+
+/// The value that the file has for this place, where the declaration allows it.
+fn allowed(declared: &Declared, values: &SettingValues, place: &Place) -> Option<SettingValue> {
+    let value = values.of(declared.section(), &declared.name, place)?;
+    declared.refuse(value).is_none().then(|| value.clone())
 }
 
 /// Values that depend on the tool or the operation.

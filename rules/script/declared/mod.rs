@@ -29,7 +29,7 @@ mod values;
 
 pub(super) use find::{Found, find, with_values};
 pub(super) use force::{Force, Live, Now};
-pub use values::{Place, SettingValues};
+pub use values::{Place, SETTINGS_TEXT_MAX, SettingValues};
 
 use adapters::channel::nearest;
 use std::fmt;

@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use toml::de::{DeTable, DeValue};
 
-/// Bytes of the file.
-const TEXT_MAX: usize = 256 * 1024;
+/// Bytes of the file with the values.
+pub const SETTINGS_TEXT_MAX: usize = 256 * 1024;
 /// Values of the file.
 const VALUES_MAX: usize = 4096;
 
@@ -216,8 +216,12 @@ impl Reader<'_> {
     }
 
     fn read(&mut self) {
-        if self.text.len() > TEXT_MAX {
-            return self.wrong(0, format!("the file is longer than {TEXT_MAX} bytes"), "drop tools that are gone");
+        if self.text.len() > SETTINGS_TEXT_MAX {
+            return self.wrong(
+                0,
+                format!("the file is longer than {SETTINGS_TEXT_MAX} bytes"),
+                "drop tools that are gone",
+            );
         }
         let (table, errors) = DeTable::parse_recoverable(self.text);
         for error in &errors {
