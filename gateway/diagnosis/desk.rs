@@ -183,10 +183,11 @@ impl Desk {
 
     /// The process that does the work; one that was ended meanwhile is killed at once.
     pub(super) fn put_child(&self, mut child: Child) {
-        if self.cancelled().is_some() {
+        let mut state = self.lock();
+        if matches!(&state.run, Run::Running(running) if running.cancelled.is_some()) {
             let _already_gone = child.kill();
         }
-        self.lock().child = Some(child);
+        state.child = Some(child);
     }
 
     /// The process, to be waited for.
