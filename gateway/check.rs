@@ -215,6 +215,16 @@ fn check_sinks(name: &str, config: &Config, report: &mut Report) {
                 .read
                 .push(format!("{name}: sends to {}; `cnc-gateway doctor` with this address connects", sink.address));
         }
+        if sink.allow_requests {
+            let line = match sink.address.is_secured() {
+                true => "whoever may publish there",
+                false => "whoever reaches the line, which is not encrypted,",
+            };
+            report.read.push(format!(
+                "{name}: sink {} takes requests: {line} may ask the gate for a slower feed and acknowledge alarms",
+                sink.name
+            ));
+        }
         let problem = |(what, next)| Problem::of(name, format!("sink {}: {what}", sink.name), next);
         report.problems.extend(problems.into_iter().map(problem));
     }

@@ -59,7 +59,8 @@ pub(super) struct StreamArguments {
 pub(super) struct IngestArguments {
     #[command(flatten)]
     stream: StreamArguments,
-    /// The database: postgres://USER@HOST:5432/DATABASE. A server elsewhere belongs behind a private network or a TLS tunnel.
+    /// The database: postgres://USER@HOST:5432/DATABASE; on another computer with ?sslmode=require&ca=/etc/cnc/ca.pem, which encrypts
+    /// the line and checks the certificate.
     #[arg(long, value_name = "ADDRESS")]
     database: String,
     /// The file whose first line is the password of the database.

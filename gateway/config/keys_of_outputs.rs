@@ -1,7 +1,7 @@
 //! The rows of the table of keys that concern what leaves the box.
 
 use super::keys::Absent::{Default, Optional, Required};
-use super::keys::Kind::{Number, SinkAddress, Text};
+use super::keys::Kind::{Flag, Number, SinkAddress, Text};
 use super::keys::{Key, key};
 
 /// Keys of `[[sink]]` and `[outbox]`.
@@ -19,6 +19,13 @@ pub(super) const OUTPUTS: &[Key] = &[
         Optional,
         "Short name in messages; what is delivered is remembered under it; default: the address",
         "接收端名称",
+    ),
+    key(
+        ("sink", "allow_requests"),
+        Flag,
+        Default("false"),
+        "Computers on the network of an mqtt or sparkplug sink may ask the gate for a slower feed and acknowledge alarms; the gate decides",
+        "允许网络向闸门提出请求",
     ),
     key(
         ("outbox", "every_nth"),

@@ -250,6 +250,8 @@ pub struct Sink {
     pub address: SinkAddress,
     /// Short name; the text of the address when none was given.
     pub name: String,
+    /// May computers on its network ask the gate for something?
+    pub allow_requests: bool,
 }
 
 /// `[http]`.

@@ -2,14 +2,17 @@
 
 use super::Sink;
 use super::build::{as_text, number, origin_of_name, source_name, text};
+use super::check_value::Scalar;
 use super::read::{Origin, Reading, Values};
 use crate::history::OutboxSettings;
+use crate::sinks::SinkAddress;
 use adapters::channel::{CHANNELS, nearest};
 use std::time::Duration;
 
 /// The sinks; names that are there twice are reported.
 pub(super) fn sinks(reading: &mut Reading<'_>) -> Option<Vec<Sink>> {
     let sinks: Option<Vec<Sink>> = reading.sinks.iter().map(sink).collect();
+    requests_need_a_way_in(reading);
     let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
         if names[..index].contains(name) {
@@ -23,7 +26,25 @@ pub(super) fn sinks(reading: &mut Reading<'_>) -> Option<Vec<Sink>> {
 
 fn sink(values: &Values) -> Option<Sink> {
     let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
-    Some(Sink { name: source_name(values)?, address })
+    Some(Sink { name: source_name(values)?, address, allow_requests: allows_requests(values) })
+}
+
+fn allows_requests(values: &Values) -> bool {
+    values.found.get("allow_requests").is_some_and(|found| found.value == Scalar::Flag(true))
+}
+
+/// Only through a broker can the network ask for something.
+fn requests_need_a_way_in(reading: &mut Reading<'_>) {
+    let origin = |values: &Values| {
+        let address: SinkAddress = values.found.get("address").and_then(as_text)?.parse().ok()?;
+        let deaf = allows_requests(values) && !address.hears();
+        values.found.get("allow_requests").filter(|_| deaf).map(|found| (found.origin.clone(), address))
+    };
+    let deaf: Vec<_> = reading.sinks.iter().filter_map(origin).collect();
+    for (origin, address) in deaf {
+        let what = format!("`allow_requests = true`, but nothing can be asked for through {}:", address.scheme());
+        reading.problem(&origin, what, "leave it out, or use an mqtts:// or sparkplugs:// sink");
+    }
 }
 
 /// What the sinks are sent.

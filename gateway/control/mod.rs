@@ -14,15 +14,18 @@
 //! | file | what |
 //! |---|---|
 //! | `server` | listens, checks, hands each order to the tick and answers with what the tick says |
-//! | `post` | the way to the tick and back, for the socket and for the page |
+//! | `post` | the way to the tick and back, for the socket, for the page and for the sinks |
+//! | `network` | the little that a computer on the network may ask for over a sink; no order |
 //! | `client` | `cnc-gateway arm`, `disarm`, `acknowledge` |
 
 mod client;
+mod network;
 mod post;
 mod server;
 
 pub use client::order;
-pub use post::{Inbox, Post, PostedRow, Wake, queue};
+pub use network::{NetworkRequest, Wish};
+pub use post::{Inbox, Post, PostedRequest, PostedRow, Wake, queue};
 pub use server::{Listening, listen};
 
 use serde::{Deserialize, Serialize};

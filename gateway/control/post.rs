@@ -1,9 +1,9 @@
 //! The way of orders and of rows of the audit to the tick, and of its answers back.
 //!
-//! Orders and rows go by queues of their own: however many rows a flood of refused requests makes, an order to disarm finds
-//! its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
+//! Orders, rows and requests of the network go by queues of their own: however many rows a flood of refused requests makes, an
+//! order to disarm finds its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
 
-use super::{ANSWER_WITHIN, Order, Posted, Reply, WAITING_MAX};
+use super::{ANSWER_WITHIN, NetworkRequest, Order, Posted, Reply, WAITING_MAX};
 use crate::history::Audit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -14,8 +14,10 @@ use tokio::sync::oneshot;
 
 /// Rows that wait for the tick.
 const ROWS_MAX: usize = 64;
-/// A row is accounted for within this time, or not at all.
+/// A row is accounted for within this time, or not at all; a request of the network is answered within it.
 const ACCOUNT_WITHIN: Duration = Duration::from_secs(3);
+/// Requests of the network that wait for the tick.
+const REQUESTS_MAX: usize = 16;
 
 /// Wakes the tick's thread while it waits for the next tick.
 #[derive(Debug, Clone, Default)]
@@ -55,11 +57,21 @@ pub struct PostedRow {
     pub stored: oneshot::Sender<bool>,
 }
 
+/// A request of the network on its way, with the way back.
+#[derive(Debug)]
+pub struct PostedRequest {
+    /// What is asked for.
+    pub request: NetworkRequest,
+    /// Where the answer goes.
+    pub reply: oneshot::Sender<Reply>,
+}
+
 /// The end of those who order.
 #[derive(Debug, Clone)]
 pub struct Post {
     orders: SyncSender<Posted>,
     rows: SyncSender<PostedRow>,
+    requests: SyncSender<PostedRequest>,
     wake: Wake,
 }
 
@@ -70,6 +82,8 @@ pub struct Inbox {
     pub orders: Receiver<Posted>,
     /// What is to be accounted for.
     pub rows: Receiver<PostedRow>,
+    /// What the network asks for.
+    pub requests: Receiver<PostedRequest>,
     /// How the tick is woken.
     pub wake: Wake,
 }
@@ -79,8 +93,10 @@ pub struct Inbox {
 pub fn queue() -> (Post, Inbox) {
     let (orders, to_obey) = sync_channel(WAITING_MAX);
     let (rows, to_keep) = sync_channel(ROWS_MAX);
+    let (requests, to_judge) = sync_channel(REQUESTS_MAX);
     let wake = Wake::default();
-    (Post { orders, rows, wake: wake.clone() }, Inbox { orders: to_obey, rows: to_keep, wake })
+    let post = Post { orders, rows, requests, wake: wake.clone() };
+    (post, Inbox { orders: to_obey, rows: to_keep, requests: to_judge, wake })
 }
 
 impl Post {
@@ -96,6 +112,19 @@ impl Post {
             _ => Reply::refused(
                 "the tick does not answer; look at the log, and restart the gateway if it does not recover",
             ),
+        }
+    }
+
+    /// Hands a request of the network to the tick and gives what it says. The tick is not woken for it: a request counts from
+    /// the next tick on.
+    pub async fn request(&self, request: NetworkRequest) -> Reply {
+        let (reply, answered) = oneshot::channel();
+        if self.requests.try_send(PostedRequest { request, reply }).is_err() {
+            return Reply::refused("too many requests wait for the gate; ask again later");
+        }
+        match tokio::time::timeout(ACCOUNT_WITHIN, answered).await {
+            Ok(Ok(reply)) => reply,
+            _ => Reply::refused("the tick does not answer; look at the log of the box"),
         }
     }
 

@@ -2,11 +2,16 @@
 
 use super::SCHEMA;
 use super::row::Row;
+use super::secured::{self, Securing};
+use crate::log::{Notice, Severity};
 use crate::nats::NatsError;
+use adapters::tls::{TlsError, TlsFiles};
 use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 use std::time::Duration;
-use tokio_postgres::{Client, Config, NoTls, Transaction};
+use tokio_postgres::config::{Host, SslMode};
+use tokio_postgres::tls::MakeTlsConnect;
+use tokio_postgres::{Client, Config, NoTls, Socket, Transaction};
 
 /// Of the advisory lock under which tables and partitions are created: any number that nothing else uses.
 const LOCK: i64 = 0x636e_6367_7731;
@@ -16,7 +21,8 @@ const DEADLINE: Duration = Duration::from_secs(10);
 /// Which database, and how to sign in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatabaseSettings {
-    /// `postgres://USER@HOST:5432/DATABASE` or `host=... user=... dbname=...`.
+    /// `postgres://USER@HOST:5432/DATABASE` or `host=... user=... dbname=...`; with `?sslmode=require` and `ca=FILE`, `cert=FILE`,
+    /// `key=FILE` the line is encrypted.
     pub address: String,
     /// The file whose first line is the password.
     pub password_file: Option<PathBuf>,
@@ -42,6 +48,9 @@ pub struct Database {
 
 /// An error of the database in words.
 fn words(doing: &str, error: &tokio_postgres::Error) -> NatsError {
+    if let Some(tls) = tls_within(error) {
+        return NatsError::new(format!("PostgreSQL, {doing}: {}", tls.what), tls.next);
+    }
     let text = match error.as_db_error() {
         Some(said) => format!("{} ({})", said.message(), said.code().code()),
         None => {
@@ -51,24 +60,49 @@ fn words(doing: &str, error: &tokio_postgres::Error) -> NatsError {
     };
     let code = error.code().map(|code| code.code().to_owned()).unwrap_or_default();
     let next = match code.as_str() {
-        "28P01" | "28000" => "compare user and --password-file with pg_hba.conf and the roles of the database",
+        "28P01" | "28000" => {
+            "compare user, --password-file and client certificate (cert=, key=) with pg_hba.conf and the roles"
+        }
         "3D000" => "create it with `createdb`, or write another name",
         "42501" => "give this user the right: GRANT CREATE, USAGE ON SCHEMA public",
+        "28P02" => "sign the client certificate by the authority that ssl_ca_file of the server names",
         "53100" => "make room on the disk of the database; what waits stays in the stream",
+        "" if text.contains("support TLS") => {
+            "write `ssl = on` into its postgresql.conf, or leave sslmode=require, ca=, cert= and key= out"
+        }
         "" => "look whether PostgreSQL runs there and listens on this address",
         _ => "look up the number in the documentation of PostgreSQL (error codes)",
     };
     NatsError::new(format!("PostgreSQL, {doing}: {text}"), next)
 }
 
+/// What TLS says, where it is the reason.
+fn tls_within(error: &tokio_postgres::Error) -> Option<TlsError> {
+    let cause = std::error::Error::source(error)?.downcast_ref::<std::io::Error>()?;
+    TlsError::within(cause, "the database")
+}
+
+/// Is the database on this computer?
+fn is_here(config: &Config) -> bool {
+    config.get_hosts().iter().all(|host| match host {
+        Host::Tcp(name) => ["localhost", "127.0.0.1", "::1"].contains(&name.as_str()),
+        #[cfg(unix)]
+        Host::Unix(_) => true,
+    })
+}
+
 impl DatabaseSettings {
-    fn config(&self) -> Result<Config, NatsError> {
-        let mut config: Config = self.address.parse().map_err(|error: tokio_postgres::Error| {
+    fn config(&self) -> Result<(Config, Option<TlsFiles>), NatsError> {
+        let (address, files) = secured::files_of(&self.address);
+        let mut config: Config = address.parse().map_err(|error: tokio_postgres::Error| {
+            let cause = std::error::Error::source(&error).map_or(String::new(), |cause| format!(": {cause}"));
             NatsError::new(
-                format!("{:?} is no address of PostgreSQL: {error}", self.address),
-                "write postgres://USER@HOST:5432/DATABASE",
+                format!("{:?} is no address of PostgreSQL: {error}{cause}", self.address),
+                "write postgres://USER@HOST:5432/DATABASE, and ?sslmode=require for an encrypted line",
             )
         })?;
+        // Without a word about it the line is plain, whatever the server offers.
+        config.ssl_mode(if files.is_some() { SslMode::Require } else { SslMode::Disable });
         if let Some(file) = &self.password_file {
             let text = std::fs::read_to_string(file).map_err(|error| {
                 NatsError::new(
@@ -79,8 +113,25 @@ impl DatabaseSettings {
             config.password(text.lines().next().unwrap_or_default());
         }
         config.connect_timeout(DEADLINE).application_name("cnc-gateway fleet ingest");
-        Ok(config)
+        Ok((config, files))
     }
+}
+
+const PLAIN: &str = "the line to PostgreSQL is not encrypted: write ?sslmode=require at the end of the address, or run this on the \
+                     computer of the database";
+
+async fn connect<T>(config: &Config, tls: T) -> Result<Client, NatsError>
+where
+    T: MakeTlsConnect<Socket> + Send,
+    T::Stream: Send + 'static,
+    T::TlsConnect: Send,
+    <T::TlsConnect as tokio_postgres::tls::TlsConnect<Socket>>::Future: Send,
+{
+    let (client, connection) = config.connect(tls).await.map_err(|error| words("connecting", &error))?;
+    tokio::spawn(async move {
+        let _seen_by_the_next_statement = connection.await;
+    });
+    Ok(client)
 }
 
 impl Database {
@@ -89,12 +140,19 @@ impl Database {
     /// # Errors
     /// What is wrong, in words.
     pub async fn open(settings: &DatabaseSettings) -> Result<Self, NatsError> {
-        let connected = settings.config()?.connect(NoTls).await;
-        let (mut client, connection) = connected.map_err(|error| words("connecting", &error))?;
-        // Its end is seen by the next statement.
-        tokio::spawn(async move {
-            let _seen_by_the_next_statement = connection.await;
-        });
+        let (config, files) = settings.config()?;
+        let mut client = match files {
+            Some(files) => {
+                let tls = files.config().map_err(|error| NatsError::new(error.what, error.next))?;
+                connect(&config, Securing(tls)).await?
+            }
+            None => {
+                if !is_here(&config) {
+                    Notice::new(Severity::Warning, "database_plain", PLAIN).say();
+                }
+                connect(&config, NoTls).await?
+            }
+        };
         let creating = |error| words("creating the tables", &error);
         let transaction = client.transaction().await.map_err(creating)?;
         transaction.execute("SELECT pg_advisory_xact_lock($1)", &[&LOCK]).await.map_err(creating)?;

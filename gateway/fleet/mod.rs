@@ -9,12 +9,14 @@
 //! |---|---|
 //! | `row` | a message as a row; pure |
 //! | `database` | tables, partitions by day, writing a batch |
+//! | `secured` | TLS for the line to the database |
 //! | `ingest` | the loop |
 //! | `schema.sql`, `same_finding*.sql` | what is created, and questions over all machines |
 
 mod database;
 pub mod ingest;
 mod row;
+mod secured;
 
 pub use database::{Database, DatabaseSettings};
 pub use row::Refused;

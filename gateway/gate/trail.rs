@@ -58,7 +58,9 @@ pub struct Trail {
 
 /// How many rows of requests there may be.
 #[derive(Debug)]
-pub(super) struct RowRate {
+pub(crate) struct RowRate {
+    per_s: f64,
+    at_once: f64,
     tokens: f64,
     at_ns: TimeNs,
     left_out: u64,
@@ -66,22 +68,32 @@ pub(super) struct RowRate {
 
 impl Default for RowRate {
     fn default() -> Self {
-        Self { tokens: ROWS_AT_ONCE, at_ns: 0, left_out: 0 }
+        Self::new(ROWS_PER_S, ROWS_AT_ONCE)
     }
 }
 
 impl RowRate {
-    /// May there be a row now? Then the text says how many before it were left out.
-    pub(super) fn may_tell(&mut self, at_ns: TimeNs) -> Option<String> {
-        let elapsed_s = (at_ns - self.at_ns).max(0) as f64 / SECOND_NS as f64;
+    /// So many per second on average, and at most so many at once.
+    pub(crate) fn new(per_s: f64, at_once: f64) -> Self {
+        Self { per_s, at_once, tokens: at_once, at_ns: 0, left_out: 0 }
+    }
+
+    /// May there be one now? Then how many before it were left out.
+    pub(crate) fn may_pass(&mut self, at_ns: TimeNs) -> Option<u64> {
+        let elapsed_s = at_ns.saturating_sub(self.at_ns).max(0) as f64 / SECOND_NS as f64;
         self.at_ns = at_ns;
-        self.tokens = (self.tokens + elapsed_s * ROWS_PER_S).min(ROWS_AT_ONCE);
+        self.tokens = (self.tokens + elapsed_s * self.per_s).min(self.at_once);
         if self.tokens < 1.0 {
             self.left_out += 1;
             return None;
         }
         self.tokens -= 1.0;
-        let left_out = std::mem::take(&mut self.left_out);
+        Some(std::mem::take(&mut self.left_out))
+    }
+
+    /// The same; the text says how many before it were left out.
+    pub(super) fn may_tell(&mut self, at_ns: TimeNs) -> Option<String> {
+        let left_out = self.may_pass(at_ns)?;
         Some(if left_out > 0 { format!("; {left_out} requests before it were left out") } else { String::new() })
     }
 }

@@ -25,7 +25,7 @@ use crate::history::{ExtraSeries, ExtraValue, Record};
 use adapters::Sample;
 use rules::estimators::wear::WearEstimator;
 use rules::estimators::{self, Estimates};
-use rules::script::{Host, OffsetProposal};
+use rules::script::{Host, OffsetProposal, OverrideRequest};
 
 /// Where a tick leaves what is to be remembered.
 pub trait Store {
@@ -65,6 +65,8 @@ pub struct Pipeline {
     tally: Tally,
     /// What the box itself proposes at this tick.
     proposal: Option<OffsetProposal>,
+    /// What the network asks for at this tick.
+    request: Option<OverrideRequest>,
 }
 
 impl Pipeline {
@@ -88,6 +90,7 @@ impl Pipeline {
             parts: Parts::default(),
             tally: Tally::default(),
             proposal: None,
+            request: None,
         }
     }
 
@@ -100,6 +103,11 @@ impl Pipeline {
     /// An offset that the box itself proposes at this tick, before [`Pipeline::decide`].
     pub fn propose(&mut self, proposal: Option<OffsetProposal>) {
         self.proposal = proposal;
+    }
+
+    /// A feed override that the network asks for at this tick, before [`Pipeline::decide`].
+    pub fn request(&mut self, request: Option<OverrideRequest>) {
+        self.request = request;
     }
 
     /// What is stored beside the channels: estimates, then the channels of the scripts' own that were there at the start.
@@ -127,8 +135,11 @@ impl Pipeline {
     pub fn decide(&mut self, sample: &Sample) {
         let estimates = self.estimates;
         self.tally.step(sample.at_ns, estimates.state);
-        let decision = self.scripts.tick(sample, &estimates);
-        self.verdict = Some(self.gate.decide(decision.request.as_ref(), sample, &estimates));
+        self.scripts.tick(sample, &estimates);
+        if let Some(request) = self.request.take() {
+            self.scripts.request(request);
+        }
+        self.verdict = Some(self.gate.decide(self.scripts.decision().request.as_ref(), sample, &estimates));
         if let Some(proposal) = self.proposal.take() {
             self.scripts.propose(proposal);
         }

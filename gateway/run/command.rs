@@ -4,10 +4,11 @@
 use super::acknowledged_alarms::AcknowledgedAlarms;
 use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;
+use super::network_requests::{self, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
 use super::report::milliseconds;
 use crate::config::{self, GateMode};
-use crate::control::{self, Inbox, Posted, PostedRow, Reply};
+use crate::control::{self, Inbox, NetworkRequest, Posted, PostedRequest, PostedRow, Reply, Wish};
 use crate::gate::offset::{Moved, OffsetOrder};
 use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Verdict, trail};
 use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
@@ -17,12 +18,13 @@ use crate::status::{Acknowledged, AlarmStatus, Problem};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use rules::estimators::StateBasis;
+use rules::script::OverrideRequest;
 use std::time::Duration;
 
 /// Who raises the alarm.
 const SOURCE: &str = "gate";
 const CODE: &str = "gate_disarmed";
-/// Rows of the page that are accounted for at a time.
+/// Rows of the page that are accounted for at a time, and requests of the network.
 const ROWS_AT_ONCE_MAX: usize = 32;
 
 /// See the [module](self).
@@ -33,6 +35,7 @@ pub struct Commands {
     target: String,
     inbox: Inbox,
     seen: AcknowledgedAlarms,
+    network: NetworkRequests,
     trail: trail::Trail,
     /// Who armed it last.
     by: String,
@@ -54,6 +57,7 @@ impl Commands {
             target,
             inbox,
             seen: AcknowledgedAlarms::default(),
+            network: NetworkRequests::default(),
             trail: trail::Trail::default(),
             by: String::new(),
             was_armed: false,
@@ -96,9 +100,43 @@ impl Commands {
             let _gone = reply.send(answer);
         }
         self.account(sample.at_ns, health);
+        self.hear_network(gate, sample.at_ns, health);
         if !health.stores() {
             gate.disarm(Disarmed::NoAudit);
         }
+    }
+
+    /// What the network has asked for meanwhile: judged like the request of a script, or refused; a row of the audit each.
+    fn hear_network(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
+        for _ in 0..ROWS_AT_ONCE_MAX {
+            let Ok(PostedRequest { request, reply }) = self.inbox.requests.try_recv() else { return };
+            let answer = match health.stores() {
+                true => self.grant(&request, at_ns),
+                false => Reply::refused(ArmError::NoAudit.to_string()),
+            };
+            self.keep(network_requests::row(&request, &answer, at_ns), gate, health);
+            let _gone = reply.send(answer);
+        }
+    }
+
+    fn grant(&mut self, NetworkRequest { sink, wish, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
+        match wish {
+            Ok(Wish::AcknowledgeAlarm { code }) => self.acknowledge_alarm(code, &network_requests::author(sink), at_ns),
+            Ok(wish) => self.network.take(sink, wish, at_ns),
+            Err(why) => Reply::refused(why),
+        }
+    }
+
+    fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> Reply {
+        match self.seen.acknowledge(code, by, at_ns) {
+            true => Reply::done(format!("the alarm {code} was seen; it stands until its reason has gone")),
+            false => Reply::refused(format!("no alarm {code:?} stands")),
+        }
+    }
+
+    /// The feed override that the network asks for at this tick.
+    pub fn requested(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
+        self.network.at(at_ns)
     }
 
     fn order(&mut self, order: &control::Order, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
@@ -124,13 +162,10 @@ impl Commands {
                 Reply::done("the next feed hold or stop may pass")
             }
             control::Order::AcknowledgeAlarm { by, code } => {
-                let stands = self.seen.acknowledge(code, by, at_ns);
-                let outcome = if stands { "done" } else { "refused" };
+                let reply = self.acknowledge_alarm(code, by, at_ns);
+                let outcome = if reply.done { "done" } else { "refused" };
                 self.keep(trail::order("acknowledged", outcome, &format!("alarm {code}"), by, at_ns), gate, health);
-                match stands {
-                    true => Reply::done(format!("the alarm {code} was seen; it stands until its reason has gone")),
-                    false => Reply::refused(format!("no alarm {code:?} stands")),
-                }
+                reply
             }
         }
     }

@@ -8,6 +8,7 @@ pub mod deadline;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
+pub mod network_requests;
 pub mod offset_commands;
 pub mod open;
 pub mod outputs;
@@ -296,7 +297,7 @@ async fn serve(
     (report, post, desk): (watch::Sender<Option<String>>, control::Post, Option<Desk>),
     outputs: Option<&Outputs>,
 ) {
-    let sinks = outputs.map(Outputs::start);
+    let sinks = outputs.map(|outputs| outputs.start(&post));
     let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
     let server = match address(plan) {
         Ok(Some(address)) => {

@@ -1,8 +1,9 @@
 //! The sinks of a running box: what they need to begin, and where they tell how they are.
 
-use crate::config::Config;
+use crate::config::{self, Config};
+use crate::control::Post;
 use crate::history::Outbox;
-use crate::sinks::{self, Board, SinkAddress, Sinks};
+use crate::sinks::{self, Board, Sinks};
 use std::path::PathBuf;
 
 /// Sinks that are configured.
@@ -12,7 +13,7 @@ pub struct Outputs {
     pub outbox: Outbox,
     /// How they are.
     pub board: Board,
-    sinks: Vec<(String, SinkAddress)>,
+    sinks: Vec<config::Sink>,
     history: PathBuf,
 }
 
@@ -23,17 +24,18 @@ impl Outputs {
         if config.sinks.is_empty() {
             return None;
         }
-        let sinks: Vec<_> = config.sinks.iter().map(|sink| (sink.name.clone(), sink.address.clone())).collect();
-        let names = sinks.iter().map(|(name, _)| name.clone());
+        let sinks = config.sinks.clone();
+        let names = sinks.iter().map(|sink| sink.name.clone());
         let outbox = Outbox::new(&config.gateway.name, config.outbox.clone(), names);
-        let board = Board::new(outbox.clone(), sinks.iter().map(|(name, at)| (name.clone(), at.text().to_owned())));
+        let board =
+            Board::new(outbox.clone(), sinks.iter().map(|sink| (sink.name.clone(), sink.address.text().to_owned())));
         Some(Self { outbox, board, sinks, history: config.history.path.clone() })
     }
 
-    /// Starts their tasks on the runtime that is running.
+    /// Starts their tasks on the runtime that is running; what the network asks for goes by this post.
     #[must_use]
-    pub fn start(&self) -> Sinks {
-        sinks::start(&self.sinks, &self.outbox, &self.board, &self.history)
+    pub fn start(&self, post: &Post) -> Sinks {
+        sinks::start(&self.sinks, post, (&self.outbox, &self.board), &self.history)
     }
 
     /// Threads that may be needed for what cannot be waited for asynchronously: reading the outbox, and a line.

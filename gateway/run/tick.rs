@@ -124,6 +124,7 @@ impl Ticker {
             if let Some(thermal) = &mut self.thermal {
                 self.pipeline.propose(thermal.step(&sample, &mut self.health));
             }
+            self.pipeline.request(self.commands.requested(sample.at_ns));
             self.pipeline.decide(&sample);
             let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);

@@ -69,6 +69,18 @@ impl SinkAddress {
         }
     }
 
+    /// Can a computer on the network of this sink send the box anything?
+    #[must_use]
+    pub fn hears(&self) -> bool {
+        matches!(self.target, SinkTarget::Mqtt(_) | SinkTarget::Sparkplug(_))
+    }
+
+    /// Is the line encrypted, and does the box know who is at its other end?
+    #[must_use]
+    pub fn is_secured(&self) -> bool {
+        self.scheme().ends_with('s')
+    }
+
     /// The word before the colon.
     #[must_use]
     pub fn scheme(&self) -> &str {

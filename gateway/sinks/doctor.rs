@@ -1,6 +1,6 @@
 //! `doctor` for a sink: connects as the box would, and says what is wrong. Sends nothing.
 
-use super::{SinkAddress, SinkError, open};
+use super::{Requests, SinkAddress, SinkError, open};
 use crate::history::{Outbox, OutboxSettings};
 use serde_json::json;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub struct Found {
 /// Connects to the receiver once.
 pub async fn examine(address: &SinkAddress) -> Found {
     let outbox = Outbox::new("doctor", OutboxSettings::default(), []);
-    let mut sink = open(address, "doctor", &outbox, Path::new(""));
+    let mut sink = open(address, ("doctor", Requests::none()), &outbox, Path::new(""));
     let began = Instant::now();
     let connected = tokio::time::timeout(DEADLINE, sink.probe()).await;
     let connected_ms = began.elapsed().as_secs_f64() * 1e3;

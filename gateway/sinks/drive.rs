@@ -1,7 +1,9 @@
 //! The task of a sink: connects, sends live data first and old data between, tries again with growing pauses.
 
 use super::board::{Board, seconds};
-use super::{Batch, Sink, SinkAddress, SinkError, open};
+use super::{Batch, Requests, Sink, SinkError, open};
+use crate::config;
+use crate::control::Post;
 use crate::history::{Head, Outbox, OutboxReader, Stretch};
 use crate::log::{Notice, Severity};
 use std::path::{Path, PathBuf};
@@ -29,11 +31,14 @@ pub struct Sinks {
     tasks: Vec<JoinHandle<()>>,
 }
 
-/// Starts a task for each of these sinks (name and address), which must be known to outbox and board in this order. The history at `path` may be
-/// opened later. Call it within a runtime.
+/// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
+/// opened later. What the network asks for goes by `post`. Call it within a runtime.
 #[must_use]
-pub fn start(sinks: &[(String, SinkAddress)], outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
-    let opened = sinks.iter().map(|(name, address)| (name.clone(), open(address, name, outbox, path)));
+pub fn start(sinks: &[config::Sink], post: &Post, (outbox, board): (&Outbox, &Board), path: &Path) -> Sinks {
+    let opened = sinks.iter().map(|config::Sink { name, address, allow_requests }| {
+        let requests = Requests::new(name, *allow_requests, Some(post.clone()));
+        (name.clone(), open(address, (name, requests), outbox, path))
+    });
     start_with(opened.collect(), outbox, board, path)
 }
 

@@ -23,6 +23,7 @@ pub mod mqtt;
 pub mod nats;
 pub mod open;
 pub mod parquet;
+mod requests;
 pub mod shdr;
 pub mod sparkplug;
 pub mod status;
@@ -31,6 +32,7 @@ pub use address::{SinkAddress, SinkTarget};
 pub use board::Board;
 pub use drive::{Sinks, start};
 pub use open::open;
+pub use requests::Requests;
 pub use status::SinkStatus;
 
 use crate::history::Item;

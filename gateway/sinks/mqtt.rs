@@ -5,13 +5,16 @@
 //! `{"online":true}`, or by the will of the connection `{"online":false}`. The prefix is the box's name where none is
 //! written.
 //!
-//! Nothing is subscribed: a network cannot ask the box for anything this way.
+//! With `allow_requests` the box subscribes `PREFIX/request` and hands what comes to the gate ([`Requests`]); the answer goes to
+//! `PREFIX/request/answer`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
 
 use super::broker::{BrokerTarget, Link, client_name};
-use super::{Batch, Pending, Sink, SinkError};
+use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::control::{Reply, Wish};
 use crate::history::{Item, Outbox};
 use adapters::address::Keys;
-use adapters::mqtt::{Outgoing, Qos, Will};
+use adapters::mqtt::{Message, Outgoing, Qos, Will};
+use serde::Deserialize;
 use serde_json::{Value as Json, json};
 
 /// Where to, and how.
@@ -42,11 +45,28 @@ pub(super) struct MqttSink {
     name: String,
     outbox: Outbox,
     link: Link,
+    requests: Requests,
+    /// A message that has come and is not answered yet.
+    asked: Option<Message>,
 }
 
 impl MqttSink {
-    pub(super) fn new(target: MqttTarget, name: &str, outbox: &Outbox) -> Self {
-        Self { target, name: name.to_owned(), outbox: outbox.clone(), link: Link::default() }
+    pub(super) fn new(target: MqttTarget, (name, requests): (&str, Requests), outbox: &Outbox) -> Self {
+        let (name, link) = (name.to_owned(), Link::default());
+        Self { target, name, outbox: outbox.clone(), link, requests, asked: None }
+    }
+
+    /// Hands a message to the gate and publishes what became of it.
+    async fn answer(&mut self, message: Message) -> Result<(), SinkError> {
+        let document = if message.retained { Err(RETAINED.to_owned()) } else { document_of(&message.payload) };
+        let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
+        let wish = document.and_then(Document::wish);
+        let Some(Reply { done, text }) = self.requests.ask(wish).await else { return Ok(()) };
+        let says = json!({"done": done, "text": text, "id": id});
+        let topic = self.topic("request/answer");
+        let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
+        let told = self.link.publish(vec![answer], Qos::AtMostOnce, &self.target.broker).await;
+        told.map_err(|(_, failure)| failure.of_item(0))
     }
 
     fn topic(&self, kind: &str) -> String {
@@ -67,6 +87,49 @@ impl MqttSink {
     }
 }
 
+/// What the broker has kept would come again at every connection, long after whoever asked has gone.
+const RETAINED: &str =
+    "a retained message is no request: publish it without the retain flag, and remove the retained one";
+/// A request is shorter than this.
+const REQUEST_BYTES_MAX: usize = 2048;
+/// Letters of the asker's own mark that are given back.
+const ID_MAX: usize = 64;
+
+/// `{"request":"feed_override","pct":80,"reason":"...","id":"..."}`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    request: String,
+    pct: Option<f64>,
+    reason: Option<String>,
+    code: Option<String>,
+    id: Option<String>,
+}
+
+fn document_of(payload: &[u8]) -> Result<Document, String> {
+    if payload.len() > REQUEST_BYTES_MAX {
+        return Err(format!("a message of {} bytes is no request: at most {REQUEST_BYTES_MAX}", payload.len()));
+    }
+    let mut document: Document =
+        serde_json::from_slice(payload).map_err(|error| format!("this is no request: {error}; {FORMS}"))?;
+    document.id = document.id.map(|id| id.chars().take(ID_MAX).collect());
+    Ok(document)
+}
+
+const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"request\":\"withdraw\"} or \
+                     {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
+
+impl Document {
+    fn wish(self) -> Result<Wish, String> {
+        match (self.request.as_str(), self.pct, self.code) {
+            ("feed_override", Some(pct), None) => Wish::feed_override(pct, &self.reason.unwrap_or_default()),
+            ("withdraw", None, None) => Ok(Wish::Withdraw),
+            ("acknowledge_alarm", None, Some(code)) => Ok(Wish::acknowledge_alarm(&code)),
+            _ => Err(format!("this is no request; {FORMS}")),
+        }
+    }
+}
+
 /// The document of an item, with who made it and whether it comes late.
 pub(super) fn document(outbox: &Outbox, item: &Item, historical: bool) -> Json {
     let mut document = item.json();
@@ -83,6 +146,11 @@ impl Sink for MqttSink {
             let will = Will { topic, payload, qos: Qos::AtLeastOnce, retain };
             let name = client_name(&self.outbox.box_id(), &self.name);
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
+            self.asked = None;
+            if self.requests.allowed() {
+                let filter = vec![self.topic("request")];
+                self.link.subscribe(filter, Qos::AtLeastOnce, &self.target.broker).await?;
+            }
             let greeted = self.link.publish(vec![self.online(true)], Qos::AtLeastOnce, &self.target.broker).await;
             greeted.map_err(|(_, failure)| failure.of_item(0))
         })
@@ -97,8 +165,20 @@ impl Sink for MqttSink {
     }
 
     fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        // Nothing is subscribed: what comes is none of ours.
-        Box::pin(async move { self.link.next(&self.target.broker).await.map(drop) })
+        // Without `allow_requests` nothing is subscribed.
+        Box::pin(async move {
+            self.asked = Some(self.link.next(&self.target.broker).await?);
+            Ok(())
+        })
+    }
+
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move {
+            match self.asked.take().filter(|message| message.topic == self.topic("request")) {
+                Some(message) => self.answer(message).await,
+                None => Ok(()),
+            }
+        })
     }
 
     fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {

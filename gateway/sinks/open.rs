@@ -5,19 +5,24 @@ use super::nats::NatsSink;
 use super::parquet::ParquetSink;
 use super::shdr::ShdrSink;
 use super::sparkplug::SparkplugSink;
-use super::{Sink, SinkAddress, SinkTarget};
+use super::{Requests, Sink, SinkAddress, SinkTarget};
 use crate::history::Outbox;
 use std::path::Path;
 
-/// The sink of an address. `name` is its name in the configuration, `outbox` knows the machine, the box and the series,
-/// `history` is the database that it belongs to. Nothing is connected yet.
+/// The sink of an address. `name` is its name in the configuration, `requests` the way of its network to the gate, `outbox`
+/// knows the machine, the box and the series, `history` is the database that it belongs to. Nothing is connected yet.
 #[must_use]
-pub fn open(address: &SinkAddress, name: &str, outbox: &Outbox, history: &Path) -> Box<dyn Sink> {
+pub fn open(
+    address: &SinkAddress,
+    (name, requests): (&str, Requests),
+    outbox: &Outbox,
+    history: &Path,
+) -> Box<dyn Sink> {
     match address.target() {
-        SinkTarget::Mqtt(target) => Box::new(MqttSink::new(target.clone(), name, outbox)),
+        SinkTarget::Mqtt(target) => Box::new(MqttSink::new(target.clone(), (name, requests), outbox)),
         SinkTarget::Nats(target) => Box::new(NatsSink::new(target.clone(), name, outbox)),
         SinkTarget::Parquet(target) => Box::new(ParquetSink::new(target.clone(), outbox, history)),
         SinkTarget::Shdr(target) => Box::new(ShdrSink::new(target.clone(), outbox)),
-        SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), name, outbox)),
+        SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), (name, requests), outbox)),
     }
 }

@@ -278,6 +278,12 @@ impl Host {
         }
     }
 
+    /// Adds a request that comes from outside to the decision of this tick; the least of it and the scripts' counts.
+    pub fn request(&mut self, request: super::decision::OverrideRequest) {
+        let least = super::decision::OverrideRequest::least(self.decision.request.iter().chain([&request])).cloned();
+        self.decision.request = least;
+    }
+
     /// The decision of the last tick.
     #[must_use]
     pub fn decision(&self) -> &Decision {

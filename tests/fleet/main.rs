@@ -6,6 +6,12 @@
 #[path = "../outputs/box_under_test.rs"]
 #[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
 mod box_under_test;
+#[path = "../huazhong/broker.rs"]
+#[expect(dead_code, reason = "only its search for programs is used")]
+mod broker;
+#[path = "../outputs/certificates.rs"]
+#[expect(dead_code, reason = "the tests of the sinks use the rest of it")]
+mod certificates;
 #[path = "../support/port.rs"]
 mod port;
 #[path = "../box/process.rs"]
@@ -18,4 +24,5 @@ mod killed;
 mod monitoring;
 mod partitions;
 mod postgres;
+mod secured;
 mod told;

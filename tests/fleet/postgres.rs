@@ -40,9 +40,24 @@ fn rustix_is_root() -> bool {
     String::from_utf8_lossy(&said.stdout).trim() == "0"
 }
 
+/// A file that the server owns and nobody else reads.
+fn place(from: &Path, to: &Path) {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::copy(from, to).expect("copied");
+    std::fs::set_permissions(to, std::fs::Permissions::from_mode(0o600)).expect("changed");
+    if rustix_is_root() {
+        assert!(Command::new("chown").arg("postgres").arg(to).status().expect("chown runs").success());
+    }
+}
+
 impl Postgres {
     /// Makes and starts one; `None` where it is not installed.
     pub(crate) fn start() -> Option<Self> {
+        Self::with(&[], |_| {}, &[])
+    }
+
+    /// One with these files in its directory, after `prepare`d pg_hba.conf, and these settings.
+    pub(crate) fn with(files: &[(&Path, &str)], prepare: impl FnOnce(&Path), settings: &[&str]) -> Option<Self> {
         let bin = programs()?;
         let directory = tempfile::tempdir().expect("a directory");
         if rustix_is_root() {
@@ -55,13 +70,25 @@ impl Postgres {
         init.args(["--auth=trust", "--username=postgres", "--encoding=UTF8", "--no-sync", "-D"]).arg(&data);
         let made = init.current_dir("/").output().expect("initdb runs");
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        prepare(&data);
+        for (from, name) in files {
+            place(from, &data.join(name));
+        }
         let mut server = as_ordinary_user(&postgres.bin.join("postgres"));
         server.arg("-D").arg(&data).args(["-p", &postgres.port.to_string(), "-c", "listen_addresses=127.0.0.1"]);
         server.arg("-c").arg(format!("unix_socket_directories={}", postgres.directory.path().display()));
+        settings.iter().for_each(|setting| {
+            server.args(["-c", setting]);
+        });
         server.current_dir("/").stdout(Stdio::null()).stderr(Stdio::null());
         postgres.child = Some(server.spawn().expect("it starts"));
         wait_for("PostgreSQL", Duration::from_secs(30), || postgres.try_sql("SELECT 1").ok());
         Some(postgres)
+    }
+
+    /// Its address with this user and host, and these keys at the end.
+    pub(crate) fn address_of(&self, user: &str, host: &str, keys: &str) -> String {
+        format!("postgres://{user}@{host}:{}/postgres{keys}", self.port)
     }
 
     /// Its address.
@@ -71,7 +98,23 @@ impl Postgres {
 
     fn try_sql(&self, statement: &str) -> Result<String, String> {
         let mut client = Command::new(self.bin.join("psql"));
-        client.args(["-X", "-A", "-t", "-F", "|", "-v", "ON_ERROR_STOP=1", &self.address(), "-c", statement]);
+        // Whatever the server asks others for, this comes through its socket.
+        client.env("PGHOST", self.directory.path()).env("PGPORT", self.port.to_string());
+        client.args([
+            "-X",
+            "-A",
+            "-t",
+            "-F",
+            "|",
+            "-v",
+            "ON_ERROR_STOP=1",
+            "-U",
+            "postgres",
+            "-d",
+            "postgres",
+            "-c",
+            statement,
+        ]);
         let said = client.output().expect("psql runs");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
         if said.status.success() { Ok(text(&said.stdout)) } else { Err(text(&said.stderr)) }

@@ -27,9 +27,25 @@ impl Sending {
 
     /// The same so many times as fast.
     pub(crate) fn at_speed(speed: &'static str, address: &str, more: &str) -> Self {
+        Self::with_script("simulated://lathe?seed=3", speed, address, more, None)
+    }
+
+    /// The same with another machine, named `lathe`, and with this script instead of the shipped ones.
+    pub(crate) fn with_script(
+        machine: &str,
+        speed: &'static str,
+        address: &str,
+        more: &str,
+        script: Option<&str>,
+    ) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
+        if let Some(script) = script {
+            let scripts = directory.path().join("data/scripts");
+            std::fs::create_dir_all(&scripts).expect("a directory");
+            std::fs::write(scripts.join("own.rhai"), script).expect("writable");
+        }
         let config = format!(
-            "[gateway]\nname = \"Lathe 7\"\n[[source]]\naddress = \"simulated://lathe?seed=3\"\n\
+            "[gateway]\nname = \"Lathe 7\"\n[[source]]\nname = \"lathe\"\naddress = \"{machine}\"\n\
              [[sink]]\nname = \"plant\"\naddress = \"{address}\"\n{more}"
         );
         std::fs::write(directory.path().join("gateway.toml"), config).expect("writable");
@@ -85,6 +101,22 @@ impl Sending {
 
     pub(crate) fn kill(&mut self) {
         self.gateway.take().expect("it runs").kill();
+    }
+
+    /// Gives an order at the box.
+    pub(crate) fn order(&self, arguments: &[&str]) -> String {
+        let mut command = program();
+        command.env("CNC_GATEWAY__GATEWAY__DATA_DIR", self.directory.path().join("data"));
+        command.args(arguments).args(["--config", text(&self.directory.path().join("gateway.toml"))]);
+        let output = command.output().expect("it runs");
+        format!("{}{}", stdout(&output), stderr(&output))
+    }
+
+    /// The rows of the audit.
+    pub(crate) fn audit(&self) -> Vec<Json> {
+        let said = run(&["history", "audit", "--json", "--history", text(&self.database())]);
+        let document: Json = serde_json::from_str(&stdout(&said)).expect("JSON");
+        document["rows"].as_array().expect("rows").clone()
     }
 
     /// The `devices.xml` that the box writes.

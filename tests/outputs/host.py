@@ -1,6 +1,7 @@
 """A Sparkplug host that is not ours: decodes with pysparkplug what comes over a broker, one JSON line per message.
 
-Arguments: PORT. Standard input: a line "rebirth GROUP NODE" asks that node for its birth.
+Arguments: PORT. Standard input: a line "rebirth GROUP NODE" asks that node for its birth, "command GROUP/NODE NAME KIND VALUE"
+sends it a metric in an NCMD.
 """
 
 import json
@@ -16,7 +17,7 @@ PROPERTY_FIELDS = {3: "int_value", 10: "double_value", 11: "boolean_value", 12: 
 
 
 def properties(metric):
-    names = metric.properties.keys
+    names = metric.properties.keys if metric.HasField("properties") else ()
     return {name: getattr(value, PROPERTY_FIELDS[value.type]) for name, value in zip(names, metric.properties.values)}
 
 
@@ -57,6 +58,16 @@ def rebirth(client, group, node):
     client.publish(f"spBv1.0/{group}/NCMD/{node}", command.encode(include_dtypes=True), qos=1)
 
 
+def command(client, node, name, kind, value):
+    datatype = pysparkplug.DataType.STRING if kind == "string" else pysparkplug.DataType.DOUBLE
+    value = {"double": float, "string": str, "null": lambda _: None}[kind](value)
+    now = pysparkplug.get_current_timestamp()
+    metric = pysparkplug.Metric(timestamp=now, name=name, datatype=datatype, value=value, is_null=value is None)
+    message = pysparkplug.NCmd(timestamp=now, metrics=(metric,))
+    group, _, edge = node.partition("/")
+    client.publish(f"spBv1.0/{group}/NCMD/{edge}", message.encode(include_dtypes=True), qos=1)
+
+
 def main():
     client = mqtt.Client(client_id="host", clean_session=False)
     state = "spBv1.0/STATE/host"
@@ -79,7 +90,8 @@ def main():
 
     def listen():
         for line in sys.stdin:
-            rebirth(client, *line.split()[1:])
+            what, *words = line.split()
+            {"rebirth": rebirth, "command": command}[what](client, *words)
 
     threading.Thread(target=listen, daemon=True).start()
     while True:

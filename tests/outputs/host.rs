@@ -45,14 +45,32 @@ impl Host {
     pub(crate) fn wait(&self, what: &str, mut ready: impl FnMut(&[Json]) -> bool) {
         let until = Instant::now() + Duration::from_secs(40);
         while !ready(&self.heard.lock().expect("whole")) {
-            let kinds = || self.heard().iter().map(|message| message["kind"].to_string()).collect::<Vec<_>>().join(" ");
+            let kinds = || self.last_kinds();
             assert!(Instant::now() < until, "waited 40 s in vain: {what}; heard {}", kinds());
             std::thread::sleep(Duration::from_millis(20));
         }
     }
 
+    /// Waits until it has heard more than so many of a kind. The message of the failure names the last ones only.
+    pub(crate) fn wait_more(&self, what: &str, kind: &str, than: usize) {
+        self.wait(what, |heard| heard.iter().filter(|message| message["kind"] == kind).count() > than);
+    }
+
+    /// How many of this kind it has heard; nothing is copied, because a long run hears a hundred thousand.
     pub(crate) fn count(&self, kind: &str) -> usize {
-        self.heard().iter().filter(|message| message["kind"] == kind).count()
+        self.heard.lock().expect("whole").iter().filter(|message| message["kind"] == kind).count()
+    }
+
+    /// Sends a command to a node: `kind` is double, string or null.
+    pub(crate) fn command(&mut self, node: &str, name: &str, kind: &str, value: &str) {
+        writeln!(self.child.stdin.as_mut().expect("piped"), "command {node} {name} {kind} {value}")
+            .expect("it listens");
+    }
+
+    fn last_kinds(&self) -> String {
+        let heard = self.heard.lock().expect("whole");
+        let last = &heard[heard.len().saturating_sub(60)..];
+        last.iter().map(|message| message["kind"].to_string()).collect::<Vec<_>>().join(" ")
     }
 
     pub(crate) fn ask_rebirth(&mut self, group: &str, node: &str) {

@@ -20,6 +20,7 @@ mod fake_sink;
 mod host;
 mod outage;
 mod plain;
+mod requests;
 mod secured;
 mod shdr;
 mod sparkplug;

@@ -10,13 +10,13 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// `mosquitto_sub`, started again when its broker dies; its lines are `TOPIC PAYLOAD`.
-struct Listener {
+pub(crate) struct Listener {
     child: Arc<Mutex<Option<Child>>>,
     lines: Arc<Mutex<Vec<String>>>,
 }
 
 impl Listener {
-    fn plain(port: u16) -> Option<Self> {
+    pub(crate) fn plain(port: u16) -> Option<Self> {
         Self::start(port, &[])
     }
 
@@ -58,7 +58,7 @@ impl Listener {
         lines.iter().filter_map(|line| serde_json::from_str(line.split_once(' ')?.1).ok()).collect()
     }
 
-    fn messages(&self, topic: &str) -> Vec<Json> {
+    pub(crate) fn messages(&self, topic: &str) -> Vec<Json> {
         let of_topic = |line: &String| line.strip_prefix(topic)?.strip_prefix(' ').map(str::to_owned);
         let lines: Vec<String> = self.lines.lock().expect("whole").iter().filter_map(of_topic).collect();
         lines.iter().map(|line| serde_json::from_str(line).expect("JSON")).collect()

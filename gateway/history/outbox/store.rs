@@ -25,8 +25,11 @@ CREATE TABLE IF NOT EXISTS outbox_sinks (
 
 /// zstd level: higher ones gain little on bodies of a kilobyte.
 const LEVEL: i32 = 3;
-/// Rows removed in one commit, so that a commit stays short.
+/// Rows beyond the bounds that are removed in one commit, so that a commit stays short; one commit adds one row.
 const ROWS_REMOVED_MAX: usize = 64;
+/// Delivered rows that are removed at a time, about two megabytes. A sink that makes up for an outage delivers up to some
+/// thousand rows a second: with fewer at a time the file would stay full for hours after it.
+const DELIVERED_REMOVED_MAX: i64 = 8192;
 /// What a row costs beside its body, bytes.
 const ROW_BYTES: u64 = 40;
 
@@ -206,12 +209,15 @@ fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -
     Ok(())
 }
 
-/// Removes the oldest rows as long as they are too old, too much or, if `tidy`, delivered. Gives the stretches that were not
-/// delivered everywhere.
+/// If `tidy`, removes what is delivered; then the oldest rows as long as they are too old or too much. Gives the stretches
+/// that were not delivered everywhere.
 fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
     let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
     let horizon_ns = stored.newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
+    if tidy {
+        remove_delivered(db, lowest, stored)?;
+    }
     let mut dropped = Vec::new();
     for _ in 0..ROWS_REMOVED_MAX {
         let Some((first, items, end_ns, bytes)) = oldest(db)? else {
@@ -220,7 +226,7 @@ fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> 
         };
         let end = first + items;
         let delivered = end <= lowest;
-        let due = (delivered && tidy) || end_ns < horizon_ns || stored.bytes > settings.max_bytes;
+        let due = end_ns < horizon_ns || stored.bytes > settings.max_bytes;
         if !due || end == stored.next_sequence {
             stored.oldest_ns = Some(end_ns);
             break;
@@ -234,6 +240,25 @@ fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> 
         }
     }
     Ok(dropped)
+}
+
+/// Removes the oldest rows whose items are all below `lowest`, but never the newest row.
+fn remove_delivered(db: &Connection, lowest: u64, stored: &mut Stored) -> Result<(), HistoryError> {
+    let end = signed(lowest.min(stored.next_sequence.saturating_sub(1)));
+    let (last, bytes): (Option<i64>, i64) = db
+        .prepare_cached(
+            "SELECT max(first_sequence), coalesce(sum(bytes), 0) FROM (
+               SELECT first_sequence, bytes FROM outbox
+               WHERE first_sequence < ?1 AND first_sequence + items <= ?1 ORDER BY first_sequence LIMIT ?2)",
+        )
+        .and_then(|mut select| select.query_row([end, DELIVERED_REMOVED_MAX], |row| Ok((row.get(0)?, row.get(1)?))))
+        .doing("looking for what is delivered")?;
+    let Some(last) = last else { return Ok(()) };
+    db.prepare_cached("DELETE FROM outbox WHERE first_sequence <= ?1")
+        .and_then(|mut delete| delete.execute([last]))
+        .doing("shortening the outbox")?;
+    stored.bytes = stored.bytes.saturating_sub(unsigned(bytes));
+    Ok(())
 }
 
 /// First number, items, time of the newest, bytes.

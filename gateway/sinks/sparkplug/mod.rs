@@ -11,17 +11,21 @@
 //! - Primary host: with `host=ID` nothing is sent before that host says `online` on `spBv1.0/STATE/ID`, and when it says
 //!   that it goes the connection ends; meanwhile everything waits in the outbox. Without it, data that the broker has
 //!   read while nobody listened is gone: at quality of service 0 a broker keeps nothing.
-//! - Commands: `Node Control/Rebirth` alone is obeyed. Nothing else that comes from the network reaches anything.
+//! - Commands: `Node Control/Rebirth` is obeyed. With `allow_requests` the metrics `request/...` are handed to the gate
+//!   ([`Requests`]), otherwise they are refused; both are told in `request/answer`. Nothing else that comes from the network
+//!   reaches anything.
 //!
 //! Without a DEVICE the metrics are those of the node itself.
 //!
 //! Source: Eclipse Sparkplug Specification 3.0.0; operational behaviour in chapter 5, topics in chapter 4.
 
 mod births;
+mod commands;
 mod payload;
 
 use super::broker::{BrokerTarget, Failure, Link, client_name};
-use super::{Batch, Pending, Sink, SinkError};
+use super::{Batch, Pending, Requests, Sink, SinkError};
+use crate::control::{Reply, Wish};
 use crate::history::{Cell, Outbox};
 use adapters::address::Keys;
 use adapters::clock::{Clock, SystemClock};
@@ -91,10 +95,13 @@ pub(super) struct SparkplugSink {
     /// Series that a birth has named.
     known: BTreeSet<i64>,
     rebirth: bool,
+    requests: Requests,
+    /// What the network has asked for and is not answered yet.
+    asked: Vec<Result<Wish, String>>,
 }
 
 impl SparkplugSink {
-    pub(super) fn new(target: SparkplugTarget, name: &str, outbox: &Outbox) -> Self {
+    pub(super) fn new(target: SparkplugTarget, (name, requests): (&str, Requests), outbox: &Outbox) -> Self {
         // A box that starts again quickly must not have the number of its last connection, whose death may still come.
         let number = u8::try_from(now_ms() / 1000 % 256).unwrap_or(0);
         Self {
@@ -106,7 +113,36 @@ impl SparkplugSink {
             next: 0,
             known: BTreeSet::new(),
             rebirth: false,
+            requests,
+            asked: Vec::new(),
         }
+    }
+
+    /// Takes what a message of the network asks for; true when there is something to attend to.
+    fn hear(&mut self, message: &adapters::mqtt::Message) -> bool {
+        let of_node = message.topic == self.target.topic("NCMD");
+        if !of_node && message.topic != self.target.topic("DCMD") {
+            return false;
+        }
+        let Ok(payload) = Payload::decode(&message.payload[..]) else { return false };
+        self.rebirth |= of_node && births::asks_rebirth(&payload);
+        self.asked = commands::wishes(&payload, message.retained);
+        self.rebirth || !self.asked.is_empty()
+    }
+
+    /// Hands to the gate what was asked for, and tells what became of it.
+    async fn answer(&mut self) -> Result<(), SinkError> {
+        for wish in std::mem::take(&mut self.asked) {
+            let Some(Reply { done, text }) = self.requests.ask(wish).await else { continue };
+            let (at_ms, kind) = (now_ms(), self.data());
+            let told = self.message(kind, vec![commands::answer(done, &text, at_ms)], at_ms);
+            self.publish(vec![told]).await.map_err(|(_, failure)| failure.of_item(0))?;
+        }
+        Ok(())
+    }
+
+    fn data(&self) -> &'static str {
+        if self.target.device.is_some() { "DDATA" } else { "NDATA" }
     }
 
     /// The next message of the node, with its number.
@@ -120,7 +156,8 @@ impl SparkplugSink {
         (self.next, self.rebirth) = (0, false);
         let at_ms = now_ms();
         let latest = self.outbox.latest();
-        let machine = births::machine(&latest, &mut self.known, at_ms);
+        let mut machine = births::machine(&latest, &mut self.known, at_ms);
+        machine.extend(commands::metrics(self.requests.allowed(), at_ms));
         let node = births::node(self.number, at_ms);
         let messages = if self.target.device.is_some() {
             vec![self.message("NBIRTH", node, at_ms), self.message("DBIRTH", machine, at_ms)]
@@ -189,7 +226,7 @@ impl SparkplugSink {
             self.birth().await?;
         }
         let first = self.next;
-        let kind = if self.target.device.is_some() { "DDATA" } else { "NDATA" };
+        let kind = self.data();
         let now = now_ms();
         let messages: Vec<Outgoing> =
             batch.items.iter().map(|item| self.message(kind, births::data(item, batch.historical), now)).collect();
@@ -231,9 +268,7 @@ impl Sink for SparkplugSink {
         Box::pin(async move {
             loop {
                 let message = self.link.next(&self.target.broker).await?;
-                let asks = |payload: Payload| births::asks_rebirth(&payload);
-                if message.topic == self.target.topic("NCMD") && Payload::decode(&message.payload[..]).is_ok_and(asks) {
-                    self.rebirth = true;
+                if self.hear(&message) {
                     return Ok(());
                 }
                 if self.state_topic().is_some_and(|topic| topic == message.topic) && !is_online(&message.payload) {
@@ -245,7 +280,12 @@ impl Sink for SparkplugSink {
     }
 
     fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(async move { if self.rebirth { self.birth().await } else { Ok(()) } })
+        Box::pin(async move {
+            if self.rebirth {
+                self.birth().await?;
+            }
+            self.answer().await
+        })
     }
 
     fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {

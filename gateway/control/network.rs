@@ -1,0 +1,102 @@
+//! What a computer on the network may ask of the gate, on its way to the tick.
+//!
+//! Less than a person: it cannot arm, cannot disarm, and cannot let a second feed hold pass. What it asks is judged by the
+//! gate like the request of a script, at every tick, and only while the configuration of its sink says `allow_requests`.
+
+use std::fmt;
+
+/// Letters of a reason or of a name that are kept.
+const WORDS_MAX: usize = 120;
+/// The gate of a machine that others can reach over the network may be slowed by them and never sped up.
+const GREATEST_PCT: f64 = 100.0;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Wish {
+    /// Another feed override, percent, for a limited time.
+    FeedOverride {
+        /// From 0 to 100; the limits of the gate come after that.
+        pct: f64,
+        /// Why, in the words of whoever asks.
+        reason: String,
+    },
+    /// The last wish for a feed override is over.
+    Withdraw,
+    /// An alarm has been seen; it stands until its reason has gone.
+    AcknowledgeAlarm {
+        /// Its code.
+        code: String,
+    },
+}
+
+impl Wish {
+    /// A feed override, checked; the words are cut and freed of control characters.
+    ///
+    /// # Errors
+    /// Why it cannot be asked for, and what can.
+    pub fn feed_override(pct: f64, reason: &str) -> Result<Self, String> {
+        if !(0.0..=GREATEST_PCT).contains(&pct) {
+            return Err(format!(
+                "{pct} % cannot be asked for over the network: write a number from 0 to {GREATEST_PCT}; the gate does not go below min_pct"
+            ));
+        }
+        Ok(Self::FeedOverride { pct, reason: words(reason) })
+    }
+
+    /// An alarm that has been seen.
+    #[must_use]
+    pub fn acknowledge_alarm(code: &str) -> Self {
+        Self::AcknowledgeAlarm { code: words(code) }
+    }
+}
+
+impl fmt::Display for Wish {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FeedOverride { pct, reason } if reason.is_empty() => write!(f, "feed override {pct} %"),
+            Self::FeedOverride { pct, reason } => write!(f, "feed override {pct} % ({reason})"),
+            Self::Withdraw => f.write_str("no feed override any more"),
+            Self::AcknowledgeAlarm { code } => write!(f, "acknowledge alarm {code}"),
+        }
+    }
+}
+
+/// A wish, or why a message is none, with where it came from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NetworkRequest {
+    /// Name of the sink in the configuration.
+    pub sink: String,
+    /// What is asked for, or why it is refused before anybody looks at it.
+    pub wish: Result<Wish, String>,
+    /// So many messages before it came too fast and were thrown away.
+    pub left_out: u64,
+}
+
+/// Text of somebody else, as it may stand in the audit and on the page.
+fn words(text: &str) -> String {
+    text.chars().filter(|letter| !letter.is_control()).take(WORDS_MAX).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_number_that_slows_can_be_asked_for() {
+        for pct in [0.0, 55.5, 100.0] {
+            assert!(Wish::feed_override(pct, "").is_ok(), "{pct}");
+        }
+        for pct in [-1.0, 100.5, 254.0, f64::NAN, f64::INFINITY] {
+            let refused = Wish::feed_override(pct, "").expect_err("refused");
+            assert!(refused.contains("from 0 to 100"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn words_of_others_are_cut() {
+        let Ok(Wish::FeedOverride { reason, .. }) = Wish::feed_override(80.0, &"a\n\u{1b}".repeat(500)) else {
+            panic!("allowed")
+        };
+        assert_eq!(reason, "a".repeat(WORDS_MAX));
+    }
+}

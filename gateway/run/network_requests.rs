@@ -1,0 +1,110 @@
+//! What the network asks of the gate, at the tick: each request is one row of the audit, and a feed override stands for a
+//! limited time as if a script asked for it at every tick. The gate judges it like one.
+
+use crate::control::{NetworkRequest, Reply, Wish};
+use crate::gate::trail;
+use crate::history::Audit;
+use adapters::clock::{SECOND_NS, TimeNs};
+use rules::script::OverrideRequest;
+
+/// A feed override stands for so long after it was asked for; whoever wants it to stay asks again before. Longer, and a machine
+/// stays slow after the system that asked has died; shorter, and a network that loses a message for a moment lets the feed jump.
+const STANDS_S: i64 = 60;
+
+/// One sink's feed override.
+#[derive(Debug, Clone)]
+struct Standing {
+    request: OverrideRequest,
+    until_ns: TimeNs,
+}
+
+/// See the [module](self). At most one request per sink.
+#[derive(Debug, Default)]
+pub struct NetworkRequests {
+    standing: Vec<Standing>,
+}
+
+impl NetworkRequests {
+    /// Takes a request for a feed override or its end; gives what became of it. An alarm is acknowledged by whoever holds the alarms.
+    pub fn take(&mut self, sink: &str, wish: &Wish, at_ns: TimeNs) -> Reply {
+        let author = author(sink);
+        self.standing.retain(|standing| *standing.request.script != *author);
+        let Wish::FeedOverride { pct, reason } = wish else {
+            return Reply::done("nothing is asked for any more");
+        };
+        let reason = if reason.is_empty() { "asked over the network" } else { reason };
+        let request = OverrideRequest { pct: *pct, reason: reason.into(), script: author.into(), version: 0 };
+        self.standing.push(Standing { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
+        Reply::done(format!("the gate is asked for {pct} % for {STANDS_S} s; it decides at every tick"))
+    }
+
+    /// The least of what stands at this tick; what is over goes.
+    pub fn at(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
+        // A clock that went back ends it too: it would stand for longer than it may.
+        let stands = |standing: &Standing| {
+            at_ns < standing.until_ns && standing.until_ns.saturating_sub(at_ns) <= STANDS_S * SECOND_NS
+        };
+        self.standing.retain(stands);
+        OverrideRequest::least(self.standing.iter().map(|standing| &standing.request)).cloned()
+    }
+}
+
+/// How a sink is named where scripts and persons are.
+#[must_use]
+pub fn author(sink: &str) -> String {
+    format!("sink {sink}")
+}
+
+/// The row of the audit.
+#[must_use]
+pub fn row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
+    let what = request.wish.as_ref().map_or_else(Clone::clone, |wish| format!("{wish}: {}", reply.text));
+    let also = match request.left_out {
+        0 => String::new(),
+        count => format!("; {count} messages before it came too fast and were thrown away"),
+    };
+    let asked = match request.wish {
+        Ok(Wish::FeedOverride { pct, .. }) => Some(pct),
+        _ => None,
+    };
+    let outcome = if reply.done { "done" } else { "refused" };
+    let row = trail::order("network_request", outcome, &format!("{what}{also}"), "", at_ns);
+    let unit = if asked.is_some() { "%".to_owned() } else { String::new() };
+    Audit { asked, unit, script: author(&request.sink), ..row }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wish(pct: f64) -> Wish {
+        Wish::feed_override(pct, "").expect("allowed")
+    }
+
+    #[test]
+    fn a_request_stands_for_a_minute_and_the_least_counts() {
+        let mut requests = NetworkRequests::default();
+        requests.take("plant", &wish(80.0), 0);
+        requests.take("cell", &wish(60.0), 10 * SECOND_NS);
+        let pct = |requests: &mut NetworkRequests, at_s: i64| requests.at(at_s * SECOND_NS).map(|it| it.pct);
+        assert_eq!(pct(&mut requests, 11), Some(60.0));
+        requests.take("cell", &Wish::Withdraw, 12 * SECOND_NS);
+        assert_eq!(pct(&mut requests, 12), Some(80.0));
+        requests.take("plant", &wish(90.0), 50 * SECOND_NS);
+        assert_eq!(pct(&mut requests, 109), Some(90.0), "asked again");
+        assert_eq!(pct(&mut requests, 110), None);
+        requests.take("plant", &wish(90.0), 200 * SECOND_NS);
+        assert_eq!(pct(&mut requests, 100), None, "a clock that went back");
+    }
+
+    #[test]
+    fn a_row_says_who_what_and_why() {
+        let request = NetworkRequest { sink: "plant".to_owned(), wish: Err("no request".to_owned()), left_out: 7 };
+        let row = row(&request, &Reply::refused("no request"), 5);
+        assert_eq!(
+            (row.kind.as_str(), row.outcome.as_str(), row.script.as_str()),
+            ("network_request", "refused", "sink plant")
+        );
+        assert!(row.reason.contains("no request; 7 messages"), "{}", row.reason);
+    }
+}

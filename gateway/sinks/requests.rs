@@ -1,0 +1,58 @@
+//! Requests to the gate that come over a sink's connection: who may ask, how often, and what is answered.
+//!
+//! A sink hands every message that looks like a request to [`Requests::ask`], whether it is allowed or not: the tick writes
+//! all of them into the audit, carries out what is allowed, and says what became of it.
+
+use crate::control::{NetworkRequest, Post, Reply, Wish};
+use crate::gate::trail::RowRate;
+use adapters::clock::{Clock, SystemClock};
+
+/// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
+/// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is
+/// thrown away unanswered, and counted.
+const PER_S: f64 = 1.0;
+const AT_ONCE: f64 = 10.0;
+
+/// The way of one sink to the gate.
+#[derive(Debug)]
+pub struct Requests {
+    sink: String,
+    allowed: bool,
+    post: Option<Post>,
+    rate: RowRate,
+}
+
+impl Requests {
+    /// Of the sink of this name; `allowed` is what its configuration says.
+    #[must_use]
+    pub fn new(sink: &str, allowed: bool, post: Option<Post>) -> Self {
+        Self { sink: sink.to_owned(), allowed, post, rate: RowRate::new(PER_S, AT_ONCE) }
+    }
+
+    /// Of a sink behind which there is no gate.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::new("", false, None)
+    }
+
+    /// May anything be asked for?
+    #[must_use]
+    pub fn allowed(&self) -> bool {
+        self.allowed
+    }
+
+    /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
+    pub async fn ask(&mut self, wish: Result<Wish, String>) -> Option<Reply> {
+        let left_out = self.rate.may_pass(SystemClock::new().now_ns())?;
+        let Some(post) = &self.post else { return Some(Reply::refused("there is no gate here")) };
+        let wish = if self.allowed { wish } else { Err(refused(&self.sink, wish)) };
+        Some(post.request(NetworkRequest { sink: self.sink.clone(), wish, left_out }).await)
+    }
+}
+
+fn refused(sink: &str, wish: Result<Wish, String>) -> String {
+    let what = wish.map_or_else(|_| "a message that is no request".to_owned(), |wish| wish.to_string());
+    format!(
+        "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"
+    )
+}

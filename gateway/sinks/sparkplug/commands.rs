@@ -1,0 +1,124 @@
+//! Requests in commands of a host (NCMD, DCMD), and their answer. Pure.
+//!
+//! | metric | type | meaning |
+//! |---|---|---|
+//! | `request/feed_override_pct` | Double | ask the gate for this feed override; null: no longer |
+//! | `request/acknowledge_alarm` | String | the alarm of this code has been seen |
+//! | `request/answer` | String | JSON: `done`, and `text` with what became of it |
+//!
+//! A host may name a metric by its alias alone, as the birth gave it.
+
+use super::payload::{Metric, Payload, Value, datatype};
+use crate::control::Wish;
+use serde_json::json;
+
+const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
+const ACKNOWLEDGE_ALARM: (&str, u64) = ("request/acknowledge_alarm", 10);
+const ANSWER: (&str, u64) = ("request/answer", 11);
+
+/// Wishes in one message; what is more is not looked at.
+const WISHES_MAX: usize = 4;
+
+/// What a birth says of them: where requests are not allowed, only the answer, because a refusal is told too.
+pub(super) fn metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
+    let null = |(name, alias): (&str, u64), datatype| Metric {
+        alias: Some(alias),
+        value: None,
+        is_null: Some(true),
+        ..Metric::named(name, datatype, at_ms, Value::Boolean(false))
+    };
+    let asked = [null(FEED_OVERRIDE, datatype::DOUBLE), null(ACKNOWLEDGE_ALARM, datatype::STRING)];
+    let asked = asked.into_iter().filter(|_| allowed);
+    asked.chain([null(ANSWER, datatype::STRING)]).collect()
+}
+
+/// What became of a request.
+pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
+    Metric {
+        alias: Some(ANSWER.1),
+        timestamp: Some(at_ms),
+        datatype: Some(datatype::STRING),
+        value: Some(Value::Text(json!({"done": done, "text": text}).to_string())),
+        ..Metric::default()
+    }
+}
+
+/// What a command asks for; empty where it asks for nothing that is known here. A message that the broker has kept is refused:
+/// it would come again at every connection.
+pub(super) fn wishes(payload: &Payload, retained: bool) -> Vec<Result<Wish, String>> {
+    let wishes = payload.metrics.iter().filter_map(wish).take(WISHES_MAX);
+    let fresh = |wish: Result<Wish, String>| match retained {
+        true => Err("a retained command is no request: publish it without the retain flag".to_owned()),
+        false => wish,
+    };
+    wishes.map(fresh).collect()
+}
+
+fn wish(metric: &Metric) -> Option<Result<Wish, String>> {
+    let is = |(name, alias): (&str, u64)| match &metric.name {
+        Some(named) if !named.is_empty() => named == name,
+        _ => metric.alias == Some(alias),
+    };
+    if is(FEED_OVERRIDE) {
+        return Some(match (&metric.value, metric.is_null) {
+            (None, _) | (_, Some(true)) => Ok(Wish::Withdraw),
+            (Some(value), _) => number(value).map_or_else(
+                || Err("request/feed_override_pct is no number".to_owned()),
+                |pct| Wish::feed_override(pct, ""),
+            ),
+        });
+    }
+    is(ACKNOWLEDGE_ALARM).then(|| match &metric.value {
+        Some(Value::Text(code)) => Ok(Wish::acknowledge_alarm(code)),
+        _ => Err("request/acknowledge_alarm is no text".to_owned()),
+    })
+}
+
+/// Whole numbers are without sign in the payload: a negative one is far above what can be asked for, and refused there.
+fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Int(number) => Some(f64::from(*number)),
+        Value::Long(number) => Some(*number as f64),
+        Value::Float(number) => Some(f64::from(*number)),
+        Value::Double(number) => Some(*number),
+        Value::Boolean(_) | Value::Text(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn payload(metrics: Vec<Metric>) -> Payload {
+        Payload { timestamp: None, metrics, seq: None }
+    }
+
+    #[test]
+    fn a_request_is_known_by_name_or_alias_and_everything_else_is_passed_over() {
+        let named = |name: &str, value| Metric::named(name, datatype::DOUBLE, 0, value);
+        let by_alias = Metric { alias: Some(9), value: Some(Value::Int(70)), ..Metric::default() };
+        let all = payload(vec![
+            named("request/feed_override_pct", Value::Double(80.0)),
+            by_alias,
+            named("request/acknowledge_alarm", Value::Text("overload".to_owned())),
+            named("spindle_power_w", Value::Double(1.0)),
+            named("request/answer", Value::Text("x".to_owned())),
+        ]);
+        let expected =
+            [Wish::feed_override(80.0, ""), Wish::feed_override(70.0, ""), Ok(Wish::acknowledge_alarm("overload"))];
+        assert_eq!(wishes(&all, false), expected);
+        assert!(wishes(&all, true).iter().all(Result::is_err), "retained");
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_and_null_withdraws() {
+        let of = |value: Option<Value>| {
+            let metric = Metric { name: Some(FEED_OVERRIDE.0.to_owned()), value, ..Metric::default() };
+            wishes(&payload(vec![metric]), false).remove(0)
+        };
+        assert_eq!(of(None), Ok(Wish::Withdraw));
+        for bad in [Value::Text("80".to_owned()), Value::Boolean(true), Value::Int(u32::MAX), Value::Double(f64::NAN)] {
+            assert!(of(Some(bad.clone())).is_err(), "{bad:?}");
+        }
+    }
+}
