@@ -51,7 +51,7 @@ pub(super) struct DiagnoseArguments {
     #[arg(long)]
     search: bool,
     /// Which engine compares.
-    #[arg(long, value_enum, default_value_t = Engine::Search, hide = true)]
+    #[arg(long, value_enum, default_value_t = Engine::Evidence, hide = true)]
     engine: Engine,
     /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
