@@ -50,9 +50,9 @@ pub(super) struct DiagnoseArguments {
     /// Tell the leading hypotheses of the search on standard error.
     #[arg(long)]
     search: bool,
-    /// Which engine compares.
-    #[arg(long, value_enum, default_value_t = Engine::Evidence, hide = true)]
-    engine: Engine,
+    /// Which engine compares; by the length of the recording where none is named.
+    #[arg(long, value_enum, hide = true)]
+    engine: Option<Engine>,
     /// Language of the words, the page and the plan.
     #[arg(long, value_enum, default_value_t = super::effects::Lang::En)]
     lang: super::effects::Lang,
@@ -70,8 +70,9 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
     }
     examination.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let found = match arguments.engine {
-        Engine::Search => twin::diagnose(&given.recording, &model, arguments.seed),
-        Engine::Evidence => twin::evidence::diagnose(&given.recording, &model),
+        None => twin::compare(&given.recording, &model, arguments.seed),
+        Some(Engine::Search) => twin::diagnose(&given.recording, &model, arguments.seed),
+        Some(Engine::Evidence) => twin::evidence::diagnose(&given.recording, &model),
     };
     let mut diagnosis = found.map_err(|all| cannot_use(&all))?;
     note_refusals(&mut diagnosis, &given);

@@ -134,7 +134,7 @@ fn diagnose(job: &Job) -> Result<(history::Diagnosis, Vec<String>), String> {
     if !examination.unusable.is_empty() {
         return Err(examination.unusable.join("; "));
     }
-    let found = twin::evidence::diagnose(&recording, &model).map_err(|problems| problems.join("; "))?;
+    let found = twin::compare(&recording, &model, SEED).map_err(|problems| problems.join("; "))?;
     tell(Stage::Writing, recording.rows())?;
     let row = history::Diagnosis {
         at_ns: job.to_ns,

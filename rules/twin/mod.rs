@@ -17,6 +17,7 @@
 mod agreement;
 pub mod bind;
 mod channel;
+mod compare;
 mod confirmed;
 mod consumer;
 mod corroborated;
@@ -84,6 +85,7 @@ pub mod wave;
 pub mod words;
 
 use crate::linear::columns as linear;
+pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
 pub use examine::{Examination, examine};
