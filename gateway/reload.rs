@@ -4,7 +4,7 @@
 use crate::files::{Lookout, Mark, Rest, advice, mark, read_text, replace};
 use crate::settings;
 use adapters::channel::nearest;
-use rules::script::{Host, Problem, ScriptFile, ScriptSet, TEXT_MAX, prepare, prepare_with, shipped};
+use rules::script::{Host, Problem, ScriptFile, ScriptSet, SettingValues, TEXT_MAX, prepare, prepare_with, shipped};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -144,9 +144,9 @@ pub struct Watch {
     directory: PathBuf,
     rest: Rest<Vec<Mark>>,
     content: Option<Result<Vec<ScriptFile>, Vec<Problem>>>,
-    /// The file with the values of the settings, and what stands in it.
+    /// The file with the values of the settings, and what stood in it at the same look.
     settings: Option<PathBuf>,
-    values: String,
+    values: Result<String, Vec<Problem>>,
 }
 
 impl Watch {
@@ -158,7 +158,7 @@ impl Watch {
             rest: Rest::new(),
             content: None,
             settings: None,
-            values: String::new(),
+            values: Ok(String::new()),
         }
     }
 
@@ -177,19 +177,41 @@ impl Watch {
             return None;
         }
         let content = read_directory(&self.directory);
-        let values = self.settings.as_ref().and_then(|path| settings::text(path).ok()).unwrap_or_default();
+        let values = self.settings.as_deref().map_or_else(|| Ok(String::new()), settings::text);
         let same = self.content.as_ref() == Some(&content) && self.values == values;
         self.values = values;
         let content = self.content.insert(content);
         (now || !same).then_some(content)
+    }
+
+    /// The scripts and the values of the last look, compiled and tried, with the name of whoever wrote the values.
+    fn prepared(&self, files: &[ScriptFile]) -> Result<Fresh, Vec<Problem>> {
+        let text = self.values.as_ref().map_err(Clone::clone)?;
+        let values = SettingValues::parse(settings::FILE, text)?;
+        Ok(Fresh { set: prepare_with(files, &values)?, by: settings::author(text) })
     }
 }
 
 /// The newest scripts: ready to run, or what is wrong with them.
 pub type Loaded = Result<ScriptSet, Vec<Problem>>;
 
+/// What a reload found.
+struct Fresh {
+    set: ScriptSet,
+    by: String,
+}
+
+/// Scripts that came into charge by a reload.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reloaded {
+    /// How many scripts there are.
+    pub count: usize,
+    /// Who has written the values of the settings.
+    pub by: String,
+}
+
 /// Watches and compiles on a thread of its own.
-pub struct Reloader(Lookout<Loaded>);
+pub struct Reloader(Lookout<Result<Fresh, Vec<Problem>>>);
 
 impl Reloader {
     /// Starts to watch. Without `poll` only [`Reloader::ask`] makes it look. The first look is not repeated: load the
@@ -200,10 +222,9 @@ impl Reloader {
     pub fn start(directory: &Path, settings: Option<&Path>, poll: bool) -> std::io::Result<Self> {
         let mut watch = Watch::beside(directory, settings);
         watch.look(false);
-        let settings = settings.map(Path::to_owned);
         let look = move |asked| {
             let found = watch.look(asked).cloned()?;
-            Some(found.and_then(|files| prepared(&files, settings.as_deref())))
+            Some(found.and_then(|files| watch.prepared(&files)))
         };
         Lookout::start("scripts", poll, look).map(Self)
     }
@@ -214,8 +235,12 @@ impl Reloader {
     }
 
     /// Puts newly found scripts in charge, or lets the host say why they are refused. Tells what happened, if anything.
-    pub fn step(&self, host: &mut Host) -> Option<Result<usize, Vec<Problem>>> {
-        Some(put_in_charge(self.0.take()?, host))
+    pub fn step(&self, host: &mut Host) -> Option<Result<Reloaded, Vec<Problem>>> {
+        let (loaded, by) = match self.0.take()? {
+            Ok(Fresh { set, by }) => (Ok(set), by),
+            Err(problems) => (Err(problems), String::new()),
+        };
+        Some(put_in_charge(loaded, host).map(|count| Reloaded { count, by }))
     }
 }
 
@@ -232,7 +257,7 @@ pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> R
 /// # Errors
 /// Everything that is wrong with the scripts or with the values.
 pub fn prepared(files: &[ScriptFile], settings: Option<&Path>) -> Loaded {
-    let values = settings.map_or_else(|| Ok(rules::script::SettingValues::default()), settings::read)?;
+    let values = settings.map_or_else(|| Ok(SettingValues::default()), settings::read)?;
     prepare_with(files, &values)
 }
 

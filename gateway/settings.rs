@@ -78,13 +78,19 @@ pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Resu
     let set = prepare_with(files, &after)?;
     let declared: Vec<&Declared> = set.declared().collect();
     let words = changes(&before, &after, &declared).iter().map(Change::words).collect::<Vec<_>>().join(", ");
-    let digest = digest(body.as_bytes());
-    let text = format!("# set by {by:?} {digest:016x}\n{body}");
-    replace(&path, &text).map_err(|error| {
+    replace(&path, &signed(&body, by)).map_err(|error| {
         let (file, what) = (path.display().to_string(), format!("the settings cannot be written: {error}"));
         vec![Problem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
     })?;
     Ok(if words.is_empty() { format!("{script}.{name} stays as it is") } else { words })
+}
+
+/// The text of the file with the name of whoever has written it, in the place of any other name.
+#[must_use]
+pub fn signed(text: &str, by: &str) -> String {
+    let body = text.split_once('\n').filter(|(first, _)| first.starts_with("# set by ")).map_or(text, |(_, body)| body);
+    let digest = digest(body.as_bytes());
+    format!("# set by {by:?} {digest:016x}\n{body}")
 }
 
 /// Who has written this text: the person whom the first line names, where the rest is still what that person has left.

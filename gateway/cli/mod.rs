@@ -5,6 +5,7 @@
 mod annotate;
 mod arm;
 mod audit;
+mod backup;
 mod bench;
 mod check;
 mod commission;
@@ -110,6 +111,10 @@ enum Command {
     Identify(identify::IdentifyArguments),
     /// What is known of this machine, what is missing, which cut or idle run to make next and why.
     Commission(commission::CommissionArguments),
+    /// Everything that makes this box decide as it does, as an archive; with --history also a copy of the history.
+    Backup(backup::BackupArguments),
+    /// Put a backup in its place.
+    Restore(backup::RestoreArguments),
     /// Note what only a person can measure: flank wear, gauge, probe, the file of a torque sensor.
     Annotate(annotate::AnnotateArguments),
     /// Insert pulses into encoder lines, prove it with a decoder, write vectors to test a device against.
@@ -167,6 +172,8 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         Command::Disarm(order) => arm::disarm(order),
         Command::Acknowledge(order) => arm::acknowledge(order),
         Command::Person(person) => person::run(person),
+        Command::Backup(arguments) => backup::backup(&arguments),
+        Command::Restore(arguments) => backup::restore(&arguments),
         Command::Bench(bench) => bench::run(&bench),
         Command::Check(check) => check::run(&check),
         Command::Replay(replay) => replay::run(replay),

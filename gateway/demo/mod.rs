@@ -24,7 +24,7 @@ const LEARNED: &str = include_str!("twin.json");
 /// What the estimators have learned.
 const ESTIMATED: &str = include_str!("estimators.json");
 /// Cutting power over the wear, in the cuts of the short part.
-const WEAR: &str = include_str!("wear.toml");
+pub(crate) const WEAR: &str = include_str!("wear.toml");
 
 const HOUR_S: i64 = 3600;
 /// 2017 to 2096, in seconds since 1970.

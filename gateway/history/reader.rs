@@ -59,6 +59,18 @@ impl Reader {
         Ok(bounds.0.zip(bounds.1))
     }
 
+    /// A whole copy of the file as it is now, at `to`, where nothing may be yet. The one who writes goes on meanwhile.
+    ///
+    /// # Errors
+    /// There is something at `to`, it cannot be written, or what `SQLite` says.
+    pub fn copy_to(&self, to: &Path) -> Result<(), HistoryError> {
+        if to.exists() {
+            return Err(HistoryError::Question(format!("{} is there already; name another file", to.display())));
+        }
+        let name = to.to_string_lossy();
+        self.db.execute("VACUUM INTO ?1", [&*name]).doing("copying the history").map(drop)
+    }
+
     /// Does the file pass `SQLite`'s own check? The findings otherwise.
     ///
     /// # Errors

@@ -11,10 +11,10 @@ use super::route::Route;
 use super::rules::aside;
 use crate::access::Role;
 use crate::archive::{Entry, pack, unpack};
-use crate::backup::{self, Places};
+use crate::backup::{self, Ask, Places, archive_name};
 use crate::config::{Config, GateMode};
 use crate::history::{Reader, Span, audit_document};
-use crate::moment;
+use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::State;
@@ -62,14 +62,7 @@ impl Configured {
     }
 
     pub(super) fn places(&self) -> Places {
-        let config = &self.config;
-        Places {
-            data_dir: config.gateway.data_dir.clone(),
-            scripts: config.scripts.directory.clone(),
-            operations: config.operations.path.clone(),
-            model: config.twin.model.clone(),
-            configuration: self.file.clone(),
-        }
+        Places::of(&self.config, self.file.as_deref())
     }
 }
 
@@ -114,36 +107,36 @@ fn now_s(shared: &Shared) -> Result<u64, ApiProblem> {
     Ok(shared.status()?.at_ms.div_euclid(1000).unsigned_abs())
 }
 
-fn named(what: &str, at_s: u64) -> String {
-    #[expect(clippy::cast_possible_wrap, reason = "a time of these centuries")]
-    let at = moment::utc(at_s as i64 * 1_000_000_000);
-    format!("cnc-gateway-{what}-{}.tar.gz", at.replace([':', '.'], "-"))
-}
-
 fn packed(files: &[Entry], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
     pack(files, at_s)
         .map_err(|error| ApiProblem::unavailable(format!("no archive could be made: {error}"), "look at the disk"))
 }
 
+fn collected(places: &Places) -> Result<Vec<Entry>, ApiProblem> {
+    backup::collect(places).map_err(|error| trouble(&error))
+}
+
 /// `GET /api/v1/backup`
 async fn take(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
-    let bytes = aside(move || packed(&backup::collect(&shared.configured.places()), at_s)).await?;
-    Ok(download("application/gzip", &named("backup", at_s), bytes))
+    let bytes = aside(move || packed(&collected(&shared.configured.places())?, at_s)).await?;
+    Ok(download("application/gzip", &archive_name("backup", at_s), bytes))
 }
 
-/// `POST /api/v1/restore`: scripts, recipe and model of a backup take the place of those in force.
-async fn restore(State(shared): State<Shared>, SignedIn(_): SignedIn, body: Bytes) -> Result<Response, ApiProblem> {
+/// `POST /api/v1/restore`: what a backup holds takes the place of what is in force; what was learned, at the next start.
+async fn restore(State(shared): State<Shared>, SignedIn(person): SignedIn, body: Bytes) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
     let done = aside(move || {
         let files = unpack(&body).map_err(|error| {
             ApiProblem::request(format!("this is no backup: {error}"), "give the file that `Take a backup` has made")
         })?;
         let places = shared.configured.places();
-        let before = packed(&backup::collect(&places), at_s)?;
+        let before = packed(&collected(&places)?, at_s)?;
         let cannot =
             |what: String| ApiProblem::request(what, "nothing was changed; take the backup of a box of this version");
-        backup::restore(&places, &files, (&before, &named("before-restore", at_s))).map_err(cannot)
+        let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS);
+        let ask = Ask { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
+        backup::restore(&places, &files, ask).map_err(cannot)
     });
     let done = done.await?;
     Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
@@ -164,7 +157,7 @@ async fn support(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
         files.push(("about.txt".to_owned(), about().into_bytes()));
         packed(&files, at_s)
     });
-    Ok(download("application/gzip", &named("support", at_s), bytes.await?))
+    Ok(download("application/gzip", &archive_name("support", at_s), bytes.await?))
 }
 
 /// Addresses in the status, masked as in the configuration.

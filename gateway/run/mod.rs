@@ -27,6 +27,7 @@ pub mod wear;
 
 use crate::access::{self, Access};
 use crate::alignment;
+use crate::backup::take_restored;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control::{self, Inbox};
@@ -155,6 +156,8 @@ fn ticker(
 ) -> Result<Begun, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
+    // Before anything is read that a restore has laid ready.
+    let restored = take_restored(data_dir);
     let twin = Twin::of(config);
     let memory = data_dir.join("estimators.json");
     let (mut scripts, watched) = rules::load(config);
@@ -198,6 +201,7 @@ fn ticker(
     }
     let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
     health.event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
+    restored.iter().for_each(|notice| health.event(start_ns, "gateway", notice));
     let run_flags = run_flags.clone();
     let operations = config.operations.path.as_deref().map(Operations::begin);
     let wear = Wear::of(config);

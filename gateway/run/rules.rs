@@ -6,7 +6,7 @@ use crate::active_scripts;
 use crate::config::Config;
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::reload::{Fallback, Reloader, furnish, load_now, load_rest};
+use crate::reload::{Fallback, Reloaded, Reloader, furnish, load_now, load_rest};
 use crate::settings;
 use adapters::clock::TimeNs;
 use rules::script::{Host, Problem, SettingValues, shipped};
@@ -118,16 +118,12 @@ impl Watched {
     }
 
     /// The history is told every setting that has another value: who, before, after.
-    fn tell_settings(&self, before: &SettingValues, host: &Host, health: &mut Health, now_ns: TimeNs) {
+    fn tell_settings((before, by): (&SettingValues, &str), host: &Host, health: &mut Health, now_ns: TimeNs) {
         let declared: Vec<_> = host.declared().collect();
         let changes = settings::changes(before, host.values(), &declared);
-        if changes.is_empty() {
-            return;
-        }
-        let by = settings::author(&settings::text(&settings::path(&self.data_dir)).unwrap_or_default());
         for change in changes {
             let text = format!("{}, by {by}", change.words());
-            let notice = Notice::new(Severity::Info, settings::KIND, text).detail(change.detail(&by).to_string());
+            let notice = Notice::new(Severity::Info, settings::KIND, text).detail(change.detail(by).to_string());
             health.event(now_ns, "scripts", &notice);
         }
     }
@@ -143,10 +139,10 @@ impl Watched {
         let before = pipeline.scripts().values().clone();
         let notice = match reloader.step(pipeline.scripts_mut()) {
             None => return,
-            Some(Ok(count)) => {
+            Some(Ok(Reloaded { count, by })) => {
                 self.failed.clear();
                 health.put(&active_scripts::path(&self.data_dir), active_scripts::text(pipeline.scripts().files()));
-                self.tell_settings(&before, pipeline.scripts(), health, now_ns);
+                Self::tell_settings((&before, &by), pipeline.scripts(), health, now_ns);
                 let text = format!("{count} scripts are in charge as they are on disk");
                 Notice::new(Severity::Info, "scripts_reloaded", text)
             }

@@ -19,7 +19,7 @@ fn newest(reloader: &Reloader, host: &mut Host) -> Result<usize, Vec<Problem>> {
     let began = Instant::now();
     loop {
         if let Some(outcome) = reloader.step(host) {
-            return outcome;
+            return outcome.map(|reloaded| reloaded.count);
         }
         assert!(began.elapsed() < Duration::from_secs(20), "nothing was noticed");
         std::thread::sleep(Duration::from_millis(20));

@@ -1,0 +1,200 @@
+//! What makes a box this box, as an archive, and its way back.
+//!
+//! In an archive is whatever a decision depends on: scripts with the list of what was delivered, the settings in force, the recipe,
+//! the models of machine and thermal error, the wear models of the library, what estimators, scripts and twin have learned,
+//! annotations and what was identified; and the configuration, to be read. [`list`] names every file of the data directory, with
+//! the reason where it is not in an archive. The history is copied beside it ([`copy_history`]).
+//!
+//! A restore ([`restore()`]) checks everything first, then changes everything, and what it replaces is kept as an archive. The
+//! configuration is not put back: it says which machine is polled, and a restart with the wrong one would poll another.
+
+pub mod list;
+mod restore;
+mod restored;
+
+pub use restore::{Ask, restore};
+pub use restored::take as take_restored;
+
+use crate::archive::Entry;
+use crate::history::{HistoryError, Reader};
+use crate::moment;
+use adapters::clock::SECOND_NS;
+use list::{Fate, LIST, of_name};
+use std::path::{Path, PathBuf};
+
+/// The longest file that goes into a backup.
+const FILE_MAX: u64 = 8 << 20;
+/// Where the files of the data directory stand in an archive.
+const DATA: &str = "data/";
+/// Where the wear models of the library stand in an archive.
+const WEAR_MODELS: &str = "wear_models/";
+/// Which of the shipped scripts were delivered, beside the scripts: what a person has deleted stays deleted.
+const DELIVERED: &str = ".shipped";
+
+/// Where everything is.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// Name of the machine.
+    pub machine: String,
+    /// The data directory.
+    pub data_dir: PathBuf,
+    /// The scripts.
+    pub scripts: PathBuf,
+    /// The history.
+    pub history: PathBuf,
+    /// The recipe.
+    pub operations: Option<PathBuf>,
+    /// The model of the machine.
+    pub model: Option<PathBuf>,
+    /// The law of the thermal error.
+    pub thermal_model: Option<PathBuf>,
+    /// The configuration.
+    pub configuration: Option<PathBuf>,
+}
+
+impl Places {
+    /// Those of a configuration that was read from this file.
+    #[must_use]
+    pub fn of(config: &crate::config::Config, file: Option<&Path>) -> Self {
+        Self {
+            machine: config.gateway.name.clone(),
+            data_dir: config.gateway.data_dir.clone(),
+            scripts: config.scripts.directory.clone(),
+            history: config.history.path.clone(),
+            operations: config.operations.path.clone(),
+            model: config.twin.model.clone(),
+            thermal_model: config.thermal.model.clone(),
+            configuration: file.map(Path::to_owned),
+        }
+    }
+}
+
+/// Name of an archive of this kind that is made at this time, seconds since 1970.
+#[must_use]
+pub fn archive_name(what: &str, at_s: u64) -> String {
+    let at = moment::utc(i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS));
+    format!("cnc-gateway-{what}-{}.tar.gz", at.replace([':', '.'], "-"))
+}
+
+/// The files of a backup.
+///
+/// # Errors
+/// The wear models of the history cannot be read.
+pub fn collect(places: &Places) -> Result<Vec<Entry>, HistoryError> {
+    let mut taken = Taken::default();
+    names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
+        taken.one(&places.scripts.join(&name), format!("scripts/{name}"));
+    });
+    for name in below(&places.data_dir) {
+        if matches!(of_name(&name), Some(Fate::AtOnce | Fate::AtStart)) {
+            taken.one(&places.data_dir.join(&name), format!("{DATA}{name}"));
+        }
+    }
+    // Without a file every setting has its default, which an empty file says as well.
+    let settings = format!("{DATA}{}", crate::settings::FILE);
+    if !taken.files.iter().any(|(name, _)| *name == settings) {
+        taken.files.push((settings, Vec::new()));
+    }
+    for (name, path) in named(places).into_iter().chain([("configuration.toml", &places.configuration)]) {
+        path.iter().for_each(|path| taken.one(path, name.to_owned()));
+    }
+    taken.files.extend(wear_models(&places.history)?);
+    let about = about(&taken.too_long);
+    taken.files.push(("about.txt".to_owned(), about.into_bytes()));
+    Ok(taken.files)
+}
+
+/// The files that the configuration names, by their names in an archive.
+fn named(places: &Places) -> [(&'static str, &Option<PathBuf>); 3] {
+    [
+        ("operations.toml", &places.operations),
+        ("model.toml", &places.model),
+        ("thermal_model.json", &places.thermal_model),
+    ]
+}
+
+/// A script, or the list of those that were delivered.
+fn is_of_scripts(name: &str) -> bool {
+    let plain = !name.contains(['/', '\\', '\0']) && !name.starts_with('.');
+    name == DELIVERED || (plain && name.len() > ".rhai".len() && name.ends_with(".rhai"))
+}
+
+#[derive(Default)]
+struct Taken {
+    files: Vec<Entry>,
+    too_long: Vec<String>,
+}
+
+impl Taken {
+    fn one(&mut self, path: &Path, name: String) {
+        match std::fs::metadata(path) {
+            Ok(file) if file.is_file() && file.len() > FILE_MAX => self.too_long.push(name),
+            Ok(file) if file.is_file() => self.files.extend(std::fs::read(path).ok().map(|content| (name, content))),
+            _ => {}
+        }
+    }
+}
+
+/// Names of what is in this folder, in their order.
+fn names(directory: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
+    let mut names: Vec<String> = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort();
+    names
+}
+
+/// Names of what is in this folder and in the folders in it.
+fn below(directory: &Path) -> Vec<String> {
+    let deeper = |name: String| {
+        let inside = names(&directory.join(&name));
+        if inside.is_empty() { vec![name] } else { inside.iter().map(|it| format!("{name}/{it}")).collect() }
+    };
+    names(directory).into_iter().flat_map(deeper).collect()
+}
+
+/// The models in force, one file for each.
+fn wear_models(history: &Path) -> Result<Vec<Entry>, HistoryError> {
+    if !history.exists() {
+        return Ok(Vec::new());
+    }
+    let models = Reader::open(history)?.wear_models()?;
+    models
+        .iter()
+        .filter(|model| model.in_force)
+        .map(|model| {
+            let toml = model.record.to_toml().map_err(HistoryError::Question)?;
+            Ok((format!("{WEAR_MODELS}{:04}.toml", model.id), toml.into_bytes()))
+        })
+        .collect()
+}
+
+/// For whoever opens the archive.
+fn about(too_long: &[String]) -> String {
+    let mut text = format!(
+        "Backup of a box: cnc-gateway {}\n\nPut back with `cnc-gateway restore FILE` or on the page (Audit, Backup and help).\n\
+         The configuration is here to be read; it is not put back.\n\nNot in it:\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    for (name, fate) in LIST {
+        if let Fate::Left(why) = fate {
+            text += &format!("  {name}: {why}\n");
+        }
+    }
+    for name in too_long {
+        text += &format!("  {name}: longer than {FILE_MAX} bytes\n");
+    }
+    text
+}
+
+/// A copy of the history that is whole, while a gateway may be writing it. Gives its length in bytes.
+///
+/// # Errors
+/// The history cannot be read, or `to` is there already or cannot be written.
+pub fn copy_history(from: &Path, to: &Path) -> Result<u64, HistoryError> {
+    let reader = Reader::open(from)?;
+    reader.copy_to(to)?;
+    Ok(std::fs::metadata(to).map_or(0, |file| file.len()))
+}
+
+#[cfg(test)]
+mod tests;

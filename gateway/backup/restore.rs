@@ -1,0 +1,210 @@
+//! A backup comes back: everything in it is checked, what is there now is kept, and then all of it takes its place.
+
+use super::list::{Fate, of_name};
+use super::restored;
+use super::{DATA, DELIVERED, Places, WEAR_MODELS, is_of_scripts, named, names};
+use crate::archive::Entry;
+use crate::files::{replace, replace_durably};
+use crate::history::{Reader, store_wear_model};
+use crate::reload::read_directory;
+use crate::settings;
+use adapters::clock::TimeNs;
+use rules::estimators::thermal::ThermalModel;
+use rules::estimators::wear::WearRecord;
+use rules::script::{ScriptFile, SettingValues, prepare_with};
+use std::path::{Path, PathBuf};
+
+/// Archives of what was replaced that are kept.
+const BEFORE_MAX: usize = 5;
+
+/// Who restores, when, and the archive of what is there now with its name.
+#[derive(Debug, Clone, Copy)]
+pub struct Ask<'a> {
+    /// Who.
+    pub by: &'a str,
+    /// When.
+    pub at_ns: TimeNs,
+    /// What is there now, and the name of its archive.
+    pub before: (&'a [u8], &'a str),
+}
+
+/// What an archive holds that this box has a place for.
+#[derive(Default)]
+struct Found {
+    scripts: Vec<ScriptFile>,
+    delivered: Option<String>,
+    settings: Option<String>,
+    /// Files that take their place now.
+    now: Vec<(PathBuf, String)>,
+    /// Files that wait for the next start, by name.
+    later: Vec<(String, String)>,
+    wear: Vec<WearRecord>,
+}
+
+/// Puts everything in place. Gives what was done, in words.
+///
+/// # Errors
+/// What is wrong with the backup, before anything was changed; or a file that cannot be written.
+pub fn restore(places: &Places, files: &[Entry], ask: Ask<'_>) -> Result<String, String> {
+    let found = Found::of(places, files)?;
+    if found.is_empty() {
+        return Err("the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
+            .to_owned());
+    }
+    found.check(places)?;
+    keep_before(&places.data_dir, ask.before)?;
+    put_scripts(&places.scripts, &found)?;
+    let say = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
+    for (path, text) in &found.now {
+        replace_durably(path, text).map_err(|error| say(path, error))?;
+    }
+    if let Some(body) = &found.settings {
+        let path = settings::path(&places.data_dir);
+        replace_durably(&path, &settings::signed(body, ask.by)).map_err(|error| say(&path, error))?;
+    }
+    let models = store(&places.history, &found.wear, ask.at_ns)?;
+    restored::lay_ready(&places.data_dir, &found.later)?;
+    Ok(found.words(models, ask.before.1))
+}
+
+impl Found {
+    fn of(places: &Places, files: &[Entry]) -> Result<Self, String> {
+        let mut found = Self::default();
+        for (name, content) in files {
+            let text = || String::from_utf8(content.clone()).map_err(|_| format!("{name} is no text"));
+            if let Some(file) = name.strip_prefix("scripts/") {
+                if !is_of_scripts(file) {
+                    return Err(format!("{name:?} is no name of a script"));
+                }
+                match file {
+                    DELIVERED => found.delivered = Some(text()?),
+                    _ => found.scripts.push(ScriptFile { name: file.to_owned(), text: text()? }),
+                }
+            } else if let Some(file) = name.strip_prefix(DATA) {
+                match of_name(file) {
+                    Some(Fate::AtOnce) if file == settings::FILE => found.settings = Some(text()?),
+                    Some(Fate::AtOnce) => found.now.push((places.data_dir.join(file), text()?)),
+                    Some(Fate::AtStart) => found.later.push((file.to_owned(), text()?)),
+                    _ => return Err(format!("{name:?} is no file of a backup")),
+                }
+            } else if name.starts_with(WEAR_MODELS) {
+                found.wear.push(WearRecord::parse(&text()?).map_err(|what| format!("{name}: {what}"))?);
+            } else if let Some(path) = named(places).into_iter().find(|it| it.0 == name).and_then(|it| it.1.as_ref()) {
+                found.now.push((path.clone(), text()?));
+            }
+        }
+        Ok(found)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.scripts.is_empty() && self.now.is_empty() && self.later.is_empty() && self.wear.is_empty()
+    }
+
+    /// Everything as the box will read it.
+    fn check(&self, places: &Places) -> Result<(), String> {
+        let of = |path: &Option<PathBuf>| {
+            let path = path.as_ref()?;
+            self.now.iter().find(|(it, _)| it == path).map(|(_, text)| text.as_str())
+        };
+        if let Some(recipe) = of(&places.operations) {
+            rules::operations::parse("operations.toml", recipe).map_err(lines)?;
+        }
+        if let Some(model) = of(&places.model) {
+            rules::twin::parse_model(model).map_err(lines)?;
+        }
+        if let Some(model) = of(&places.thermal_model) {
+            ThermalModel::read(model, &places.machine).map_err(|what| format!("the thermal model {what}"))?;
+        }
+        for (name, text) in self.later.iter().filter(|(name, _)| name.ends_with(".json")) {
+            serde_json::from_str::<serde_json::Value>(text).map_err(|error| format!("{name} is not JSON: {error}"))?;
+        }
+        self.check_scripts(places)
+    }
+
+    /// The scripts with the settings that will be in force, those that are there where the archive has none.
+    fn check_scripts(&self, places: &Places) -> Result<(), String> {
+        if self.scripts.is_empty() && self.settings.is_none() {
+            return Ok(());
+        }
+        let there;
+        let scripts = if self.scripts.is_empty() {
+            there = read_directory(&places.scripts).map_err(lines)?;
+            &there
+        } else {
+            &self.scripts
+        };
+        let values = match &self.settings {
+            Some(text) => SettingValues::parse(settings::FILE, text).map_err(lines)?,
+            None => settings::read(&settings::path(&places.data_dir)).map_err(lines)?,
+        };
+        prepare_with(scripts, &values).map(drop).map_err(lines)
+    }
+
+    fn words(&self, models: usize, before: &str) -> String {
+        let files = self.now.len();
+        let what = [
+            (!self.scripts.is_empty()).then(|| format!("{} scripts", self.scripts.len())),
+            self.settings.is_some().then(|| "the settings".to_owned()),
+            (files > 0).then(|| format!("{files} files (recipe, models, annotations, drafts, versions)")),
+            (models > 0).then(|| format!("{models} wear models")),
+        ];
+        let what: Vec<String> = what.into_iter().flatten().collect();
+        let mut words = if what.is_empty() { String::new() } else { format!("{} restored; ", what.join(", ")) };
+        if !self.later.is_empty() {
+            let names: Vec<&str> = self.later.iter().map(|(name, _)| name.as_str()).collect();
+            words += &format!(
+                "what was learned ({}) waits for the next start of the box, within a day; until then the box goes on with what it has; ",
+                names.join(", ")
+            );
+        }
+        words += &format!("what was there before is kept as {before} in the data directory");
+        words
+    }
+}
+
+/// Every problem on a line of its own.
+fn lines<P: std::fmt::Display>(all: Vec<P>) -> String {
+    all.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// Stores the models that are not in force yet; how many.
+fn store(history: &Path, wanted: &[WearRecord], at_ns: TimeNs) -> Result<usize, String> {
+    let say = |error: crate::history::HistoryError| format!("the wear models: {error}");
+    let there = match wanted.is_empty() || !history.exists() {
+        true => Vec::new(),
+        false => Reader::open(history).and_then(|reader| reader.wear_models()).map_err(say)?,
+    };
+    let fresh = |record: &&WearRecord| !there.iter().any(|it| it.in_force && it.record == **record);
+    let mut stored = 0;
+    for record in wanted.iter().filter(fresh) {
+        store_wear_model(history, at_ns, record).map_err(say)?;
+        stored += 1;
+    }
+    Ok(stored)
+}
+
+fn keep_before(data_dir: &Path, (archive, name): (&[u8], &str)) -> Result<(), String> {
+    let say = |error: std::io::Error| format!("what is there now could not be kept: {error}");
+    std::fs::create_dir_all(data_dir).map_err(say)?;
+    std::fs::write(data_dir.join(name), archive).map_err(say)?;
+    let mut kept = names(data_dir);
+    kept.retain(|it| it.contains("-before-restore-") && it.ends_with(".tar.gz"));
+    let surplus = kept.len().saturating_sub(BEFORE_MAX);
+    kept[..surplus].iter().try_for_each(|name| std::fs::remove_file(data_dir.join(name))).map_err(say)
+}
+
+/// The scripts of the backup and no others: one that is not in it would still decide.
+fn put_scripts(directory: &Path, found: &Found) -> Result<(), String> {
+    if found.scripts.is_empty() {
+        return Ok(());
+    }
+    let say = |error: std::io::Error| format!("{}: {error}", directory.display());
+    for file in &found.scripts {
+        replace(&directory.join(&file.name), &file.text).map_err(say)?;
+    }
+    if let Some(list) = &found.delivered {
+        replace(&directory.join(DELIVERED), list).map_err(say)?;
+    }
+    let surplus = |name: &String| name.ends_with(".rhai") && !found.scripts.iter().any(|file| file.name == *name);
+    names(directory).into_iter().filter(surplus).try_for_each(|name| std::fs::remove_file(directory.join(name))).map_err(say)
+}

@@ -1,0 +1,78 @@
+//! `cnc-gateway backup` and `cnc-gateway restore`: what makes a box this box, as an archive, and its way back. At the box itself,
+//! whether the gateway runs or not.
+
+use super::{CannotRun, CommandResult, Outcome, configuration, print};
+use crate::archive::{pack, unpack};
+use crate::backup::{Ask, Places, archive_name, collect, copy_history};
+use adapters::clock::{Clock, SECOND_NS, SystemClock};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `backup`.
+#[derive(Debug, Args)]
+pub(super) struct BackupArguments {
+    /// Configuration of the box; without it the built-in one.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Archive to write; without it a name with the time, in this directory.
+    #[arg(long, value_name = "FILE.tar.gz")]
+    out: Option<PathBuf>,
+    /// Copy the history too, to this file, which must not be there yet. A gateway may be writing it meanwhile.
+    #[arg(long, value_name = "COPY.db")]
+    history: Option<PathBuf>,
+}
+
+/// Arguments of `restore`.
+#[derive(Debug, Args)]
+pub(super) struct RestoreArguments {
+    /// Archive that `backup` or the page has made.
+    archive: PathBuf,
+    /// Configuration of the box; without it the built-in one.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Who restores; stands in the settings and their history.
+    #[arg(long, value_name = "NAME", default_value = "at the box")]
+    by: String,
+}
+
+fn now() -> (i64, u64) {
+    let now_ns = SystemClock::new().now_ns();
+    (now_ns, now_ns.div_euclid(SECOND_NS).unsigned_abs())
+}
+
+fn cannot(what: impl ToString) -> CannotRun {
+    CannotRun::new(what.to_string(), "")
+}
+
+pub(super) fn backup(arguments: &BackupArguments) -> CommandResult {
+    let config = configuration(arguments.config.as_deref())?;
+    let (_, at_s) = now();
+    let files = collect(&Places::of(&config, arguments.config.as_deref())).map_err(cannot)?;
+    let archive = pack(&files, at_s).map_err(cannot)?;
+    let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
+    std::fs::write(&out, &archive).map_err(|error| cannot(format!("{}: {error}", out.display())))?;
+    print(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
+    match &arguments.history {
+        Some(copy) => {
+            let bytes = copy_history(&config.history.path, copy).map_err(cannot)?;
+            print(&format!("{}: the history, {bytes} bytes\n", copy.display()));
+        }
+        None => print("the history is not in it; --history COPY.db copies it beside\n"),
+    }
+    Ok(Outcome::Fine)
+}
+
+pub(super) fn restore(arguments: &RestoreArguments) -> CommandResult {
+    let config = configuration(arguments.config.as_deref())?;
+    let places = Places::of(&config, arguments.config.as_deref());
+    let shown = arguments.archive.display();
+    let bytes = std::fs::read(&arguments.archive).map_err(|error| cannot(format!("{shown}: {error}")))?;
+    let files = unpack(&bytes).map_err(|error| cannot(format!("{shown} is no backup: {error}")))?;
+    let (at_ns, at_s) = now();
+    let before = collect(&places).map_err(cannot)?;
+    let before = pack(&before, at_s).map_err(cannot)?;
+    let ask = Ask { by: &arguments.by, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
+    let done = crate::backup::restore(&places, &files, ask).map_err(cannot)?;
+    print(&format!("{done}\n"));
+    Ok(Outcome::Fine)
+}
