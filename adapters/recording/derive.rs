@@ -14,13 +14,13 @@ const DERIVABLE: [&str; 6] = [
     "cutting_time_min",
 ];
 
-/// The recording with every derivable quantity that it lacks.
+/// The recording with every derivable quantity that it lacks. A column without a single value is lacking: a history has the column
+/// of every channel that its sources know, whether or not the machine delivers it.
 #[must_use]
 pub fn with_derived(mut recording: Recording) -> Recording {
     for name in DERIVABLE {
-        if recording.numbers(name).is_none()
-            && let Some(numbers) = derived(&recording, name)
-        {
+        let lacking = recording.numbers(name).is_none_or(|numbers| numbers.present().next().is_none());
+        if lacking && let Some(numbers) = derived(&recording, name) {
             recording.set_column(name, Cells::Numbers(numbers));
         }
     }

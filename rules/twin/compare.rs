@@ -1,7 +1,11 @@
 //! Which comparison a recording gets.
 //!
-//! By evidence (`evidence`), which holds every column of its bank for every row in memory: about 750 of them. A recording of
-//! more rows than are fitted one by one goes to the search over forms (`diagnose`), which looks at an excerpt of it.
+//! By evidence (`evidence`), but for two cases that go to the search over forms (`diagnose`):
+//!
+//! - more rows than are fitted one by one: the evidence holds about 750 columns for every row in memory, the search looks at an
+//!   excerpt of them;
+//! - a model without a free parameter: nothing of a missing contribution is absorbed there, and the evidence gives a mere factor of
+//!   the cut the name of any law of the cut.
 
 use super::diagnosis::Diagnosis;
 use super::frame::ROWS_MAX;
@@ -14,5 +18,10 @@ use adapters::Recording;
 /// # Errors
 /// Everything that makes the input unusable, with what to record instead.
 pub fn compare(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
-    if recording.rows() > ROWS_MAX { diagnose(recording, model, seed) } else { evidence::diagnose(recording, model) }
+    let has_free = model.parts.iter().flat_map(|part| &part.parameters).any(|parameter| !parameter.fixed);
+    if recording.rows() > ROWS_MAX || !has_free {
+        diagnose(recording, model, seed)
+    } else {
+        evidence::diagnose(recording, model)
+    }
 }

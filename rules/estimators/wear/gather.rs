@@ -8,8 +8,11 @@ use adapters::recording::{Numbers, with_derived};
 
 /// Speed and feed within this share are those of one cut.
 const SAME_SHARE: f64 = 0.02;
-/// Wear and depth within this are those of one cut, mm.
+/// Depths within this are those of one cut, mm.
 const SAME_MM: f64 = 1e-6;
+/// Wears within this are those of one cut, mm: a shop's microscope tells no less apart, and a wear that is taken in a straight line
+/// between two readings grows within the cut. Too small, a cut falls apart into its rows, each with the noise of one row.
+const SAME_WEAR_MM: f64 = 0.005;
 /// A stretch of rows this many times shorter than is usual is a transition and no cut.
 const TRANSITION: usize = 5;
 /// Columns whose change begins a new cut.
@@ -137,11 +140,38 @@ impl Rows<'_> {
         let groups = settled(self.groups(each_row));
         let rows: usize = groups.iter().map(|group| group.members.len()).sum();
         if groups.is_empty() {
-            let what = "no row has wear, speed, feed, depth and cutting power at once, with the tool in the work";
-            return Err(Refusal::new(RefusalKind::TooFew, what, "look at the columns with --json of `history query`"));
+            return Err(self.no_row());
         }
         let cuts = self.merged(groups, each_row).iter().map(|group| mean(&group.members)).collect();
         Ok(Gathered { cuts, rows, left_out: self.recording.rows() - rows })
+    }
+
+    /// Why there is no cut: how many rows have a value in each column, and which column is absent where the others are there.
+    fn no_row(&self) -> Refusal {
+        let power = (&self.power, "cutting power");
+        let names = FACTORS.iter().map(|factor| factor.name);
+        let columns: Vec<(&Numbers, &str)> = self.factors.iter().copied().zip(names).chain([power]).collect();
+        let has = |column: &Numbers, row: usize| column.get(row).is_some_and(|value| value.is_finite());
+        let rows = self.recording.rows();
+        let each = columns.iter().map(|(column, name)| {
+            let present = (0..rows).filter(|row| has(column, *row)).count();
+            format!("{name} in {present}")
+        });
+        let each = each.collect::<Vec<String>>().join(", ");
+        let others = |at: usize| {
+            let all = |row: &usize| columns.iter().enumerate().all(|(other, it)| other == at || has(it.0, *row));
+            (0..rows).filter(all).count()
+        };
+        let lacking = (0..columns.len()).map(|at| (others(at), columns[at].1)).filter(|(count, _)| *count > 0);
+        let lacking = lacking.max_by_key(|(count, _)| *count).map_or_else(String::new, |(count, name)| {
+            format!("; {count} rows lack {name} alone, or the spindle or the feed stands still in them")
+        });
+        let what = format!(
+            "no row has wear, speed, feed, depth and cutting power at once, with the tool in the work: of {rows} rows there is {each}{lacking}"
+        );
+        let next = "give what is missing in the rows of the cuts: wear with `annotate flank-wear` before and after them, depth and \
+                    diameter by an operations file";
+        Refusal::new(RefusalKind::TooFew, what, next)
     }
 
     /// Consecutive rows of the same conditions.
@@ -203,7 +233,7 @@ fn settled(mut groups: Vec<Group>) -> Vec<Group> {
 
 fn alike(a: &Conditions, b: &Conditions) -> bool {
     let close = |x: f64, y: f64| (x - y).abs() <= SAME_SHARE * x.abs();
-    (a.flank_wear_mm - b.flank_wear_mm).abs() <= SAME_MM
+    (a.flank_wear_mm - b.flank_wear_mm).abs() <= SAME_WEAR_MM
         && (a.depth_of_cut_mm - b.depth_of_cut_mm).abs() <= SAME_MM
         && close(a.cutting_speed_m_min, b.cutting_speed_m_min)
         && close(a.feed_per_rev_mm, b.feed_per_rev_mm)
@@ -261,6 +291,29 @@ mod tests {
         assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
         let told = gather(&recording(3, &columns), &Columns::default()).expect_err("refused").to_string();
         assert!(told.contains("--load-loss"), "{told}");
+    }
+
+    #[test]
+    fn wear_that_grows_within_a_cut_does_not_break_it() {
+        let mut recording = recording(100, &CONDITIONS);
+        let wear = |row: usize| 0.1 + if row < 50 { 0.0 } else { 0.1 } + 5e-5 * row as f64;
+        recording.set_column("flank_wear_mm", Cells::Numbers(Numbers::full((0..100).map(wear).collect())));
+        recording.set_column("cutting_power_w", Cells::Numbers(Numbers::full(vec![800.0; 100])));
+        let gathered = gather(&recording, &Columns::default()).expect("cuts");
+        assert_eq!(gathered.cuts.len(), 2, "another edge is another cut: {gathered:?}");
+    }
+
+    #[test]
+    fn where_no_row_has_everything_the_message_says_what_is_absent() {
+        let mut recording = recording(4, &CONDITIONS);
+        let power = [Some(800.0), None, None, None].into_iter().collect::<Numbers>();
+        recording.set_column("cutting_power_w", Cells::Numbers(power));
+        let wear = [None, Some(0.1), Some(0.1), Some(0.1)].into_iter().collect::<Numbers>();
+        recording.set_column("flank_wear_mm", Cells::Numbers(wear));
+        let told = gather(&recording, &Columns::default()).expect_err("refused").to_string();
+        for part in ["of 4 rows", "flank_wear_mm in 3", "cutting power in 1", "3 rows lack cutting power alone"] {
+            assert!(told.contains(part), "{part}: {told}");
+        }
     }
 
     #[test]

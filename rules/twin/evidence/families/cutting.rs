@@ -222,7 +222,7 @@ fn recipes(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
         }
     }
     if let Some(coolant) = inputs.scene.column("coolant_on")
-        && inputs.deviation_of(coolant, false) > 0.0
+        && cuts_dry(inputs, cut, coolant)
     {
         bank.of(COOLANT, "recorded").column(inputs, inputs.column(|row| cut[row] * coolant[row]));
     }
@@ -236,6 +236,20 @@ fn recipes(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
             bank.of(OVERRIDE, rows).column(inputs, inputs.column(law));
         }
     }
+}
+
+/// Share of the square of the cut that must be dry: less is a few rows at the edges of the cuts, and coolant that is on in every
+/// cut is a name for any factor of the whole cut.
+const DRY_MIN: f64 = 0.01;
+
+/// Is there cutting without coolant, so that its factor can be told from one of every cut?
+fn cuts_dry(inputs: &Inputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
+    let square = |share: &dyn Fn(usize) -> f64| {
+        let of = |row: usize| cut[row] * share(row);
+        inputs.taken(false).map(|row| of(row).powi(2)).filter(|square| square.is_finite()).sum::<f64>()
+    };
+    let (dry, whole) = (square(&|row| 1.0 - coolant[row]), square(&|_| 1.0));
+    dry > DRY_MIN * whole
 }
 
 /// Consumers that a word or a flag of the recording tells.
