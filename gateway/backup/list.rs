@@ -45,7 +45,10 @@ pub const LIST: &[Row] = &[
     ("scripts/*.new", Fate::Left(SEEN_TO)),
     ("persons.json", Fate::Left(SECRET)),
     ("tls/*", Fate::Left(SECRET)),
-    ("offsets.json", Fate::Left("it says what stands in the control now; an older one would take back the wrong amount")),
+    (
+        "offsets.json",
+        Fate::Left("it says what stands in the control now; an older one would take back the wrong amount"),
+    ),
     ("offsets.json.unreadable", Fate::Left("a person has to look at it, at this box")),
     ("diagnoses/*", Fate::Left("reports to read, which decide nothing")),
     ("control.sock", Fate::Left("an entrance of the running process")),
@@ -124,7 +127,15 @@ mod tests {
         }
         let kept = of_name("cnc-gateway-before-restore-2026.tar.gz");
         assert_eq!(kept, Some(Fate::Left("it is a backup itself")));
-        for name in ["another.json", "wear.jsonl", "persons.json.old", "drafts", "drafts/..", "drafts/../x", "sub/settings.toml"] {
+        for name in [
+            "another.json",
+            "wear.jsonl",
+            "persons.json.old",
+            "drafts",
+            "drafts/..",
+            "drafts/../x",
+            "sub/settings.toml",
+        ] {
             assert_eq!(of_name(name), None, "{name}");
         }
     }

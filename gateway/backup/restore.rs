@@ -206,5 +206,9 @@ fn put_scripts(directory: &Path, found: &Found) -> Result<(), String> {
         replace(&directory.join(DELIVERED), list).map_err(say)?;
     }
     let surplus = |name: &String| name.ends_with(".rhai") && !found.scripts.iter().any(|file| file.name == *name);
-    names(directory).into_iter().filter(surplus).try_for_each(|name| std::fs::remove_file(directory.join(name))).map_err(say)
+    names(directory)
+        .into_iter()
+        .filter(surplus)
+        .try_for_each(|name| std::fs::remove_file(directory.join(name)))
+        .map_err(say)
 }

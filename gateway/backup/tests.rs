@@ -96,7 +96,8 @@ fn an_empty_box_gets_everything_that_decides() {
     assert!(take_restored(&new.data_dir).is_some());
     let without_author = |files: Vec<Entry>| {
         let body = |text: &[u8]| String::from_utf8_lossy(text).lines().skip(1).collect::<String>().into_bytes();
-        let each = |(name, text): Entry| if name.ends_with("settings.toml") { (name, body(&text)) } else { (name, text) };
+        let each =
+            |(name, text): Entry| if name.ends_with("settings.toml") { (name, body(&text)) } else { (name, text) };
         files.into_iter().map(each).collect::<Vec<_>>()
     };
     assert_eq!(without_author(taken(&new)), without_author(first.clone()));

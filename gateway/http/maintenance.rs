@@ -124,7 +124,11 @@ async fn take(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
 }
 
 /// `POST /api/v1/restore`: what a backup holds takes the place of what is in force; what was learned, at the next start.
-async fn restore(State(shared): State<Shared>, SignedIn(person): SignedIn, body: Bytes) -> Result<Response, ApiProblem> {
+async fn restore(
+    State(shared): State<Shared>,
+    SignedIn(person): SignedIn,
+    body: Bytes,
+) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
     let done = aside(move || {
         let files = unpack(&body).map_err(|error| {

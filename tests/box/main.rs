@@ -1,5 +1,6 @@
 //! The whole box: real child processes, sockets, files, signals and a browser.
 
+mod backup;
 mod browser;
 mod cost;
 mod diagnosing;
