@@ -51,7 +51,7 @@ use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
 use outputs::Outputs;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -147,6 +147,17 @@ async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
     bind(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
 }
 
+/// The estimators and edges as they were remembered, the scripts in charge and the gate.
+fn pipeline(plan: &Plan, memory: &Path) -> (Pipeline, rules::Watched) {
+    let (mut scripts, watched) = rules::load(&plan.config);
+    if plan.speed == MachineSpeed::Real {
+        scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
+    }
+    let mut pipeline = Pipeline::new(remembered::estimators(memory), scripts, Gate::new(plan.config.gate.clone()));
+    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
+    (pipeline, watched)
+}
+
 fn ticker(
     plan: &Plan,
     run_flags: &Arc<RunFlags>,
@@ -160,12 +171,7 @@ fn ticker(
     let restored = take_restored(data_dir);
     let twin = Twin::of(config);
     let memory = data_dir.join("estimators.json");
-    let (mut scripts, watched) = rules::load(config);
-    if plan.speed == MachineSpeed::Real {
-        scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
-    }
-    let mut pipeline = Pipeline::new(remembered::estimators(&memory), scripts, Gate::new(config.gate.clone()));
-    remembered::edges(&mut pipeline, &memory.with_file_name(health::WEAR_MEMORY));
+    let (mut pipeline, watched) = pipeline(plan, &memory);
     let beside = twin.as_ref().map(Twin::series).unwrap_or_default();
     let mut thermal = Thermal::of(config)?;
     let of_thermal = thermal.as_ref().map(Thermal::series).unwrap_or_default();
