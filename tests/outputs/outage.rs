@@ -143,7 +143,7 @@ impl Bench {
 }
 
 #[test]
-#[ignore = "5 minutes: an outage fits into the outbox and is made up for"]
+#[ignore = "7 minutes: an outage fits into the outbox and is made up for"]
 fn an_outage_fits_and_is_made_up_for_without_delaying_live_data() {
     let hours: f64 = std::env::var("OUTAGE_H").ok().and_then(|hours| hours.parse().ok()).unwrap_or(2.0);
     let channels: Vec<ChannelId> =
