@@ -50,7 +50,7 @@ pub(super) struct DiagnoseArguments {
     /// Tell the leading hypotheses of the search on standard error.
     #[arg(long)]
     search: bool,
-    /// Which engine compares; by the length of the recording where none is named.
+    /// Which engine compares; where none is named, the recording and the model decide.
     #[arg(long, value_enum, hide = true)]
     engine: Option<Engine>,
     /// Language of the words, the page and the plan.

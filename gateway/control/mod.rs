@@ -24,7 +24,7 @@ mod post;
 mod server;
 
 pub use client::order;
-pub use network::{NetworkRequest, Wish};
+pub use network::{NetworkRequest, RequestedChange};
 pub use post::{Inbox, Post, PostedRequest, PostedRow, Wake, queue};
 pub use server::{Listening, listen};
 

@@ -12,7 +12,7 @@ const GREATEST_PCT: f64 = 100.0;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Wish {
+pub enum RequestedChange {
     /// Another feed override, percent, for a limited time.
     FeedOverride {
         /// From 0 to 100; the limits of the gate come after that.
@@ -20,7 +20,7 @@ pub enum Wish {
         /// Why, in the words of whoever asks.
         reason: String,
     },
-    /// The last wish for a feed override is over.
+    /// The last feed override that was asked for is over.
     Withdraw,
     /// An alarm has been seen; it stands until its reason has gone.
     AcknowledgeAlarm {
@@ -29,7 +29,7 @@ pub enum Wish {
     },
 }
 
-impl Wish {
+impl RequestedChange {
     /// A feed override, checked; the words are cut and freed of control characters.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl Wish {
     }
 }
 
-impl fmt::Display for Wish {
+impl fmt::Display for RequestedChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::FeedOverride { pct, reason } if reason.is_empty() => write!(f, "feed override {pct} %"),
@@ -61,13 +61,13 @@ impl fmt::Display for Wish {
     }
 }
 
-/// A wish, or why a message is none, with where it came from.
+/// A change that is asked for, or why a message is none, with where it came from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkRequest {
     /// Name of the sink in the configuration.
     pub sink: String,
     /// What is asked for, or why it is refused before anybody looks at it.
-    pub wish: Result<Wish, String>,
+    pub change: Result<RequestedChange, String>,
     /// So many messages before it came too fast and were thrown away.
     pub left_out: u64,
 }
@@ -84,17 +84,19 @@ mod tests {
     #[test]
     fn only_a_number_that_slows_can_be_asked_for() {
         for pct in [0.0, 55.5, 100.0] {
-            assert!(Wish::feed_override(pct, "").is_ok(), "{pct}");
+            assert!(RequestedChange::feed_override(pct, "").is_ok(), "{pct}");
         }
         for pct in [-1.0, 100.5, 254.0, f64::NAN, f64::INFINITY] {
-            let refused = Wish::feed_override(pct, "").expect_err("refused");
+            let refused = RequestedChange::feed_override(pct, "").expect_err("refused");
             assert!(refused.contains("from 0 to 100"), "{refused}");
         }
     }
 
     #[test]
     fn words_of_others_are_cut() {
-        let Ok(Wish::FeedOverride { reason, .. }) = Wish::feed_override(80.0, &"a\n\u{1b}".repeat(500)) else {
+        let Ok(RequestedChange::FeedOverride { reason, .. }) =
+            RequestedChange::feed_override(80.0, &"a\n\u{1b}".repeat(500))
+        else {
             panic!("allowed")
         };
         assert_eq!(reason, "a".repeat(WORDS_MAX));

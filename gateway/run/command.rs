@@ -8,7 +8,7 @@ use super::network_requests::{self, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
 use super::report::milliseconds;
 use crate::config::{self, GateMode};
-use crate::control::{self, Inbox, NetworkRequest, Posted, PostedRequest, PostedRow, Reply, Wish};
+use crate::control::{self, Inbox, NetworkRequest, Posted, PostedRequest, PostedRow, Reply, RequestedChange};
 use crate::gate::offset::{Moved, OffsetOrder};
 use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Verdict, trail};
 use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
@@ -119,10 +119,12 @@ impl Commands {
         }
     }
 
-    fn grant(&mut self, NetworkRequest { sink, wish, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
-        match wish {
-            Ok(Wish::AcknowledgeAlarm { code }) => self.acknowledge_alarm(code, &network_requests::author(sink), at_ns),
-            Ok(wish) => self.network.take(sink, wish, at_ns),
+    fn grant(&mut self, NetworkRequest { sink, change, .. }: &NetworkRequest, at_ns: TimeNs) -> Reply {
+        match change {
+            Ok(RequestedChange::AcknowledgeAlarm { code }) => {
+                self.acknowledge_alarm(code, &network_requests::author(sink), at_ns)
+            }
+            Ok(change) => self.network.take(sink, change, at_ns),
             Err(why) => Reply::refused(why),
         }
     }

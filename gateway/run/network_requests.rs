@@ -1,7 +1,7 @@
 //! What the network asks of the gate, at the tick: each request is one row of the audit, and a feed override stands for a
 //! limited time as if a script asked for it at every tick. The gate judges it like one.
 
-use crate::control::{NetworkRequest, Reply, Wish};
+use crate::control::{NetworkRequest, Reply, RequestedChange};
 use crate::gate::trail;
 use crate::history::Audit;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -26,10 +26,10 @@ pub struct NetworkRequests {
 
 impl NetworkRequests {
     /// Takes a request for a feed override or its end; gives what became of it. An alarm is acknowledged by whoever holds the alarms.
-    pub fn take(&mut self, sink: &str, wish: &Wish, at_ns: TimeNs) -> Reply {
+    pub fn take(&mut self, sink: &str, change: &RequestedChange, at_ns: TimeNs) -> Reply {
         let author = author(sink);
         self.standing.retain(|standing| *standing.request.script != *author);
-        let Wish::FeedOverride { pct, reason } = wish else {
+        let RequestedChange::FeedOverride { pct, reason } = change else {
             return Reply::done("nothing is asked for any more");
         };
         let reason = if reason.is_empty() { "asked over the network" } else { reason };
@@ -58,13 +58,13 @@ pub fn author(sink: &str) -> String {
 /// The row of the audit.
 #[must_use]
 pub fn row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
-    let what = request.wish.as_ref().map_or_else(Clone::clone, |wish| format!("{wish}: {}", reply.text));
+    let what = request.change.as_ref().map_or_else(Clone::clone, |change| format!("{change}: {}", reply.text));
     let also = match request.left_out {
         0 => String::new(),
         count => format!("; {count} messages before it came too fast and were thrown away"),
     };
-    let asked = match request.wish {
-        Ok(Wish::FeedOverride { pct, .. }) => Some(pct),
+    let asked = match request.change {
+        Ok(RequestedChange::FeedOverride { pct, .. }) => Some(pct),
         _ => None,
     };
     let outcome = if reply.done { "done" } else { "refused" };
@@ -77,29 +77,29 @@ pub fn row(request: &NetworkRequest, reply: &Reply, at_ns: TimeNs) -> Audit {
 mod tests {
     use super::*;
 
-    fn wish(pct: f64) -> Wish {
-        Wish::feed_override(pct, "").expect("allowed")
+    fn change(pct: f64) -> RequestedChange {
+        RequestedChange::feed_override(pct, "").expect("allowed")
     }
 
     #[test]
     fn a_request_stands_for_a_minute_and_the_least_counts() {
         let mut requests = NetworkRequests::default();
-        requests.take("plant", &wish(80.0), 0);
-        requests.take("cell", &wish(60.0), 10 * SECOND_NS);
+        requests.take("plant", &change(80.0), 0);
+        requests.take("cell", &change(60.0), 10 * SECOND_NS);
         let pct = |requests: &mut NetworkRequests, at_s: i64| requests.at(at_s * SECOND_NS).map(|it| it.pct);
         assert_eq!(pct(&mut requests, 11), Some(60.0));
-        requests.take("cell", &Wish::Withdraw, 12 * SECOND_NS);
+        requests.take("cell", &RequestedChange::Withdraw, 12 * SECOND_NS);
         assert_eq!(pct(&mut requests, 12), Some(80.0));
-        requests.take("plant", &wish(90.0), 50 * SECOND_NS);
+        requests.take("plant", &change(90.0), 50 * SECOND_NS);
         assert_eq!(pct(&mut requests, 109), Some(90.0), "asked again");
         assert_eq!(pct(&mut requests, 110), None);
-        requests.take("plant", &wish(90.0), 200 * SECOND_NS);
+        requests.take("plant", &change(90.0), 200 * SECOND_NS);
         assert_eq!(pct(&mut requests, 100), None, "a clock that went back");
     }
 
     #[test]
     fn a_row_says_who_what_and_why() {
-        let request = NetworkRequest { sink: "plant".to_owned(), wish: Err("no request".to_owned()), left_out: 7 };
+        let request = NetworkRequest { sink: "plant".to_owned(), change: Err("no request".to_owned()), left_out: 7 };
         let row = row(&request, &Reply::refused("no request"), 5);
         assert_eq!(
             (row.kind.as_str(), row.outcome.as_str(), row.script.as_str()),

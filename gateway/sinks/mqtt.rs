@@ -10,7 +10,7 @@
 
 use super::broker::{BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::control::{Reply, Wish};
+use crate::control::{Reply, RequestedChange};
 use crate::history::{Item, Outbox};
 use adapters::address::Keys;
 use adapters::mqtt::{Message, Outgoing, Qos, Will};
@@ -60,8 +60,8 @@ impl MqttSink {
     async fn answer(&mut self, message: Message) -> Result<(), SinkError> {
         let document = if message.retained { Err(RETAINED.to_owned()) } else { document_of(&message.payload) };
         let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
-        let wish = document.and_then(Document::wish);
-        let Some(Reply { done, text }) = self.requests.ask(wish).await else { return Ok(()) };
+        let change = document.and_then(Document::change);
+        let Some(Reply { done, text }) = self.requests.ask(change).await else { return Ok(()) };
         let says = json!({"done": done, "text": text, "id": id});
         let topic = self.topic("request/answer");
         let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
@@ -120,11 +120,11 @@ const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"reques
                      {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
 
 impl Document {
-    fn wish(self) -> Result<Wish, String> {
+    fn change(self) -> Result<RequestedChange, String> {
         match (self.request.as_str(), self.pct, self.code) {
-            ("feed_override", Some(pct), None) => Wish::feed_override(pct, &self.reason.unwrap_or_default()),
-            ("withdraw", None, None) => Ok(Wish::Withdraw),
-            ("acknowledge_alarm", None, Some(code)) => Ok(Wish::acknowledge_alarm(&code)),
+            ("feed_override", Some(pct), None) => RequestedChange::feed_override(pct, &self.reason.unwrap_or_default()),
+            ("withdraw", None, None) => Ok(RequestedChange::Withdraw),
+            ("acknowledge_alarm", None, Some(code)) => Ok(RequestedChange::acknowledge_alarm(&code)),
             _ => Err(format!("this is no request; {FORMS}")),
         }
     }

@@ -3,7 +3,7 @@
 //! A sink hands every message that looks like a request to [`Requests::ask`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
-use crate::control::{NetworkRequest, Post, Reply, Wish};
+use crate::control::{NetworkRequest, Post, Reply, RequestedChange};
 use crate::gate::trail::RowRate;
 use adapters::clock::{Clock, SystemClock};
 
@@ -42,16 +42,16 @@ impl Requests {
     }
 
     /// Asks, and gives what became of it; `None` for what came too fast, which is not answered.
-    pub async fn ask(&mut self, wish: Result<Wish, String>) -> Option<Reply> {
+    pub async fn ask(&mut self, change: Result<RequestedChange, String>) -> Option<Reply> {
         let left_out = self.rate.may_pass(SystemClock::new().now_ns())?;
         let Some(post) = &self.post else { return Some(Reply::refused("there is no gate here")) };
-        let wish = if self.allowed { wish } else { Err(refused(&self.sink, wish)) };
-        Some(post.request(NetworkRequest { sink: self.sink.clone(), wish, left_out }).await)
+        let change = if self.allowed { change } else { Err(refused(&self.sink, change)) };
+        Some(post.request(NetworkRequest { sink: self.sink.clone(), change, left_out }).await)
     }
 }
 
-fn refused(sink: &str, wish: Result<Wish, String>) -> String {
-    let what = wish.map_or_else(|_| "a message that is no request".to_owned(), |wish| wish.to_string());
+fn refused(sink: &str, change: Result<RequestedChange, String>) -> String {
+    let what = change.map_or_else(|_| "a message that is no request".to_owned(), |change| change.to_string());
     format!(
         "{what}: the sink {sink} takes no requests; write allow_requests = true under its [[sink]] to let them reach the gate"
     )

@@ -9,7 +9,7 @@
 //! A host may name a metric by its alias alone, as the birth gave it.
 
 use super::payload::{Metric, Payload, Value, datatype};
-use crate::control::Wish;
+use crate::control::RequestedChange;
 use serde_json::json;
 
 const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
@@ -17,7 +17,7 @@ const ACKNOWLEDGE_ALARM: (&str, u64) = ("request/acknowledge_alarm", 10);
 const ANSWER: (&str, u64) = ("request/answer", 11);
 
 /// Wishes in one message; what is more is not looked at.
-const WISHES_MAX: usize = 4;
+const CHANGES_MAX: usize = 4;
 
 /// What a birth says of them: where requests are not allowed, only the answer, because a refusal is told too.
 pub(super) fn metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
@@ -45,31 +45,31 @@ pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
 
 /// What a command asks for; empty where it asks for nothing that is known here. A message that the broker has kept is refused:
 /// it would come again at every connection.
-pub(super) fn wishes(payload: &Payload, retained: bool) -> Vec<Result<Wish, String>> {
-    let wishes = payload.metrics.iter().filter_map(wish).take(WISHES_MAX);
-    let fresh = |wish: Result<Wish, String>| match retained {
+pub(super) fn changes(payload: &Payload, retained: bool) -> Vec<Result<RequestedChange, String>> {
+    let changes = payload.metrics.iter().filter_map(change).take(CHANGES_MAX);
+    let fresh = |change: Result<RequestedChange, String>| match retained {
         true => Err("a retained command is no request: publish it without the retain flag".to_owned()),
-        false => wish,
+        false => change,
     };
-    wishes.map(fresh).collect()
+    changes.map(fresh).collect()
 }
 
-fn wish(metric: &Metric) -> Option<Result<Wish, String>> {
+fn change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
     let is = |(name, alias): (&str, u64)| match &metric.name {
         Some(named) if !named.is_empty() => named == name,
         _ => metric.alias == Some(alias),
     };
     if is(FEED_OVERRIDE) {
         return Some(match (&metric.value, metric.is_null) {
-            (None, _) | (_, Some(true)) => Ok(Wish::Withdraw),
+            (None, _) | (_, Some(true)) => Ok(RequestedChange::Withdraw),
             (Some(value), _) => number(value).map_or_else(
                 || Err("request/feed_override_pct is no number".to_owned()),
-                |pct| Wish::feed_override(pct, ""),
+                |pct| RequestedChange::feed_override(pct, ""),
             ),
         });
     }
     is(ACKNOWLEDGE_ALARM).then(|| match &metric.value {
-        Some(Value::Text(code)) => Ok(Wish::acknowledge_alarm(code)),
+        Some(Value::Text(code)) => Ok(RequestedChange::acknowledge_alarm(code)),
         _ => Err("request/acknowledge_alarm is no text".to_owned()),
     })
 }
@@ -104,19 +104,22 @@ mod tests {
             named("spindle_power_w", Value::Double(1.0)),
             named("request/answer", Value::Text("x".to_owned())),
         ]);
-        let expected =
-            [Wish::feed_override(80.0, ""), Wish::feed_override(70.0, ""), Ok(Wish::acknowledge_alarm("overload"))];
-        assert_eq!(wishes(&all, false), expected);
-        assert!(wishes(&all, true).iter().all(Result::is_err), "retained");
+        let expected = [
+            RequestedChange::feed_override(80.0, ""),
+            RequestedChange::feed_override(70.0, ""),
+            Ok(RequestedChange::acknowledge_alarm("overload")),
+        ];
+        assert_eq!(changes(&all, false), expected);
+        assert!(changes(&all, true).iter().all(Result::is_err), "retained");
     }
 
     #[test]
     fn what_is_no_number_is_refused_and_null_withdraws() {
         let of = |value: Option<Value>| {
             let metric = Metric { name: Some(FEED_OVERRIDE.0.to_owned()), value, ..Metric::default() };
-            wishes(&payload(vec![metric]), false).remove(0)
+            changes(&payload(vec![metric]), false).remove(0)
         };
-        assert_eq!(of(None), Ok(Wish::Withdraw));
+        assert_eq!(of(None), Ok(RequestedChange::Withdraw));
         for bad in [Value::Text("80".to_owned()), Value::Boolean(true), Value::Int(u32::MAX), Value::Double(f64::NAN)] {
             assert!(of(Some(bad.clone())).is_err(), "{bad:?}");
         }

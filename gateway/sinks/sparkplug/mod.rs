@@ -25,7 +25,7 @@ mod payload;
 
 use super::broker::{BrokerTarget, Failure, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::control::{Reply, Wish};
+use crate::control::{Reply, RequestedChange};
 use crate::history::{Cell, Outbox};
 use adapters::address::Keys;
 use adapters::clock::{Clock, SystemClock};
@@ -97,7 +97,7 @@ pub(super) struct SparkplugSink {
     rebirth: bool,
     requests: Requests,
     /// What the network has asked for and is not answered yet.
-    asked: Vec<Result<Wish, String>>,
+    asked: Vec<Result<RequestedChange, String>>,
 }
 
 impl SparkplugSink {
@@ -126,14 +126,14 @@ impl SparkplugSink {
         }
         let Ok(payload) = Payload::decode(&message.payload[..]) else { return false };
         self.rebirth |= of_node && births::asks_rebirth(&payload);
-        self.asked = commands::wishes(&payload, message.retained);
+        self.asked = commands::changes(&payload, message.retained);
         self.rebirth || !self.asked.is_empty()
     }
 
     /// Hands to the gate what was asked for, and tells what became of it.
     async fn answer(&mut self) -> Result<(), SinkError> {
-        for wish in std::mem::take(&mut self.asked) {
-            let Some(Reply { done, text }) = self.requests.ask(wish).await else { continue };
+        for change in std::mem::take(&mut self.asked) {
+            let Some(Reply { done, text }) = self.requests.ask(change).await else { continue };
             let (at_ms, kind) = (now_ms(), self.data());
             let told = self.message(kind, vec![commands::answer(done, &text, at_ms)], at_ms);
             self.publish(vec![told]).await.map_err(|(_, failure)| failure.of_item(0))?;

@@ -6,7 +6,7 @@
 //!
 //! | threshold | source | cost of being wrong | noticed by |
 //! |---|---|---|---|
-//! | `nothing_max` | odds of 1000 to 1 against nothing: noise whose memory is longer than the grid allows gives odds up to 200 to 1; of 466 concealed cases by others none that scored lay between 7 to 1 and 1000 to 1, of 200 placebos 5 did | higher: false reports; lower: silence about weak effects | recordings with nothing hidden |
+//! | `nothing_max` | odds of 1000 to 1 against nothing: of 200 placebos 12 passed at 7 to 1 and 7 pass at 1000 to 1, while no score of 466 concealed cases by others fell; noise whose memory is longer than the grid allows gives any odds | higher: false reports; lower: silence about weak effects | recordings with nothing hidden |
 //! | `inner_gain` | less than one deviation of a paired sum: it only refuses what does not carry over at all | higher: silence; lower: forms that fit one unit only | recordings with nothing hidden, real placebos |
 //! | `member_loss` | a third of a deviation: chance moves a useless member by more than that half of the time | higher: true names lost beside others; lower: forms that fit one unit stay | concealed pairs |
 //! | `alone` | the second name holds at most 15 % | higher: classes where one is sure; lower: sure wrong names | concealed pairs and classes |

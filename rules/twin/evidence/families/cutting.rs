@@ -244,11 +244,10 @@ const DRY_MIN: f64 = 0.01;
 
 /// Is there cutting without coolant, so that its factor can be told from one of every cut?
 fn cuts_dry(inputs: &Inputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
-    let square = |share: &dyn Fn(usize) -> f64| {
-        let of = |row: usize| cut[row] * share(row);
-        inputs.taken(false).map(|row| of(row).powi(2)).filter(|square| square.is_finite()).sum::<f64>()
-    };
-    let (dry, whole) = (square(&|row| 1.0 - coolant[row]), square(&|_| 1.0));
+    let known = inputs.taken(false).filter(|row| coolant[*row].is_finite());
+    let (dry, whole) = known.fold((0.0, 0.0), |(dry, whole), row| {
+        (dry + (cut[row] * (1.0 - coolant[row])).powi(2), whole + cut[row].powi(2))
+    });
     dry > DRY_MIN * whole
 }
 
