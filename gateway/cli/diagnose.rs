@@ -50,7 +50,7 @@ pub(super) struct DiagnoseArguments {
     /// Tell the leading hypotheses of the search on standard error.
     #[arg(long)]
     search: bool,
-    /// Which engine compares; where none is named, the recording and the model decide.
+    /// Let one engine answer alone; without it, each claim needs both.
     #[arg(long, value_enum, hide = true)]
     engine: Option<Engine>,
     /// Language of the words, the page and the plan.

@@ -22,23 +22,37 @@ pub(super) fn next_step(outcome: &Outcome, verdict: Verdict, alternatives: &[Alt
     if matches!(verdict, Verdict::NoMismatch | Verdict::Explained) {
         return None;
     }
-    let gain = outcome.information().clamp(GAIN_BOUNDS.0, GAIN_BOUNDS.1);
+    let gain = outcome.information();
     let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
     let gone = outcome.withdrawn.iter().flat_map(|withdrawn| withdrawn.kinds.iter().map(String::as_str));
-    let of_effect = open.chain(gone).find_map(effect).map(|effect| {
-        let doc = effect.doc();
-        Experiment {
-            statement: doc.en.experiment.to_owned(),
-            minutes: doc.experiment_minutes,
-            expected_delta_ic: gain,
-            effect: doc.kind.to_owned(),
-        }
-    });
-    of_effect.or_else(|| {
+    of_effects(open.chain(gone), gain).or_else(|| {
         let form = outcome.last().parts.iter().rev().find_map(form_of);
         let statement = form.map_or_else(repeat, |form| over(&form.channel));
-        Some(Experiment { statement, minutes: CHANNEL_MINUTES, expected_delta_ic: gain, effect: String::new() })
+        Some(experiment(statement, CHANNEL_MINUTES, gain, ""))
     })
+}
+
+/// The experiment of the first of these kinds that the catalogue holds.
+pub(super) fn of_effects<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
+    let doc = kinds.find_map(effect)?.doc();
+    Some(experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
+}
+
+/// Another kind that this data cannot rule out, with the experiment that separates it from the one it would replace.
+pub(super) fn alternative(kind: &str, instead_of: &str) -> Alternative {
+    let experiment = effect(kind).or_else(|| effect(instead_of)).map(|effect| effect.doc().en.experiment);
+    Alternative {
+        effect: kind.to_owned(),
+        instead_of: instead_of.to_owned(),
+        delta_ic: 0.0,
+        separating_experiment: experiment.unwrap_or_default().to_owned(),
+    }
+}
+
+/// An experiment, its gain in information within the bounds in which it is told.
+pub(super) fn experiment(statement: String, minutes: f64, gain: f64, effect: &str) -> Experiment {
+    let expected_delta_ic = gain.clamp(GAIN_BOUNDS.0, GAIN_BOUNDS.1);
+    Experiment { statement, minutes, expected_delta_ic, effect: effect.to_owned() }
 }
 
 fn form_of(part: &Part) -> Option<&Empirical> {

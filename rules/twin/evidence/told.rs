@@ -18,6 +18,7 @@ use crate::twin::inputs::rows_with_inputs;
 use crate::twin::linear::least_squares;
 use crate::twin::locate::{Region, conditions, spans};
 use crate::twin::model::{Model, Part};
+use crate::twin::next_step::{alternative, experiment, of_effects};
 use crate::twin::noise::Arma;
 use crate::twin::verdicts::unit_of;
 
@@ -179,15 +180,7 @@ impl Told<'_, '_> {
     }
 
     fn alternatives(&self) -> Vec<Alternative> {
-        let of = |(other, instead): &(String, String)| Alternative {
-            effect: other.clone(),
-            instead_of: instead.clone(),
-            delta_ic: 0.0,
-            separating_experiment: effect(other)
-                .or_else(|| effect(instead))
-                .map_or(String::new(), |effect| effect.doc().en.experiment.to_owned()),
-        };
-        self.answer.alternatives.iter().map(of).collect()
+        self.answer.alternatives.iter().map(|(other, instead)| alternative(other, instead)).collect()
     }
 
     /// What separates what is left; always where the answer is not sure.
@@ -195,23 +188,10 @@ impl Told<'_, '_> {
         if matches!(self.answer.verdict, Verdict::Explained | Verdict::NoMismatch) {
             return None;
         }
-        let known = alternatives.iter().find_map(|other| effect(&other.effect).or_else(|| effect(&other.instead_of)));
-        let known = known.or_else(|| self.answer.names.iter().find_map(|name| effect(name)));
-        let gain = self.answer.information.clamp(10.0, 100.0);
-        Some(match known.map(Effect::doc) {
-            Some(doc) => Experiment {
-                statement: doc.en.experiment.to_owned(),
-                minutes: doc.experiment_minutes,
-                expected_delta_ic: gain,
-                effect: doc.kind.to_owned(),
-            },
-            None => Experiment {
-                statement: self.sweep(),
-                minutes: SWEEP_MINUTES,
-                expected_delta_ic: gain,
-                effect: String::new(),
-            },
-        })
+        let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
+        let kinds = open.chain(self.answer.names.iter().map(String::as_str));
+        let gain = self.answer.information;
+        of_effects(kinds, gain).or_else(|| Some(experiment(self.sweep(), SWEEP_MINUTES, gain, "")))
     }
 
     /// To vary one input where the difference is largest.
