@@ -12,7 +12,7 @@ use crate::address::{Circuit, EdaTarget, SerialTarget};
 use crate::channel::ChannelId;
 use crate::clock::Clock;
 use crate::driver::{Fact, Source, SourceError};
-use crate::modbus::line::{Fault, serial_fault, serial_silence};
+use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
 use crate::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;
@@ -55,10 +55,10 @@ impl Eda9033a {
         Ok(Self { name: name.to_owned(), bus: Bus::of(line)?, address, ct, deadline, channels, late: 0 })
     }
 
-    fn ask(&mut self, clock: &dyn Clock) -> Result<(Values, Stamp), Fault> {
+    fn ask(&mut self, clock: &dyn Clock) -> Result<(Values, Stamp), ModbusError> {
         let mut bus = self.bus.lock().unwrap_or_else(PoisonError::into_inner);
         let answer = exchange(&mut bus, clock, self.address, self.deadline);
-        if matches!(answer, Err(Fault::Timeout { .. } | Fault::Garbled(_))) {
+        if matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_))) {
             bus.keep_quiet(2 * self.deadline);
         }
         self.late = bus.late_answers();
@@ -80,7 +80,7 @@ fn exchange(
     clock: &dyn Clock,
     address: u8,
     deadline: Duration,
-) -> Result<([u8; ANSWER_BYTES], Stamp), Fault> {
+) -> Result<([u8; ANSWER_BYTES], Stamp), ModbusError> {
     let target = bus.target().clone();
     let failed = |error| serial_fault(&error, &target);
     bus.send(&request(address)).map_err(failed)?;
@@ -99,9 +99,9 @@ fn exchange(
     if bytes.is_empty() { Err(serial_silence(&target)) } else { Err(no_frame(&bytes)) }
 }
 
-fn no_frame(bytes: &[u8]) -> Fault {
+fn no_frame(bytes: &[u8]) -> ModbusError {
     let shown: Vec<String> = bytes.iter().take(16).map(|byte| format!("{byte:02X}")).collect();
-    Fault::Garbled(format!("{} bytes without a good frame among them: {}", bytes.len(), shown.join(" ")))
+    ModbusError::Garbled(format!("{} bytes without a good frame among them: {}", bytes.len(), shown.join(" ")))
 }
 
 /// The answer among the bytes, wherever it begins: two-wire adapters return our own request first.

@@ -1,7 +1,7 @@
 //! The shift of an axis' coordinate: what a thermal compensation moves between two programs, and gives back.
 //!
 //! The offset belongs to the operator, who may have set it to anything and may set it anew at any time. A shift is added to
-//! what the operator has set; what somebody has changed in between is the new starting point. [`Ledger`] keeps that account,
+//! what the operator has set; what somebody has changed in between is the new starting point. [`OffsetShares`] keeps that account,
 //! the same for every control. A line that fails, or a gateway that dies, in the middle of a write leaves open whether the
 //! control has taken it: the intent stays in the account until the control was read again.
 
@@ -138,9 +138,9 @@ pub enum LastWrite {
 
 /// Whose is which part of the offset of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Ledger(Option<Left>);
+pub struct OffsetShares(Option<Left>);
 
-impl Ledger {
+impl OffsetShares {
     /// With what an earlier run has left.
     #[must_use]
     pub fn with(left: Option<Left>) -> Self {
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn what_somebody_else_has_set_is_the_new_beginning() {
-        let mut ledger = Ledger::default();
+        let mut ledger = OffsetShares::default();
         assert_eq!((ledger.settle(40.0), ledger.left()), ((40.0, LastWrite::InForce), None));
         ledger.note(40.0, 45.0);
         assert_eq!(ledger.settle(45.0), (40.0, LastWrite::InForce));
@@ -205,7 +205,7 @@ mod tests {
         for (found_um, last, shift_um) in
             [(48.0, LastWrite::Taken, 8.0), (45.0, LastWrite::NotTaken, 5.0), (7.0, LastWrite::Replaced, 0.0)]
         {
-            let mut ledger = Ledger::default();
+            let mut ledger = OffsetShares::default();
             ledger.intend(40.0, 45.0, 48.0);
             let (base_um, found) = ledger.settle(found_um);
             let left = ledger.left().map_or(0.0, |left| left.shift_um());

@@ -20,7 +20,7 @@ enum Filled {
     Words(Words, Vec<Arc<str>>),
 }
 
-struct Column {
+struct ReplayedColumn {
     channel: ChannelId,
     cells: Filled,
     /// Reasons from `<channel>_missing`.
@@ -32,7 +32,7 @@ pub struct Replay {
     name: String,
     channels: Vec<ChannelId>,
     ignored: Vec<String>,
-    columns: Vec<Column>,
+    columns: Vec<ReplayedColumn>,
     times_ns: Vec<TimeNs>,
     period: Duration,
     row: usize,
@@ -167,7 +167,7 @@ impl Source for LiveReplay {
     }
 }
 
-impl Column {
+impl ReplayedColumn {
     fn reading(&self, row: usize, stamp: Stamp) -> Reading {
         let value = match &self.cells {
             Filled::Numbers(numbers) => numbers.get(row).map(|number| Reading::number(self.channel, stamp, number)),
@@ -185,7 +185,7 @@ impl Column {
     }
 }
 
-fn split(recording: &Recording) -> (Vec<Column>, Vec<String>) {
+fn split(recording: &Recording) -> (Vec<ReplayedColumn>, Vec<String>) {
     let mut columns = Vec::new();
     let mut ignored = Vec::new();
     for column in recording.columns() {
@@ -193,7 +193,7 @@ fn split(recording: &Recording) -> (Vec<Column>, Vec<String>) {
         match ChannelId::of(&column.name).and_then(|channel| filled(channel, &column.cells)) {
             Some((channel, cells)) => {
                 let missing = recording.words(&format!("{}_missing", column.name)).cloned();
-                columns.push(Column { channel, cells, missing });
+                columns.push(ReplayedColumn { channel, cells, missing });
             }
             None if missing => {}
             None => ignored.push(column.name.clone()),

@@ -40,12 +40,12 @@ pub fn silence(target: &SerialTarget) -> Duration {
 
 /// An open line.
 #[derive(Debug)]
-struct Open {
+struct OpenPort {
     file: File,
     last_byte: Instant,
 }
 
-fn open(target: &SerialTarget) -> io::Result<Open> {
+fn open(target: &SerialTarget) -> io::Result<OpenPort> {
     // Without NONBLOCK the open itself waits for a modem's carrier.
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
     let mut options = OpenOptions::new();
@@ -54,7 +54,7 @@ fn open(target: &SerialTarget) -> io::Result<Open> {
     flock(&file, FlockOperation::NonBlockingLockExclusive)
         .map_err(|_| io::Error::new(ErrorKind::ResourceBusy, "another program holds the line"))?;
     set_up(&file, target)?;
-    Ok(Open { file, last_byte: Instant::now() })
+    Ok(OpenPort { file, last_byte: Instant::now() })
 }
 
 fn set_up(file: &File, target: &SerialTarget) -> io::Result<()> {
@@ -75,7 +75,7 @@ fn set_up(file: &File, target: &SerialTarget) -> io::Result<()> {
 #[derive(Debug)]
 pub struct Bus {
     target: SerialTarget,
-    open: Option<Open>,
+    open: Option<OpenPort>,
     quiet_until: Option<Instant>,
     late_answers: u64,
 }
@@ -158,7 +158,7 @@ impl Bus {
         self.quiet_until = Some(Instant::now() + wait);
     }
 
-    fn line(&mut self) -> io::Result<&mut Open> {
+    fn line(&mut self) -> io::Result<&mut OpenPort> {
         if self.open.is_none() {
             self.open = Some(open(&self.target)?);
         }
@@ -180,7 +180,7 @@ impl Bus {
     }
 }
 
-fn receive(line: &mut Open, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
+fn receive(line: &mut OpenPort, until: Instant, into: &mut Vec<u8>) -> io::Result<bool> {
     let mut buffer = [0_u8; 512];
     loop {
         match line.file.read(&mut buffer) {

@@ -75,7 +75,7 @@ enum Sensor {
     OneWire(String),
 }
 
-struct Point {
+struct ProbeChannel {
     channel: ChannelId,
     name: String,
     sensor: Sensor,
@@ -86,7 +86,7 @@ struct Point {
 pub struct Temperatures {
     address: String,
     sys: PathBuf,
-    points: Vec<Point>,
+    points: Vec<ProbeChannel>,
     channels: Vec<ChannelId>,
     period: Duration,
 }
@@ -111,7 +111,7 @@ impl Temperatures {
         if !(1..=POINTS_MAX).contains(&raw.point.len()) {
             problems.push(format!("{} points: there are 1 to {POINTS_MAX}", raw.point.len()));
         }
-        let mut points: Vec<Point> = Vec::new();
+        let mut points: Vec<ProbeChannel> = Vec::new();
         for (index, raw) in raw.point.iter().enumerate() {
             match point(raw) {
                 Ok(point) if points.iter().any(|other| other.channel == point.channel) => {
@@ -130,7 +130,7 @@ impl Temperatures {
     }
 }
 
-fn point(raw: &RawPoint) -> Result<Point, String> {
+fn point(raw: &RawPoint) -> Result<ProbeChannel, String> {
     let channel = ChannelId::of(&raw.channel).filter(|id| id.channel().unit == "°C").ok_or_else(|| {
         let names = channel::CHANNELS.iter().filter(|known| known.unit == "°C").map(|known| known.name);
         let hint = channel::nearest(&raw.channel, names).map(|near| format!("; did you mean {near}?"));
@@ -149,7 +149,7 @@ fn point(raw: &RawPoint) -> Result<Point, String> {
     if !raw.offset_c.is_finite() {
         return Err("offset_c is no number".to_owned());
     }
-    Ok(Point { channel, name: raw.name.clone(), sensor, offset_c: raw.offset_c })
+    Ok(ProbeChannel { channel, name: raw.name.clone(), sensor, offset_c: raw.offset_c })
 }
 
 fn text_of(file: &Path, most: u64) -> io::Result<String> {
@@ -254,8 +254,9 @@ impl Source for Temperatures {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        let told =
-            |point: &Point| Fact::text(point.channel.name(), format!("{} ({})", point.name, point.sensor.told()));
+        let told = |point: &ProbeChannel| {
+            Fact::text(point.channel.name(), format!("{} ({})", point.name, point.sensor.told()))
+        };
         self.points.iter().map(told).collect()
     }
 }

@@ -161,7 +161,7 @@ pub(super) fn paths(keys: &mut Keys) -> Option<(u8, Vec<u8>)> {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Word {
+enum AddressWord {
     None,
     Mailbox,
     Second,
@@ -171,24 +171,24 @@ enum Word {
 
 fn write(keys: &mut Keys) -> WriteMethod {
     let words = [
-        ("none", Word::None),
-        ("mailbox", Word::Mailbox),
-        ("second_override", Word::Second),
-        ("macro", Word::Macro),
-        ("direct", Word::Direct),
+        ("none", AddressWord::None),
+        ("mailbox", AddressWord::Mailbox),
+        ("second_override", AddressWord::Second),
+        ("macro", AddressWord::Macro),
+        ("direct", AddressWord::Direct),
     ];
     match keys.choice("write", &words) {
-        Word::None => WriteMethod::None,
-        Word::Mailbox => {
+        AddressWord::None => WriteMethod::None,
+        AddressWord::Mailbox => {
             let (area, at) = place_or(keys, "mailbox", (Area::R, 900));
             WriteMethod::Mailbox { area, at }
         }
-        Word::Second => {
+        AddressWord::Second => {
             let (area, at) = place_or(keys, "second_override", (Area::R, 910));
             WriteMethod::SecondOverride { area, at }
         }
-        Word::Macro => WriteMethod::Macro { variable: keys.number("macro", 500, 100, 999) },
-        Word::Direct => WriteMethod::Direct,
+        AddressWord::Macro => WriteMethod::Macro { variable: keys.number("macro", 500, 100, 999) },
+        AddressWord::Direct => WriteMethod::Direct,
     }
 }
 

@@ -4,7 +4,7 @@ use super::keys::Keys;
 use super::meter::{self, WaveformKeep};
 use super::secured::{Login, tls_files};
 use super::target::{Endpoint, Target, endpoint, library};
-use crate::nclink::mailbox::{Mailbox, Register};
+use crate::nclink::mailbox::{ControllerRegister, Mailbox};
 use crate::nclink::offset_mailbox::OffsetMailbox;
 use crate::tls::TlsFiles;
 use std::path::PathBuf;
@@ -27,9 +27,9 @@ pub struct NcLinkTarget {
     /// Number of the spindle among the axes, where it is not 5.
     pub spindle_axis: Option<u32>,
     /// First register of the mailbox for the feed override; without one nothing is ever written.
-    pub mailbox: Option<Register>,
+    pub mailbox: Option<ControllerRegister>,
     /// First register of the mailbox for offsets; without one no axis is ever shifted.
-    pub offset: Option<Register>,
+    pub offset: Option<ControllerRegister>,
     /// Make the spindle's current out of the device's sample channel?
     pub sample: bool,
     /// Keep its raw samples around high currents?
@@ -59,7 +59,7 @@ pub struct HncNetTarget {
     /// Keep raw samples of the spindle's current around high ones?
     pub keep: Option<WaveformKeep>,
     /// First register of the mailbox for the feed override; without one none is ever written.
-    pub mailbox: Option<Register>,
+    pub mailbox: Option<ControllerRegister>,
     /// How axes are shifted; without it none ever is.
     pub offset: Option<HncOffset>,
 }
@@ -68,7 +68,7 @@ pub struct HncNetTarget {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HncOffset {
     /// Through registers that the ladder reads, from this one on.
-    Registers(Register),
+    Registers(ControllerRegister),
     /// By the channel's external zero offset.
     Zero {
         /// What a count is, µm.
@@ -145,7 +145,7 @@ pub(super) fn hncnet(body: &str, keys: &mut Keys) -> Result<Target, String> {
 }
 
 /// `offset=D110`, or `offset=zero` with what a count is.
-fn hnc_offset(keys: &mut Keys, mailbox: Option<Register>) -> Option<HncOffset> {
+fn hnc_offset(keys: &mut Keys, mailbox: Option<ControllerRegister>) -> Option<HncOffset> {
     let text = keys.text("offset");
     let unit_um = keys.optional("offset_unit_um", 1e-4, 100.0);
     match (text.as_deref(), unit_um) {
@@ -162,13 +162,13 @@ fn hnc_offset(keys: &mut Keys, mailbox: Option<Register>) -> Option<HncOffset> {
 }
 
 /// Where the mailbox for offsets begins; it must not lie over the one for the feed override.
-fn registers(keys: &mut Keys, text: &str, mailbox: Option<Register>) -> Option<Register> {
-    let first = text.parse::<Register>().map_err(|problem| keys.problem(format!("offset={problem}"))).ok()?;
+fn registers(keys: &mut Keys, text: &str, mailbox: Option<ControllerRegister>) -> Option<ControllerRegister> {
+    let first = text.parse::<ControllerRegister>().map_err(|problem| keys.problem(format!("offset={problem}"))).ok()?;
     if !OffsetMailbox::may_begin(first) {
         keys.problem(format!("offset={first}: name a W or D register; others are too short or keep their contents"));
         return None;
     }
-    let overlaps = |other: &Register| {
+    let overlaps = |other: &ControllerRegister| {
         let apart = other.index + Mailbox::LENGTH <= first.index || first.index + OffsetMailbox::LENGTH <= other.index;
         other.kind == first.kind && !apart
     };
@@ -189,7 +189,7 @@ fn kept(keys: &mut Keys, sampled: bool, next: &str) -> Result<Option<WaveformKee
 }
 
 /// `write=mailbox`, and where it begins.
-fn mailbox(keys: &mut Keys) -> Option<Register> {
+fn mailbox(keys: &mut Keys) -> Option<ControllerRegister> {
     let wanted = keys.choice("write", &[("none", false), ("mailbox", true)]);
     let text = keys.text("mailbox");
     if !wanted {
@@ -198,7 +198,7 @@ fn mailbox(keys: &mut Keys) -> Option<Register> {
         }
         return None;
     }
-    match text.as_deref().unwrap_or("D100").parse::<Register>() {
+    match text.as_deref().unwrap_or("D100").parse::<ControllerRegister>() {
         Ok(first) if Mailbox::may_begin(first) => Some(first),
         Ok(first) => {
             keys.problem(format!(

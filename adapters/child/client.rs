@@ -21,12 +21,12 @@ pub enum Taken {
 }
 
 /// A child that is asked in words of one's own. `Q` names what it can die of.
-pub struct Client<Q> {
+pub struct ChildClient<Q> {
     child: Supervised,
     deaths: HashMap<Q, u32>,
 }
 
-impl<Q: Copy + Eq + Hash> Client<Q> {
+impl<Q: Copy + Eq + Hash> ChildClient<Q> {
     /// Nothing is started before the first question.
     #[must_use]
     pub fn new(settings: ChildSettings) -> Self {

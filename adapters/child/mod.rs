@@ -38,7 +38,7 @@ mod supervise;
 mod tests;
 
 pub use crate::vendor_functions as functions;
-pub use client::{Client, Taken};
+pub use client::{ChildClient, Taken};
 pub use ffi::{Argument, Missing, Returned, reason};
 pub use guard::{Guarded, MARGIN_LEN, Overrun};
 pub use message::MESSAGE_MAX;

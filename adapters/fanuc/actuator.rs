@@ -14,11 +14,11 @@
 //! Nothing is looked at sooner than the settling time after a write: a return code 0 says that a byte has arrived, not
 //! that the ladder left it there.
 
-use super::answer::{Answer, ItemResult};
+use super::answer::{FocasAnswer, FocasItemResult};
 use super::asking::Asking;
 use super::dial::Dial;
 use super::feed_override;
-use super::item::{Area, Item, Stretch, Write};
+use super::item::{Area, FocasItem, Stretch, Write};
 use super::line::{Asked, FanucLine};
 use super::poll::signal;
 use super::server::ladder::ENABLED;
@@ -91,18 +91,18 @@ impl FanucActuator {
         })
     }
 
-    fn item(&self) -> Item {
+    fn item(&self) -> FocasItem {
         match self.method {
-            WriteMethod::Mailbox { area, at } => Item::Pmc(Stretch::bytes(area, at, 5)),
+            WriteMethod::Mailbox { area, at } => FocasItem::Pmc(Stretch::bytes(area, at, 5)),
             WriteMethod::SecondOverride { .. } => self.signal(feed_override::SECOND_AT),
-            WriteMethod::Macro { variable } => Item::Macro(variable),
+            WriteMethod::Macro { variable } => FocasItem::Macro(variable),
             WriteMethod::Direct | WriteMethod::None => self.signal(feed_override::AT),
         }
     }
 
     /// A byte of override signals of this path.
-    fn signal(&self, at: u16) -> Item {
-        Item::Pmc(Stretch::bytes(Area::G, signal(at, self.path), 1))
+    fn signal(&self, at: u16) -> FocasItem {
+        FocasItem::Pmc(Stretch::bytes(Area::G, signal(at, self.path), 1))
     }
 
     fn give_back(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
@@ -125,40 +125,40 @@ impl FanucActuator {
     }
 
     /// The byte that an earlier run may have left on, and what it holds then.
-    fn leftover(&self) -> Option<(Item, IsLeftOn)> {
+    fn leftover(&self) -> Option<(FocasItem, IsLeftOn)> {
         match self.method {
             WriteMethod::Mailbox { area, at } => {
-                Some((Item::Pmc(Stretch::bytes(area, at, 1)), |byte| byte == i32::from(ENABLED)))
+                Some((FocasItem::Pmc(Stretch::bytes(area, at, 1)), |byte| byte == i32::from(ENABLED)))
             }
             WriteMethod::SecondOverride { area, at } => {
-                Some((Item::Pmc(Stretch::bytes(area, at, 1)), |byte| byte != 0))
+                Some((FocasItem::Pmc(Stretch::bytes(area, at, 1)), |byte| byte != 0))
             }
             WriteMethod::Macro { .. } | WriteMethod::Direct | WriteMethod::None => None,
         }
     }
 
     /// What the way of writing itself says.
-    fn told(&self, asked: &Asked, item: Item) -> Result<OverridePct, SourceError> {
+    fn told(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
         match (asked.of(item), self.method) {
-            (Some(Ok(Answer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
-            (Some(Ok(Answer::Memory(_))), WriteMethod::SecondOverride { .. }) => self.override_of(asked, item),
-            (Some(Ok(Answer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
+            (Some(Ok(FocasAnswer::Memory(bytes))), WriteMethod::Mailbox { .. }) => self.of_mailbox(bytes),
+            (Some(Ok(FocasAnswer::Memory(_))), WriteMethod::SecondOverride { .. }) => self.override_of(asked, item),
+            (Some(Ok(FocasAnswer::Memory(bytes))), _) => self.of_direct(bytes.first().copied().unwrap_or(-1)),
             // A vacant variable asks for nothing.
-            (Some(Ok(Answer::Number(None))), _) => Ok(OverridePct::FULL),
-            (Some(Ok(Answer::Number(Some(value)))), _) => self.percent(*value),
+            (Some(Ok(FocasAnswer::Number(None))), _) => Ok(OverridePct::FULL),
+            (Some(Ok(FocasAnswer::Number(Some(value)))), _) => self.percent(*value),
             (other, _) => Err(self.unread(other)),
         }
     }
 
-    fn bytes<'a>(&self, asked: &'a Asked, item: Item) -> Result<&'a [i32], SourceError> {
+    fn bytes<'a>(&self, asked: &'a Asked, item: FocasItem) -> Result<&'a [i32], SourceError> {
         match asked.of(item) {
-            Some(Ok(Answer::Memory(bytes))) => Ok(bytes),
+            Some(Ok(FocasAnswer::Memory(bytes))) => Ok(bytes),
             other => Err(self.unread(other)),
         }
     }
 
     /// It was asked for, and this came.
-    fn unread(&self, found: Option<&ItemResult>) -> SourceError {
+    fn unread(&self, found: Option<&FocasItemResult>) -> SourceError {
         match found {
             Some(Err(error)) => self.refused(&format!("it cannot be read back: {error}"), error.next()),
             _ => self.decode("another kind of answer"),
@@ -169,11 +169,11 @@ impl FanucActuator {
     fn dial_of(&self, asked: &Asked) -> Result<OverridePct, SourceError> {
         let none = || self.decode("the byte of the dial is no override");
         let dial = self.dial.ok_or_else(none)?;
-        dial.read(self.bytes(asked, Item::Pmc(dial.stretch()))?).ok_or_else(none)
+        dial.read(self.bytes(asked, FocasItem::Pmc(dial.stretch()))?).ok_or_else(none)
     }
 
     /// An inverted byte.
-    fn override_of(&self, asked: &Asked, item: Item) -> Result<OverridePct, SourceError> {
+    fn override_of(&self, asked: &Asked, item: FocasItem) -> Result<OverridePct, SourceError> {
         let byte = self.bytes(asked, item)?.first().and_then(|byte| u8::try_from(*byte).ok());
         byte.map(feed_override::decode).ok_or_else(|| self.decode("an override signal is a byte"))
     }
@@ -249,8 +249,8 @@ impl Actuator for FanucActuator {
             clock.sleep_until(at_ns.saturating_add(self.settle_ns));
         }
         let (own, obeyed) = (self.item(), self.signal(feed_override::AT));
-        let dial = self.dial.map(|dial| Item::Pmc(dial.stretch()));
-        let items: Vec<Item> = [own].into_iter().chain(dial.into_iter().flat_map(|dial| [obeyed, dial])).collect();
+        let dial = self.dial.map(|dial| FocasItem::Pmc(dial.stretch()));
+        let items: Vec<FocasItem> = [own].into_iter().chain(dial.into_iter().flat_map(|dial| [obeyed, dial])).collect();
         let asked = self.line.ask(clock, &items)?;
         let told = self.told(&asked, own)?;
         if self.written.is_none() {
@@ -273,7 +273,7 @@ impl Actuator for FanucActuator {
         {
             return Ok(Some(beside));
         }
-        let asked = self.line.ask(clock, &[Item::Pmc(dial.stretch())])?;
+        let asked = self.line.ask(clock, &[FocasItem::Pmc(dial.stretch())])?;
         self.dial_of(&asked).map(Some)
     }
 

@@ -1,6 +1,6 @@
 //! What a controller answers, typed. Numbers are in the unit that the question implies.
 
-use super::code::{Consequence, ReturnCode};
+use super::code::{Consequence, FocasReturnCode};
 use crate::driver::SEE_DOCTOR;
 use crate::reading::Absence;
 use serde::{Deserialize, Serialize};
@@ -162,7 +162,7 @@ pub struct PastAlarm {
 
 /// A message to the operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Message {
+pub struct OperatorMessage {
     /// Its number; -1 where there is none.
     pub number: i32,
     /// 0 to 3 messages of the ladder, 4 of a macro program.
@@ -173,8 +173,8 @@ pub struct Message {
 
 /// What was asked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Answer {
-    /// To [`Item::System`](super::item::Item::System).
+pub enum FocasAnswer {
+    /// To [`Item::System`](super::item::FocasItem::System).
     System(System),
     /// To a status.
     Status(Status),
@@ -207,7 +207,7 @@ pub enum Answer {
     /// The alarms that are on.
     Alarms(Vec<Alarm>),
     /// Messages to the operator.
-    Messages(Vec<Message>),
+    Messages(Vec<OperatorMessage>),
     /// Alarms that have been, the oldest first.
     History(Vec<PastAlarm>),
     /// Life of the tools of a group.
@@ -252,14 +252,14 @@ pub enum Answer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     /// Why.
-    pub code: ReturnCode,
+    pub code: FocasReturnCode,
     /// More about it.
     pub detail: i16,
 }
 
 /// Why one item of a poll has no value, while the others have.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ItemError {
+pub enum FocasItemError {
     /// The control refused.
     Refused(Refusal),
     /// Its answer makes no sense.
@@ -270,7 +270,7 @@ pub enum ItemError {
     NotOffered,
 }
 
-impl fmt::Display for ItemError {
+impl fmt::Display for FocasItemError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refused(refusal) => refusal.code.fmt(f),
@@ -280,12 +280,12 @@ impl fmt::Display for ItemError {
     }
 }
 
-impl ItemError {
+impl FocasItemError {
     /// The reason that a reading without this item has.
     #[must_use]
     pub fn absence(&self) -> Absence {
         match self {
-            Self::Refused(refusal) if refusal.code == ReturnCode::PATH => Absence::Refused,
+            Self::Refused(refusal) if refusal.code == FocasReturnCode::PATH => Absence::Refused,
             Self::Refused(refusal) => match refusal.code.consequence() {
                 Consequence::NotSupported | Consequence::Wrong => Absence::NotSupported,
                 _ => Absence::Refused,
@@ -307,4 +307,4 @@ impl ItemError {
 }
 
 /// What became of one item.
-pub type ItemResult = Result<Answer, ItemError>;
+pub type FocasItemResult = Result<FocasAnswer, FocasItemError>;

@@ -4,8 +4,8 @@
 //! acknowledged, and the gateway switches the bit off again. So a request counts once however often it is sent, a line
 //! that breaks in between leaves nothing that asks a second time, and a ladder without the rungs is found out.
 
-use super::answer::Answer;
-use super::item::{Area, Item, Stretch, Write};
+use super::answer::FocasAnswer;
+use super::item::{Area, FocasItem, Stretch, Write};
 use super::line::FanucLine;
 use super::server::ladder::request_bit;
 use crate::clock::Clock;
@@ -76,9 +76,9 @@ impl Asking {
 
     /// The gateway's byte and the ladder's.
     fn look(&self, clock: &dyn Clock, request: LadderRequest) -> Result<(i32, i32), SourceError> {
-        let item = Item::Pmc(Stretch::bytes(self.at.0, self.at.1, 2));
+        let item = FocasItem::Pmc(Stretch::bytes(self.at.0, self.at.1, 2));
         match self.line.ask(clock, &[item])?.of(item) {
-            Some(Ok(Answer::Memory(bytes))) if bytes.len() == 2 => Ok((bytes[0], bytes[1])),
+            Some(Ok(FocasAnswer::Memory(bytes))) if bytes.len() == 2 => Ok((bytes[0], bytes[1])),
             Some(Err(error)) => Err(self.refused(request, format!("its bytes cannot be read: {error}"), error.next())),
             _ => Err(self.refused(request, "its bytes cannot be read: another kind of answer".to_owned(), SEE_DOCTOR)),
         }

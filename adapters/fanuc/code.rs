@@ -5,7 +5,7 @@ use std::fmt;
 
 /// A return code; 0 is success and never stands here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct ReturnCode(pub i16);
+pub struct FocasReturnCode(pub i16);
 
 /// What follows from a code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Consequence {
     State,
 }
 
-struct Row {
+struct CodeRow {
     code: i16,
     name: &'static str,
     what: &'static str,
@@ -30,13 +30,19 @@ struct Row {
     consequence: Consequence,
 }
 
-const fn row(code: i16, name: &'static str, consequence: Consequence, what: &'static str, next: &'static str) -> Row {
-    Row { code, name, what, next, consequence }
+const fn row(
+    code: i16,
+    name: &'static str,
+    consequence: Consequence,
+    what: &'static str,
+    next: &'static str,
+) -> CodeRow {
+    CodeRow { code, name, what, next, consequence }
 }
 
 use Consequence::{Again, NotSupported, Reconnect, State, Wrong};
 
-const TABLE: [Row; 35] = [
+const TABLE: [CodeRow; 35] = [
     row(
         -17,
         "EW_PROTOCOL",
@@ -110,7 +116,7 @@ const TABLE: [Row; 35] = [
     row(18, "EW_PMC", State, "an error in the PMC", "Look at the PMC alarm screen"),
 ];
 
-impl ReturnCode {
+impl FocasReturnCode {
     /// The reset button.
     pub const BUSY: Self = Self(-1);
     /// No such function.
@@ -132,7 +138,7 @@ impl ReturnCode {
     /// Connection lost, as the vendor's library says it.
     pub const SOCKET: Self = Self(-16);
 
-    fn row(self) -> Option<&'static Row> {
+    fn row(self) -> Option<&'static CodeRow> {
         TABLE.iter().find(|row| row.code == self.0)
     }
 
@@ -161,7 +167,7 @@ impl ReturnCode {
     }
 }
 
-impl fmt::Display for ReturnCode {
+impl fmt::Display for FocasReturnCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({} {})", self.what(), self.name(), self.0)
     }
@@ -174,18 +180,18 @@ mod tests {
     #[test]
     fn every_code_of_the_header_has_words() {
         for code in (-17..=18).filter(|code| *code != 0) {
-            let code = ReturnCode(code);
+            let code = FocasReturnCode(code);
             assert!(code.name().starts_with("EW_") && code.name() != "EW_?", "{code:?}");
             assert!(!code.what().is_empty() && !code.next().is_empty());
         }
-        assert_eq!(ReturnCode(99).name(), "EW_?");
+        assert_eq!(FocasReturnCode(99).name(), "EW_?");
     }
 
     #[test]
     fn what_follows_from_a_code() {
-        assert_eq!(ReturnCode::SOCKET.consequence(), Reconnect);
-        assert_eq!(ReturnCode::NOOPT.consequence(), NotSupported);
-        assert_eq!(ReturnCode(13).consequence(), State);
-        assert_eq!(ReturnCode::BUSY.consequence(), Again);
+        assert_eq!(FocasReturnCode::SOCKET.consequence(), Reconnect);
+        assert_eq!(FocasReturnCode::NOOPT.consequence(), NotSupported);
+        assert_eq!(FocasReturnCode(13).consequence(), State);
+        assert_eq!(FocasReturnCode::BUSY.consequence(), Again);
     }
 }

@@ -1,8 +1,8 @@
 //! The data of an answer, typed. Every length is checked: the vendor's own library does not, and takes nothing for a
 //! value.
 
-use super::answer::{Alarm, Answer, SpeedUnit, Status, System};
-use super::item::{Item, Spindle, Width};
+use super::answer::{Alarm, FocasAnswer, SpeedUnit, Status, System};
+use super::item::{FocasItem, PmcWidth, Spindle};
 use super::opening::Generation;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, Number, WireError};
@@ -15,70 +15,74 @@ const DIAGNOSIS_REAL: i16 = 5;
 ///
 /// # Errors
 /// The length does not fit the item.
-pub fn answer(item: Item, generation: Generation, data: &[u8]) -> Result<Answer, WireError> {
+pub fn answer(item: FocasItem, generation: Generation, data: &[u8]) -> Result<FocasAnswer, WireError> {
     let mut cursor = Cursor::new("data of an answer", data);
     let answer = match item {
-        Item::System => Answer::System(system(&mut cursor)?),
-        Item::Status => Answer::Status(status(&mut cursor)?),
-        Item::StatusLong => {
+        FocasItem::System => FocasAnswer::System(system(&mut cursor)?),
+        FocasItem::Status => FocasAnswer::Status(status(&mut cursor)?),
+        FocasItem::StatusLong => {
             let status = status(&mut cursor)?;
             cursor.bytes(8)?;
-            Answer::Status(status)
+            FocasAnswer::Status(status)
         }
-        Item::Feed | Item::SpindleSpeed | Item::Position(_, 1..) => Answer::Number(number(&mut cursor)?.measured()),
-        Item::Macro(_) => Answer::Number(number(&mut cursor)?.value()),
-        Item::ToolOffset(..) | Item::WorkOffset(..) => Answer::Number(number(&mut cursor)?.measured()),
-        Item::Spindles(Spindle::PlainLoad | Spindle::MaxSpeed | Spindle::Gear) => {
-            Answer::Numbers(each(&mut cursor, Number::LEN, |c| Ok(Some(f64::from(number(c)?.mantissa))))?)
+        FocasItem::Feed | FocasItem::SpindleSpeed | FocasItem::Position(_, 1..) => {
+            FocasAnswer::Number(number(&mut cursor)?.measured())
         }
-        Item::Spindles(_) | Item::Servos(_) | Item::Position(..) => {
-            Answer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
+        FocasItem::Macro(_) => FocasAnswer::Number(number(&mut cursor)?.value()),
+        FocasItem::ToolOffset(..) | FocasItem::WorkOffset(..) => FocasAnswer::Number(number(&mut cursor)?.measured()),
+        FocasItem::Spindles(Spindle::PlainLoad | Spindle::MaxSpeed | Spindle::Gear) => {
+            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |c| Ok(Some(f64::from(number(c)?.mantissa))))?)
         }
-        Item::FeedUnit => Answer::Unit(unit(generation, cursor.i16()?)),
-        Item::SpindleUnit => {
+        FocasItem::Spindles(_) | FocasItem::Servos(_) | FocasItem::Position(..) => {
+            FocasAnswer::Numbers(each(&mut cursor, Number::LEN, |cursor| Ok(number(cursor)?.measured()))?)
+        }
+        FocasItem::FeedUnit => FocasAnswer::Unit(unit(generation, cursor.i16()?)),
+        FocasItem::SpindleUnit => {
             // The library says rpm whatever the number is.
             cursor.i16()?;
-            Answer::Unit(SpeedUnit::Rpm)
+            FocasAnswer::Unit(SpeedUnit::Rpm)
         }
-        Item::HandleRetrace | Item::ToolMode | Item::Count(_) | Item::TuningMode => {
-            Answer::Whole(i32::from(cursor.i16()?))
+        FocasItem::HandleRetrace | FocasItem::ToolMode | FocasItem::Count(_) | FocasItem::TuningMode => {
+            FocasAnswer::Whole(i32::from(cursor.i16()?))
         }
-        Item::Sequence | Item::BlockCount | Item::AlarmBits => Answer::Whole(cursor.i32()?),
-        Item::AxisNames | Item::SpindleNames(_) => Answer::Names(each(&mut cursor, 4, name)?),
-        Item::Program => Answer::Program { running: cursor.i32()?, main: cursor.i32()? },
-        Item::ProgramName => Answer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
-        Item::ProgramPath | Item::MainProgram => Answer::Text(text(rest(&mut cursor)?)),
-        Item::Alarms(_) => Answer::Alarms(each(&mut cursor, 16 + super::request::ALARM_TEXT_LEN, alarm)?),
-        Item::ModalGroup(_) => Answer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
-        Item::ModalWord(_) => {
+        FocasItem::Sequence | FocasItem::BlockCount | FocasItem::AlarmBits => FocasAnswer::Whole(cursor.i32()?),
+        FocasItem::AxisNames | FocasItem::SpindleNames(_) => FocasAnswer::Names(each(&mut cursor, 4, name)?),
+        FocasItem::Program => FocasAnswer::Program { running: cursor.i32()?, main: cursor.i32()? },
+        FocasItem::ProgramName => FocasAnswer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
+        FocasItem::ProgramPath | FocasItem::MainProgram => FocasAnswer::Text(text(rest(&mut cursor)?)),
+        FocasItem::Alarms(_) => FocasAnswer::Alarms(each(&mut cursor, 16 + super::request::ALARM_TEXT_LEN, alarm)?),
+        FocasItem::ModalGroup(_) => FocasAnswer::Groups(each(&mut cursor, 2, |cursor| Ok(cursor.bytes(2)?[0]))?),
+        FocasItem::ModalWord(_) => {
             let (value, flags) = (cursor.i32()?, [cursor.u8()?, cursor.u8()?]);
             cursor.bytes(2)?;
-            Answer::Modal { value, flags }
+            FocasAnswer::Modal { value, flags }
         }
-        Item::Parameter(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, REAL)?,
-        Item::Diagnosis(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
-        Item::Pmc(stretch) => {
+        FocasItem::Parameter(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, REAL)?,
+        FocasItem::Diagnosis(wanted, axis) => parameter(&mut cursor, generation, wanted, axis, DIAGNOSIS_REAL)?,
+        FocasItem::Pmc(stretch) => {
             if data.len() != stretch.len() {
                 return Err(mismatch("bytes of PMC memory", stretch.len(), data.len()));
             }
-            Answer::Memory(each(&mut cursor, usize::from(stretch.width.bytes()), |c| element(c, stretch.width))?)
+            FocasAnswer::Memory(each(&mut cursor, usize::from(stretch.width.bytes()), |c| element(c, stretch.width))?)
         }
-        Item::ExecutedText(_) => Answer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
-        Item::Timer(_) => Answer::Time { minutes: cursor.i32()?, milliseconds: cursor.i32()? },
-        Item::PanelSignals(_) => Answer::Signals(each(&mut cursor, 2, |cursor| cursor.i16())?),
-        Item::CncId => Answer::Text(super::records::cnc_id(&mut cursor)?),
-        Item::Messages(_) => Answer::Messages(each(&mut cursor, 12 + MESSAGE_TEXT_LEN, super::records::message)?),
-        Item::HistoryCount => Answer::Whole(cursor.i32()?),
-        Item::AlarmHistory(..) => {
-            Answer::History(each(&mut cursor, 28 + HISTORY_TEXT_LEN, super::records::past_alarm)?)
+        FocasItem::ExecutedText(_) => FocasAnswer::Named { number: cursor.i32()?, name: text(rest(&mut cursor)?) },
+        FocasItem::Timer(_) => FocasAnswer::Time { minutes: cursor.i32()?, milliseconds: cursor.i32()? },
+        FocasItem::PanelSignals(_) => FocasAnswer::Signals(each(&mut cursor, 2, |cursor| cursor.i16())?),
+        FocasItem::CncId => FocasAnswer::Text(super::records::cnc_id(&mut cursor)?),
+        FocasItem::Messages(_) => {
+            FocasAnswer::Messages(each(&mut cursor, 12 + MESSAGE_TEXT_LEN, super::records::message)?)
         }
-        Item::GCodes => Answer::Names(each(&mut cursor, 12, super::records::g_code)?),
-        Item::ToolGroup => {
+        FocasItem::HistoryCount => FocasAnswer::Whole(cursor.i32()?),
+        FocasItem::AlarmHistory(..) => {
+            FocasAnswer::History(each(&mut cursor, 28 + HISTORY_TEXT_LEN, super::records::past_alarm)?)
+        }
+        FocasItem::GCodes => FocasAnswer::Names(each(&mut cursor, 12, super::records::g_code)?),
+        FocasItem::ToolGroup => {
             let [_next, in_use, _selected] = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
             cursor.bytes(cursor.left())?;
-            Answer::Whole(in_use)
+            FocasAnswer::Whole(in_use)
         }
-        Item::ToolLife(group) => super::records::life(&mut cursor, group)?,
+        FocasItem::ToolLife(group) => super::records::life(&mut cursor, group)?,
     };
     cursor.end()?;
     Ok(answer)
@@ -159,11 +163,11 @@ fn alarm(cursor: &mut Cursor<'_>) -> Result<Alarm, WireError> {
     Ok(Alarm { number, kind, axis, text: text(&bytes[..length]) })
 }
 
-fn element(cursor: &mut Cursor<'_>, width: Width) -> Result<i32, WireError> {
+fn element(cursor: &mut Cursor<'_>, width: PmcWidth) -> Result<i32, WireError> {
     match width {
-        Width::Byte => cursor.u8().map(i32::from),
-        Width::Word => cursor.i16().map(i32::from),
-        Width::Long => cursor.i32(),
+        PmcWidth::Byte => cursor.u8().map(i32::from),
+        PmcWidth::Word => cursor.i16().map(i32::from),
+        PmcWidth::Long => cursor.i32(),
     }
 }
 
@@ -175,7 +179,7 @@ fn parameter(
     wanted: u16,
     axis: i16,
     real: i16,
-) -> Result<Answer, WireError> {
+) -> Result<FocasAnswer, WireError> {
     let (found, _axis, kind) = (cursor.i32()?, cursor.i16()?, cursor.i16()?);
     if found != i32::from(wanted) {
         let what = "number of a parameter";
@@ -192,5 +196,5 @@ fn parameter(
     if axis >= 0 {
         values.truncate(1);
     }
-    Ok(Answer::Data { kind, values })
+    Ok(FocasAnswer::Data { kind, values })
 }

@@ -4,37 +4,37 @@
 //! Only values that hold between readings: one that is interpolated would keep all the others waiting for it. What a control
 //! does not have is asked for once per connection.
 
-use super::answer::{Answer, Message, PastAlarm};
-use super::item::{Item, Question, Spindle, Timer, Word};
+use super::answer::{FocasAnswer, OperatorMessage, PastAlarm};
+use super::item::{BlockWord, FocasItem, Question, Spindle, Timer};
 use super::line::Asked;
 use super::readings::reading;
-use super::states::{self, Found};
+use super::states::{self, OrAbsence};
 use super::view::{View, number, text};
 use crate::channel::ChannelId;
 use crate::reading::{Absence, Reading, Stamp, Value};
 
 /// Parameters of the parts made, made in all, and required.
-const PARTS: Item = Item::Parameter(6711, 0);
-const PARTS_TOTAL: Item = Item::Parameter(6712, 0);
-const PARTS_REQUIRED: Item = Item::Parameter(6713, 0);
-const GEAR: Item = Item::Spindles(Spindle::Gear);
+const PARTS: FocasItem = FocasItem::Parameter(6711, 0);
+const PARTS_TOTAL: FocasItem = FocasItem::Parameter(6712, 0);
+const PARTS_REQUIRED: FocasItem = FocasItem::Parameter(6713, 0);
+const GEAR: FocasItem = FocasItem::Spindles(Spindle::Gear);
 /// Bytes of the block that runs.
-const BLOCK: Item = Item::ExecutedText(128);
+const BLOCK: FocasItem = FocasItem::ExecutedText(128);
 /// At most so many messages are shown.
-const MESSAGES: Item = Item::Messages(2);
+const MESSAGES: FocasItem = FocasItem::Messages(2);
 /// So many of the last alarms are shown.
 const ALARMS_SHOWN: u16 = 3;
 
 /// Numbers of the group, whose items are read as they are.
-const NUMBERS: [(&str, Item); 4] =
+const NUMBERS: [(&str, FocasItem); 4] =
     [("part_count", PARTS), ("gear_stage", GEAR), ("parts_total", PARTS_TOTAL), ("parts_required", PARTS_REQUIRED)];
 
 /// Meters of time.
-const TIMES: [(&str, Item); 4] = [
-    ("power_on_time_s", Item::Timer(Timer::PowerOn)),
-    ("operating_time_s", Item::Timer(Timer::Operating)),
-    ("cutting_time_s", Item::Timer(Timer::Cutting)),
-    ("cycle_time_s", Item::Timer(Timer::Cycle)),
+const TIMES: [(&str, FocasItem); 4] = [
+    ("power_on_time_s", FocasItem::Timer(Timer::PowerOn)),
+    ("operating_time_s", FocasItem::Timer(Timer::Operating)),
+    ("cutting_time_s", FocasItem::Timer(Timer::Cutting)),
+    ("cycle_time_s", FocasItem::Timer(Timer::Cycle)),
 ];
 
 /// The others, in the order of [`others`].
@@ -49,7 +49,14 @@ pub(super) fn channels(details: bool) -> Vec<ChannelId> {
 
 /// What is asked for.
 pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
-    let others = [BLOCK, MESSAGES, Item::GCodes, Item::ModalWord(Word::M), Item::HistoryCount, Item::ToolGroup];
+    let others = [
+        BLOCK,
+        MESSAGES,
+        FocasItem::GCodes,
+        FocasItem::ModalWord(BlockWord::M),
+        FocasItem::HistoryCount,
+        FocasItem::ToolGroup,
+    ];
     let items = NUMBERS.iter().chain(&TIMES).map(|(_, item)| *item).chain(others);
     items.take(if details { usize::MAX } else { 2 }).map(|item| item.on(path)).collect()
 }
@@ -59,12 +66,12 @@ pub(super) fn questions(path: u8, details: bool) -> Vec<Question> {
 pub(super) fn further(asked: &Asked) -> Vec<Question> {
     let view = View { asked, path: asked.path };
     let whole = |item| match view.answer(item) {
-        Ok(Answer::Whole(whole)) => u16::try_from(*whole).ok().filter(|whole| *whole > 0),
+        Ok(FocasAnswer::Whole(whole)) => u16::try_from(*whole).ok().filter(|whole| *whole > 0),
         _ => None,
     };
     let first = |last: u16| last.saturating_sub(ALARMS_SHOWN - 1).max(1);
-    let history = whole(Item::HistoryCount).map(|last| Item::AlarmHistory(first(last), last));
-    let life = whole(Item::ToolGroup).map(Item::ToolLife);
+    let history = whole(FocasItem::HistoryCount).map(|last| FocasItem::AlarmHistory(first(last), last));
+    let life = whole(FocasItem::ToolGroup).map(FocasItem::ToolLife);
     history.into_iter().chain(life).map(|item| item.on(asked.path)).collect()
 }
 
@@ -80,49 +87,51 @@ pub(super) fn readings(asked: &Asked, further: Option<&Asked>, details: bool, ou
     out.extend(named.map(|(channel, value)| reading(channel, stamp, value)));
 }
 
-fn seconds(view: &View<'_>, item: Item) -> Found<f64> {
+fn seconds(view: &View<'_>, item: FocasItem) -> OrAbsence<f64> {
     match view.answer(item)? {
-        Answer::Time { minutes, milliseconds } => Ok(f64::from(*minutes) * 60.0 + f64::from(*milliseconds) / 1000.0),
+        FocasAnswer::Time { minutes, milliseconds } => {
+            Ok(f64::from(*minutes) * 60.0 + f64::from(*milliseconds) / 1000.0)
+        }
         _ => Err(Absence::OutOfRange),
     }
 }
 
-fn others(view: &View<'_>, further: Option<&Asked>) -> [Found<Value>; 7] {
+fn others(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<Value>; 7] {
     let block = match view.answer(BLOCK) {
-        Ok(Answer::Named { name, .. }) => Ok(name.lines().next().unwrap_or_default().trim().to_owned()),
+        Ok(FocasAnswer::Named { name, .. }) => Ok(name.lines().next().unwrap_or_default().trim().to_owned()),
         other => other.and(Err(Absence::OutOfRange)),
     };
     let messages = match view.answer(MESSAGES) {
-        Ok(Answer::Messages(messages)) => Ok(joined(messages)),
+        Ok(FocasAnswer::Messages(messages)) => Ok(joined(messages)),
         other => other.and(Err(Absence::OutOfRange)),
     };
-    let codes = match view.answer(Item::GCodes) {
-        Ok(Answer::Names(codes)) => Ok(codes.join(" ")),
+    let codes = match view.answer(FocasItem::GCodes) {
+        Ok(FocasAnswer::Names(codes)) => Ok(codes.join(" ")),
         other => other.and(Err(Absence::OutOfRange)),
     };
-    let m_code = view.number(Item::ModalWord(Word::M)).map(|code| format!("M{code}"));
+    let m_code = view.number(FocasItem::ModalWord(BlockWord::M)).map(|code| format!("M{code}"));
     let [life, used] = life(view, further);
     [text(block), text(messages), text(codes), text(m_code), text(history(view, further)), number(life), number(used)]
 }
 
 /// Number and text of every message; a control without one sends a number that is none.
-fn joined(messages: &[Message]) -> String {
+fn joined(messages: &[OperatorMessage]) -> String {
     let shown = messages.iter().filter(|message| message.number >= 0 && !message.text.is_empty());
     shown.map(|message| format!("{} {}", message.number, message.text)).collect::<Vec<_>>().join("; ")
 }
 
 /// The last alarms, the newest first.
-fn history(view: &View<'_>, further: Option<&Asked>) -> Found<String> {
-    let count = view.number(Item::HistoryCount)?;
+fn history(view: &View<'_>, further: Option<&Asked>) -> OrAbsence<String> {
+    let count = view.number(FocasItem::HistoryCount)?;
     if count < 1.0 {
         return Ok(String::new());
     }
     let found = further.and_then(|further| {
-        let at = further.questions.iter().position(|asked| matches!(asked.item, Item::AlarmHistory(..)))?;
+        let at = further.questions.iter().position(|asked| matches!(asked.item, FocasItem::AlarmHistory(..)))?;
         further.results.get(at)
     });
     match found {
-        Some(Ok(Answer::History(past))) => {
+        Some(Ok(FocasAnswer::History(past))) => {
             let axes = view.asked.facts.axes_of(view.path).unwrap_or_default();
             let one = |PastAlarm { alarm, at: [year, month, day, hour, minute, second] }: &PastAlarm| {
                 let year = i32::from(*year);
@@ -140,16 +149,16 @@ fn history(view: &View<'_>, further: Option<&Asked>) -> Found<String> {
 }
 
 /// Life and use of the tools in use.
-fn life(view: &View<'_>, further: Option<&Asked>) -> [Found<f64>; 2] {
-    if let Err(reason) = view.answer(Item::ToolGroup) {
+fn life(view: &View<'_>, further: Option<&Asked>) -> [OrAbsence<f64>; 2] {
+    if let Err(reason) = view.answer(FocasItem::ToolGroup) {
         return [Err(reason); 2];
     }
     let found = further.and_then(|further| {
-        let at = further.questions.iter().position(|asked| matches!(asked.item, Item::ToolLife(_)))?;
+        let at = further.questions.iter().position(|asked| matches!(asked.item, FocasItem::ToolLife(_)))?;
         further.results.get(at)
     });
     match found {
-        Some(Ok(Answer::Life { life, count, .. })) => [Ok(f64::from(*life)), Ok(f64::from(*count))],
+        Some(Ok(FocasAnswer::Life { life, count, .. })) => [Ok(f64::from(*life)), Ok(f64::from(*count))],
         Some(Ok(_)) => [Err(Absence::OutOfRange); 2],
         Some(Err(error)) => [Err(error.absence()); 2],
         // No group is in use.

@@ -1,11 +1,11 @@
 //! Channels besides those of the table: further axes and spindles by their own names, and the user's own. They are declared
 //! when the source is opened, and travel with the quick or with the slow group.
 
-use super::answer::Answer;
-use super::item::{Item, Position, Question, Servo, Spindle};
+use super::answer::FocasAnswer;
+use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
-use super::own::{OwnChannel, Pace};
-use super::states::Found;
+use super::own::{OwnChannel, ReadWith};
+use super::states::OrAbsence;
 use super::view::{View, number};
 use crate::address::FanucOptions;
 use crate::channel::{ChannelId, DeclareError, Kind, NewChannel, declare};
@@ -57,8 +57,8 @@ enum Of {
 
 /// Diagnosis numbers of the temperatures of a servo motor and of its encoder, °C. Source: B-64305EN, 30i maintenance
 /// manual, diagnosis 308 and 309.
-const MOTOR_TEMPERATURE: Item = Item::Diagnosis(308, -1);
-const ENCODER_TEMPERATURE: Item = Item::Diagnosis(309, -1);
+const MOTOR_TEMPERATURE: FocasItem = FocasItem::Diagnosis(308, -1);
+const ENCODER_TEMPERATURE: FocasItem = FocasItem::Diagnosis(309, -1);
 
 /// Where a further channel comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,18 +85,18 @@ const TEMPERATURES: (f64, f64) = (-50.0, 300.0);
 const SPEEDS: (f64, f64) = (-100_000.0, 100_000.0);
 
 impl Of {
-    fn item(self) -> Item {
+    fn item(self) -> FocasItem {
         match self {
-            Self::Position(which) => Item::Position(which, -1),
-            Self::Load => Item::Servos(Servo::Load),
-            Self::Current => Item::Servos(Servo::Current),
+            Self::Position(which) => FocasItem::Position(which, -1),
+            Self::Load => FocasItem::Servos(Servo::Load),
+            Self::Current => FocasItem::Servos(Servo::Current),
             Self::MotorTemperature => MOTOR_TEMPERATURE,
             Self::EncoderTemperature => ENCODER_TEMPERATURE,
         }
     }
 
-    fn pace(self) -> Pace {
-        if matches!(self, Self::MotorTemperature | Self::EncoderTemperature) { Pace::Slow } else { Pace::Fast }
+    fn pace(self) -> ReadWith {
+        if matches!(self, Self::MotorTemperature | Self::EncoderTemperature) { ReadWith::Slow } else { ReadWith::Fast }
     }
 
     /// Ending of the name, unit, range, and what it is in English and Chinese.
@@ -126,7 +126,7 @@ impl Of {
 ///
 /// # Errors
 /// The name of the channel and why it cannot be added.
-pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(Pace, Extra)>, (String, DeclareError)> {
+pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWith, Extra)>, (String, DeclareError)> {
     let mut extras = Vec::new();
     for axis in &options.axes {
         for of in quantities(options) {
@@ -136,7 +136,7 @@ pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(Pace, Extra)>, 
                 // X, Y and Z have it already.
                 continue;
             }
-            let kind = if of.pace() == Pace::Slow { Kind::Held } else { Kind::Continuous };
+            let kind = if of.pace() == ReadWith::Slow { Kind::Held } else { Kind::Continuous };
             let (en, zh) = (format!("{} axis {en}", axis.name), format!("{}{zh}", axis.name));
             let new = NewChannel { name, unit: unit.to_owned(), range, kind, en, zh };
             extras.push((of.pace(), put(&new, axis.path.unwrap_or(path), From::Axis(axis.clone(), of))?));
@@ -150,7 +150,7 @@ pub fn declared(options: &FanucOptions, path: u8) -> Result<Vec<(Pace, Extra)>, 
             let name = format!("spindle{number}_{ending}");
             let (en, zh) = (format!("Spindle {number}: {en}"), format!("主轴{number}{zh}"));
             let new = NewChannel { name, unit: unit.to_owned(), range, kind: Kind::Continuous, en, zh };
-            extras.push((Pace::Fast, put(&new, path, From::Spindle(usize::from(number) - 1, what))?));
+            extras.push((ReadWith::Fast, put(&new, path, From::Spindle(usize::from(number) - 1, what))?));
         }
     }
     for own in &options.own {
@@ -176,29 +176,29 @@ impl Extra {
     pub fn question(&self) -> Question {
         let item = match &self.from {
             From::Axis(_, of) => of.item(),
-            From::Spindle(_, what) => Item::Spindles(*what),
+            From::Spindle(_, what) => FocasItem::Spindles(*what),
             From::Own(own) => own.item,
         };
         item.on(self.path)
     }
 
     /// The channel's value in what was answered.
-    pub(super) fn read(&self, asked: &Asked) -> Found<Value> {
+    pub(super) fn read(&self, asked: &Asked) -> OrAbsence<Value> {
         let view = View { asked, path: self.path };
         match &self.from {
             From::Axis(axis, Of::Position(which)) => number(view.position(*which, &axis.name, axis.rotary)),
             From::Axis(axis, of @ (Of::Load | Of::Current)) => number(view.axis(of.item(), &axis.name)),
             From::Axis(axis, of) => number(place(&view, of.item(), view.place(&axis.name)?)),
-            From::Spindle(at, what) => number(place(&view, Item::Spindles(*what), *at)),
+            From::Spindle(at, what) => number(place(&view, FocasItem::Spindles(*what), *at)),
             From::Own(own) => number(own.value(view.answer(own.item)?)),
         }
     }
 }
 
 /// The value at a place of an answer that has one per axis or spindle.
-fn place(view: &View<'_>, item: Item, place: usize) -> Found<f64> {
+fn place(view: &View<'_>, item: FocasItem, place: usize) -> OrAbsence<f64> {
     match view.answer(item)? {
-        Answer::Numbers(values) | Answer::Data { values, .. } => {
+        FocasAnswer::Numbers(values) | FocasAnswer::Data { values, .. } => {
             values.get(place).copied().flatten().ok_or(Absence::NotSupported)
         }
         _ => Err(Absence::OutOfRange),

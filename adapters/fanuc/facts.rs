@@ -4,25 +4,25 @@
 //! asked again with every poll until it has answered; until then what depends on it is absent with the reason, because
 //! a guess would be silently wrong (an inch machine read as millimetres).
 
-use super::answer::{Answer, ItemError, ItemResult, System};
-use super::code::{Consequence, ReturnCode};
-use super::item::{Item, Question};
+use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, System};
+use super::code::{Consequence, FocasReturnCode};
+use super::item::{FocasItem, Question};
 use super::opening::{Generation, Opening};
 use crate::reading::Absence;
 
 /// Parameter 1001, bit 0 (INM): the machine measures in inches.
-pub const INCH_MACHINE: Item = Item::Parameter(1001, 0);
+pub const INCH_MACHINE: FocasItem = FocasItem::Parameter(1001, 0);
 
 /// Parameter 3107 of older controls; bit 3 (GSC): the actual feed is shown per revolution while G95 (G99) is active.
 /// Source: `libfwlib32` 1.0.5, which asks for it in `cnc_rdspeed` and makes mm/rev of the feed by this bit.
-pub const FEED_SHOWN: Item = Item::Parameter(3107, 0);
+pub const FEED_SHOWN: FocasItem = FocasItem::Parameter(3107, 0);
 const FEED_SHOWN_BIT: u8 = 3;
 
 /// Parameter 1006, bit 0 (ROT) of every axis: it turns, and its positions are degrees.
-pub const ROTARY: Item = Item::Parameter(1006, -1);
+pub const ROTARY: FocasItem = FocasItem::Parameter(1006, -1);
 
 /// A fact, or why it is not known.
-pub type Known<T> = Result<T, Absence>;
+pub type KnownFact<T> = Result<T, Absence>;
 
 /// What does not change while a connection lasts.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,10 +32,10 @@ pub struct Facts {
     /// Kind and series, if the control says them.
     pub system: Option<System>,
     /// Does the machine measure in inches? A control without the parameter measures in millimetres.
-    pub inch: Known<bool>,
+    pub inch: KnownFact<bool>,
     /// Is the actual feed shown per revolution while feed per revolution is active? Asked of older controls only; newer
     /// ones tell the unit itself.
-    pub feed_follows_mode: Known<bool>,
+    pub feed_follows_mode: KnownFact<bool>,
     /// What is known of each path.
     paths: Vec<PathFacts>,
     /// What has not been answered yet, with the reason.
@@ -47,9 +47,9 @@ pub struct Facts {
 struct PathFacts {
     path: u8,
     /// Names of the axes, in the order of every answer about axes.
-    axes: Known<Vec<String>>,
+    axes: KnownFact<Vec<String>>,
     /// Which of them turn.
-    rotary: Known<Vec<bool>>,
+    rotary: KnownFact<Vec<bool>>,
 }
 
 impl Facts {
@@ -60,9 +60,9 @@ impl Facts {
             |path: &u8| PathFacts { path: *path, axes: Err(Absence::NotYetRead), rotary: Err(Absence::NotYetRead) };
         let older = matches!(opening.generation, Generation::Older(_));
         let own = paths.first().copied().unwrap_or(1);
-        let mut questions = vec![Item::System.on(own), INCH_MACHINE.on(own)];
+        let mut questions = vec![FocasItem::System.on(own), INCH_MACHINE.on(own)];
         questions.extend(older.then(|| FEED_SHOWN.on(own)));
-        questions.extend(paths.iter().flat_map(|path| [Item::AxisNames, ROTARY].map(|item| item.on(*path))));
+        questions.extend(paths.iter().flat_map(|path| [FocasItem::AxisNames, ROTARY].map(|item| item.on(*path))));
         Self {
             opening,
             system: None,
@@ -81,13 +81,13 @@ impl Facts {
     ///
     /// # Errors
     /// Why they are not known.
-    pub fn axes_of(&self, path: u8) -> Known<&[String]> {
+    pub fn axes_of(&self, path: u8) -> KnownFact<&[String]> {
         let facts = self.path(path).ok_or(Absence::NotSupported)?;
         facts.axes.as_deref().map_err(|reason| *reason)
     }
 
     /// Every path with the names of its axes, the one that is written to first.
-    pub fn axes(&self) -> impl Iterator<Item = (u8, Known<&[String]>)> {
+    pub fn axes(&self) -> impl Iterator<Item = (u8, KnownFact<&[String]>)> {
         self.paths.iter().map(|facts| (facts.path, facts.axes.as_deref().map_err(|reason| *reason)))
     }
 
@@ -95,7 +95,7 @@ impl Facts {
     ///
     /// # Errors
     /// Why it is not known.
-    pub fn is_rotary(&self, path: u8, axis: usize) -> Known<bool> {
+    pub fn is_rotary(&self, path: u8, axis: usize) -> KnownFact<bool> {
         let facts = self.path(path).ok_or(Absence::NotSupported)?;
         match &facts.rotary {
             Ok(rotary) => Ok(rotary.get(axis).copied().unwrap_or(false)),
@@ -104,7 +104,7 @@ impl Facts {
     }
 
     /// Takes the answer to one of the open questions.
-    pub fn take(&mut self, question: Question, result: &ItemResult) {
+    pub fn take(&mut self, question: Question, result: &FocasItemResult) {
         let settled = match result {
             Ok(answer) => self.answered(question, answer),
             Err(error) => is_final(error) && self.refused(question),
@@ -120,16 +120,18 @@ impl Facts {
         }
     }
 
-    fn answered(&mut self, question: Question, answer: &Answer) -> bool {
+    fn answered(&mut self, question: Question, answer: &FocasAnswer) -> bool {
         let bits = |value: &Option<f64>| value.unwrap_or(0.0).rem_euclid(256.0) as u8;
         match (question.item, answer) {
-            (Item::System, Answer::System(system)) => self.system = Some(system.clone()),
-            (INCH_MACHINE, Answer::Data { values, .. }) => self.inch = Ok(values.first().map_or(0, bits) & 1 == 1),
-            (FEED_SHOWN, Answer::Data { values, .. }) => {
+            (FocasItem::System, FocasAnswer::System(system)) => self.system = Some(system.clone()),
+            (INCH_MACHINE, FocasAnswer::Data { values, .. }) => self.inch = Ok(values.first().map_or(0, bits) & 1 == 1),
+            (FEED_SHOWN, FocasAnswer::Data { values, .. }) => {
                 self.feed_follows_mode = Ok(values.first().map_or(0, bits) >> FEED_SHOWN_BIT & 1 == 1);
             }
-            (Item::AxisNames, Answer::Names(names)) => self.set(question.path, |facts| facts.axes = Ok(names.clone())),
-            (ROTARY, Answer::Data { values, .. }) => {
+            (FocasItem::AxisNames, FocasAnswer::Names(names)) => {
+                self.set(question.path, |facts| facts.axes = Ok(names.clone()))
+            }
+            (ROTARY, FocasAnswer::Data { values, .. }) => {
                 let rotary = values.iter().map(|value| bits(value) & 1 == 1).collect();
                 self.set(question.path, |facts| facts.rotary = Ok(rotary));
             }
@@ -143,7 +145,7 @@ impl Facts {
         match question.item {
             INCH_MACHINE => self.inch = Ok(false),
             FEED_SHOWN => self.feed_follows_mode = Ok(false),
-            Item::AxisNames => self.set(question.path, |facts| facts.axes = Err(Absence::NotSupported)),
+            FocasItem::AxisNames => self.set(question.path, |facts| facts.axes = Err(Absence::NotSupported)),
             ROTARY => self.set(question.path, |facts| facts.rotary = Ok(Vec::new())),
             _ => {}
         }
@@ -154,7 +156,7 @@ impl Facts {
         match question.item {
             INCH_MACHINE => self.inch = Err(reason),
             FEED_SHOWN => self.feed_follows_mode = Err(reason),
-            Item::AxisNames => self.set(question.path, |facts| facts.axes = Err(reason)),
+            FocasItem::AxisNames => self.set(question.path, |facts| facts.axes = Err(reason)),
             ROTARY => self.set(question.path, |facts| facts.rotary = Err(reason)),
             _ => {}
         }
@@ -168,14 +170,14 @@ impl Facts {
 }
 
 /// Is there no use in asking again?
-fn is_final(error: &ItemError) -> bool {
+fn is_final(error: &FocasItemError) -> bool {
     match error {
-        ItemError::Refused(refusal) if refusal.code == ReturnCode::PATH => false,
-        ItemError::Refused(refusal) => {
+        FocasItemError::Refused(refusal) if refusal.code == FocasReturnCode::PATH => false,
+        FocasItemError::Refused(refusal) => {
             matches!(refusal.code.consequence(), Consequence::NotSupported | Consequence::Wrong)
         }
-        ItemError::NotOffered => true,
-        ItemError::Malformed(_) | ItemError::Failed(_) => false,
+        FocasItemError::NotOffered => true,
+        FocasItemError::Malformed(_) | FocasItemError::Failed(_) => false,
     }
 }
 
@@ -190,8 +192,8 @@ mod tests {
         Facts::unknown(opening, &[1, 2])
     }
 
-    fn refusal(code: i16) -> ItemResult {
-        Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail: 0 }))
+    fn refusal(code: i16) -> FocasItemResult {
+        Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail: 0 }))
     }
 
     #[test]
@@ -201,7 +203,7 @@ mod tests {
             let open = facts.open.len();
             facts.take(INCH_MACHINE.on(1), &refusal(code));
             assert_eq!((facts.inch, facts.open.len()), (Err(Absence::Refused), open), "code {code}");
-            facts.take(INCH_MACHINE.on(1), &Ok(Answer::Data { kind: 0, values: vec![Some(1.0)] }));
+            facts.take(INCH_MACHINE.on(1), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(1.0)] }));
             assert_eq!((facts.inch, facts.open.len()), (Ok(true), open - 1));
         }
     }
@@ -222,9 +224,9 @@ mod tests {
     #[test]
     fn bits_of_parameters() {
         let mut facts = facts(2);
-        facts.take(FEED_SHOWN.on(1), &Ok(Answer::Data { kind: 0, values: vec![Some(8.0)] }));
+        facts.take(FEED_SHOWN.on(1), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(8.0)] }));
         assert_eq!(facts.feed_follows_mode, Ok(true));
-        facts.take(ROTARY.on(2), &Ok(Answer::Data { kind: 0, values: vec![Some(0.0), Some(5.0)] }));
+        facts.take(ROTARY.on(2), &Ok(FocasAnswer::Data { kind: 0, values: vec![Some(0.0), Some(5.0)] }));
         assert_eq!((facts.is_rotary(2, 0), facts.is_rotary(2, 1)), (Ok(false), Ok(true)));
         assert_eq!(facts.is_rotary(1, 0), Err(Absence::NotYetRead));
     }

@@ -1,6 +1,6 @@
 //! What the adapter needs of a controller, however it is talked to.
 
-use super::answer::{ItemResult, Refusal};
+use super::answer::{FocasItemResult, Refusal};
 use super::item::{Question, Write};
 use super::opening::Opening;
 use std::time::Duration;
@@ -17,7 +17,7 @@ pub trait Focas: Send {
     ///
     /// # Errors
     /// The connection as a whole failed; it is not usable any more and `out` holds nothing new.
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError>;
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError>;
 
     /// Writes, on the path that the connection was made for.
     ///

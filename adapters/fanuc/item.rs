@@ -1,7 +1,7 @@
 //! What can be asked of a controller and what can be written to it, in the words of the control.
 
-pub use super::pmc::{Area, Stretch, Width};
-pub use super::word::Word;
+pub use super::pmc::{Area, PmcWidth, Stretch};
+pub use super::word::BlockWord;
 use serde::{Deserialize, Serialize};
 
 /// Which position of the axes.
@@ -116,7 +116,7 @@ impl Timer {
 
 /// One thing to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Item {
+pub enum FocasItem {
     /// Kind, series, version of the control.
     System,
     /// Mode, running, motion, emergency, alarm.
@@ -141,9 +141,9 @@ pub enum Item {
     AxisNames,
     /// Names of the spindles; the argument that the generations want differently.
     SpindleNames(i16),
-    /// Unit of [`Item::Feed`].
+    /// Unit of [`FocasItem::Feed`].
     FeedUnit,
-    /// Unit of [`Item::SpindleSpeed`].
+    /// Unit of [`FocasItem::SpindleSpeed`].
     SpindleUnit,
     /// Numbers of the program running and of the main program.
     Program,
@@ -164,7 +164,7 @@ pub enum Item {
     /// Modal G codes: of one group, or all with -1.
     ModalGroup(i16),
     /// A modal word.
-    ModalWord(Word),
+    ModalWord(BlockWord),
     /// A position of one axis from 1, or all with -1.
     Position(Position, i16),
     /// A custom macro variable.
@@ -209,10 +209,10 @@ pub struct Question {
     /// Path from 1.
     pub path: u8,
     /// What is asked.
-    pub item: Item,
+    pub item: FocasItem,
 }
 
-impl Item {
+impl FocasItem {
     /// The question for it on a path from 1.
     #[must_use]
     pub fn on(self, path: u8) -> Question {

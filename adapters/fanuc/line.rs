@@ -3,11 +3,11 @@
 //! which is a state and not a fault.
 
 use super::allow::AllowList;
-use super::answer::{ItemError, ItemResult};
+use super::answer::{FocasItemError, FocasItemResult};
 use super::code::Consequence;
 use super::facts::Facts;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Question, Write};
+use super::item::{FocasItem, Question, Write};
 use super::opening::Opening;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::SourceError;
@@ -36,7 +36,7 @@ pub struct LineCounts {
     pub broken: u64,
 }
 
-struct Inner {
+struct FanucConnection {
     name: String,
     connect: Connect,
     focas: Option<Box<dyn Focas>>,
@@ -56,7 +56,7 @@ struct Inner {
 /// A handle on the connection; clones are handles on the same one.
 #[derive(Clone)]
 pub struct FanucLine {
-    inner: Arc<Mutex<Inner>>,
+    inner: Arc<Mutex<FanucConnection>>,
 }
 
 /// What one round of questions gave.
@@ -69,7 +69,7 @@ pub struct Asked {
     /// What was asked.
     pub questions: Vec<Question>,
     /// One result per question.
-    pub results: Vec<ItemResult>,
+    pub results: Vec<FocasItemResult>,
     /// When it began, on the gateway's clock.
     pub began_ns: TimeNs,
     /// When it was over.
@@ -79,13 +79,13 @@ pub struct Asked {
 impl Asked {
     /// What became of an item of the line's own path.
     #[must_use]
-    pub fn of(&self, item: Item) -> Option<&ItemResult> {
+    pub fn of(&self, item: FocasItem) -> Option<&FocasItemResult> {
         self.on(item.on(self.path))
     }
 
     /// What became of a question.
     #[must_use]
-    pub fn on(&self, question: Question) -> Option<&ItemResult> {
+    pub fn on(&self, question: Question) -> Option<&FocasItemResult> {
         let at = self.questions.iter().position(|asked| *asked == question)?;
         self.results.get(at)
     }
@@ -96,7 +96,7 @@ impl FanucLine {
     /// the others are read besides.
     #[must_use]
     pub fn new(name: &str, connect: Connect, paths: (u8, Vec<u8>), allow: AllowList, duty_pct: u8) -> Self {
-        let inner = Inner {
+        let inner = FanucConnection {
             name: name.to_owned(),
             connect,
             focas: None,
@@ -113,7 +113,7 @@ impl FanucLine {
         Self { inner: Arc::new(Mutex::new(inner)) }
     }
 
-    fn locked<T>(&self, act: impl FnOnce(&mut Inner) -> T) -> T {
+    fn locked<T>(&self, act: impl FnOnce(&mut FanucConnection) -> T) -> T {
         act(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -121,7 +121,7 @@ impl FanucLine {
     ///
     /// # Errors
     /// As there.
-    pub fn ask(&self, clock: &dyn Clock, items: &[Item]) -> Result<Asked, SourceError> {
+    pub fn ask(&self, clock: &dyn Clock, items: &[FocasItem]) -> Result<Asked, SourceError> {
         self.locked(|inner| {
             let path = inner.paths.0;
             inner.ask(clock, items.iter().map(|item| item.on(path)).collect())
@@ -163,7 +163,7 @@ impl FanucLine {
     }
 }
 
-impl Inner {
+impl FanucConnection {
     fn ask(&mut self, clock: &dyn Clock, questions: Vec<Question>) -> Result<Asked, SourceError> {
         let facts = self.connected(clock)?;
         let known = |question: &Question| !self.unsupported.contains(question);
@@ -177,14 +177,14 @@ impl Inner {
         let mut found = wanted.iter().zip(found).peekable();
         let answer = |question: &Question| {
             let own = found.next_if(|(asked, _)| *asked == question);
-            own.map_or(Err(ItemError::NotOffered), |(_, result)| result)
+            own.map_or(Err(FocasItemError::NotOffered), |(_, result)| result)
         };
         let results = questions.iter().map(answer).collect();
         Ok(Asked { facts, path: self.paths.0, questions, results, began_ns, ended_ns: clock.now_ns() })
     }
 
     /// Takes what has been told at last.
-    fn learn_facts(&mut self, open: &[Question], found: &[ItemResult], facts: Arc<Facts>) -> Arc<Facts> {
+    fn learn_facts(&mut self, open: &[Question], found: &[FocasItemResult], facts: Arc<Facts>) -> Arc<Facts> {
         if open.is_empty() {
             return facts;
         }
@@ -196,7 +196,11 @@ impl Inner {
     }
 
     /// One round of questions on an open connection, not before the duty cycle allows it.
-    fn round(&mut self, clock: &dyn Clock, questions: &[Question]) -> Result<(TimeNs, Vec<ItemResult>), SourceError> {
+    fn round(
+        &mut self,
+        clock: &dyn Clock,
+        questions: &[Question],
+    ) -> Result<(TimeNs, Vec<FocasItemResult>), SourceError> {
         self.rest(clock);
         let began_ns = clock.now_ns();
         let mut found = Vec::with_capacity(questions.len());
@@ -208,8 +212,8 @@ impl Inner {
         if let Err(error) = outcome {
             return Err(self.lost(&error, "the values", clock.now_ns()));
         }
-        let dead = |result: &ItemResult| matches!(result, Err(ItemError::Refused(refusal)) if refusal.code.consequence() == Consequence::Reconnect);
-        if let Some(Err(ItemError::Refused(refusal))) = found.iter().find(|result| dead(result)) {
+        let dead = |result: &FocasItemResult| matches!(result, Err(FocasItemError::Refused(refusal)) if refusal.code.consequence() == Consequence::Reconnect);
+        if let Some(Err(FocasItemError::Refused(refusal))) = found.iter().find(|result| dead(result)) {
             return Err(self.lost(&FocasError::Broken(refusal.code.to_string()), "the values", clock.now_ns()));
         }
         Ok((began_ns, found))
@@ -227,10 +231,10 @@ impl Inner {
         self.not_before_ns = ended_ns + took_ns.min(60 * crate::clock::SECOND_NS) * (100 - duty) / duty;
     }
 
-    fn learn(&mut self, questions: &[Question], results: &[ItemResult]) {
-        let missing = |result: &ItemResult| match result {
-            Err(ItemError::Refused(refusal)) => refusal.code.consequence() == Consequence::NotSupported,
-            Err(ItemError::NotOffered) => true,
+    fn learn(&mut self, questions: &[Question], results: &[FocasItemResult]) {
+        let missing = |result: &FocasItemResult| match result {
+            Err(FocasItemError::Refused(refusal)) => refusal.code.consequence() == Consequence::NotSupported,
+            Err(FocasItemError::NotOffered) => true,
             _ => false,
         };
         let absent = questions.iter().zip(results).filter(|(_, result)| missing(result));

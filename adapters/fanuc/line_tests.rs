@@ -1,11 +1,11 @@
 //! The line with a controller that is a list of answers, on a clock that stands still.
 
 use super::allow::AllowList;
-use super::answer::{Answer, ItemError, ItemResult, Refusal, System};
-use super::code::ReturnCode;
+use super::answer::{FocasAnswer, FocasItemError, FocasItemResult, Refusal, System};
+use super::code::FocasReturnCode;
 use super::facts::INCH_MACHINE;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Question, Stretch, Write};
+use super::item::{FocasItem, Question, Stretch, Write};
 use super::line::{Connect, FanucLine};
 use super::opening::{Generation, Opening};
 use crate::clock::{Clock, SECOND_NS, TimeNs};
@@ -24,13 +24,13 @@ struct Told {
     asked: AtomicU64,
     connect: Mutex<Option<FocasError>>,
     fail: Mutex<Option<FocasError>>,
-    results: Mutex<HashMap<Item, ItemResult>>,
+    results: Mutex<HashMap<FocasItem, FocasItemResult>>,
 }
 
 /// What the mock answers unless it is told otherwise.
-fn usual(item: Item) -> ItemResult {
+fn usual(item: FocasItem) -> FocasItemResult {
     Ok(match item {
-        Item::System => Answer::System(System {
+        FocasItem::System => FocasAnswer::System(System {
             additional: 0,
             axes_max: 32,
             kind: "31".into(),
@@ -39,9 +39,9 @@ fn usual(item: Item) -> ItemResult {
             version: "27.0".into(),
             axes: "02".into(),
         }),
-        Item::AxisNames => Answer::Names(vec!["X".into(), "Z".into()]),
-        Item::Parameter(..) => Answer::Data { kind: 0, values: vec![Some(0.0); 2] },
-        _ => Answer::Whole(1),
+        FocasItem::AxisNames => FocasAnswer::Names(vec!["X".into(), "Z".into()]),
+        FocasItem::Parameter(..) => FocasAnswer::Data { kind: 0, values: vec![Some(0.0); 2] },
+        _ => FocasAnswer::Whole(1),
     })
 }
 
@@ -52,7 +52,7 @@ impl Focas for Mock {
         &self.1
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         self.0.now_ns.fetch_add(self.0.takes_ns.load(Ordering::SeqCst), Ordering::SeqCst);
         self.0.asked.fetch_add(questions.len() as u64, Ordering::SeqCst);
         if let Some(error) = self.0.fail.lock().expect("sound").take() {
@@ -106,48 +106,52 @@ fn line(duty_pct: u8) -> (FanucLine, Arc<Told>, Standing) {
     )
 }
 
-fn refused(code: i16) -> ItemResult {
-    Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail: 0 }))
+fn refused(code: i16) -> FocasItemResult {
+    Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail: 0 }))
 }
 
 #[test]
 fn the_controller_has_its_share_of_the_time_for_itself() {
     let (line, told, clock) = line(25);
     told.takes_ns.store(20_000_000, Ordering::SeqCst);
-    line.ask(&clock, &[Item::Feed]).expect("well");
-    let first = line.ask(&clock, &[Item::Feed]).expect("well");
-    let second = line.ask(&clock, &[Item::Feed]).expect("well");
+    line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    let first = line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    let second = line.ask(&clock, &[FocasItem::Feed]).expect("well");
     assert_eq!(second.began_ns - first.ended_ns, 60_000_000, "busy 20 ms of every 80 ms");
 }
 
 #[test]
 fn what_is_missing_is_asked_once_per_connection() {
     let (line, told, clock) = line(100);
-    told.results.lock().expect("sound").insert(Item::Feed, refused(6));
-    let items = [Item::Sequence, Item::Feed, Item::BlockCount];
+    told.results.lock().expect("sound").insert(FocasItem::Feed, refused(6));
+    let items = [FocasItem::Sequence, FocasItem::Feed, FocasItem::BlockCount];
     let asked = line.ask(&clock, &items).expect("well");
-    assert_eq!(asked.of(Item::Feed), Some(&refused(6)));
-    assert_eq!(line.unsupported(), [Item::Feed.on(1)]);
+    assert_eq!(asked.of(FocasItem::Feed), Some(&refused(6)));
+    assert_eq!(line.unsupported(), [FocasItem::Feed.on(1)]);
     let before = told.asked.load(Ordering::SeqCst);
     let asked = line.ask(&clock, &items).expect("well");
     assert_eq!(told.asked.load(Ordering::SeqCst) - before, 2);
-    assert_eq!(asked.of(Item::Feed), Some(&Err(ItemError::NotOffered)));
-    assert_eq!(asked.of(Item::BlockCount), Some(&Ok(Answer::Whole(1))), "the answers stay with their questions");
+    assert_eq!(asked.of(FocasItem::Feed), Some(&Err(FocasItemError::NotOffered)));
+    assert_eq!(
+        asked.of(FocasItem::BlockCount),
+        Some(&Ok(FocasAnswer::Whole(1))),
+        "the answers stay with their questions"
+    );
     *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
     assert!(line.ask(&clock, &items).is_err());
     told.results.lock().expect("sound").clear();
     let asked = line.ask(&clock, &items).expect("a new connection");
-    assert_eq!(asked.of(Item::Feed), Some(&Ok(Answer::Whole(1))), "the control may have got the option");
+    assert_eq!(asked.of(FocasItem::Feed), Some(&Ok(FocasAnswer::Whole(1))), "the control may have got the option");
 }
 
 #[test]
 fn a_code_that_says_the_connection_is_dead_ends_it() {
     let (line, told, clock) = line(100);
-    line.ask(&clock, &[Item::Feed]).expect("well");
-    told.results.lock().expect("sound").insert(Item::Feed, refused(-16));
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    line.ask(&clock, &[FocasItem::Feed]).expect("well");
+    told.results.lock().expect("sound").insert(FocasItem::Feed, refused(-16));
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     told.results.lock().expect("sound").clear();
-    line.ask(&clock, &[Item::Feed]).expect("well again");
+    line.ask(&clock, &[FocasItem::Feed]).expect("well again");
     assert_eq!((line.counts().connections, line.counts().broken), (2, 1));
 }
 
@@ -156,35 +160,38 @@ fn off_is_what_was_on_before() {
     let (line, told, clock) = line(100);
     let nobody = || Some(FocasError::NobodyThere("refused".into()));
     *told.connect.lock().expect("sound") = nobody();
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })), "it may be the wrong address");
+    assert!(
+        matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })),
+        "it may be the wrong address"
+    );
     *told.connect.lock().expect("sound") = None;
-    line.ask(&clock, &[Item::Feed]).expect("on");
+    line.ask(&clock, &[FocasItem::Feed]).expect("on");
     *told.fail.lock().expect("sound") = Some(FocasError::Broken("reset".into()));
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     *told.connect.lock().expect("sound") = nobody();
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Off { .. })), "starting, or off");
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "starting, or off");
     told.now_ns.fetch_add(200 * SECOND_NS, Ordering::SeqCst);
-    let error = line.ask(&clock, &[Item::Feed]).expect_err("too long for a start");
+    let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("too long for a start");
     assert!(matches!(error, SourceError::Line { .. }), "the host lives and nobody listens: {error}");
     *told.connect.lock().expect("sound") = Some(FocasError::Unreachable("no route".into()));
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Off { .. })), "however long");
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Off { .. })), "however long");
 }
 
 #[test]
 fn facts_that_are_refused_for_now_are_asked_for_again_with_every_round() {
     for code in [-1, 7, 11] {
         let (line, told, clock) = line(100);
-        let questions = [Item::AxisNames, INCH_MACHINE];
+        let questions = [FocasItem::AxisNames, INCH_MACHINE];
         questions.iter().for_each(|item| drop(told.results.lock().expect("sound").insert(*item, refused(code))));
-        let asked = line.ask(&clock, &[Item::Feed]).expect("well");
+        let asked = line.ask(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!(asked.facts.inch, Err(Absence::Refused), "no guess while the control says {code}");
         assert_eq!(asked.facts.axes_of(1), Err(Absence::Refused));
         told.results.lock().expect("sound").clear();
-        let asked = line.ask(&clock, &[Item::Feed]).expect("well");
+        let asked = line.ask(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!((asked.facts.inch, asked.facts.axes_of(1).map(<[String]>::len)), (Ok(false), Ok(2)));
         assert_eq!(line.counts().connections, 1, "on the same connection");
         let before = told.asked.load(Ordering::SeqCst);
-        line.ask(&clock, &[Item::Feed]).expect("well");
+        line.ask(&clock, &[FocasItem::Feed]).expect("well");
         assert_eq!(told.asked.load(Ordering::SeqCst) - before, 1, "nothing is asked twice once it is known");
     }
 }
@@ -192,12 +199,12 @@ fn facts_that_are_refused_for_now_are_asked_for_again_with_every_round() {
 #[test]
 fn an_answer_that_was_cut_off_is_no_machine_that_is_off() {
     let (line, told, clock) = line(100);
-    line.ask(&clock, &[Item::Feed]).expect("on");
+    line.ask(&clock, &[FocasItem::Feed]).expect("on");
     *told.fail.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited: None });
-    assert!(matches!(line.ask(&clock, &[Item::Feed]), Err(SourceError::Line { .. })));
+    assert!(matches!(line.ask(&clock, &[FocasItem::Feed]), Err(SourceError::Line { .. })));
     for waited in [None, Some(Duration::from_secs(2))] {
         *told.connect.lock().expect("sound") = Some(FocasError::Cut { got: 20, waited });
-        let error = line.ask(&clock, &[Item::Feed]).expect_err("an opening that was cut off");
+        let error = line.ask(&clock, &[FocasItem::Feed]).expect_err("an opening that was cut off");
         assert!(!matches!(error, SourceError::Off { .. }), "{error}");
         assert!(error.to_string().contains("20 bytes"), "{error}");
     }

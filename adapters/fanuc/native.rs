@@ -5,15 +5,17 @@
 //! connection, because there is no other way to find the beginning of the next frame. The deadline holds for the whole
 //! exchange, also when the answer comes byte by byte. Leaving says so: a controller has only a few connections.
 
-use super::answer::{ItemError, ItemResult, Refusal};
-use super::code::ReturnCode;
+use super::answer::{FocasItemError, FocasItemResult, Refusal};
+use super::code::FocasReturnCode;
 use super::decode;
 use super::focas::{Focas, FocasError};
-use super::item::{Item, Question, Write};
+use super::item::{FocasItem, Question, Write};
 use super::opening::{Generation, Opening};
 use super::request;
 use super::statistics::Statistics;
-use super::wire::{Frame, FrameKind, HEADER_LEN, Header, Reply, Request, WireError, frame, replies, request_body};
+use super::wire::{
+    FocasFrame, FocasHeader, FrameKind, HEADER_LEN, Reply, Request, WireError, frame, replies, request_body,
+};
 use crate::address::Endpoint;
 use crate::stream::{self, Short};
 use std::io::{ErrorKind, Write as _};
@@ -66,7 +68,7 @@ impl Native {
         };
         let opening = opening.map_err(|error| protocol(&error))?;
         if u16::from(settings.path) > opening.paths.max(1) {
-            return Err(FocasError::Refused(Refusal { code: ReturnCode::PATH, detail: 0 }));
+            return Err(FocasError::Refused(Refusal { code: FocasReturnCode::PATH, detail: 0 }));
         }
         Ok(Self { stream, settings, opening, statistics: Statistics::default() })
     }
@@ -109,7 +111,7 @@ impl Native {
 
 /// Is the frame the answer to these questions? Shows each answer to `take`, or none.
 fn checked(
-    answer: &Frame,
+    answer: &FocasFrame,
     generation: Generation,
     requests: &[Request],
     take: &mut impl FnMut(usize, &Reply<'_>),
@@ -137,7 +139,7 @@ impl Focas for Native {
         &self.opening
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         let before = out.len();
         let mut rest = questions;
         while !rest.is_empty() {
@@ -165,13 +167,15 @@ impl Drop for Native {
 }
 
 fn refused(reply: &Reply<'_>) -> Option<Refusal> {
-    (reply.code != 0).then_some(Refusal { code: ReturnCode(reply.code), detail: reply.detail })
+    (reply.code != 0).then_some(Refusal { code: FocasReturnCode(reply.code), detail: reply.detail })
 }
 
-fn result(item: Item, generation: Generation, reply: &Reply<'_>) -> ItemResult {
+fn result(item: FocasItem, generation: Generation, reply: &Reply<'_>) -> FocasItemResult {
     match refused(reply) {
-        Some(refusal) => Err(ItemError::Refused(refusal)),
-        None => decode::answer(item, generation, reply.data).map_err(|error| ItemError::Malformed(error.to_string())),
+        Some(refusal) => Err(FocasItemError::Refused(refusal)),
+        None => {
+            decode::answer(item, generation, reply.data).map_err(|error| FocasItemError::Malformed(error.to_string()))
+        }
     }
 }
 
@@ -197,13 +201,13 @@ fn send(stream: &mut TcpStream, bytes: &[u8], timeout: Duration) -> Result<(), F
     stream.write_all(bytes).map_err(line)
 }
 
-fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<Frame, FocasError> {
+fn receive(stream: &mut TcpStream, deadline: Instant, timeout: Duration) -> Result<FocasFrame, FocasError> {
     let mut head = [0; HEADER_LEN];
     fill(stream, &mut head, deadline, 0, timeout)?;
-    let header = Header::of(&head).map_err(|error| protocol(&error))?;
+    let header = FocasHeader::of(&head).map_err(|error| protocol(&error))?;
     let mut body = vec![0; header.body_len];
     fill(stream, &mut body, deadline, HEADER_LEN, timeout)?;
-    Ok(Frame { version: header.version, kind: header.kind, body })
+    Ok(FocasFrame { version: header.version, kind: header.kind, body })
 }
 
 /// Reads until the buffer is full or the deadline is over; `before` bytes of the same answer have come already.

@@ -7,7 +7,7 @@ use super::feed_override;
 use super::item::Area;
 use super::line::{Connect, FanucLine};
 use super::native::{Native, NativeSettings};
-use super::own::Pace;
+use super::own::ReadWith;
 use super::pace::SharedPace;
 use super::poll;
 use super::readings::Manner;
@@ -74,8 +74,8 @@ pub fn opened(name: &str, connect: Connect, path: u8, options: &FanucOptions) ->
     };
     let of = |pace| extras.iter().filter(move |(own, _)| *own == pace).map(|(_, extra)| extra.clone()).collect();
     let sources: Vec<Box<dyn Source>> = vec![
-        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace, of(Pace::Fast))),
-        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace, of(Pace::Slow))),
+        Box::new(FanucSource::fast(name, line.clone(), manner, options, &pace, of(ReadWith::Fast))),
+        Box::new(FanucSource::slow(name, line.clone(), manner, options, &pace, of(ReadWith::Slow))),
     ];
     let actuator = FanucActuator::new(name, line.clone(), path, options);
     let actuator = actuator.map(|actuator| Box::new(actuator) as Box<dyn Actuator>);

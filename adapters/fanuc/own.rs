@@ -8,15 +8,15 @@
 //! read = "diagnosis 301 axis 1"      read = "work_offset 1 axis 3"
 //! ```
 
-use super::answer::Answer;
-use super::item::{Area, Item, Stretch, Width};
-use super::states::Found;
+use super::answer::FocasAnswer;
+use super::item::{Area, FocasItem, PmcWidth, Stretch};
+use super::states::OrAbsence;
 use crate::channel::NewChannel;
 use crate::reading::Absence;
 
 /// With which group a channel is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pace {
+pub enum ReadWith {
     /// With motion and states.
     Fast,
     /// With parts and times.
@@ -27,7 +27,7 @@ pub enum Pace {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OwnItem {
     /// The item.
-    pub item: Item,
+    pub item: FocasItem,
     /// A single bit of a byte of PMC memory.
     pub bit: Option<u8>,
 }
@@ -38,7 +38,7 @@ pub struct OwnChannel {
     /// Name, unit and range.
     pub new: NewChannel,
     /// What is read.
-    pub item: Item,
+    pub item: FocasItem,
     /// A single bit of it.
     pub bit: Option<u8>,
     /// Factor by which what is read becomes the unit.
@@ -46,7 +46,7 @@ pub struct OwnChannel {
     /// Added after the factor, in the unit.
     pub offset: f64,
     /// With which group.
-    pub pace: Pace,
+    pub pace: ReadWith,
     /// Path from 1; `None` is the one that is written to.
     pub path: Option<u8>,
 }
@@ -59,25 +59,29 @@ impl OwnItem {
     pub fn read(text: &str) -> Result<Self, String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let found = match words.as_slice() {
-            ["macro", number] => whole(number, 1, 65_535).map(Item::Macro).map(Self::plain),
-            ["parameter", number] => whole(number, 0, 32_767).map(|number| Item::Parameter(number, 0)).map(Self::plain),
+            ["macro", number] => whole(number, 1, 65_535).map(FocasItem::Macro).map(Self::plain),
+            ["parameter", number] => {
+                whole(number, 0, 32_767).map(|number| FocasItem::Parameter(number, 0)).map(Self::plain)
+            }
             ["parameter", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| Item::Parameter(number, axis)).map(Self::plain)
+                numbered(number, axis).map(|(number, axis)| FocasItem::Parameter(number, axis)).map(Self::plain)
             }
-            ["diagnosis", number] => whole(number, 0, 32_767).map(|number| Item::Diagnosis(number, 0)).map(Self::plain),
+            ["diagnosis", number] => {
+                whole(number, 0, 32_767).map(|number| FocasItem::Diagnosis(number, 0)).map(Self::plain)
+            }
             ["diagnosis", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| Item::Diagnosis(number, axis)).map(Self::plain)
+                numbered(number, axis).map(|(number, axis)| FocasItem::Diagnosis(number, axis)).map(Self::plain)
             }
-            ["pmc", place] => pmc(place, Width::Byte),
-            ["pmc", place, "byte"] => pmc(place, Width::Byte),
-            ["pmc", place, "word"] => pmc(place, Width::Word),
-            ["pmc", place, "long"] => pmc(place, Width::Long),
+            ["pmc", place] => pmc(place, PmcWidth::Byte),
+            ["pmc", place, "byte"] => pmc(place, PmcWidth::Byte),
+            ["pmc", place, "word"] => pmc(place, PmcWidth::Word),
+            ["pmc", place, "long"] => pmc(place, PmcWidth::Long),
             ["tool_offset", number, "type", kind] => whole(number, 1, 9999)
                 .zip(whole(kind, 0, 15))
-                .map(|(number, kind)| Item::ToolOffset(number, kind))
+                .map(|(number, kind)| FocasItem::ToolOffset(number, kind))
                 .map(Self::plain),
             ["work_offset", number, "axis", axis] => {
-                numbered(number, axis).map(|(number, axis)| Item::WorkOffset(number, axis)).map(Self::plain)
+                numbered(number, axis).map(|(number, axis)| FocasItem::WorkOffset(number, axis)).map(Self::plain)
             }
             _ => None,
         };
@@ -90,7 +94,7 @@ impl OwnItem {
         })
     }
 
-    fn plain(item: Item) -> Self {
+    fn plain(item: FocasItem) -> Self {
         Self { item, bit: None }
     }
 }
@@ -106,17 +110,17 @@ fn numbered(number: &str, axis: &str) -> Option<(u16, i16)> {
 }
 
 /// `R100` or `R100.3`.
-fn pmc(place: &str, width: Width) -> Option<OwnItem> {
+fn pmc(place: &str, width: PmcWidth) -> Option<OwnItem> {
     let (byte, bit) = place.split_once('.').map_or((place, None), |(byte, bit)| (byte, Some(bit)));
     let mut letters = byte.chars();
     let area = Area::of_letter(letters.next()?)?;
     let from = whole(letters.as_str(), 0, 60_000)?;
     let bit = match bit {
         None => None,
-        Some(bit) if width == Width::Byte => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 8)?),
+        Some(bit) if width == PmcWidth::Byte => Some(bit.parse::<u8>().ok().filter(|bit| *bit < 8)?),
         Some(_) => return None,
     };
-    Some(OwnItem { item: Item::Pmc(Stretch { area, from, to: from + width.bytes() - 1, width }), bit })
+    Some(OwnItem { item: FocasItem::Pmc(Stretch { area, from, to: from + width.bytes() - 1, width }), bit })
 }
 
 impl OwnChannel {
@@ -124,14 +128,16 @@ impl OwnChannel {
     ///
     /// # Errors
     /// The answer holds no number: a vacant variable, or another kind of answer.
-    pub fn value(&self, answer: &Answer) -> Found<f64> {
+    pub fn value(&self, answer: &FocasAnswer) -> OrAbsence<f64> {
         let raw = match (answer, self.bit) {
-            (Answer::Memory(elements), Some(bit)) => f64::from(elements.first().ok_or(Absence::OutOfRange)? >> bit & 1),
-            (Answer::Memory(elements), None) => f64::from(*elements.first().ok_or(Absence::OutOfRange)?),
+            (FocasAnswer::Memory(elements), Some(bit)) => {
+                f64::from(elements.first().ok_or(Absence::OutOfRange)? >> bit & 1)
+            }
+            (FocasAnswer::Memory(elements), None) => f64::from(*elements.first().ok_or(Absence::OutOfRange)?),
             // A vacant variable has no value.
-            (Answer::Number(value), _) => value.ok_or(Absence::NotSupported)?,
-            (Answer::Data { values, .. }, _) => values.first().copied().flatten().ok_or(Absence::OutOfRange)?,
-            (Answer::Whole(whole), _) => f64::from(*whole),
+            (FocasAnswer::Number(value), _) => value.ok_or(Absence::NotSupported)?,
+            (FocasAnswer::Data { values, .. }, _) => values.first().copied().flatten().ok_or(Absence::OutOfRange)?,
+            (FocasAnswer::Whole(whole), _) => f64::from(*whole),
             _ => return Err(Absence::OutOfRange),
         };
         Ok(raw * self.scale + self.offset)
@@ -142,20 +148,23 @@ impl OwnChannel {
 mod tests {
     use super::*;
 
-    fn item(text: &str) -> Item {
+    fn item(text: &str) -> FocasItem {
         OwnItem::read(text).expect("readable").item
     }
 
     #[test]
     fn what_can_be_read() {
-        assert_eq!(item("macro 500"), Item::Macro(500));
-        assert_eq!(item("parameter 1420 axis 2"), Item::Parameter(1420, 2));
-        assert_eq!(item("diagnosis 403"), Item::Diagnosis(403, 0));
-        assert_eq!(item("pmc D20 word"), Item::Pmc(Stretch { area: Area::D, from: 20, to: 21, width: Width::Word }));
-        assert_eq!(item("tool_offset 1 type 3"), Item::ToolOffset(1, 3));
-        assert_eq!(item("work_offset 0 axis 1"), Item::WorkOffset(0, 1));
+        assert_eq!(item("macro 500"), FocasItem::Macro(500));
+        assert_eq!(item("parameter 1420 axis 2"), FocasItem::Parameter(1420, 2));
+        assert_eq!(item("diagnosis 403"), FocasItem::Diagnosis(403, 0));
+        assert_eq!(
+            item("pmc D20 word"),
+            FocasItem::Pmc(Stretch { area: Area::D, from: 20, to: 21, width: PmcWidth::Word })
+        );
+        assert_eq!(item("tool_offset 1 type 3"), FocasItem::ToolOffset(1, 3));
+        assert_eq!(item("work_offset 0 axis 1"), FocasItem::WorkOffset(0, 1));
         let bit = OwnItem::read("pmc r100.3").expect("readable");
-        assert_eq!((bit.item, bit.bit), (Item::Pmc(Stretch::bytes(Area::R, 100, 1)), Some(3)));
+        assert_eq!((bit.item, bit.bit), (FocasItem::Pmc(Stretch::bytes(Area::R, 100, 1)), Some(3)));
         for wrong in [
             "",
             "macro",

@@ -27,13 +27,13 @@ const PERIOD_MAX: Duration = Duration::from_secs(60);
 
 /// One group.
 #[derive(Debug, Clone, Copy)]
-struct Group {
+struct PollGroup {
     wanted_s: f64,
     /// How long the control takes to answer it; `None` before the first answer.
     busy_s: Option<f64>,
 }
 
-impl Group {
+impl PollGroup {
     /// Share of the control's time that it takes at the period that is wanted.
     fn share(&self) -> f64 {
         self.busy_s.unwrap_or(0.0) / self.wanted_s
@@ -43,7 +43,7 @@ impl Group {
 /// The groups of one control; clones are handles on the same ones.
 #[derive(Debug, Clone)]
 pub struct SharedPace {
-    groups: Arc<Mutex<Vec<Group>>>,
+    groups: Arc<Mutex<Vec<PollGroup>>>,
     planned: f64,
 }
 
@@ -65,11 +65,11 @@ impl SharedPace {
     #[must_use]
     pub fn group(&self, wanted: Duration) -> GroupPace {
         let mut groups = self.lock();
-        groups.push(Group { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None });
+        groups.push(PollGroup { wanted_s: wanted.as_secs_f64().max(1e-3), busy_s: None });
         GroupPace { shared: self.clone(), at: groups.len() - 1 }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Group>> {
+    fn lock(&self) -> MutexGuard<'_, Vec<PollGroup>> {
         // Each group is complete whenever the lock is free.
         self.groups.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -104,7 +104,7 @@ impl GroupPace {
         let groups = self.shared.lock();
         let (Some(first), Some(own)) = (groups.first(), groups.get(self.at)) else { return PERIOD_MAX };
         let planned = self.shared.planned;
-        let slow: f64 = groups.iter().skip(1).map(Group::share).sum();
+        let slow: f64 = groups.iter().skip(1).map(PollGroup::share).sum();
         // What the slow groups may take: what the first one leaves, and never less than their quarter.
         let left = (planned - first.share()).max(SLOW_SHARE * planned);
         let stretch = (slow / left).max(1.0);

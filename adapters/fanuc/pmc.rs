@@ -72,7 +72,7 @@ impl Area {
 
 /// Bytes of one element of PMC memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Width {
+pub enum PmcWidth {
     /// One byte, 0 to 255.
     Byte,
     /// Two bytes, signed.
@@ -81,7 +81,7 @@ pub enum Width {
     Long,
 }
 
-impl Width {
+impl PmcWidth {
     /// Number of bytes.
     #[must_use]
     pub fn bytes(self) -> u16 {
@@ -119,14 +119,14 @@ pub struct Stretch {
     /// Last byte.
     pub to: u16,
     /// Size of the elements.
-    pub width: Width,
+    pub width: PmcWidth,
 }
 
 impl Stretch {
     /// So many single bytes.
     #[must_use]
     pub fn bytes(area: Area, from: u16, count: u16) -> Self {
-        Self { area, from, to: from.saturating_add(count.saturating_sub(1)), width: Width::Byte }
+        Self { area, from, to: from.saturating_add(count.saturating_sub(1)), width: PmcWidth::Byte }
     }
 
     /// Number of bytes; 0 when it ends before it begins.

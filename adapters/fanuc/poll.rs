@@ -1,7 +1,7 @@
 //! What is asked for, group by group. Every group is a source with its own period; both share one connection. The
 //! questions of all paths travel together.
 
-use super::item::{Area, Item, Position, Question, Servo, Spindle, Stretch, Word};
+use super::item::{Area, BlockWord, FocasItem, Position, Question, Servo, Spindle, Stretch};
 
 /// Signals of one path lie this many bytes after those of the one before.
 const PATH_STEP: u16 = 1000;
@@ -28,48 +28,48 @@ pub fn ladder_signals(path: u8) -> Stretch {
 pub const FIRST_LADDER_BYTE: u16 = 6;
 
 /// The modal words F, S and T.
-pub const MODAL_F: Item = Item::ModalWord(Word::F);
+pub const MODAL_F: FocasItem = FocasItem::ModalWord(BlockWord::F);
 /// See [`MODAL_F`].
-pub const MODAL_S: Item = Item::ModalWord(Word::S);
+pub const MODAL_S: FocasItem = FocasItem::ModalWord(BlockWord::S);
 /// See [`MODAL_F`].
-pub const MODAL_T: Item = Item::ModalWord(Word::T);
+pub const MODAL_T: FocasItem = FocasItem::ModalWord(BlockWord::T);
 
 /// The modal group of feed per minute (0) and per revolution ([`PER_REVOLUTION`]): group 05 of the manuals, G94 and G95
 /// on a mill, G98 and G99 on a lathe with the codes of system A.
-pub const FEED_GROUP: Item = Item::ModalGroup(4);
+pub const FEED_GROUP: FocasItem = FocasItem::ModalGroup(4);
 /// Feed per revolution in [`FEED_GROUP`]. Source: FOCAS2 manual, `cnc_modal`; `libfwlib32` 1.0.5 takes 1 for it.
 pub const PER_REVOLUTION: u8 = 1;
 
 /// The alarms, asked for only when the status says that there are some.
-pub const ALARMS: Item = Item::Alarms(8);
+pub const ALARMS: FocasItem = FocasItem::Alarms(8);
 
 /// What changes quickly on every path.
-fn quick(path: u8) -> [Item; 16] {
+fn quick(path: u8) -> [FocasItem; 16] {
     [
-        Item::Status,
+        FocasItem::Status,
         // Before what the vendor's call for the positions answers besides.
-        Item::Position(Position::Machine, -1),
-        Item::Feed,
-        Item::SpindleSpeed,
-        Item::Spindles(Spindle::Load),
-        Item::Servos(Servo::Load),
-        Item::ProgramName,
-        Item::Program,
-        Item::Sequence,
+        FocasItem::Position(Position::Machine, -1),
+        FocasItem::Feed,
+        FocasItem::SpindleSpeed,
+        FocasItem::Spindles(Spindle::Load),
+        FocasItem::Servos(Servo::Load),
+        FocasItem::ProgramName,
+        FocasItem::Program,
+        FocasItem::Sequence,
         MODAL_F,
         MODAL_S,
         MODAL_T,
-        Item::FeedUnit,
+        FocasItem::FeedUnit,
         FEED_GROUP,
-        Item::Pmc(control_signals(path)),
-        Item::Pmc(ladder_signals(path)),
+        FocasItem::Pmc(control_signals(path)),
+        FocasItem::Pmc(ladder_signals(path)),
     ]
 }
 
 /// What changes quickly: one frame.
 #[must_use]
 pub fn fast(path: u8) -> Vec<Question> {
-    let own = [Item::Servos(Servo::Current), MOTOR_TEMPERATURE];
+    let own = [FocasItem::Servos(Servo::Current), MOTOR_TEMPERATURE];
     quick(path).into_iter().chain(own).map(|item| item.on(path)).collect()
 }
 
@@ -80,12 +80,12 @@ pub fn further(path: u8) -> Vec<Question> {
 }
 
 /// Temperature of the winding of the spindle motor, °C.
-pub const MOTOR_TEMPERATURE: Item = Item::Diagnosis(403, 1);
+pub const MOTOR_TEMPERATURE: FocasItem = FocasItem::Diagnosis(403, 1);
 
 /// Power of the spindle drive, W, in this diagnosis number.
 #[must_use]
-pub fn power(diagnosis: u16) -> Item {
-    Item::Diagnosis(diagnosis, 1)
+pub fn power(diagnosis: u16) -> FocasItem {
+    FocasItem::Diagnosis(diagnosis, 1)
 }
 
 /// What changes slowly: parts and gear stage, without the details that a source asks for besides.

@@ -1,12 +1,12 @@
 //! Answers to channels: units, states, and a reason where there is no value. Pure.
 
-use super::answer::{Answer, Status};
+use super::answer::{FocasAnswer, Status};
 use super::dial::Dial;
 use super::extra::Extra;
-use super::item::{Item, Position, Servo, Spindle};
+use super::item::{FocasItem, Position, Servo, Spindle};
 use super::line::Asked;
 use super::poll;
-use super::states::{self, Found};
+use super::states::{self, OrAbsence};
 use super::view::{View, flag, number, text, word};
 use crate::channel::{ChannelId, on_path};
 use crate::reading::{Absence, Reading, Stamp, Value};
@@ -69,7 +69,7 @@ pub fn columns<'a>(further: Option<u8>, names: impl IntoIterator<Item = &'a str>
 /// Does the answer say that alarms of this path have to be asked for?
 #[must_use]
 pub fn alarmed(asked: &Asked, path: u8) -> bool {
-    matches!(asked.on(Item::Status.on(path)), Some(Ok(Answer::Status(status))) if states::alarmed(status))
+    matches!(asked.on(FocasItem::Status.on(path)), Some(Ok(FocasAnswer::Status(status))) if states::alarmed(status))
 }
 
 /// How answers are read besides what they say.
@@ -109,17 +109,17 @@ pub fn fast(
     let status = view.status();
     let axes = ["X", "Y", "Z"];
     let position = axes.map(|letter| number(view.position(Position::Machine, letter, false)));
-    let load = axes.map(|letter| number(view.axis(Item::Servos(Servo::Load), letter)));
-    let current = axes.map(|letter| number(view.axis(Item::Servos(Servo::Current), letter)));
+    let load = axes.map(|letter| number(view.axis(FocasItem::Servos(Servo::Load), letter)));
+    let current = axes.map(|letter| number(view.axis(FocasItem::Servos(Servo::Current), letter)));
     let single_block = signals.single_block() == Ok(true);
     let values = [
         number(view.number(poll::MODAL_S)),
         number(view.feed_mm_min(poll::MODAL_F, view.programmed_unit(&signals))),
-        number(view.number(Item::SpindleSpeed)),
-        number(view.feed_mm_min(Item::Feed, view.feed_unit(&signals))),
+        number(view.number(FocasItem::SpindleSpeed)),
+        number(view.feed_mm_min(FocasItem::Feed, view.feed_unit(&signals))),
         number(pct),
         number(signals.spindle_override()),
-        number(view.number(Item::Spindles(Spindle::Load))),
+        number(view.number(FocasItem::Spindles(Spindle::Load))),
     ];
     let words = [
         flag(signals.rapid()),
@@ -127,7 +127,7 @@ pub fn fast(
         word(status.map(|status| states::mode(&status, single_block))),
         word(status.map(|status| states::execution(&status, pct.ok()))),
         text(view.program()),
-        text(view.number(Item::Sequence).map(|number| format!("N{number}"))),
+        text(view.number(FocasItem::Sequence).map(|number| format!("N{number}"))),
         text(view.number(poll::MODAL_T).map(|number| format!("T{number}"))),
         text(status.map(|status| alarm_text(&status, &view, alarms))),
         word(status.map(|status| states::motion(&status))),
@@ -147,7 +147,7 @@ pub fn fast(
 fn alarm_text(status: &Status, view: &View<'_>, alarms: Option<&Asked>) -> String {
     let found = alarms.and_then(|alarms| alarms.on(poll::ALARMS.on(view.path)));
     let alarms = match found {
-        Some(Ok(Answer::Alarms(alarms))) => alarms.as_slice(),
+        Some(Ok(FocasAnswer::Alarms(alarms))) => alarms.as_slice(),
         _ => &[],
     };
     states::alarm(status, alarms, view.asked.facts.axes_of(view.path).unwrap_or_default())
@@ -159,7 +159,7 @@ pub(super) fn extra(extras: &[Extra], asked: &Asked, out: &mut Vec<Reading>) {
     out.extend(extras.iter().map(|extra| reading(extra.channel, stamp, extra.read(asked))));
 }
 
-pub(super) fn reading(channel: ChannelId, stamp: Stamp, value: Found<Value>) -> Reading {
+pub(super) fn reading(channel: ChannelId, stamp: Stamp, value: OrAbsence<Value>) -> Reading {
     match value {
         Ok(Value::Number(value)) => Reading::number(channel, stamp, value),
         Ok(Value::Text(text)) => Reading::text(channel, stamp, text),

@@ -1,7 +1,7 @@
 //! Records within the data of an answer: messages, remembered alarms, G codes, tool life. What is known of their layout
 //! comes from what the vendor's library makes of them.
 
-use super::answer::{Alarm, Answer, Message, PastAlarm};
+use super::answer::{Alarm, FocasAnswer, OperatorMessage, PastAlarm};
 use super::decode::text;
 use super::request::{HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 use super::wire::{Cursor, WireError};
@@ -21,9 +21,9 @@ fn told(cursor: &mut Cursor<'_>, told: i32, length: usize) -> Read<String> {
     Ok(text(&bytes[..told]))
 }
 
-pub(super) fn message(cursor: &mut Cursor<'_>) -> Read<Message> {
+pub(super) fn message(cursor: &mut Cursor<'_>) -> Read<OperatorMessage> {
     let (number, kind, length) = (cursor.i32()?, cursor.i32()?, cursor.i32()?);
-    Ok(Message { number, kind, text: told(cursor, length, MESSAGE_TEXT_LEN)? })
+    Ok(OperatorMessage { number, kind, text: told(cursor, length, MESSAGE_TEXT_LEN)? })
 }
 
 pub(super) fn past_alarm(cursor: &mut Cursor<'_>) -> Read<PastAlarm> {
@@ -51,7 +51,7 @@ pub(super) fn g_code(cursor: &mut Cursor<'_>) -> Read<String> {
     })
 }
 
-pub(super) fn life(cursor: &mut Cursor<'_>, wanted: u16) -> Read<Answer> {
+pub(super) fn life(cursor: &mut Cursor<'_>, wanted: u16) -> Read<FocasAnswer> {
     let found = cursor.i32()?;
     if found != i32::from(wanted) {
         let what = "number of a group of tools";
@@ -64,5 +64,5 @@ pub(super) fn life(cursor: &mut Cursor<'_>, wanted: u16) -> Read<Answer> {
     let count = cursor.i32()?;
     // What stands behind is not known; controls may send more.
     cursor.bytes(cursor.left())?;
-    Ok(Answer::Life { tools, life, count })
+    Ok(FocasAnswer::Life { tools, life, count })
 }

@@ -1,6 +1,6 @@
 //! Items and writes as blocks on the wire, in the encoding of the controller's generation.
 
-use super::item::{Item, Write};
+use super::item::{FocasItem, Write};
 use super::opening::{Generation, Opening};
 use super::wire::{Number, Request};
 
@@ -26,63 +26,63 @@ fn by_generation(generation: Generation, newer: u16, older: u16) -> u16 {
 
 /// The block that asks for an item.
 #[must_use]
-pub fn reading(item: Item, generation: Generation) -> Request {
+pub fn reading(item: FocasItem, generation: Generation) -> Request {
     use function as f;
     let number = i32::from;
     match item {
-        Item::System => Request::cnc(f::SYSTEM, &[]),
-        Item::Status => Request::cnc(f::STATUS, &[]),
-        Item::StatusLong => Request::cnc(f::STATUS_LONG, &[]),
-        Item::HandleRetrace => Request::cnc(f::HANDLE_RETRACE, &[]),
-        Item::ToolMode => Request::cnc(f::TOOL_MODE, &[]),
-        Item::Feed => Request::cnc(f::FEED, &[]),
-        Item::SpindleSpeed => Request::cnc(f::SPINDLE_SPEED, &[]),
-        Item::Spindles(what) => Request::cnc(f::SPINDLES, &[what.number(), -1]),
-        Item::Servos(what) => Request::cnc(f::SERVOS, &[what.number()]),
-        Item::Count(what) => Request::cnc(f::COUNT, &[number(what)]),
-        Item::AxisNames => Request::cnc(f::AXIS_NAMES, &[]),
-        Item::SpindleNames(which) => Request::cnc(f::SPINDLE_NAMES, &[number(which)]),
-        Item::FeedUnit => {
+        FocasItem::System => Request::cnc(f::SYSTEM, &[]),
+        FocasItem::Status => Request::cnc(f::STATUS, &[]),
+        FocasItem::StatusLong => Request::cnc(f::STATUS_LONG, &[]),
+        FocasItem::HandleRetrace => Request::cnc(f::HANDLE_RETRACE, &[]),
+        FocasItem::ToolMode => Request::cnc(f::TOOL_MODE, &[]),
+        FocasItem::Feed => Request::cnc(f::FEED, &[]),
+        FocasItem::SpindleSpeed => Request::cnc(f::SPINDLE_SPEED, &[]),
+        FocasItem::Spindles(what) => Request::cnc(f::SPINDLES, &[what.number(), -1]),
+        FocasItem::Servos(what) => Request::cnc(f::SERVOS, &[what.number()]),
+        FocasItem::Count(what) => Request::cnc(f::COUNT, &[number(what)]),
+        FocasItem::AxisNames => Request::cnc(f::AXIS_NAMES, &[]),
+        FocasItem::SpindleNames(which) => Request::cnc(f::SPINDLE_NAMES, &[number(which)]),
+        FocasItem::FeedUnit => {
             Request::cnc(f::SPEED_UNIT, &[if matches!(generation, Generation::Newer(_)) { UNIT_OF_FEED } else { 0 }])
         }
-        Item::SpindleUnit => Request::cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
-        Item::Program => Request::cnc(f::PROGRAM, &[]),
-        Item::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
-        Item::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
-        Item::MainProgram => Request::cnc(f::MAIN_PROGRAM, &[]),
-        Item::Sequence => Request::cnc(f::SEQUENCE, &[]),
-        Item::BlockCount => Request::cnc(f::BLOCK_COUNT, &[]),
-        Item::AlarmBits => Request::cnc(f::ALARM_BITS, &[]),
-        Item::Alarms(most) => Request::cnc(f::ALARMS, &[-1, i32::from(most), 2, signed(ALARM_TEXT_LEN)]),
-        Item::ModalGroup(group) => Request::cnc(f::MODAL_GROUP, &[number(group)]),
-        Item::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[word.number()]),
-        Item::Position(what, axis) => Request::cnc(f::POSITION, &[what.number(), number(axis)]),
-        Item::Macro(variable) => Request::cnc(f::MACRO, &twice(variable)),
-        Item::Parameter(parameter, axis) => {
+        FocasItem::SpindleUnit => Request::cnc(f::SPEED_UNIT, &[UNIT_OF_SPINDLE]),
+        FocasItem::Program => Request::cnc(f::PROGRAM, &[]),
+        FocasItem::ProgramName => Request::cnc(f::PROGRAM_NAME, &[]),
+        FocasItem::ProgramPath => Request::cnc(f::PROGRAM_PATH, &[]),
+        FocasItem::MainProgram => Request::cnc(f::MAIN_PROGRAM, &[]),
+        FocasItem::Sequence => Request::cnc(f::SEQUENCE, &[]),
+        FocasItem::BlockCount => Request::cnc(f::BLOCK_COUNT, &[]),
+        FocasItem::AlarmBits => Request::cnc(f::ALARM_BITS, &[]),
+        FocasItem::Alarms(most) => Request::cnc(f::ALARMS, &[-1, i32::from(most), 2, signed(ALARM_TEXT_LEN)]),
+        FocasItem::ModalGroup(group) => Request::cnc(f::MODAL_GROUP, &[number(group)]),
+        FocasItem::ModalWord(word) => Request::cnc(f::MODAL_WORD, &[word.number()]),
+        FocasItem::Position(what, axis) => Request::cnc(f::POSITION, &[what.number(), number(axis)]),
+        FocasItem::Macro(variable) => Request::cnc(f::MACRO, &twice(variable)),
+        FocasItem::Parameter(parameter, axis) => {
             let [first, last] = twice(parameter);
             Request::cnc(by_generation(generation, f::PARAMETER, f::PARAMETER_OLDER), &[first, last, number(axis)])
         }
-        Item::Diagnosis(diagnosis, axis) => {
+        FocasItem::Diagnosis(diagnosis, axis) => {
             let [first, last] = twice(diagnosis);
             Request::cnc(by_generation(generation, f::DIAGNOSIS, f::DIAGNOSIS_OLDER), &[first, last, number(axis)])
         }
-        Item::Pmc(stretch) => Request::pmc(f::PMC_READ, &pmc(stretch)),
-        Item::ToolOffset(offset, kind) => Request::cnc(f::TOOL_OFFSET, &tool(offset, kind)),
-        Item::WorkOffset(offset, axis) => Request::cnc(f::WORK_OFFSET, &work(offset, axis)),
-        Item::ExecutedText(most) => Request::cnc(f::EXECUTED_TEXT, &[i32::from(most)]),
-        Item::Timer(timer) => Request::cnc(f::TIMER, &[timer.number()]),
-        Item::TuningMode => Request::cnc(f::TUNING_MODE, &[]),
-        Item::PanelSignals(mask) => Request::cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
-        Item::CncId => Request::cnc(f::CNC_ID, &[]),
-        Item::Messages(most) => match generation {
+        FocasItem::Pmc(stretch) => Request::pmc(f::PMC_READ, &pmc(stretch)),
+        FocasItem::ToolOffset(offset, kind) => Request::cnc(f::TOOL_OFFSET, &tool(offset, kind)),
+        FocasItem::WorkOffset(offset, axis) => Request::cnc(f::WORK_OFFSET, &work(offset, axis)),
+        FocasItem::ExecutedText(most) => Request::cnc(f::EXECUTED_TEXT, &[i32::from(most)]),
+        FocasItem::Timer(timer) => Request::cnc(f::TIMER, &[timer.number()]),
+        FocasItem::TuningMode => Request::cnc(f::TUNING_MODE, &[]),
+        FocasItem::PanelSignals(mask) => Request::cnc(f::PANEL_SIGNALS, &[i32::from(mask)]),
+        FocasItem::CncId => Request::cnc(f::CNC_ID, &[]),
+        FocasItem::Messages(most) => match generation {
             Generation::Newer(_) => Request::cnc(f::MESSAGES, &[0, -1, i32::from(most)]),
             Generation::Older(_) => Request::cnc(f::MESSAGES_OLDER, &[-1]),
         },
-        Item::HistoryCount => Request::cnc(f::ALARM_HISTORY_COUNT, &[]),
-        Item::AlarmHistory(first, last) => Request::cnc(f::ALARM_HISTORY, &[first.into(), last.into(), 1]),
-        Item::GCodes => Request::cnc(f::G_CODES, &[-1, 0]),
-        Item::ToolGroup => Request::cnc(f::TOOL_GROUP, &[]),
-        Item::ToolLife(group) => Request::cnc(f::TOOL_LIFE, &twice(group)),
+        FocasItem::HistoryCount => Request::cnc(f::ALARM_HISTORY_COUNT, &[]),
+        FocasItem::AlarmHistory(first, last) => Request::cnc(f::ALARM_HISTORY, &[first.into(), last.into(), 1]),
+        FocasItem::GCodes => Request::cnc(f::G_CODES, &[-1, 0]),
+        FocasItem::ToolGroup => Request::cnc(f::TOOL_GROUP, &[]),
+        FocasItem::ToolLife(group) => Request::cnc(f::TOOL_LIFE, &twice(group)),
     }
 }
 
@@ -144,32 +144,32 @@ fn increments(value: i32) -> Vec<u8> {
 
 /// About how many bytes the answer to an item takes, its head included, for a frame that the controller can send.
 #[must_use]
-pub fn answer_len(item: Item, opening: &Opening) -> usize {
+pub fn answer_len(item: FocasItem, opening: &Opening) -> usize {
     let (axes, spindles) = (usize::from(opening.axes_max), usize::from(opening.spindles_max));
     let values = match opening.generation {
         Generation::Newer(_) => 8 * axes,
         Generation::Older(_) => 4 * axes,
     };
     let data = match item {
-        Item::Servos(_) | Item::Position(_, -1) => 8 * axes,
-        Item::Spindles(_) => 8 * spindles,
-        Item::AxisNames => 4 * axes,
-        Item::SpindleNames(_) => 4 * spindles,
-        Item::Parameter(..) | Item::Diagnosis(..) => 8 + values,
-        Item::Alarms(most) => usize::from(most) * (16 + ALARM_TEXT_LEN),
-        Item::ModalGroup(-1) => 80,
-        Item::ExecutedText(most) => 4 + usize::from(most),
-        Item::ProgramPath | Item::MainProgram => 256,
-        Item::ProgramName | Item::PanelSignals(_) => 40,
-        Item::Pmc(stretch) => stretch.len(),
-        Item::Messages(most) => usize::from(most.max(1)) * (12 + MESSAGE_TEXT_LEN),
-        Item::AlarmHistory(first, last) => (usize::from(last.saturating_sub(first)) + 1) * (28 + HISTORY_TEXT_LEN),
+        FocasItem::Servos(_) | FocasItem::Position(_, -1) => 8 * axes,
+        FocasItem::Spindles(_) => 8 * spindles,
+        FocasItem::AxisNames => 4 * axes,
+        FocasItem::SpindleNames(_) => 4 * spindles,
+        FocasItem::Parameter(..) | FocasItem::Diagnosis(..) => 8 + values,
+        FocasItem::Alarms(most) => usize::from(most) * (16 + ALARM_TEXT_LEN),
+        FocasItem::ModalGroup(-1) => 80,
+        FocasItem::ExecutedText(most) => 4 + usize::from(most),
+        FocasItem::ProgramPath | FocasItem::MainProgram => 256,
+        FocasItem::ProgramName | FocasItem::PanelSignals(_) => 40,
+        FocasItem::Pmc(stretch) => stretch.len(),
+        FocasItem::Messages(most) => usize::from(most.max(1)) * (12 + MESSAGE_TEXT_LEN),
+        FocasItem::AlarmHistory(first, last) => (usize::from(last.saturating_sub(first)) + 1) * (28 + HISTORY_TEXT_LEN),
         // Controls that are known have up to 28 groups.
-        Item::GCodes => 28 * 12,
-        Item::ToolLife(_) => 24,
-        Item::CncId => 16,
-        Item::System | Item::StatusLong => 22,
-        Item::Status => 14,
+        FocasItem::GCodes => 28 * 12,
+        FocasItem::ToolLife(_) => 24,
+        FocasItem::CncId => 16,
+        FocasItem::System | FocasItem::StatusLong => 22,
+        FocasItem::Status => 14,
         _ => Number::LEN,
     };
     16 + data

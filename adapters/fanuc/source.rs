@@ -3,7 +3,7 @@
 use super::details;
 use super::extra::Extra;
 use super::facts::Facts;
-use super::item::{Item, Question};
+use super::item::{FocasItem, Question};
 use super::line::{Asked, FanucLine};
 use super::pace::{GroupPace, SharedPace};
 use super::poll;
@@ -18,7 +18,7 @@ use std::time::Duration;
 
 /// Which group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Group {
+enum PolledGroup {
     Fast,
     Slow,
 }
@@ -27,7 +27,7 @@ enum Group {
 pub struct FanucSource {
     name: String,
     line: FanucLine,
-    group: Group,
+    group: PolledGroup,
     questions: Vec<Question>,
     /// Each path with its channels at the places of [`readings::columns`]; the slow group has them in its order.
     paths: Vec<(Manner, Vec<Option<ChannelId>>)>,
@@ -59,13 +59,24 @@ impl FanucSource {
         let paths: Vec<_> = std::iter::once((manner, own)).chain(further).collect();
         let mut questions = poll::fast(manner.path);
         questions.extend(power.map(|number| poll::power(number).on(manner.path)));
-        questions.extend(manner.dial.map(|dial| Item::Pmc(dial.stretch()).on(manner.path)));
+        questions.extend(manner.dial.map(|dial| FocasItem::Pmc(dial.stretch()).on(manner.path)));
         questions.extend(options.further.iter().flat_map(|path| poll::further(*path)));
         add(&mut questions, &extras);
         let own = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten());
         let channels = own.chain(extras.iter().map(|extra| extra.channel)).collect();
         let (name, pace) = (name.to_owned(), shared.group(options.period));
-        Self { name, line, group: Group::Fast, questions, paths, channels, extras, details: false, pace, facts: None }
+        Self {
+            name,
+            line,
+            group: PolledGroup::Fast,
+            questions,
+            paths,
+            channels,
+            extras,
+            details: false,
+            pace,
+            facts: None,
+        }
     }
 
     /// What changes slowly and holds in between: parts, times, texts, codes. Of the first path only.
@@ -86,7 +97,7 @@ impl FanucSource {
         Self {
             name: format!("{name}{joint}group=slow"),
             line,
-            group: Group::Slow,
+            group: PolledGroup::Slow,
             questions,
             paths: Vec::new(),
             channels,
@@ -126,7 +137,7 @@ impl Source for FanucSource {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let asked = self.line.ask_on(clock, &self.questions)?;
         self.facts = Some(asked.facts.clone());
-        if self.group == Group::Slow {
+        if self.group == PolledGroup::Slow {
             let further = details::further(&asked);
             let further = if further.is_empty() { None } else { Some(self.line.ask_on(clock, &further)?) };
             self.pace.took(busy(&asked) + further.as_ref().map(busy).unwrap_or_default());
@@ -146,10 +157,10 @@ impl Source for FanucSource {
     fn facts(&self) -> Vec<Fact> {
         let paced = paced(&self.pace, self.group);
         match (&self.facts, self.group) {
-            (Some(facts), Group::Fast) => {
+            (Some(facts), PolledGroup::Fast) => {
                 identity(facts, self.line.path()).into_iter().chain(experience(&self.line)).chain(paced).collect()
             }
-            (Some(_), Group::Slow) => paced.collect(),
+            (Some(_), PolledGroup::Slow) => paced.collect(),
             (None, _) => Vec::new(),
         }
     }
@@ -161,10 +172,10 @@ fn busy(asked: &Asked) -> Duration {
 }
 
 /// How long the control takes to answer a group, and the period that it can therefore keep.
-fn paced(pace: &GroupPace, group: Group) -> impl Iterator<Item = Fact> {
+fn paced(pace: &GroupPace, group: PolledGroup) -> impl Iterator<Item = Fact> {
     let word = match group {
-        Group::Fast => "fast",
-        Group::Slow => "slow",
+        PolledGroup::Fast => "fast",
+        PolledGroup::Slow => "slow",
     };
     let ms = |name: &str, time: Duration| {
         Fact::number(format!("{word}_group_{name}_ms"), (time.as_secs_f64() * 1e4).round() / 10.0)

@@ -16,27 +16,27 @@ const ALARM_KINDS: [&str; 16] =
 const ALARMS_SHOWN: usize = 4;
 
 /// A signal, or why it is not known.
-pub type Found<T> = Result<T, Absence>;
+pub type OrAbsence<T> = Result<T, Absence>;
 
 /// Bytes F000 to F004 and G006 to G030 of a path, each with the reason where they could not be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Signals {
-    control: Found<[u8; 5]>,
-    ladder: Found<[u8; 25]>,
+    control: OrAbsence<[u8; 5]>,
+    ladder: OrAbsence<[u8; 25]>,
 }
 
 impl Signals {
     /// From the two stretches, where they could be read.
     #[must_use]
-    pub fn new(control: Found<&[i32]>, ladder: Found<&[i32]>) -> Self {
+    pub fn new(control: OrAbsence<&[i32]>, ladder: OrAbsence<&[i32]>) -> Self {
         Self { control: control.and_then(bytes), ladder: ladder.and_then(bytes) }
     }
 
-    fn f(&self, byte: usize, bit: u8) -> Found<bool> {
+    fn f(&self, byte: usize, bit: u8) -> OrAbsence<bool> {
         self.control.map(|bytes| bytes[byte] >> bit & 1 == 1)
     }
 
-    fn g(&self, byte: usize) -> Found<u8> {
+    fn g(&self, byte: usize) -> OrAbsence<u8> {
         self.ladder.map(|bytes| bytes[byte - 6])
     }
 
@@ -44,7 +44,7 @@ impl Signals {
     ///
     /// # Errors
     /// Why it is not known, here and below.
-    pub fn drives_ready(&self) -> Found<bool> {
+    pub fn drives_ready(&self) -> OrAbsence<bool> {
         self.f(0, 6)
     }
 
@@ -52,7 +52,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn tapping(&self) -> Found<bool> {
+    pub fn tapping(&self) -> OrAbsence<bool> {
         self.f(1, 5)
     }
 
@@ -60,7 +60,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn inch(&self) -> Found<bool> {
+    pub fn inch(&self) -> OrAbsence<bool> {
         self.f(2, 0)
     }
 
@@ -68,7 +68,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn rapid(&self) -> Found<bool> {
+    pub fn rapid(&self) -> OrAbsence<bool> {
         self.f(2, 1)
     }
 
@@ -76,7 +76,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn dry_run(&self) -> Found<bool> {
+    pub fn dry_run(&self) -> OrAbsence<bool> {
         self.f(2, 7)
     }
 
@@ -84,7 +84,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn threading(&self) -> Found<bool> {
+    pub fn threading(&self) -> OrAbsence<bool> {
         self.f(2, 3)
     }
 
@@ -92,7 +92,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn single_block(&self) -> Found<bool> {
+    pub fn single_block(&self) -> OrAbsence<bool> {
         self.f(4, 3)
     }
 
@@ -100,7 +100,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn override_cancelled(&self) -> Found<bool> {
+    pub fn override_cancelled(&self) -> OrAbsence<bool> {
         self.g(6).map(|byte| byte >> 4 & 1 == 1)
     }
 
@@ -109,7 +109,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn feed_override(&self, second: bool) -> Found<f64> {
+    pub fn feed_override(&self, second: bool) -> OrAbsence<f64> {
         let first = self.g(12)?;
         if self.override_cancelled() == Ok(true) || self.tapping() == Ok(true) || self.threading() == Ok(true) {
             return Ok(100.0);
@@ -123,7 +123,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above.
-    pub fn spindle_override(&self) -> Found<f64> {
+    pub fn spindle_override(&self) -> OrAbsence<f64> {
         let pct = OverridePct::new(self.g(30)?).ok_or(Absence::OutOfRange)?;
         Ok(f64::from(pct.percent()))
     }
@@ -132,7 +132,7 @@ impl Signals {
     ///
     /// # Errors
     /// As above; nothing of the kind is *not supported*.
-    pub fn operation(&self) -> Found<&'static str> {
+    pub fn operation(&self) -> OrAbsence<&'static str> {
         match (self.threading()?, self.tapping()?) {
             (_, true) => Ok(operation::TAPPING),
             (true, _) => Ok(operation::THREADING),
@@ -141,7 +141,7 @@ impl Signals {
     }
 }
 
-fn bytes<const N: usize>(values: &[i32]) -> Found<[u8; N]> {
+fn bytes<const N: usize>(values: &[i32]) -> OrAbsence<[u8; N]> {
     let bytes: Vec<u8> = values.iter().filter_map(|value| u8::try_from(*value).ok()).collect();
     bytes.try_into().map_err(|_| Absence::OutOfRange)
 }

@@ -3,7 +3,7 @@
 //! the vendor's library and the handbook all take their numbers from here.
 //!
 //! Numbers within a function (which position, which meter, which word) stand beside the item that they belong to, in
-//! [`item`](super::item) and [`word`](super::item::Word). What was confirmed by the vendor's own library or by captured
+//! [`item`](super::item) and [`word`](super::item::BlockWord). What was confirmed by the vendor's own library or by captured
 //! frames is tested with values written by hand, which do not come from this table.
 
 /// Which controls have a function.
@@ -29,7 +29,7 @@ impl Era {
 
 /// Where a row is known from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Known {
+pub enum RowOrigin {
     /// Frames of the vendor's library were captured, and the values it made of the answer.
     Captured,
     /// The vendor's library 1.0.5 sends it and makes the expected values of our server's answer.
@@ -38,7 +38,7 @@ pub enum Known {
     Client,
 }
 
-impl Known {
+impl RowOrigin {
     fn word(self) -> &'static str {
         match self {
             Self::Captured => "captured frames",
@@ -50,7 +50,7 @@ impl Known {
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Row {
+pub struct TableRow {
     /// What it is about.
     pub name: &'static str,
     /// 1 the numerical control, 2 the PMC.
@@ -66,7 +66,7 @@ pub struct Row {
     /// Calls of the vendor's library that send it.
     pub calls: &'static str,
     /// Where it is known from.
-    pub known: Known,
+    pub known: RowOrigin,
 }
 
 macro_rules! table {
@@ -80,7 +80,7 @@ macro_rules! table {
         }
 
         /// Every function.
-        pub const TABLE: &[Row] = &[$(Row {
+        pub const TABLE: &[TableRow] = &[$(TableRow {
             name: stringify!($name),
             device: $device,
             function: $function,
@@ -88,7 +88,7 @@ macro_rules! table {
             arguments: $arguments,
             answer: $answer,
             calls: $library,
-            known: Known::$known,
+            known: RowOrigin::$known,
         },)*];
     };
 }
@@ -162,7 +162,7 @@ table! {
 #[must_use]
 pub fn markdown() -> String {
     let head = "| function | controls | arguments | answer | library | known from |\n|---|---|---|---|---|---|\n";
-    let row = |row: &Row| {
+    let row = |row: &TableRow| {
         format!(
             "| {}/{:02X} {} | {} | {} | {} | {} | {} |\n",
             row.device,

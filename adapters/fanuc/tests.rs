@@ -3,7 +3,7 @@
 use super::item::Area;
 use super::line::FanucLine;
 use super::open::{OpenedFanuc, native};
-use super::server::{Controller, Served, Server, ServerSettings, SimulatedControl};
+use super::server::{Controller, ServedControl, Server, ServerSettings, SimulatedControl};
 use super::work_offset::ExternalOffsets;
 use crate::address::{Address, Target};
 use crate::clock::{Clock, ScaledClock, SystemClock};
@@ -14,7 +14,7 @@ use crate::units::OverridePct;
 use std::net::TcpListener;
 use std::sync::Arc;
 
-fn serve(served: Box<dyn Served>) -> Server {
+fn serve(served: Box<dyn ServedControl>) -> Server {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     Server::start(listener, served, ServerSettings::default()).expect("threads")
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Words that a block can carry, in the order of their numbers on the wire (0 to 28).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the letters of the words say it; M2 and M3 are the second and third M of a block")]
-pub enum Word {
+pub enum BlockWord {
     A,
     B,
     C,
@@ -22,7 +22,7 @@ pub enum Word {
     M3,
     /// Not used by the controls that are known.
     Unused14,
-    /// See [`Word::Unused14`].
+    /// See [`BlockWord::Unused14`].
     Unused15,
     N,
     O,
@@ -39,7 +39,7 @@ pub enum Word {
     Z,
 }
 
-impl Word {
+impl BlockWord {
     /// Every word with its number in the library's `cnc_modal`; on the wire it has the number of its place here.
     /// Source: what `libfwlib32` 1.0.5 puts on the wire for each of its numbers.
     pub const ALL: [(Self, Option<i16>); 29] = [
@@ -99,14 +99,20 @@ mod tests {
 
     #[test]
     fn the_words_stand_in_the_order_of_their_numbers() {
-        for (number, (word, _)) in (0..).zip(Word::ALL) {
-            assert_eq!((word.number(), Word::of_number(number)), (number, Some(word)));
+        for (number, (word, _)) in (0..).zip(BlockWord::ALL) {
+            assert_eq!((word.number(), BlockWord::of_number(number)), (number, Some(word)));
         }
         // By hand from the reference: cnc_modal(103), (106), (107), (108) and (109) ask for 5, 11, 21, 22 and 20.
-        let asked = [(Word::F, 5, 103), (Word::M, 11, 106), (Word::S, 21, 107), (Word::T, 22, 108), (Word::R, 20, 109)];
+        let asked = [
+            (BlockWord::F, 5, 103),
+            (BlockWord::M, 11, 106),
+            (BlockWord::S, 21, 107),
+            (BlockWord::T, 22, 108),
+            (BlockWord::R, 20, 109),
+        ];
         for (word, wire, library) in asked {
             assert_eq!((word.number(), word.number_in_library()), (wire, Some(library)), "{word:?}");
         }
-        assert_eq!(Word::of_number(29), None);
+        assert_eq!(BlockWord::of_number(29), None);
     }
 }

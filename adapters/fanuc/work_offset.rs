@@ -3,11 +3,11 @@
 //!
 //! The offset is in the coordinate of every work offset G54 to G59 and takes effect for blocks that are not yet
 //! buffered; hence only while no program runs. The operator may use the external offset too; whose is which part of it is
-//! the gate's account ([`crate::offset::Ledger`]). Increment system IS-B in millimetres only, where an increment is a
+//! the gate's account ([`crate::offset::OffsetShares`]). Increment system IS-B in millimetres only, where an increment is a
 //! micrometre.
 
-use super::answer::{Answer, Status};
-use super::item::{Item, Write};
+use super::answer::{FocasAnswer, Status};
+use super::item::{FocasItem, Write};
 use super::line::{Asked, FanucLine};
 use crate::clock::Clock;
 use crate::driver::{SEE_DOCTOR, SourceError};
@@ -33,7 +33,7 @@ impl ExternalOffsets {
         if let Some(number) = self.numbers[axis.index()] {
             return Ok(number);
         }
-        let facts = self.line.ask(clock, &[Item::Status])?.facts;
+        let facts = self.line.ask(clock, &[FocasItem::Status])?.facts;
         let not_told = |_| self.refused(axis, "the control has not told the names of its axes", SEE_DOCTOR);
         let axes = facts.axes_of(self.line.path()).map_err(not_told)?;
         let place = axes.iter().position(|name| name.eq_ignore_ascii_case(axis.word()));
@@ -43,8 +43,8 @@ impl ExternalOffsets {
         number.ok_or_else(|| self.refused(axis, "the control has no axis of this name", &next))
     }
 
-    fn offset_um(&self, axis: Axis, item: Item, asked: &Asked) -> Result<f64, SourceError> {
-        let Some(Ok(Answer::Number(Some(mm)))) = asked.of(item) else {
+    fn offset_um(&self, axis: Axis, item: FocasItem, asked: &Asked) -> Result<f64, SourceError> {
+        let Some(Ok(FocasAnswer::Number(Some(mm)))) = asked.of(item) else {
             return Err(self.refused(axis, "the external offset cannot be read", SEE_DOCTOR));
         };
         let um = mm * 1000.0;
@@ -65,16 +65,16 @@ impl OffsetSink for ExternalOffsets {
     }
 
     fn at_rest(&mut self, clock: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
-        let item = Item::WorkOffset(0, self.number(clock, axis)?);
-        let asked = self.line.ask(clock, &[Item::Status, item])?;
+        let item = FocasItem::WorkOffset(0, self.number(clock, axis)?);
+        let asked = self.line.ask(clock, &[FocasItem::Status, item])?;
         let unit = match asked.facts.inch {
             Ok(false) => Ok(()),
             Ok(true) => Err(("the machine measures in inches", "Only machines in millimetres are shifted")),
             Err(_) => Err(("the control has not told whether it measures in inches", "It is asked again by itself")),
         };
         unit.map_err(|(what, next)| self.refused(axis, what, next))?;
-        let at_rest = match asked.of(Item::Status) {
-            Some(Ok(Answer::Status(Status { run, .. }))) => Some(*run == 0),
+        let at_rest = match asked.of(FocasItem::Status) {
+            Some(Ok(FocasAnswer::Status(Status { run, .. }))) => Some(*run == 0),
             _ => None,
         };
         self.movable(axis, at_rest)?;
@@ -89,7 +89,7 @@ impl OffsetSink for ExternalOffsets {
         #[expect(clippy::cast_possible_truncation, reason = "saturates; an increment is a micrometre")]
         let value = wanted_um.round() as i32;
         self.line.write(clock, &Write::WorkOffset { number: 0, axis: number, value })?;
-        let item = Item::WorkOffset(0, number);
+        let item = FocasItem::WorkOffset(0, number);
         self.offset_um(axis, item, &self.line.ask(clock, &[item])?)
     }
 }

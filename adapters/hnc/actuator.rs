@@ -5,21 +5,21 @@ use super::item::{channel, flag};
 use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{Actuator, LadderRequest, SourceError};
-use crate::nclink::mailbox::{Letter, Mailbox, Register};
+use crate::nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest};
 use crate::units::OverridePct;
 
 /// Posts letters for the ladder; see [`mailbox`](crate::nclink::mailbox).
 pub struct HncActuator {
     line: HncLine,
     mailbox: Mailbox,
-    last: Letter,
+    last: MailboxRequest,
 }
 
 impl HncActuator {
     /// A mailbox that begins at this register.
     #[must_use]
-    pub fn new(line: HncLine, first: Register) -> Self {
-        Self { line, mailbox: Mailbox::new(first), last: Letter::Release }
+    pub fn new(line: HncLine, first: ControllerRegister) -> Self {
+        Self { line, mailbox: Mailbox::new(first), last: MailboxRequest::Release }
     }
 }
 
@@ -29,12 +29,12 @@ impl Actuator for HncActuator {
     }
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.last = Letter::Override(wanted);
+        self.last = MailboxRequest::Override(wanted);
         self.line.write(&self.mailbox.post(self.last, None))
     }
 
     fn release(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
-        self.last = Letter::Release;
+        self.last = MailboxRequest::Release;
         self.line.write(&self.mailbox.post(self.last, None))
     }
 

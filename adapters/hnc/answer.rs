@@ -6,7 +6,7 @@ use std::fmt;
 
 /// One answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Answer {
+pub enum HncAnswer {
     /// A whole number.
     Whole(i32),
     /// A real number; always finite.
@@ -19,7 +19,7 @@ pub enum Answer {
 
 /// Why there is none.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ItemError {
+pub enum HncItemError {
     /// Return code 1: the value has not arrived yet. Ask again; there is no value now.
     NotYet,
     /// Another return code.
@@ -32,7 +32,7 @@ pub enum ItemError {
     Failed(String),
 }
 
-impl ItemError {
+impl HncItemError {
     /// The reason for the channel.
     #[must_use]
     pub fn absence(&self) -> Absence {
@@ -47,13 +47,13 @@ impl ItemError {
 }
 
 /// One item.
-pub type ItemResult = Result<Answer, ItemError>;
+pub type HncItemResult = Result<HncAnswer, HncItemError>;
 
 /// A return code of opening or writing, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ReturnCode(pub i32);
+pub struct HncReturnCode(pub i32);
 
-impl fmt::Display for ReturnCode {
+impl fmt::Display for HncReturnCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let words = match self.0 {
             0 => "all well",

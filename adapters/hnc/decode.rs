@@ -1,7 +1,7 @@
 //! Values to words and text.
 
-use super::answer::{Answer, ItemError, ItemResult};
-use super::item::{Item, channel, flag};
+use super::answer::{HncAnswer, HncItemError, HncItemResult};
+use super::item::{HncItem, channel, flag};
 use crate::reading::Absence;
 use crate::words::{execution, mode, operation};
 
@@ -12,35 +12,35 @@ pub(super) fn text_of(bytes: &[u8]) -> String {
 }
 
 /// The whole number of an answer.
-pub(super) fn whole(result: &ItemResult) -> Result<i32, Absence> {
+pub(super) fn whole(result: &HncItemResult) -> Result<i32, Absence> {
     match result {
-        Ok(Answer::Whole(number)) => Ok(*number),
+        Ok(HncAnswer::Whole(number)) => Ok(*number),
         Ok(_) => Err(Absence::OutOfRange),
         Err(error) => Err(error.absence()),
     }
 }
 
 /// The number of an answer.
-pub(super) fn number(result: &ItemResult) -> Result<f64, Absence> {
+pub(super) fn number(result: &HncItemResult) -> Result<f64, Absence> {
     match result {
-        Ok(Answer::Real(number)) => Ok(*number),
+        Ok(HncAnswer::Real(number)) => Ok(*number),
         other => whole(other).map(f64::from),
     }
 }
 
 /// The text of an answer.
-pub(super) fn text(result: &ItemResult) -> Result<&str, Absence> {
+pub(super) fn text(result: &HncItemResult) -> Result<&str, Absence> {
     match result {
-        Ok(Answer::Text(text)) => Ok(text),
+        Ok(HncAnswer::Text(text)) => Ok(text),
         Ok(_) => Err(Absence::OutOfRange),
         Err(error) => Err(error.absence()),
     }
 }
 
 /// The alarms as one text, empty without any.
-pub(super) fn alarms(result: &ItemResult) -> Result<String, Absence> {
+pub(super) fn alarms(result: &HncItemResult) -> Result<String, Absence> {
     match result {
-        Ok(Answer::Alarms(alarms)) => {
+        Ok(HncAnswer::Alarms(alarms)) => {
             let each: Vec<String> = alarms.iter().map(|(number, text)| format!("{number} {text}")).collect();
             Ok(each.join("; "))
         }
@@ -52,7 +52,7 @@ pub(super) fn alarms(result: &ItemResult) -> Result<String, Absence> {
 /// Answers by item; what was not asked for is not offered.
 pub(super) trait Answers {
     /// The answer to an item.
-    fn of(&self, item: Item) -> ItemResult;
+    fn of(&self, item: HncItem) -> HncItemResult;
 
     /// A whole number of the channel.
     fn flag(&self, kind: i32) -> Result<i32, Absence> {
@@ -62,7 +62,7 @@ pub(super) trait Answers {
     /// Is a flag set? A flag that the controller does not have is not.
     fn set(&self, kind: i32) -> Result<bool, Absence> {
         match self.of(flag(kind)) {
-            Err(ItemError::NotOffered | ItemError::Refused(-2)) => Ok(false),
+            Err(HncItemError::NotOffered | HncItemError::Refused(-2)) => Ok(false),
             other => whole(&other).map(|flag| flag != 0),
         }
     }
@@ -105,9 +105,9 @@ mod tests {
     use std::collections::HashMap;
 
     impl Answers for HashMap<i32, i32> {
-        fn of(&self, item: Item) -> ItemResult {
-            let Item::Channel(kind, ..) = item else { return Err(ItemError::NotOffered) };
-            self.get(&kind).map(|value| Answer::Whole(*value)).ok_or(ItemError::NotOffered)
+        fn of(&self, item: HncItem) -> HncItemResult {
+            let HncItem::Channel(kind, ..) = item else { return Err(HncItemError::NotOffered) };
+            self.get(&kind).map(|value| HncAnswer::Whole(*value)).ok_or(HncItemError::NotOffered)
         }
     }
 
@@ -143,9 +143,9 @@ mod tests {
 
     #[test]
     fn not_yet_is_no_zero() {
-        assert_eq!(number(&Err(ItemError::NotYet)), Err(Absence::NotYetRead));
-        assert_eq!(number(&Err(ItemError::Refused(-1))), Err(Absence::Refused));
-        assert_eq!(number(&Ok(Answer::Real(2.5))), Ok(2.5));
-        assert_eq!(alarms(&Ok(Answer::Alarms(vec![(7, "a".into()), (8, "b".into())]))), Ok("7 a; 8 b".to_owned()));
+        assert_eq!(number(&Err(HncItemError::NotYet)), Err(Absence::NotYetRead));
+        assert_eq!(number(&Err(HncItemError::Refused(-1))), Err(Absence::Refused));
+        assert_eq!(number(&Ok(HncAnswer::Real(2.5))), Ok(2.5));
+        assert_eq!(alarms(&Ok(HncAnswer::Alarms(vec![(7, "a".into()), (8, "b".into())]))), Ok("7 a; 8 b".to_owned()));
     }
 }

@@ -1,11 +1,11 @@
 //! What can be asked of the library: the numbers of the vendor's headers, each with the width of its value.
 
-use crate::nclink::mailbox::Register;
+use crate::nclink::mailbox::ControllerRegister;
 use serde::{Deserialize, Serialize};
 
 /// How a value lies in the buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Width {
+pub enum HncWidth {
     /// The low four bytes, signed, whatever `Bit32` is.
     Whole,
     /// `fBit64`.
@@ -16,13 +16,13 @@ pub enum Width {
 
 /// One question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Item {
+pub enum HncItem {
     /// `HNC_SystemGetValue`.
-    System(i32, Width),
+    System(i32, HncWidth),
     /// `HNC_ChannelGetValue` of channel 0: type, index.
-    Channel(i32, i32, Width),
+    Channel(i32, i32, HncWidth),
     /// `HNC_AxisGetValue`: type, logical axis.
-    Axis(i32, i32, Width),
+    Axis(i32, i32, HncWidth),
     /// `HNC_RegGetValue`: type, index.
     Register(i32, i32),
     /// `HNC_CrdsGetValue` of channel 0: its external zero offset, of a logical axis.
@@ -34,22 +34,22 @@ pub enum Item {
 }
 
 /// Version of the controller.
-pub const NC_VERSION: Item = Item::System(24, Width::Text);
+pub const NC_VERSION: HncItem = HncItem::System(24, HncWidth::Text);
 /// Serial number.
-pub const SERIAL: Item = Item::System(25, Width::Text);
+pub const SERIAL: HncItem = HncItem::System(25, HncWidth::Text);
 /// Counts of a position per millimetre.
-pub const MOVE_UNIT: Item = Item::System(1, Width::Whole);
+pub const MOVE_UNIT: HncItem = HncItem::System(1, HncWidth::Whole);
 
 /// A whole number of channel 0.
 #[must_use]
-pub const fn flag(kind: i32) -> Item {
-    Item::Channel(kind, 0, Width::Whole)
+pub const fn flag(kind: i32) -> HncItem {
+    HncItem::Channel(kind, 0, HncWidth::Whole)
 }
 
 /// A real number of channel 0.
 #[must_use]
-pub const fn real(kind: i32) -> Item {
-    Item::Channel(kind, 0, Width::Real)
+pub const fn real(kind: i32) -> HncItem {
+    HncItem::Channel(kind, 0, HncWidth::Real)
 }
 
 /// `HNC_CRDS_CH_G5X_OFFSET_ZERO`: the channel's external zero offset, in counts of [`MOVE_UNIT`].
@@ -111,7 +111,7 @@ pub mod axis {
 
 /// Number of a register's kind (`HncRegType`).
 #[must_use]
-pub fn register_type(at: Register) -> Option<i32> {
+pub fn register_type(at: ControllerRegister) -> Option<i32> {
     let at = ['X', 'Y', 'F', 'G', 'R', 'W', 'D', 'B', 'P'].iter().position(|kind| *kind == at.kind)?;
     i32::try_from(at).ok()
 }
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn registers_have_the_numbers_of_the_header() {
-        let of = |kind| register_type(Register { kind, index: 0 });
+        let of = |kind| register_type(ControllerRegister { kind, index: 0 });
         assert_eq!(['X', 'G', 'R', 'D', 'P'].map(of), [0, 3, 4, 6, 8].map(Some));
         assert_eq!(of('Q'), None);
     }

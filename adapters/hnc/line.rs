@@ -1,14 +1,14 @@
 //! The parent's side: the library through its child, shared by source and actuator.
 
 use super::KIND;
-use super::answer::{ItemError, ItemResult, ReturnCode};
-use super::item::{Item, register_type};
-use super::message::{Ask, Tell};
+use super::answer::{HncItemError, HncItemResult, HncReturnCode};
+use super::item::{HncItem, register_type};
+use super::message::{HncReply, HncRequest};
 use super::sampling::{Columns, SampledItem};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Client, Taken};
+use crate::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
 use crate::driver::SourceError;
-use crate::nclink::mailbox::Register;
+use crate::nclink::mailbox::ControllerRegister;
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -51,15 +51,15 @@ pub struct Alive {
     pub generation: u64,
 }
 
-struct Inner {
-    child: Client<Item>,
+struct HncConnection {
+    child: ChildClient<HncItem>,
     settings: HncSettings,
 }
 
 /// A handle on the child; clones are handles on the same one.
 #[derive(Clone)]
 pub struct HncLine {
-    inner: Arc<Mutex<Inner>>,
+    inner: Arc<Mutex<HncConnection>>,
     name: String,
 }
 
@@ -71,7 +71,7 @@ impl HncLine {
         child.program.clone_from(&settings.program);
         child.environment.clone_from(&settings.environment);
         let name = settings.name.clone();
-        let inner = Inner { child: Client::new(child), settings };
+        let inner = HncConnection { child: ChildClient::new(child), settings };
         Self { inner: Arc::new(Mutex::new(inner)), name }
     }
 
@@ -93,12 +93,12 @@ impl HncLine {
     /// [`SourceError::Line`] while it is not, with what the library says.
     pub fn alive(&self) -> Result<Alive, SourceError> {
         let mut inner = self.locked();
-        match inner.ask(&Ask::Alive, "its connection")? {
-            Tell::Alive { code: 0, connected, lost } => {
+        match inner.ask(&HncRequest::Alive, "its connection")? {
+            HncReply::Alive { code: 0, connected, lost } => {
                 Ok(Alive { connected, lost, generation: inner.child.child().generation() })
             }
-            Tell::Alive { code, .. } => Err(inner.line_failed(
-                format!("the controller is not connected ({})", ReturnCode(code)),
+            HncReply::Alive { code, .. } => Err(inner.line_failed(
+                format!("the controller is not connected ({})", HncReturnCode(code)),
                 "The library connects again by itself; check that the machine is on and the cable is in.",
             )),
             other => Err(inner.nonsense("its connection", &other)),
@@ -109,8 +109,8 @@ impl HncLine {
     ///
     /// # Errors
     /// As there.
-    pub fn read(&self, item: Item) -> Result<ItemResult, SourceError> {
-        self.read_each(&[item]).map(|mut results| results.pop().unwrap_or(Err(ItemError::NotOffered)))
+    pub fn read(&self, item: HncItem) -> Result<HncItemResult, SourceError> {
+        self.read_each(&[item]).map(|mut results| results.pop().unwrap_or(Err(HncItemError::NotOffered)))
     }
 
     /// Reads items in one request to the child. One that the child dies of costs this item only; one that it has died of
@@ -118,12 +118,12 @@ impl HncLine {
     ///
     /// # Errors
     /// [`SourceError::Timeout`] on a dead link, [`SourceError::Line`] when the library cannot be loaded or connected.
-    pub fn read_each(&self, items: &[Item]) -> Result<Vec<ItemResult>, SourceError> {
+    pub fn read_each(&self, items: &[HncItem]) -> Result<Vec<HncItemResult>, SourceError> {
         let mut inner = self.locked();
         let mut results = Vec::with_capacity(items.len());
         while let Some(rest) = items.get(results.len()..).filter(|rest| !rest.is_empty()) {
             match inner.child.survived(rest) {
-                0 => results.push(Err(ItemError::NotOffered)),
+                0 => results.push(Err(HncItemError::NotOffered)),
                 count => inner.read_some(&rest[..count], &mut results)?,
             }
         }
@@ -134,7 +134,7 @@ impl HncLine {
     ///
     /// # Errors
     /// The first that is refused, or the line.
-    pub fn write(&self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+    pub fn write(&self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
         let mut inner = self.locked();
         for (at, value) in words {
             let request = format!("writing {at}");
@@ -142,7 +142,7 @@ impl HncLine {
                 return Err(inner.refused(&request, "there is no such register".to_owned()));
             };
             let index = i32::try_from(at.index).unwrap_or(i32::MAX);
-            inner.done(&Ask::Write(kind, index, *value), &request)?;
+            inner.done(&HncRequest::Write(kind, index, *value), &request)?;
         }
         Ok(())
     }
@@ -152,7 +152,7 @@ impl HncLine {
     /// # Errors
     /// It is refused, or the line failed.
     pub fn write_zero(&self, axis: i32, counts: i32) -> Result<(), SourceError> {
-        self.locked().done(&Ask::WriteZero(axis, counts), "writing the external zero offset")
+        self.locked().done(&HncRequest::WriteZero(axis, counts), "writing the external zero offset")
     }
 
     /// Begins to sample.
@@ -161,10 +161,10 @@ impl HncLine {
     /// Refused where the library or the controller cannot, or somebody else samples.
     pub fn sample(&self, items: &[SampledItem]) -> Result<(), SourceError> {
         let mut inner = self.locked();
-        match inner.ask(&Ask::Sample(items.to_vec()), "sampling")? {
-            Tell::Done => Ok(()),
-            Tell::Code(function, code) => Err(inner.refused("sampling", format!("{function}: {code}"))),
-            Tell::Confused(what) => Err(inner.refused("sampling", what)),
+        match inner.ask(&HncRequest::Sample(items.to_vec()), "sampling")? {
+            HncReply::Done => Ok(()),
+            HncReply::Code(function, code) => Err(inner.refused("sampling", format!("{function}: {code}"))),
+            HncReply::Confused(what) => Err(inner.refused("sampling", what)),
             other => Err(inner.nonsense("sampling", &other)),
         }
     }
@@ -175,9 +175,9 @@ impl HncLine {
     /// See [`SourceError`].
     pub fn sampled(&self) -> Result<Columns, SourceError> {
         let mut inner = self.locked();
-        match inner.ask(&Ask::Sampled, "the samples")? {
-            Tell::Sampled(columns) => Ok(columns),
-            Tell::Code(function, code) => Err(inner.refused("the samples", format!("{function}: {code}"))),
+        match inner.ask(&HncRequest::Sampled, "the samples")? {
+            HncReply::Sampled(columns) => Ok(columns),
+            HncReply::Code(function, code) => Err(inner.refused("the samples", format!("{function}: {code}"))),
             other => Err(inner.nonsense("the samples", &other)),
         }
     }
@@ -187,43 +187,43 @@ impl HncLine {
         self.locked().child.end();
     }
 
-    fn locked(&self) -> MutexGuard<'_, Inner> {
+    fn locked(&self) -> MutexGuard<'_, HncConnection> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Inner {
+impl HncConnection {
     /// Reads as many as one child survives, at least one.
-    fn read_some(&mut self, items: &[Item], results: &mut Vec<ItemResult>) -> Result<(), SourceError> {
+    fn read_some(&mut self, items: &[HncItem], results: &mut Vec<HncItemResult>) -> Result<(), SourceError> {
         self.open()?;
         let mut dead = None;
         let take = |told| match told {
-            Tell::Read(result) => {
-                let malformed = matches!(result, Err(ItemError::Malformed(_)));
+            HncReply::Read(result) => {
+                let malformed = matches!(result, Err(HncItemError::Malformed(_)));
                 results.push(result);
                 if malformed { Taken::Suspect } else { Taken::Good }
             }
-            Tell::DeadLink(took_ms) => {
+            HncReply::DeadLink(took_ms) => {
                 dead = Some(Duration::from_millis(took_ms));
                 Taken::Last
             }
             other => {
-                results.push(Err(ItemError::Malformed(format!("{other:?}"))));
+                results.push(Err(HncItemError::Malformed(format!("{other:?}"))));
                 Taken::Suspect
             }
         };
-        let outcome = self.child.told_each(items, &Ask::Read(items.to_vec()), take);
+        let outcome = self.child.told_each(items, &HncRequest::Read(items.to_vec()), take);
         if let Some(took) = dead {
             return Err(self.dead_link(took));
         }
         if let Err((_, error)) = outcome {
-            results.push(Err(ItemError::Failed(error.to_string())));
+            results.push(Err(HncItemError::Failed(error.to_string())));
         }
         Ok(())
     }
 
     /// A question whose failure ends the poll.
-    fn ask(&mut self, ask: &Ask, request: &str) -> Result<Tell, SourceError> {
+    fn ask(&mut self, ask: &HncRequest, request: &str) -> Result<HncReply, SourceError> {
         self.open()?;
         let began = Instant::now();
         let told = self.child.told(ask).map_err(|error| self.child_failed(&error, request))?;
@@ -231,11 +231,11 @@ impl Inner {
     }
 
     /// Something to be done that is done or refused.
-    fn done(&mut self, ask: &Ask, request: &str) -> Result<(), SourceError> {
+    fn done(&mut self, ask: &HncRequest, request: &str) -> Result<(), SourceError> {
         match self.ask(ask, request)? {
-            Tell::Done => Ok(()),
-            Tell::Code(_, code) => Err(self.refused(request, code.to_string())),
-            Tell::Confused(what) => Err(self.refused(request, what)),
+            HncReply::Done => Ok(()),
+            HncReply::Code(_, code) => Err(self.refused(request, code.to_string())),
+            HncReply::Confused(what) => Err(self.refused(request, what)),
             other => Err(self.nonsense(request, &other)),
         }
     }
@@ -246,7 +246,7 @@ impl Inner {
             return Ok(());
         }
         let settings = &self.settings;
-        let ask = Ask::Open {
+        let ask = HncRequest::Open {
             vendor_library: settings.vendor_library.clone(),
             local_host: settings.local_host.clone().unwrap_or_else(|| local_host(&settings.at)),
             local_port: settings.local_port,
@@ -256,16 +256,16 @@ impl Inner {
         };
         let told = self.child.told(&ask).map_err(|error| self.child_failed(&error, "opening"));
         let failed = match told? {
-            Tell::Opened => return Ok(()),
-            Tell::Unloadable(what) => self.line_failed(
+            HncReply::Opened => return Ok(()),
+            HncReply::Unloadable(what) => self.line_failed(
                 format!("the library {} cannot be used: {what}", self.settings.vendor_library.display()),
                 "Check library= in the address, and that the file is for this processor.",
             ),
-            Tell::Code(function, code) if function == "HNC_NetInit" => self.line_failed(
+            HncReply::Code(function, code) if function == "HNC_NetInit" => self.line_failed(
                 format!("the library cannot listen at port {}: {code}", self.settings.local_port),
                 "Give another local_port= in the address, or end the other program.",
             ),
-            Tell::Code(_, code) => self.line_failed(
+            HncReply::Code(_, code) => self.line_failed(
                 format!("the controller does not answer: {code}"),
                 "Check that the machine is on, and its network number and port.",
             ),
@@ -309,9 +309,9 @@ impl Inner {
         }
     }
 
-    fn nonsense(&self, request: &str, told: &Tell) -> SourceError {
+    fn nonsense(&self, request: &str, told: &HncReply) -> SourceError {
         let what = match told {
-            Tell::Confused(what) => what.clone(),
+            HncReply::Confused(what) => what.clone(),
             other => format!("{other:?}"),
         };
         SourceError::Decode { source_name: self.settings.name.clone(), request: request.to_owned(), what }

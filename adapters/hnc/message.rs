@@ -1,14 +1,14 @@
 //! What parent and child say, as JSON.
 
-use super::answer::{ItemResult, ReturnCode};
-use super::item::Item;
+use super::answer::{HncItemResult, HncReturnCode};
+use super::item::HncItem;
 use super::sampling::{Columns, SampledItem};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// From the parent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Ask {
+pub(super) enum HncRequest {
     /// Load the library, listen, connect.
     Open {
         /// The library's file.
@@ -28,7 +28,7 @@ pub(super) enum Ask {
     Alive,
     /// Read these, one answer for each as soon as it is there. After an answer that cannot be trusted, or a link that is
     /// dead, no other comes.
-    Read(Vec<Item>),
+    Read(Vec<HncItem>),
     /// Write one register: type, index, value.
     Write(i32, i32, i64),
     /// Write the channel's external zero offset: logical axis, counts.
@@ -41,13 +41,13 @@ pub(super) enum Ask {
 
 /// From the child.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Tell {
+pub(super) enum HncReply {
     /// Connected.
     Opened,
     /// The library could not be loaded, or lacks what nothing works without.
     Unloadable(String),
     /// A return code of this function.
-    Code(String, ReturnCode),
+    Code(String, HncReturnCode),
     /// `HNC_NetIsConnect`, and how often an event told of a connection and of a loss.
     Alive {
         /// 0 connected, otherwise a code.
@@ -58,7 +58,7 @@ pub(super) enum Tell {
         lost: u64,
     },
     /// One item.
-    Read(ItemResult),
+    Read(HncItemResult),
     /// A call took so long, ms, that the link must be dead.
     DeadLink(u64),
     /// Written, or sampling.

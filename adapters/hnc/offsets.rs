@@ -6,23 +6,23 @@
 //! unit of its positions. On a lathe X is shifted in what the control shows of X, which may be a diameter. Nothing is saved
 //! in the control: the power should take it back to what the operator has saved.
 
-use super::answer::{Answer, ItemError, ItemResult};
+use super::answer::{HncAnswer, HncItemError, HncItemResult};
 use super::decode::{text, whole};
-use super::item::{self, Item, Width, axis, channel, flag, register_type};
+use super::item::{self, HncItem, HncWidth, axis, channel, flag, register_type};
 use super::line::HncLine;
 use crate::clock::Clock;
 use crate::driver::{SEE_DOCTOR, SourceError};
-use crate::nclink::mailbox::Register;
-use crate::nclink::offset_mailbox::Registers;
+use crate::nclink::mailbox::ControllerRegister;
+use crate::nclink::offset_mailbox::RegisterAccess;
 use crate::offset::{Axis, OffsetSink};
 
 /// Axes whose names are asked for.
 const AXES: i32 = 3;
 
 /// Nothing runs and nothing is held; `None` where the controller does not say.
-const STATE: [Item; 2] = [flag(channel::CYCLE), flag(channel::HOLD)];
+const STATE: [HncItem; 2] = [flag(channel::CYCLE), flag(channel::HOLD)];
 
-fn at_rest(state: &[ItemResult]) -> Option<bool> {
+fn at_rest(state: &[HncItemResult]) -> Option<bool> {
     let flags: Result<Vec<i32>, _> = state.iter().map(whole).collect();
     flags.ok().map(|flags| flags.iter().all(|flag| *flag == 0))
 }
@@ -30,23 +30,23 @@ fn at_rest(state: &[ItemResult]) -> Option<bool> {
 /// The registers of the ladder.
 pub(super) struct HncRegisters(pub(super) HncLine);
 
-impl Registers for HncRegisters {
+impl RegisterAccess for HncRegisters {
     fn name(&self) -> &str {
         self.0.name()
     }
 
-    fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
         let kind = register_type(first).unwrap_or(-1);
         let registers =
-            (first.index..first.index + count).map(|at| Item::Register(kind, i32::try_from(at).unwrap_or(-1)));
-        let items: Vec<Item> = STATE.into_iter().chain(registers).collect();
+            (first.index..first.index + count).map(|at| HncItem::Register(kind, i32::try_from(at).unwrap_or(-1)));
+        let items: Vec<HncItem> = STATE.into_iter().chain(registers).collect();
         let mut results = self.0.read_each(&items)?;
         let words = results.split_off(STATE.len());
         let words = words.iter().filter_map(|word| whole(word).ok()).map(i64::from).collect();
         Ok((words, at_rest(&results)))
     }
 
-    fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+    fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
         self.0.write(words)
     }
 }
@@ -70,10 +70,10 @@ impl ZeroOffsets {
         if let Some(number) = self.numbers[axis.index()] {
             return Ok(number);
         }
-        let names: Vec<Item> = (0..AXES).map(|number| Item::Axis(axis::NAME, number, Width::Text)).collect();
+        let names: Vec<HncItem> = (0..AXES).map(|number| HncItem::Axis(axis::NAME, number, HncWidth::Text)).collect();
         let found = self.line.read_each(&names)?;
         let named =
-            |name: &ItemResult| text(name).is_ok_and(|name| Axis::of(name.get(..1).unwrap_or("")) == Some(axis));
+            |name: &HncItemResult| text(name).is_ok_and(|name| Axis::of(name.get(..1).unwrap_or("")) == Some(axis));
         let number = found.iter().position(named).and_then(|at| i32::try_from(at).ok());
         self.numbers[axis.index()] = number;
         number.ok_or_else(|| {
@@ -82,7 +82,7 @@ impl ZeroOffsets {
     }
 
     /// What the address says a count is must be what the control says of its positions.
-    fn same_unit(&self, axis: Axis, per_mm: &ItemResult) -> Result<(), SourceError> {
+    fn same_unit(&self, axis: Axis, per_mm: &HncItemResult) -> Result<(), SourceError> {
         let unit_um = whole(per_mm).ok().filter(|per_mm| *per_mm > 0).map(|per_mm| 1000.0 / f64::from(per_mm));
         match unit_um {
             Some(unit_um) if (unit_um / self.unit_um - 1.0).abs() < 1e-6 => Ok(()),
@@ -94,10 +94,10 @@ impl ZeroOffsets {
         }
     }
 
-    fn offset_um(&self, axis: Axis, found: &ItemResult) -> Result<f64, SourceError> {
+    fn offset_um(&self, axis: Axis, found: &HncItemResult) -> Result<f64, SourceError> {
         let what = match found {
-            Ok(Answer::Whole(counts)) => return self.whole_um(axis, *counts),
-            Err(ItemError::NotOffered) => "the library has no HNC_CrdsGetValue".to_owned(),
+            Ok(HncAnswer::Whole(counts)) => return self.whole_um(axis, *counts),
+            Err(HncItemError::NotOffered) => "the library has no HNC_CrdsGetValue".to_owned(),
             other => format!("the external zero offset cannot be read ({other:?})"),
         };
         Err(self.refused(axis, &what, "Write offset=D110 in the address, with rungs in the ladder."))
@@ -123,7 +123,7 @@ impl OffsetSink for ZeroOffsets {
     }
 
     fn at_rest(&mut self, _: &dyn Clock, axis: Axis) -> Result<f64, SourceError> {
-        let zero = Item::ExternalZero(self.number(axis)?);
+        let zero = HncItem::ExternalZero(self.number(axis)?);
         let [cycle, hold] = STATE;
         let found = self.line.read_each(&[cycle, hold, item::MOVE_UNIT, zero])?;
         let [state @ .., per_mm, zero] = found.as_slice() else {
@@ -142,7 +142,7 @@ impl OffsetSink for ZeroOffsets {
         #[expect(clippy::cast_possible_truncation, reason = "saturates; the gate has limited it")]
         let counts = (wanted_um / self.unit_um).round() as i32;
         self.line.write_zero(number, counts)?;
-        let found = self.line.read(Item::ExternalZero(number))?;
+        let found = self.line.read(HncItem::ExternalZero(number))?;
         self.offset_um(axis, &found)
     }
 }

@@ -3,7 +3,7 @@
 //! The first channel always is the system's counter of milliseconds (F register of the system, word 149). By it a missing
 //! millisecond is counted, and a library that gives the same values twice is seen through.
 
-use crate::nclink::sample::{Column, SampleBlock};
+use crate::nclink::sample::{ItemColumn, SampleBlock};
 use serde::{Deserialize, Serialize};
 
 /// Sampling channels of V1.
@@ -144,7 +144,7 @@ impl Sampling {
     }
 
     fn empty(&self, begin_ms: i64) -> SampleBlock {
-        let column = |path: &String| Column { path: path.clone(), values: Vec::new(), step_ms: 1.0, word: None };
+        let column = |path: &String| ItemColumn { path: path.clone(), values: Vec::new(), step_ms: 1.0, word: None };
         let columns = self.names.iter().map(column).collect();
         SampleBlock { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns }
     }

@@ -1,8 +1,8 @@
 //! A controller behind the vendor's library as a source.
 
-use super::answer::{ItemError, ItemResult};
+use super::answer::{HncItemError, HncItemResult};
 use super::decode::{Answers, alarms, number, text, whole};
-use super::item::{self, Item, Width, axis, channel, flag, real};
+use super::item::{self, HncItem, HncWidth, axis, channel, flag, real};
 use super::line::{Alive, HncLine};
 use super::sampling::{Sampled, Sampling};
 use crate::channel::ChannelId;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Items of the channel that are numbers of a channel of ours.
-const NUMBERS: [(Item, &str); 8] = [
+const NUMBERS: [(HncItem, &str); 8] = [
     (real(channel::ACT_FEEDRATE), "feed_mm_min"),
     (real(channel::PROG_FEEDRATE), "feed_programmed_mm_min"),
     (flag(channel::FEED_OVERRIDE), "feed_override_pct"),
@@ -40,10 +40,10 @@ const FLAGS: [i32; 8] = [
 ];
 
 /// Ending of an axis' channels with the item: position in counts, speed, load current.
-const AXIS: [(&str, i32, Width); 3] = [
-    ("axis_position_mm", axis::ACT_POS, Width::Whole),
-    ("axis_velocity_mm_min", axis::ACT_VEL, Width::Real),
-    ("axis_current_a", axis::LOAD_CUR, Width::Real),
+const AXIS: [(&str, i32, HncWidth); 3] = [
+    ("axis_position_mm", axis::ACT_POS, HncWidth::Whole),
+    ("axis_velocity_mm_min", axis::ACT_VEL, HncWidth::Real),
+    ("axis_current_a", axis::LOAD_CUR, HncWidth::Real),
 ];
 
 /// Counts per millimetre where the controller does not tell.
@@ -53,7 +53,7 @@ const SPINDLE: i32 = 5;
 
 /// What is found out once per connection.
 #[derive(Debug, Clone, Default)]
-struct Layout {
+struct HncLayout {
     generation: u64,
     move_unit: f64,
     spindle: i32,
@@ -62,11 +62,11 @@ struct Layout {
 }
 
 /// What one poll has answered.
-struct Poll(HashMap<Item, ItemResult>);
+struct Poll(HashMap<HncItem, HncItemResult>);
 
 impl Answers for Poll {
-    fn of(&self, item: Item) -> ItemResult {
-        self.0.get(&item).cloned().unwrap_or(Err(ItemError::NotOffered))
+    fn of(&self, item: HncItem) -> HncItemResult {
+        self.0.get(&item).cloned().unwrap_or(Err(HncItemError::NotOffered))
     }
 }
 
@@ -75,7 +75,7 @@ pub struct HncSource {
     line: HncLine,
     period: Duration,
     channels: Vec<ChannelId>,
-    layout: Layout,
+    layout: HncLayout,
     alive: Alive,
     sampling: Option<Sampling>,
     sink: Option<BlockSink>,
@@ -90,7 +90,7 @@ impl HncSource {
             line,
             period,
             channels: channels(),
-            layout: Layout::default(),
+            layout: HncLayout::default(),
             alive: Alive::default(),
             sampling,
             sink: None,
@@ -118,16 +118,16 @@ impl HncSource {
         let spindle = whole(&read(flag(channel::SPDL_LAX))?).unwrap_or(SPINDLE);
         let mut axes = Vec::new();
         for (index, usual) in (0..).zip(['X', 'Y', 'Z']) {
-            let name = read(Item::Axis(axis::NAME, index, Width::Text))?;
+            let name = read(HncItem::Axis(axis::NAME, index, HncWidth::Text))?;
             let letter = match text(&name) {
                 Ok(name) => name.chars().next().map(|letter| letter.to_ascii_uppercase()),
                 // An axis that is not there; a library without names has the usual ones.
-                Err(Absence::NotSupported) if name == Err(ItemError::NotOffered) => Some(usual),
+                Err(Absence::NotSupported) if name == Err(HncItemError::NotOffered) => Some(usual),
                 Err(_) => None,
             };
             axes.extend(letter.filter(|letter| "XYZ".contains(*letter)).map(|letter| (letter, index)));
         }
-        self.layout = Layout { generation, move_unit: unit, spindle, axes };
+        self.layout = HncLayout { generation, move_unit: unit, spindle, axes };
         self.begin_sampling()
     }
 
@@ -144,13 +144,13 @@ impl HncSource {
         Ok(())
     }
 
-    fn items(&self) -> Vec<Item> {
-        let mut items: Vec<Item> = NUMBERS.iter().map(|(item, _)| *item).collect();
+    fn items(&self) -> Vec<HncItem> {
+        let mut items: Vec<HncItem> = NUMBERS.iter().map(|(item, _)| *item).collect();
         items.extend(FLAGS.map(flag));
-        items.extend([flag(channel::TOOL_USE), flag(channel::RUN_ROW), Item::Program, Item::Alarms]);
-        items.push(Item::Axis(axis::LOAD_CUR, self.layout.spindle, Width::Real));
+        items.extend([flag(channel::TOOL_USE), flag(channel::RUN_ROW), HncItem::Program, HncItem::Alarms]);
+        items.push(HncItem::Axis(axis::LOAD_CUR, self.layout.spindle, HncWidth::Real));
         for (_, number) in &self.layout.axes {
-            items.extend(AXIS.map(|(_, kind, width)| Item::Axis(kind, *number, width)));
+            items.extend(AXIS.map(|(_, kind, width)| HncItem::Axis(kind, *number, width)));
         }
         items
     }
@@ -159,42 +159,42 @@ impl HncSource {
         for channel in &self.channels {
             let value = self.value(channel.name(), poll);
             out.push(match value {
-                Ok(Found::Number(number)) => Reading::number(*channel, stamp, number),
-                Ok(Found::Text(text)) => Reading::text(*channel, stamp, Arc::from(text)),
+                Ok(HncValue::Number(number)) => Reading::number(*channel, stamp, number),
+                Ok(HncValue::Text(text)) => Reading::text(*channel, stamp, Arc::from(text)),
                 Err(reason) => Reading::absent(*channel, stamp, reason),
             });
         }
     }
 
-    fn value(&self, name: &str, poll: &Poll) -> Result<Found, Absence> {
+    fn value(&self, name: &str, poll: &Poll) -> Result<HncValue, Absence> {
         match name {
-            "mode" => return poll.mode().map(Found::text),
-            "execution" => return poll.execution().map(Found::text),
-            "operation" => return poll.operation().map(Found::text),
-            "alarm" => return alarms(&poll.of(Item::Alarms)).map(Found::Text),
-            "program" => return text(&poll.of(Item::Program)).map(|name| Found::text(last_part(name))),
-            "block" => return poll.flag(channel::RUN_ROW).map(|row| Found::Text(format!("N{row}"))),
-            "tool" => return poll.flag(channel::TOOL_USE).map(|tool| Found::Text(format!("T{tool}"))),
+            "mode" => return poll.mode().map(HncValue::text),
+            "execution" => return poll.execution().map(HncValue::text),
+            "operation" => return poll.operation().map(HncValue::text),
+            "alarm" => return alarms(&poll.of(HncItem::Alarms)).map(HncValue::Text),
+            "program" => return text(&poll.of(HncItem::Program)).map(|name| HncValue::text(last_part(name))),
+            "block" => return poll.flag(channel::RUN_ROW).map(|row| HncValue::Text(format!("N{row}"))),
+            "tool" => return poll.flag(channel::TOOL_USE).map(|tool| HncValue::Text(format!("T{tool}"))),
             "spindle_current_a" => {
-                let item = Item::Axis(axis::LOAD_CUR, self.layout.spindle, Width::Real);
-                return number(&poll.of(item)).map(Found::Number);
+                let item = HncItem::Axis(axis::LOAD_CUR, self.layout.spindle, HncWidth::Real);
+                return number(&poll.of(item)).map(HncValue::Number);
             }
             _ => {}
         }
         if let Some((item, _)) = NUMBERS.iter().find(|(_, channel)| *channel == name) {
-            return number(&poll.of(*item)).map(Found::Number);
+            return number(&poll.of(*item)).map(HncValue::Number);
         }
         self.axis_value(name, poll)
     }
 
-    fn axis_value(&self, name: &str, poll: &Poll) -> Result<Found, Absence> {
+    fn axis_value(&self, name: &str, poll: &Poll) -> Result<HncValue, Absence> {
         let (letter, ending) = name.split_once('_').ok_or(Absence::NotSupported)?;
         let upper = letter.to_ascii_uppercase();
         let known = self.layout.axes.iter().find(|(letter, _)| upper.starts_with(*letter));
         let (_, axis_number) = known.ok_or(Absence::NotSupported)?;
         let row = AXIS.iter().find(|(channel, ..)| *channel == ending).ok_or(Absence::NotSupported)?;
-        let found = number(&poll.of(Item::Axis(row.1, *axis_number, row.2)))?;
-        Ok(Found::Number(if row.1 == axis::ACT_POS { found / self.layout.move_unit } else { found }))
+        let found = number(&poll.of(HncItem::Axis(row.1, *axis_number, row.2)))?;
+        Ok(HncValue::Number(if row.1 == axis::ACT_POS { found / self.layout.move_unit } else { found }))
     }
 
     fn take_samples(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
@@ -209,12 +209,12 @@ impl HncSource {
     }
 }
 
-enum Found {
+enum HncValue {
     Number(f64),
     Text(String),
 }
 
-impl Found {
+impl HncValue {
     fn text(text: &str) -> Self {
         Self::Text(text.to_owned())
     }
@@ -268,7 +268,7 @@ impl Source for HncSource {
         let began_ns = clock.now_ns();
         let items = self.items();
         let results = self.line.read_each(&items)?;
-        let answers: HashMap<Item, ItemResult> = items.into_iter().zip(results).collect();
+        let answers: HashMap<HncItem, HncItemResult> = items.into_iter().zip(results).collect();
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
         self.readings(&Poll(answers), stamp, out);
         self.take_samples(clock)

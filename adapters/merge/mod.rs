@@ -31,7 +31,7 @@ use crate::reading::{Absence, Reading};
 use crate::sample::{Sample, Slot};
 use std::ops::Range;
 use std::time::Duration;
-use track::{Pace, Put, Track};
+use track::{PeriodLimits, Put, ReadingTrack};
 
 /// Position of a source in the list the merge was built from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -82,7 +82,7 @@ pub const LAG_MAX: Duration = Duration::from_secs(2);
 pub const GAP_PERIODS: i64 = 2;
 
 struct SourceState {
-    pace: Pace,
+    pace: PeriodLimits,
     /// Its readings were true so much before their stamps.
     lag_ns: i64,
     newest_ns: TimeNs,
@@ -118,7 +118,7 @@ const NO_TRACK: u16 = u16::MAX;
 pub struct Merge {
     sources: Vec<SourceState>,
     lanes: Vec<Lane>,
-    tracks: Vec<Track>,
+    tracks: Vec<ReadingTrack>,
     /// Track of (source, channel), or [`NO_TRACK`].
     lookup: Vec<u16>,
     /// Channels that there were when the merge was made.
@@ -135,7 +135,7 @@ impl Merge {
     pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
         let delay_ns = delay_of(plans, delay);
         let channels = ChannelId::count();
-        let pace = |plan: &SourcePlan| Pace::new(nanoseconds(plan.period), delay_ns);
+        let pace = |plan: &SourcePlan| PeriodLimits::new(nanoseconds(plan.period), delay_ns);
         let mut merge = Self {
             sources: plans
                 .iter()
@@ -164,7 +164,7 @@ impl Merge {
         for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
             let track = self.tracks.len();
             self.lookup[source * self.channels + channel.index()] = u16::try_from(track).unwrap_or(NO_TRACK);
-            self.tracks.push(Track::new(channel, source, self.sources[source].pace));
+            self.tracks.push(ReadingTrack::new(channel, source, self.sources[source].pace));
         }
         if self.tracks.len() > first {
             self.lanes.push(Lane { channel, tracks: first..self.tracks.len() });
@@ -195,7 +195,7 @@ impl Merge {
     /// A source turned out to be slower (or faster) than it promised: gaps are measured with this period from now on.
     pub fn set_period(&mut self, source: SourceId, period: Duration) {
         let Some(state) = self.sources.get_mut(source.0) else { return };
-        state.pace = Pace::new(nanoseconds(period), self.delay_ns);
+        state.pace = PeriodLimits::new(nanoseconds(period), self.delay_ns);
     }
 
     /// Takes a reading. One of a channel that the source did not announce is counted and dropped.
@@ -270,7 +270,7 @@ impl Merge {
 }
 
 /// The first source with a value wins; without any, the reason of the first one stands.
-fn best(tracks: &mut [Track], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
+fn best(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
     let mut reason: Option<Slot> = None;
     for track in tracks {
         let state = &mut sources[track.source];

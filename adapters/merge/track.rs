@@ -11,7 +11,7 @@ const DEPTH: (i64, i64) = (8, 4096);
 
 /// What follows from a source's period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Pace {
+pub(super) struct PeriodLimits {
     /// The widest gap that is bridged.
     pub(super) gap_ns: i64,
     /// A reading this much older than the newest one means that a clock stepped.
@@ -19,7 +19,7 @@ pub(super) struct Pace {
     depth: usize,
 }
 
-impl Pace {
+impl PeriodLimits {
     pub(super) fn new(period_ns: i64, delay_ns: i64) -> Self {
         let period_ns = period_ns.max(1);
         let gap_ns = period_ns.saturating_mul(super::GAP_PERIODS);
@@ -44,21 +44,21 @@ pub(super) enum Put {
     AfterStep,
 }
 
-struct Point {
+struct TrackPoint {
     mid_ns: TimeNs,
     value: Result<Value, Absence>,
 }
 
-pub(super) struct Track {
+pub(super) struct ReadingTrack {
     continuous: bool,
     /// Position of the source in the merge's list.
     pub(super) source: usize,
-    points: VecDeque<Point>,
+    points: VecDeque<TrackPoint>,
     depth: usize,
 }
 
-impl Track {
-    pub(super) fn new(channel: ChannelId, source: usize, pace: Pace) -> Self {
+impl ReadingTrack {
+    pub(super) fn new(channel: ChannelId, source: usize, pace: PeriodLimits) -> Self {
         let continuous = channel.channel().kind == Kind::Continuous;
         Self { continuous, source, points: VecDeque::with_capacity(pace.depth), depth: pace.depth }
     }
@@ -74,10 +74,10 @@ impl Track {
         mid_ns: TimeNs,
         value: Result<Value, Absence>,
         last_tick_ns: TimeNs,
-        pace: &Pace,
+        pace: &PeriodLimits,
     ) -> Put {
         let Some(last_ns) = self.last_ns().filter(|last_ns| mid_ns <= *last_ns) else {
-            return self.insert(self.points.len(), Point { mid_ns, value }, Put::Newest);
+            return self.insert(self.points.len(), TrackPoint { mid_ns, value }, Put::Newest);
         };
         let first_ns = self.points.front().map_or(last_ns, |point| point.mid_ns);
         if mid_ns < first_ns && first_ns <= last_tick_ns {
@@ -86,7 +86,7 @@ impl Track {
         if mid_ns < last_ns.saturating_sub(pace.horizon_ns) && last_ns > last_tick_ns {
             self.drop_after(mid_ns.saturating_add(pace.horizon_ns));
             let at = self.before(mid_ns);
-            return self.insert(at, Point { mid_ns, value }, Put::AfterStep);
+            return self.insert(at, TrackPoint { mid_ns, value }, Put::AfterStep);
         }
         let at = self.before(mid_ns);
         match at.checked_sub(1).and_then(|at| self.points.get_mut(at)).filter(|point| point.mid_ns == mid_ns) {
@@ -94,7 +94,7 @@ impl Track {
                 point.value = value;
                 Put::Repeated
             }
-            None => self.insert(at, Point { mid_ns, value }, Put::Between),
+            None => self.insert(at, TrackPoint { mid_ns, value }, Put::Between),
         }
     }
 
@@ -104,7 +104,7 @@ impl Track {
     }
 
     /// Never grows beyond the depth: the oldest reading makes room.
-    fn insert(&mut self, at: usize, point: Point, put: Put) -> Put {
+    fn insert(&mut self, at: usize, point: TrackPoint, put: Put) -> Put {
         let full = self.points.len() >= self.depth;
         match at {
             0 if full => return Put::TooLate,
@@ -141,7 +141,7 @@ impl Track {
     }
 
     /// Linear between two numbers around the tick, when they are close enough together.
-    fn between(&self, before: &Point, after: &Point, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
+    fn between(&self, before: &TrackPoint, after: &TrackPoint, at_ns: TimeNs, gap_ns: i64) -> Option<f64> {
         let width_ns = after.mid_ns.checked_sub(before.mid_ns).filter(|width_ns| *width_ns <= gap_ns)?;
         if !self.continuous || before.mid_ns == at_ns {
             return None;

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// What came back.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Answer {
+pub(crate) struct ModbusResponse {
     /// Without address and check.
     pub(crate) pdu: Vec<u8>,
     /// From the end of the request to the beginning of the answer.
@@ -19,7 +19,7 @@ pub(crate) struct Answer {
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Fault {
+pub(crate) enum ModbusError {
     /// The line itself.
     Line {
         /// What happened.
@@ -38,7 +38,7 @@ pub(crate) enum Fault {
     Garbled(String),
 }
 
-impl Fault {
+impl ModbusError {
     /// The same as the error of a source.
     pub(crate) fn of_source(self, source_name: &str, request: String, deadline: Duration) -> SourceError {
         let source_name = source_name.to_owned();
@@ -59,9 +59,15 @@ impl Fault {
 }
 
 /// Something over which a unit can be asked.
-pub(crate) trait Line: Send {
+pub(crate) trait ModbusLine: Send {
     /// Asks and waits. `answer_bytes` is the length of a good answer without address and check.
-    fn ask(&mut self, clock: &dyn Clock, unit: u8, request: &[u8], answer_bytes: usize) -> Result<Answer, Fault>;
+    fn ask(
+        &mut self,
+        clock: &dyn Clock,
+        unit: u8,
+        request: &[u8],
+        answer_bytes: usize,
+    ) -> Result<ModbusResponse, ModbusError>;
 
     /// How long a request may take.
     fn deadline(&self) -> Duration;
@@ -74,7 +80,7 @@ pub(crate) trait Line: Send {
 const NO_TERMINAL: i32 = 25;
 
 /// What a failed serial line means, and what to do.
-pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> Fault {
+pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> ModbusError {
     let port = target.port.display();
     let next = match error.kind() {
         ErrorKind::NotFound => "Plug the adapter in and look with: ls /dev/serial/by-id".to_owned(),
@@ -85,11 +91,11 @@ pub(crate) fn serial_fault(error: &io::Error, target: &SerialTarget) -> Fault {
         }
         _ => "Check the adapter; the line is opened again by itself".to_owned(),
     };
-    Fault::Line { what: format!("{port}: {error}"), next: format!("{next}.") }
+    ModbusError::Line { what: format!("{port}: {error}"), next: format!("{next}.") }
 }
 
 /// What silence on a serial line means, and what to do.
-pub(crate) fn serial_silence(target: &SerialTarget) -> Fault {
+pub(crate) fn serial_silence(target: &SerialTarget) -> ModbusError {
     let parity = match target.parity {
         Parity::None => "no",
         Parity::Even => "even",
@@ -99,5 +105,5 @@ pub(crate) fn serial_silence(target: &SerialTarget) -> Fault {
         "Check the power of the meter, its unit number, that A and B are not swapped, and that it speaks {} Bd with {parity} parity.",
         target.baud
     );
-    Fault::Timeout { next }
+    ModbusError::Timeout { next }
 }

@@ -1,10 +1,10 @@
 //! A Modbus meter as a source.
 
-use super::line::{Fault, Line};
+use super::line::{ModbusError, ModbusLine};
 use super::number::Format;
 use super::pdu::{NoRegisters, RegisterBlock};
-use super::plan::Plan;
-use super::profile::{Profile, Quantity, Register, find};
+use super::plan::PollBlocks;
+use super::profile::{MeterRegister, Profile, RegisterMeaning, find};
 use super::refresh::Refresh;
 use super::rtu::RtuLine;
 use super::tcp::TcpLine;
@@ -27,7 +27,7 @@ enum Law {
 
 /// A channel and the registers that it comes from.
 #[derive(Debug, Clone, PartialEq)]
-struct Output {
+struct MeterChannel {
     channel: ChannelId,
     law: Law,
     parts: Vec<Part>,
@@ -47,11 +47,11 @@ struct Part {
 /// A meter that is polled over Modbus.
 pub struct ModbusMeter {
     name: String,
-    line: Box<dyn Line>,
+    line: Box<dyn ModbusLine>,
     unit: u8,
     profile: Profile,
-    plan: Plan,
-    outputs: Vec<Output>,
+    plan: PollBlocks,
+    outputs: Vec<MeterChannel>,
     channels: Vec<ChannelId>,
     period: Duration,
     serial: Option<SerialTarget>,
@@ -81,12 +81,12 @@ impl ModbusMeter {
 
     fn new(
         address: &Address,
-        line: Box<dyn Line>,
+        line: Box<dyn ModbusLine>,
         meter: &MeterTarget,
         serial: Option<SerialTarget>,
     ) -> Result<Self, String> {
         let profile = find(&meter.profile, meter.profiles.as_deref()).map_err(|error| error.to_string())?;
-        let plan = Plan::of(&profile)?;
+        let plan = PollBlocks::of(&profile)?;
         let parts = parts(&profile, &plan, &factors(&profile, meter)?)?;
         let outputs = outputs(&profile, &parts, meter.circuit)?;
         let busy = serial.as_ref().map(|line| plan.wire_time(line) * 5 / 4).unwrap_or_default();
@@ -120,7 +120,9 @@ impl ModbusMeter {
             let asked = ask(self.line.as_mut(), clock, self.unit, block);
             let (registers, stamp) = match asked {
                 Ok((registers, stamp)) => (Ok(registers), stamp),
-                Err(Fault::Refused(code)) if self.plan.blocks.len() > 1 => (Err(code), Stamp::exact(clock.now_ns())),
+                Err(ModbusError::Refused(code)) if self.plan.blocks.len() > 1 => {
+                    (Err(code), Stamp::exact(clock.now_ns()))
+                }
                 Err(fault) => return Err(fault.of_source(&self.name, block.told(), self.line.deadline())),
             };
             self.registers.push(registers);
@@ -128,13 +130,13 @@ impl ModbusMeter {
         }
         match self.registers.first() {
             Some(Err(code)) if self.registers.iter().all(Result::is_err) => {
-                Err(Fault::Refused(*code).of_source(&self.name, self.plan.blocks[0].told(), self.line.deadline()))
+                Err(ModbusError::Refused(*code).of_source(&self.name, self.plan.blocks[0].told(), self.line.deadline()))
             }
             _ => Ok(()),
         }
     }
 
-    fn reading(&self, output: &Output) -> Reading {
+    fn reading(&self, output: &MeterChannel) -> Reading {
         let mut stamp = self.stamps[0];
         let mut numbers = Vec::with_capacity(3);
         for part in &output.parts {
@@ -165,12 +167,19 @@ impl ModbusMeter {
     }
 }
 
-fn ask(line: &mut dyn Line, clock: &dyn Clock, unit: u8, block: &RegisterBlock) -> Result<(Vec<u16>, Stamp), Fault> {
+fn ask(
+    line: &mut dyn ModbusLine,
+    clock: &dyn Clock,
+    unit: u8,
+    block: &RegisterBlock,
+) -> Result<(Vec<u16>, Stamp), ModbusError> {
     let answer = line.ask(clock, unit, &block.request(), block.answer_bytes())?;
     match block.registers(&answer.pdu) {
         Ok(registers) => Ok((registers, answer.stamp)),
-        Err(NoRegisters::Refused(code)) => Err(Fault::Refused(code)),
-        Err(NoRegisters::Other(bytes)) => Err(Fault::Garbled(format!("{bytes} bytes that answer another question"))),
+        Err(NoRegisters::Refused(code)) => Err(ModbusError::Refused(code)),
+        Err(NoRegisters::Other(bytes)) => {
+            Err(ModbusError::Garbled(format!("{bytes} bytes that answer another question")))
+        }
     }
 }
 
@@ -193,38 +202,38 @@ fn factors(profile: &Profile, meter: &MeterTarget) -> Result<Vec<f64>, String> {
         return Err(format!("{} counts its transformers in: leave ct and pt out", profile.meter));
     }
     let ratio = |quantity| match quantity {
-        Quantity::Power | Quantity::PhasePower(_) => meter.ct * meter.pt,
-        Quantity::Current(_) => meter.ct,
-        Quantity::Voltage(_) | Quantity::LineVoltage => meter.pt,
-        Quantity::Channel(_) => 1.0,
+        RegisterMeaning::Power | RegisterMeaning::PhasePower(_) => meter.ct * meter.pt,
+        RegisterMeaning::Current(_) => meter.ct,
+        RegisterMeaning::Voltage(_) | RegisterMeaning::LineVoltage => meter.pt,
+        RegisterMeaning::Channel(_) => 1.0,
     };
     Ok(profile.registers.iter().map(|register| register.factor * ratio(register.quantity)).collect())
 }
 
 /// Where each register of the profile is found in the blocks.
-fn parts(profile: &Profile, plan: &Plan, factors: &[f64]) -> Result<Vec<Part>, String> {
-    let part = |(register, factor): (&Register, &f64)| {
+fn parts(profile: &Profile, plan: &PollBlocks, factors: &[f64]) -> Result<Vec<Part>, String> {
+    let part = |(register, factor): (&MeterRegister, &f64)| {
         let place = plan.place(register).ok_or_else(|| format!("no block holds register {}", register.address));
         place.map(|(block, offset)| Part { block, offset, format: register.format, factor: *factor })
     };
     profile.registers.iter().zip(factors).map(part).collect()
 }
 
-fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<Output>, String> {
-    let where_is = |wanted: &dyn Fn(Quantity) -> bool| -> Vec<Part> {
+fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<MeterChannel>, String> {
+    let where_is = |wanted: &dyn Fn(RegisterMeaning) -> bool| -> Vec<Part> {
         let each = profile.registers.iter().zip(parts);
         each.filter(|(register, _)| wanted(register.quantity)).map(|(_, part)| *part).collect()
     };
-    let total = where_is(&|quantity| quantity == Quantity::Power);
-    let phases = where_is(&|quantity| matches!(quantity, Quantity::PhasePower(_)));
-    let currents = where_is(&|quantity| matches!(quantity, Quantity::Current(_)));
-    let line = where_is(&|quantity| quantity == Quantity::LineVoltage);
-    let voltages = where_is(&|quantity| matches!(quantity, Quantity::Voltage(_)));
+    let total = where_is(&|quantity| quantity == RegisterMeaning::Power);
+    let phases = where_is(&|quantity| matches!(quantity, RegisterMeaning::PhasePower(_)));
+    let currents = where_is(&|quantity| matches!(quantity, RegisterMeaning::Current(_)));
+    let line = where_is(&|quantity| quantity == RegisterMeaning::LineVoltage);
+    let voltages = where_is(&|quantity| matches!(quantity, RegisterMeaning::Voltage(_)));
     let power = if circuit == Circuit::Spindle { "spindle_power_w" } else { "total_power_w" };
     let mut outputs = Vec::new();
     let mut add = |name: &str, law, parts: Vec<Part>| {
         if let Some(channel) = ChannelId::of(name).filter(|_| !parts.is_empty()) {
-            outputs.push(Output { channel, law, parts });
+            outputs.push(MeterChannel { channel, law, parts });
         }
     };
     add(power, Law::Sum, if total.is_empty() { phases } else { total });
@@ -234,8 +243,8 @@ fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<Ou
     let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
     add("supply_voltage_v", law, voltages);
     for (register, part) in profile.registers.iter().zip(parts) {
-        if let Quantity::Channel(channel) = register.quantity {
-            outputs.push(Output { channel, law: Law::Sum, parts: vec![*part] });
+        if let RegisterMeaning::Channel(channel) = register.quantity {
+            outputs.push(MeterChannel { channel, law: Law::Sum, parts: vec![*part] });
         }
     }
     let mut seen = Vec::new();
@@ -248,8 +257,8 @@ fn outputs(profile: &Profile, parts: &[Part], circuit: Circuit) -> Result<Vec<Ou
     if outputs.is_empty() { Err(format!("profile {} gives no channel", profile.name)) } else { Ok(outputs) }
 }
 
-fn point_name(register: &Register) -> Option<Fact> {
-    let Quantity::Channel(channel) = register.quantity else { return None };
+fn point_name(register: &MeterRegister) -> Option<Fact> {
+    let RegisterMeaning::Channel(channel) = register.quantity else { return None };
     register.name.as_ref().map(|name| Fact::text(channel.name(), name.clone()))
 }
 

@@ -41,5 +41,5 @@ mod tcp;
 
 pub use meter::ModbusMeter;
 pub use number::{Format, WordOrder};
-pub use plan::{Plan, wire_time};
+pub use plan::{PollBlocks, wire_time};
 pub use refresh::Refresh;

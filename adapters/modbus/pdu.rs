@@ -7,14 +7,14 @@ pub const REGISTERS_MAX: u16 = 125;
 
 /// Which table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Table {
+pub enum RegisterTable {
     /// Function 3.
     Holding,
     /// Function 4.
     Input,
 }
 
-impl Table {
+impl RegisterTable {
     /// The function code that reads it.
     #[must_use]
     pub fn function(self) -> u8 {
@@ -29,7 +29,7 @@ impl Table {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegisterBlock {
     /// Of which table.
-    pub table: Table,
+    pub table: RegisterTable,
     /// Protocol address of the first one, counted from 0.
     pub start: u16,
     /// How many, 1 to 125.
@@ -71,7 +71,7 @@ impl RegisterBlock {
     /// What it asks for, for messages.
     #[must_use]
     pub fn told(&self) -> String {
-        let table = if self.table == Table::Holding { "holding" } else { "input" };
+        let table = if self.table == RegisterTable::Holding { "holding" } else { "input" };
         format!("{} {table} registers from {} (0x{:04X})", self.count, self.start, self.start)
     }
 }
@@ -107,8 +107,8 @@ pub fn exception(code: u8) -> (&'static str, &'static str) {
 /// The exception code to answer with.
 pub fn understood(request: &[u8]) -> Result<RegisterBlock, u8> {
     let table = match request.first() {
-        Some(3) => Table::Holding,
-        Some(4) => Table::Input,
+        Some(3) => RegisterTable::Holding,
+        Some(4) => RegisterTable::Input,
         _ => return Err(1),
     };
     let [_, a, b, c, d] = *request else { return Err(3) };
@@ -119,7 +119,7 @@ pub fn understood(request: &[u8]) -> Result<RegisterBlock, u8> {
 
 /// The answer that carries these registers (at most 125).
 #[must_use]
-pub fn answer(table: Table, registers: &[u16]) -> Vec<u8> {
+pub fn answer(table: RegisterTable, registers: &[u16]) -> Vec<u8> {
     let bytes = u8::try_from(2 * registers.len()).unwrap_or(u8::MAX);
     let mut answer = vec![table.function(), bytes];
     answer.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
@@ -139,17 +139,17 @@ mod tests {
     #[test]
     fn the_example_of_the_specification() {
         // 6.3: registers 108 to 110 hold 02 2B, 00 00, 00 64.
-        let block = RegisterBlock { table: Table::Holding, start: 0x6B, count: 3 };
+        let block = RegisterBlock { table: RegisterTable::Holding, start: 0x6B, count: 3 };
         assert_eq!(block.request(), [0x03, 0x00, 0x6B, 0x00, 0x03]);
         let bytes = [0x03, 0x06, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64];
         assert_eq!(block.registers(&bytes), Ok(vec![0x022B, 0x0000, 0x0064]));
         assert_eq!(understood(&block.request()), Ok(block));
-        assert_eq!(answer(Table::Holding, &[0x022B, 0, 0x64]), bytes);
+        assert_eq!(answer(RegisterTable::Holding, &[0x022B, 0, 0x64]), bytes);
     }
 
     #[test]
     fn an_exception_and_an_answer_to_something_else_are_no_registers() {
-        let block = RegisterBlock { table: Table::Input, start: 0, count: 2 };
+        let block = RegisterBlock { table: RegisterTable::Input, start: 0, count: 2 };
         assert_eq!(block.registers(&[0x84, 2]), Err(NoRegisters::Refused(2)));
         assert_eq!(block.registers(&[0x83, 2]), Err(NoRegisters::Other(2)));
         assert_eq!(block.registers(&[4, 2, 0, 0]), Err(NoRegisters::Other(4)));
@@ -160,7 +160,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn no_answer_makes_it_panic(bytes in proptest::collection::vec(0_u8.., 0..300), count in 1_u16..126) {
-            let _ = RegisterBlock { table: Table::Input, start: 0, count }.registers(&bytes);
+            let _ = RegisterBlock { table: RegisterTable::Input, start: 0, count }.registers(&bytes);
             let _ = understood(&bytes);
         }
     }

@@ -1,7 +1,7 @@
 //! The fewest blocks that hold every register of a profile, and what they take on the wire.
 
 use super::pdu::RegisterBlock;
-use super::profile::{Profile, Register};
+use super::profile::{MeterRegister, Profile};
 use crate::address::SerialTarget;
 use crate::serial;
 use std::time::Duration;
@@ -16,18 +16,18 @@ const ANSWER_AROUND: usize = 5;
 
 /// The blocks of one poll.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Plan {
+pub struct PollBlocks {
     /// In the order of their addresses; no two overlap.
     pub blocks: Vec<RegisterBlock>,
 }
 
-impl Plan {
+impl PollBlocks {
     /// The fewest blocks within the profile's limits.
     ///
     /// # Errors
     /// In words: a profile that needs too many requests.
     pub fn of(profile: &Profile) -> Result<Self, String> {
-        let end = |register: &Register| u32::from(register.address) + u32::from(register.format.registers());
+        let end = |register: &MeterRegister| u32::from(register.address) + u32::from(register.format.registers());
         let mut spans: Vec<(u32, u32)> =
             profile.registers.iter().map(|register| (u32::from(register.address), end(register))).collect();
         spans.sort_unstable();
@@ -48,7 +48,7 @@ impl Plan {
     }
 
     /// In which block a register stands, and how many registers into it.
-    pub(super) fn place(&self, register: &Register) -> Option<(usize, usize)> {
+    pub(super) fn place(&self, register: &MeterRegister) -> Option<(usize, usize)> {
         let holds = |block: &RegisterBlock| {
             register.address >= block.start
                 && register.address - block.start + register.format.registers() <= block.count
@@ -85,7 +85,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn blocks(name: &str) -> Vec<(u16, u16)> {
-        let plan = Plan::of(&find(name, None).expect("shipped")).expect("a plan");
+        let plan = PollBlocks::of(&find(name, None).expect("shipped")).expect("a plan");
         plan.blocks.iter().map(|block| (block.start, block.count)).collect()
     }
 
@@ -101,10 +101,10 @@ mod tests {
     #[test]
     fn a_meter_with_limits_gets_more_blocks() {
         let profile = Profile { block_gap: 10, ..find("sdm630", None).expect("shipped") };
-        let plan = Plan::of(&profile).expect("a plan");
+        let plan = PollBlocks::of(&profile).expect("a plan");
         assert_eq!(plan.blocks.iter().map(|b| (b.start, b.count)).collect::<Vec<_>>(), [(0, 18), (52, 2)]);
         let narrow = Profile { block_max: 4, ..profile };
-        assert!(Plan::of(&narrow).expect("a plan").blocks.iter().all(|block| block.count <= 4));
+        assert!(PollBlocks::of(&narrow).expect("a plan").blocks.iter().all(|block| block.count <= 4));
     }
 
     #[test]

@@ -26,7 +26,7 @@
 //! Without `power` the sum of the phases is taken.
 
 use super::number::{Format, WordOrder};
-use super::pdu::{REGISTERS_MAX, Table};
+use super::pdu::{REGISTERS_MAX, RegisterTable};
 use crate::channel::{self, CHANNELS, ChannelId};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ pub const SHIPPED: [(&str, &str); 9] = [
 
 /// What a register means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum RegisterMeaning {
     /// Of all phases together, W.
     Power,
     /// Of one phase, 0 to 2, W.
@@ -70,9 +70,9 @@ pub enum Quantity {
 
 /// One number of the meter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Register {
+pub struct MeterRegister {
     /// What it means.
-    pub quantity: Quantity,
+    pub quantity: RegisterMeaning,
     /// Protocol address of its first register.
     pub address: u16,
     /// How it lies there.
@@ -91,7 +91,7 @@ pub struct Profile {
     /// The meter.
     pub meter: String,
     /// Where its numbers are.
-    pub table: Table,
+    pub table: RegisterTable,
     /// Which word comes first.
     pub word_order: WordOrder,
     /// Are the numbers those of the secondary side of transformers?
@@ -107,7 +107,7 @@ pub struct Profile {
     /// Where the map comes from.
     pub source: String,
     /// Its numbers.
-    pub registers: Vec<Register>,
+    pub registers: Vec<MeterRegister>,
 }
 
 /// A profile that cannot be used, with everything that is wrong with it.
@@ -235,7 +235,7 @@ pub fn parse(name: &str, place: &str, text: &str) -> Result<Profile, ProfileErro
     Ok(Profile {
         name: name.to_owned(),
         meter: raw.meter,
-        table: if matches!(raw.registers, RawTable::Input) { Table::Input } else { Table::Holding },
+        table: if matches!(raw.registers, RawTable::Input) { RegisterTable::Input } else { RegisterTable::Holding },
         word_order: raw.word_order,
         secondary: raw.values == RawSide::Secondary,
         period: Duration::from_secs_f64(raw.period_s),
@@ -262,7 +262,7 @@ fn of_whole(raw: &RawProfile) -> Vec<String> {
     problems
 }
 
-fn register(raw: &RawValue) -> Result<Register, String> {
+fn register(raw: &RawValue) -> Result<MeterRegister, String> {
     let (quantity, base) = match (&raw.quantity, &raw.channel) {
         (Some(quantity), None) => of_quantity(quantity)?,
         (None, Some(channel)) => of_channel(channel)?,
@@ -276,24 +276,24 @@ fn register(raw: &RawValue) -> Result<Register, String> {
         return Err(format!("address = {}: the number does not end within the 65536 registers", raw.address));
     }
     let factor = raw.scale * unit;
-    Ok(Register { quantity, address: raw.address, format: raw.r#type, factor, name: raw.name.clone() })
+    Ok(MeterRegister { quantity, address: raw.address, format: raw.r#type, factor, name: raw.name.clone() })
 }
 
-const QUANTITIES: [(&str, Quantity, &str); 11] = [
-    ("power", Quantity::Power, "W"),
-    ("power_l1", Quantity::PhasePower(0), "W"),
-    ("power_l2", Quantity::PhasePower(1), "W"),
-    ("power_l3", Quantity::PhasePower(2), "W"),
-    ("current_l1", Quantity::Current(0), "A"),
-    ("current_l2", Quantity::Current(1), "A"),
-    ("current_l3", Quantity::Current(2), "A"),
-    ("voltage_l1", Quantity::Voltage(0), "V"),
-    ("voltage_l2", Quantity::Voltage(1), "V"),
-    ("voltage_l3", Quantity::Voltage(2), "V"),
-    ("voltage_l12", Quantity::LineVoltage, "V"),
+const QUANTITIES: [(&str, RegisterMeaning, &str); 11] = [
+    ("power", RegisterMeaning::Power, "W"),
+    ("power_l1", RegisterMeaning::PhasePower(0), "W"),
+    ("power_l2", RegisterMeaning::PhasePower(1), "W"),
+    ("power_l3", RegisterMeaning::PhasePower(2), "W"),
+    ("current_l1", RegisterMeaning::Current(0), "A"),
+    ("current_l2", RegisterMeaning::Current(1), "A"),
+    ("current_l3", RegisterMeaning::Current(2), "A"),
+    ("voltage_l1", RegisterMeaning::Voltage(0), "V"),
+    ("voltage_l2", RegisterMeaning::Voltage(1), "V"),
+    ("voltage_l3", RegisterMeaning::Voltage(2), "V"),
+    ("voltage_l12", RegisterMeaning::LineVoltage, "V"),
 ];
 
-fn of_quantity(name: &str) -> Result<(Quantity, &'static str), String> {
+fn of_quantity(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
     if let Some((_, quantity, base)) = QUANTITIES.iter().find(|(known, ..)| *known == name) {
         return Ok((*quantity, base));
     }
@@ -302,10 +302,10 @@ fn of_quantity(name: &str) -> Result<(Quantity, &'static str), String> {
     Err(format!("no quantity {name:?}{hint}"))
 }
 
-fn of_channel(name: &str) -> Result<(Quantity, &'static str), String> {
+fn of_channel(name: &str) -> Result<(RegisterMeaning, &'static str), String> {
     let id = ChannelId::of(name).filter(|id| !id.channel().unit.is_empty());
     if let Some(id) = id {
-        return Ok((Quantity::Channel(id), id.channel().unit));
+        return Ok((RegisterMeaning::Channel(id), id.channel().unit));
     }
     let names = CHANNELS.iter().map(|channel| channel.name);
     let hint = channel::nearest(name, names).map(|near| format!("; did you mean {near}?")).unwrap_or_default();

@@ -5,7 +5,7 @@
 //! of our own request that two-wire adapters return, do no harm.
 
 use super::crc::{crc, is_whole};
-use super::line::{Answer, Fault, Line, serial_fault, serial_silence};
+use super::line::{ModbusError, ModbusLine, ModbusResponse, serial_fault, serial_silence};
 use crate::clock::Clock;
 use crate::reading::Stamp;
 use crate::serial::{Bus, SharedBus, wire_time};
@@ -31,15 +31,21 @@ impl RtuLine {
     }
 }
 
-impl Line for RtuLine {
-    fn ask(&mut self, clock: &dyn Clock, unit: u8, request: &[u8], answer_bytes: usize) -> Result<Answer, Fault> {
+impl ModbusLine for RtuLine {
+    fn ask(
+        &mut self,
+        clock: &dyn Clock,
+        unit: u8,
+        request: &[u8],
+        answer_bytes: usize,
+    ) -> Result<ModbusResponse, ModbusError> {
         let mut bus = self.bus.lock().unwrap_or_else(PoisonError::into_inner);
         let mut frame = vec![unit];
         frame.extend(request);
         let check = crc(&frame);
         frame.extend(check);
         let answer = exchange(&mut bus, clock, &frame, answer_bytes, self.deadline);
-        if matches!(answer, Err(Fault::Timeout { .. } | Fault::Garbled(_))) {
+        if matches!(answer, Err(ModbusError::Timeout { .. } | ModbusError::Garbled(_))) {
             bus.keep_quiet(2 * self.deadline);
         }
         self.late = bus.late_answers();
@@ -61,7 +67,7 @@ fn exchange(
     frame: &[u8],
     answer_bytes: usize,
     deadline: Duration,
-) -> Result<Answer, Fault> {
+) -> Result<ModbusResponse, ModbusError> {
     let target = bus.target().clone();
     let failed = |error| serial_fault(&error, &target);
     bus.send(frame).map_err(failed)?;
@@ -73,13 +79,13 @@ fn exchange(
             let sent = wire_time(&target, frame.len());
             let received = wire_time(&target, found.len());
             let pdu = found[1..found.len() - 2].to_vec();
-            return Ok(Answer { pdu, stamp: between(began_ns, clock.now_ns(), sent, received) });
+            return Ok(ModbusResponse { pdu, stamp: between(began_ns, clock.now_ns(), sent, received) });
         }
     }
     if bytes.is_empty() {
         return Err(serial_silence(&target));
     }
-    Err(Fault::Garbled(format!("{} bytes without a good frame among them: {}", bytes.len(), excerpt(&bytes))))
+    Err(ModbusError::Garbled(format!("{} bytes without a good frame among them: {}", bytes.len(), excerpt(&bytes))))
 }
 
 /// The value was taken after the request had left and before the answer began to come; the wire's own time is known.

@@ -8,7 +8,7 @@
 //! Limits: 16 connections, a minute of silence on each.
 
 use super::pdu::{self, RegisterBlock};
-use super::profile::{Profile, Quantity};
+use super::profile::{Profile, RegisterMeaning};
 use super::tcp::{frame, header};
 use crate::clock::Clock;
 use crate::simulated::{MeterValues, Simulated, SimulatedMeter};
@@ -37,7 +37,7 @@ pub struct ModbusServer {
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
-struct Served {
+struct ServedMeter {
     meter: SimulatedMeter,
     clock: Arc<dyn Clock>,
     profile: Profile,
@@ -56,7 +56,7 @@ impl ModbusServer {
         let at = listener.local_addr()?;
         let stop = Arc::new(AtomicBool::new(false));
         let connections = AtomicUsize::new(0);
-        let served = Arc::new(Served { meter: machine.meter(), clock, profile, stop: stop.clone(), connections });
+        let served = Arc::new(ServedMeter { meter: machine.meter(), clock, profile, stop: stop.clone(), connections });
         let thread = std::thread::Builder::new().name("modbus".to_owned()).spawn(move || accept(&listener, &served))?;
         Ok(Self { at, stop, thread: Some(thread) })
     }
@@ -78,7 +78,7 @@ impl Drop for ModbusServer {
     }
 }
 
-fn accept(listener: &TcpListener, served: &Arc<Served>) {
+fn accept(listener: &TcpListener, served: &Arc<ServedMeter>) {
     while !served.stop.load(Ordering::SeqCst) {
         let Ok((stream, _)) = listener.accept() else {
             std::thread::sleep(Duration::from_millis(5));
@@ -100,7 +100,7 @@ fn accept(listener: &TcpListener, served: &Arc<Served>) {
     }
 }
 
-fn talk(served: &Served, mut stream: TcpStream) -> io::Result<()> {
+fn talk(served: &ServedMeter, mut stream: TcpStream) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(LOOK))?;
@@ -117,7 +117,7 @@ fn talk(served: &Served, mut stream: TcpStream) -> io::Result<()> {
     }
 }
 
-fn fill(served: &Served, stream: &mut TcpStream, mut into: &mut [u8]) -> io::Result<()> {
+fn fill(served: &ServedMeter, stream: &mut TcpStream, mut into: &mut [u8]) -> io::Result<()> {
     let until = Instant::now() + IDLE_MAX;
     while !into.is_empty() {
         if served.stop.load(Ordering::SeqCst) || Instant::now() > until {
@@ -133,7 +133,7 @@ fn fill(served: &Served, stream: &mut TcpStream, mut into: &mut [u8]) -> io::Res
     Ok(())
 }
 
-impl Served {
+impl ServedMeter {
     /// `None`: the meter is silent at this moment.
     fn answer(&self, unit: u8, request: &[u8]) -> Option<Vec<u8>> {
         let function = request.first().copied().unwrap_or(0);
@@ -182,7 +182,7 @@ impl Served {
 }
 
 /// `None`: the simulated meter does not measure it.
-fn number(quantity: Quantity, values: &MeterValues, spindle: bool) -> Option<f64> {
+fn number(quantity: RegisterMeaning, values: &MeterValues, spindle: bool) -> Option<f64> {
     let power_w = if spindle { values.spindle_power_w } else { values.total_power_w };
     let phase_v = values.supply_voltage_v / 3.0_f64.sqrt();
     let current_a = match spindle {
@@ -190,12 +190,12 @@ fn number(quantity: Quantity, values: &MeterValues, spindle: bool) -> Option<f64
         false => power_w.abs() / (3.0 * phase_v * POWER_FACTOR).max(1.0),
     };
     match quantity {
-        Quantity::Power => Some(power_w),
-        Quantity::PhasePower(_) => Some(power_w / 3.0),
-        Quantity::Current(_) => Some(current_a),
-        Quantity::Voltage(_) => Some(phase_v),
-        Quantity::LineVoltage => Some(values.supply_voltage_v),
-        Quantity::Channel(channel) => match channel.name() {
+        RegisterMeaning::Power => Some(power_w),
+        RegisterMeaning::PhasePower(_) => Some(power_w / 3.0),
+        RegisterMeaning::Current(_) => Some(current_a),
+        RegisterMeaning::Voltage(_) => Some(phase_v),
+        RegisterMeaning::LineVoltage => Some(values.supply_voltage_v),
+        RegisterMeaning::Channel(channel) => match channel.name() {
             "bearing_temperature_c" => Some(values.bearing_temperature_c),
             "ambient_temperature_c" => Some(values.ambient_temperature_c),
             "spindle_power_w" => Some(values.spindle_power_w),

@@ -3,7 +3,7 @@
 //! Source: Modbus Messaging on TCP/IP Implementation Guide V1.0b, 3.1.3 (the header: transaction, protocol 0, length,
 //! unit) and 4.2 (TCP_NODELAY; a connection per server).
 
-use super::line::{Answer, Fault, Line};
+use super::line::{ModbusError, ModbusLine, ModbusResponse};
 use crate::address::Endpoint;
 use crate::clock::Clock;
 use crate::reading::Stamp;
@@ -35,12 +35,12 @@ impl TcpLine {
 
     /// The open connection, or a new one. It is put back only after a good exchange: whatever still comes on another one
     /// belongs to a request that was given up.
-    fn connection(&mut self, until: Instant) -> Result<TcpStream, Fault> {
+    fn connection(&mut self, until: Instant) -> Result<TcpStream, ModbusError> {
         let open = self.stream.take();
         open.map_or_else(|| connect(&self.at, until), Ok).map_err(|error| unreachable(&self.at, &error))
     }
 
-    fn matching(&mut self, stream: &mut TcpStream, unit: u8, until: Instant) -> Result<Vec<u8>, Fault> {
+    fn matching(&mut self, stream: &mut TcpStream, unit: u8, until: Instant) -> Result<Vec<u8>, ModbusError> {
         for _ in 0..STRAY_MAX {
             let (header, pdu) = receive(stream, until)?;
             if header.transaction == self.transaction {
@@ -48,20 +48,20 @@ impl TcpLine {
             }
             self.stray += 1;
         }
-        Err(Fault::Garbled(format!("{STRAY_MAX} answers, all to other requests")))
+        Err(ModbusError::Garbled(format!("{STRAY_MAX} answers, all to other requests")))
     }
 }
 
 /// Some gateways answer as unit 0 or 255 whatever was asked.
-fn of_unit(answered: u8, asked: u8) -> Result<(), Fault> {
+fn of_unit(answered: u8, asked: u8) -> Result<(), ModbusError> {
     if answered == asked || matches!(answered, 0 | 255) {
         return Ok(());
     }
-    Err(Fault::Garbled(format!("unit {answered} answered in place of unit {asked}")))
+    Err(ModbusError::Garbled(format!("unit {answered} answered in place of unit {asked}")))
 }
 
-impl Line for TcpLine {
-    fn ask(&mut self, clock: &dyn Clock, unit: u8, request: &[u8], _: usize) -> Result<Answer, Fault> {
+impl ModbusLine for TcpLine {
+    fn ask(&mut self, clock: &dyn Clock, unit: u8, request: &[u8], _: usize) -> Result<ModbusResponse, ModbusError> {
         let until = Instant::now() + self.deadline;
         self.transaction = self.transaction.wrapping_add(1);
         let mut stream = self.connection(until)?;
@@ -70,7 +70,7 @@ impl Line for TcpLine {
         let pdu = self.matching(&mut stream, unit, until)?;
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
         self.stream = Some(stream);
-        Ok(Answer { pdu, stamp })
+        Ok(ModbusResponse { pdu, stamp })
     }
 
     fn deadline(&self) -> Duration {
@@ -89,7 +89,7 @@ fn connect(at: &Endpoint, until: Instant) -> io::Result<TcpStream> {
     Ok(stream)
 }
 
-fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> Fault {
+fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> ModbusError {
     let next = match error.kind() {
         ErrorKind::ConnectionRefused => {
             format!("{host} is there but nothing listens on port {port}: is Modbus TCP enabled, is the port right?")
@@ -97,12 +97,12 @@ fn unreachable(Endpoint { host, port }: &Endpoint, error: &io::Error) -> Fault {
         ErrorKind::TimedOut | ErrorKind::WouldBlock => "Check the network cable and the address.".to_owned(),
         _ => "Check the address and the network.".to_owned(),
     };
-    Fault::Line { what: format!("cannot connect: {error}"), next }
+    ModbusError::Line { what: format!("cannot connect: {error}"), next }
 }
 
-fn broken(error: &io::Error) -> Fault {
+fn broken(error: &io::Error) -> ModbusError {
     let next = "It is opened again by itself; many meters serve one or two clients at a time.".to_owned();
-    Fault::Line { what: format!("the connection broke: {error}"), next }
+    ModbusError::Line { what: format!("the connection broke: {error}"), next }
 }
 
 /// Header and PDU as one write, so that they leave in one packet.
@@ -119,7 +119,7 @@ pub(super) fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
 
 /// What a frame begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct MbapHeader {
     pub(super) transaction: u16,
     pub(super) unit: u8,
     /// Bytes of the PDU, 1 to 253.
@@ -127,27 +127,27 @@ pub(super) struct Header {
 }
 
 /// `None`: this is not Modbus.
-pub(super) fn header(bytes: [u8; HEADER]) -> Option<Header> {
+pub(super) fn header(bytes: [u8; HEADER]) -> Option<MbapHeader> {
     let [t_high, t_low, p_high, p_low, l_high, l_low, unit] = bytes;
     let pdu = usize::from(u16::from_be_bytes([l_high, l_low])).checked_sub(1)?;
     let modbus = (p_high, p_low) == (0, 0) && (1..=PDU_MAX).contains(&pdu);
-    modbus.then_some(Header { transaction: u16::from_be_bytes([t_high, t_low]), unit, pdu })
+    modbus.then_some(MbapHeader { transaction: u16::from_be_bytes([t_high, t_low]), unit, pdu })
 }
 
-fn receive(stream: &mut TcpStream, until: Instant) -> Result<(Header, Vec<u8>), Fault> {
+fn receive(stream: &mut TcpStream, until: Instant) -> Result<(MbapHeader, Vec<u8>), ModbusError> {
     let mut head = [0_u8; HEADER];
     fill(stream, &mut head, until)?;
     let header = header(head).ok_or_else(|| {
-        Fault::Garbled(format!("{head:02X?} is no Modbus header; is this the port of another protocol?"))
+        ModbusError::Garbled(format!("{head:02X?} is no Modbus header; is this the port of another protocol?"))
     })?;
     let mut pdu = vec![0_u8; header.pdu];
     fill(stream, &mut pdu, until)?;
     Ok((header, pdu))
 }
 
-fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), Fault> {
+fn fill(stream: &mut TcpStream, into: &mut [u8], until: Instant) -> Result<(), ModbusError> {
     stream::fill(stream, into, until).map_err(|short| match short {
-        Short::Silent => Fault::Timeout {
+        Short::Silent => ModbusError::Timeout {
             next: "Check the unit number and the power of the meter; a slow one may need timeout_ms=2000.".to_owned(),
         },
         Short::Closed => broken(&io::Error::new(ErrorKind::UnexpectedEof, "the meter closed it")),
@@ -165,7 +165,7 @@ mod tests {
         let bytes = frame(0x1501, 0xFF, &[3, 0, 4, 0, 1]);
         assert_eq!(bytes, [0x15, 0x01, 0, 0, 0, 6, 0xFF, 3, 0, 4, 0, 1]);
         let head = header(*bytes.first_chunk().expect("seven bytes"));
-        assert_eq!(head, Some(Header { transaction: 0x1501, unit: 0xFF, pdu: 5 }));
+        assert_eq!(head, Some(MbapHeader { transaction: 0x1501, unit: 0xFF, pdu: 5 }));
         assert_eq!(header(*b"HTTP/1."), None);
     }
 }

@@ -3,11 +3,11 @@
 use super::inbox::Inbox;
 use super::incoming::{Allows, Frames, Incoming};
 use super::packet::{self, Qos};
-use super::reader::{READ_PAUSE, Reader, Writer};
-use super::{Message, MqttError, Options, Version, words};
+use super::reader::{PacketWriter, READ_PAUSE, Reader};
+use super::{MqttError, MqttMessage, Options, Version, words};
 use crate::address::Endpoint;
 use crate::stream;
-use crate::tls::{Line, TlsError, TlsFiles};
+use crate::tls::{TcpConnection, TlsError, TlsFiles};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::JoinHandle;
@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 
 /// A connection to a broker. Dropping it says goodbye.
 #[derive(Debug)]
-pub struct Client {
-    writer: Arc<Writer>,
+pub struct MqttClient {
+    writer: Arc<PacketWriter>,
     inbox: Arc<Inbox>,
     next_id: AtomicU16,
     deadline: Duration,
@@ -25,7 +25,7 @@ pub struct Client {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Client {
+impl MqttClient {
     /// Connects, with a clean session. Takes at most the deadline of the options.
     ///
     /// # Errors
@@ -45,11 +45,11 @@ impl Client {
             Some(error) => MqttError::Tls(error),
             None => MqttError::Closed(error.to_string()),
         };
-        let line = Arc::new(Line::over(stream, &options.host, &lines).map_err(broken)?);
+        let line = Arc::new(TcpConnection::over(stream, &options.host, &lines).map_err(broken)?);
         pause.set_read_timeout(Some(READ_PAUSE.min(options.deadline))).map_err(io)?;
         line.write_all(&packet::connect(options)?).map_err(broken)?;
         let (frames, allows) = greeted(&line, options, until)?;
-        let writer = Arc::new(Writer::new(line));
+        let writer = Arc::new(PacketWriter::new(line));
         let inbox = Arc::new(Inbox::default());
         let asked = options.keep_alive.max(Duration::from_secs(1));
         let keep_alive = allows.keep_alive_s.map_or(asked, |seconds| asked.min(Duration::from_secs(seconds.into())));
@@ -96,7 +96,7 @@ impl Client {
     ///
     /// # Errors
     /// [`MqttError::Closed`] when the connection is over and everything that had arrived is taken.
-    pub fn receive(&self, wait: Duration) -> Result<Option<Message>, MqttError> {
+    pub fn receive(&self, wait: Duration) -> Result<Option<MqttMessage>, MqttError> {
         self.inbox.take(Instant::now() + wait)
     }
 
@@ -149,7 +149,7 @@ impl Client {
     }
 }
 
-impl Drop for Client {
+impl Drop for MqttClient {
     fn drop(&mut self) {
         let _broker_is_gone = self.writer.write(&packet::DISCONNECT);
         self.writer.shut();
@@ -161,7 +161,7 @@ impl Drop for Client {
 }
 
 /// Waits for `CONNACK` (section 3.2); what came after it stays in the frames.
-fn greeted(line: &Line, options: &Options, until: Instant) -> Result<(Frames, Allows), MqttError> {
+fn greeted(line: &TcpConnection, options: &Options, until: Instant) -> Result<(Frames, Allows), MqttError> {
     let (mut frames, mut buffer) = (Frames::of(options.version), [0; 1024]);
     while Instant::now() < until {
         match line.read(&mut buffer) {
@@ -186,7 +186,7 @@ fn greeted(line: &Line, options: &Options, until: Instant) -> Result<(Frames, Al
 }
 
 /// A broker that wants TLS, or another kind of it, says nothing and goes.
-fn hung_up(line: &Line) -> MqttError {
+fn hung_up(line: &TcpConnection) -> MqttError {
     let hint = if line.is_secured() { "" } else { "; a port that wants TLS does so, usually 8883" };
     MqttError::Closed(format!("the broker hung up at once{hint}"))
 }
@@ -218,7 +218,7 @@ mod tests {
     fn refusals_and_silence_are_told_apart() {
         let outcome = |bytes| {
             let (port, thread) = saying(bytes);
-            let outcome = Client::connect(&options(port)).map(|_| ());
+            let outcome = MqttClient::connect(&options(port)).map(|_| ());
             thread.join().expect("no panic");
             outcome
         };
@@ -232,13 +232,13 @@ mod tests {
     #[test]
     fn nobody_there_is_unreachable() {
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port").port();
-        assert!(matches!(Client::connect(&options(port)), Err(MqttError::Unreachable { .. })));
+        assert!(matches!(MqttClient::connect(&options(port)), Err(MqttError::Unreachable { .. })));
     }
 
     #[test]
     fn a_subscription_that_is_not_granted_is_named() {
         let (port, thread) = saying(b"\x20\x02\x00\x00\x90\x04\x00\x01\x00\x80");
-        let client = Client::connect(&options(port)).expect("greeted");
+        let client = MqttClient::connect(&options(port)).expect("greeted");
         let said = client.subscribe(&["a".to_owned(), "b".to_owned()], Qos::AtMostOnce).expect_err("b is refused");
         assert!(said.to_string().contains("to subscribe b"), "{said}");
         assert!(matches!(

@@ -1,6 +1,6 @@
 //! What has arrived: messages, acknowledgements, and the end of the connection.
 
-use super::{Message, MqttError, QUEUE_BYTES, QUEUE_MESSAGES};
+use super::{MqttError, MqttMessage, QUEUE_BYTES, QUEUE_MESSAGES};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ const ACKNOWLEDGEMENTS_MAX: usize = 1024;
 
 #[derive(Debug, Default)]
 struct Contents {
-    messages: VecDeque<Message>,
+    messages: VecDeque<MqttMessage>,
     bytes: usize,
     dropped: u64,
     /// What the broker said to packets with an identifier: one code per subscription, none for a message.
@@ -28,7 +28,7 @@ pub(super) struct Inbox {
 }
 
 impl Inbox {
-    pub(super) fn put(&self, message: Message) {
+    pub(super) fn put(&self, message: MqttMessage) {
         let mut contents = self.locked();
         contents.bytes += message.payload.len();
         contents.messages.push_back(message);
@@ -66,7 +66,7 @@ impl Inbox {
     }
 
     /// The oldest message, waiting for one until `until`. What arrived before the connection broke is still given.
-    pub(super) fn take(&self, until: Instant) -> Result<Option<Message>, MqttError> {
+    pub(super) fn take(&self, until: Instant) -> Result<Option<MqttMessage>, MqttError> {
         self.wait(until, |contents| {
             let message = contents.messages.pop_front()?;
             contents.bytes -= message.payload.len();
@@ -117,8 +117,8 @@ impl Inbox {
 mod tests {
     use super::*;
 
-    fn message(bytes: usize) -> Message {
-        Message { topic: String::new(), payload: vec![0; bytes], arrived: Instant::now(), retained: false }
+    fn message(bytes: usize) -> MqttMessage {
+        MqttMessage { topic: String::new(), payload: vec![0; bytes], arrived: Instant::now(), retained: false }
     }
 
     #[test]

@@ -2,12 +2,12 @@
 //!
 //! - Quality of service 0 and 1, clean session, keep-alive, user and password, TLS with client certificates, a will,
 //!   retained messages. No session that outlives the connection: the protocols above ask or send again after a reconnect.
-//! - Many messages may be on their way at once ([`Client::publish_all`]): a line with a round trip of 50 ms would
+//! - Many messages may be on their way at once ([`MqttClient::publish_all`]): a line with a round trip of 50 ms would
 //!   otherwise carry 20 messages a second.
 //! - `TCP_NODELAY` is on: without it a small request waits for the acknowledgement of the one before, 40 ms and more.
 //! - One thread per connection reads, answers the broker and fills a bounded queue, so that a message is stamped when it
 //!   arrives and not when somebody has time for it. When nobody takes, the oldest message goes and is counted.
-//! - A connection that broke stays broken ([`Client::receive`] tells why); the caller connects again, and the name of the
+//! - A connection that broke stays broken ([`MqttClient::receive`] tells why); the caller connects again, and the name of the
 //!   broker is looked up again then.
 //!
 //! Limits: a packet of at most [`PACKET_MAX`] bytes, a queue of at most [`QUEUE_MESSAGES`] messages and [`QUEUE_BYTES`].
@@ -23,7 +23,7 @@ mod publishing;
 mod reader;
 mod words;
 
-pub use client::Client;
+pub use client::MqttClient;
 pub use packet::Qos;
 pub use publishing::Outgoing;
 
@@ -104,7 +104,7 @@ pub fn unique() -> String {
 
 /// One message of a subscription.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Message {
+pub struct MqttMessage {
     /// Its topic.
     pub topic: String,
     /// Its payload.

@@ -1,6 +1,6 @@
 //! Messages on their way: many at once, each acknowledged.
 
-use super::client::Client;
+use super::client::MqttClient;
 use super::packet::{self, Qos};
 use super::{MqttError, words};
 use std::collections::VecDeque;
@@ -23,7 +23,7 @@ const NEVER: [u8; 3] = [0x90, 0x95, 0x99];
 /// A code from here on says no (section 5-2.4).
 const REFUSED: u8 = 0x80;
 
-impl Client {
+impl MqttClient {
     /// Sends a message; with [`Qos::AtLeastOnce`] it waits for the broker's acknowledgement.
     ///
     /// # Errors

@@ -3,9 +3,9 @@
 use super::inbox::Inbox;
 use super::incoming::{Frames, Incoming};
 use super::packet::{PING, acknowledge};
-use super::{Message, MqttError, words};
+use super::{MqttError, MqttMessage, words};
 use crate::stream::is_silence;
-use crate::tls::Line;
+use crate::tls::TcpConnection;
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,8 +15,8 @@ pub(super) const READ_PAUSE: Duration = Duration::from_millis(200);
 
 /// The writing half of the connection; one packet at a time.
 #[derive(Debug)]
-pub(super) struct Writer {
-    line: Arc<Line>,
+pub(super) struct PacketWriter {
+    line: Arc<TcpConnection>,
     /// When something was sent last. Held while it is sent: one packet at a time.
     sent: Mutex<Sent>,
 }
@@ -28,8 +28,8 @@ struct Sent {
     pings: u64,
 }
 
-impl Writer {
-    pub(super) fn new(line: Arc<Line>) -> Self {
+impl PacketWriter {
+    pub(super) fn new(line: Arc<TcpConnection>) -> Self {
         Self { line, sent: Mutex::new(Sent { at: Instant::now(), pings: 0 }) }
     }
 
@@ -58,7 +58,7 @@ impl Writer {
 
 pub(super) struct Reader {
     pub(super) frames: Frames,
-    pub(super) writer: Arc<Writer>,
+    pub(super) writer: Arc<PacketWriter>,
     pub(super) inbox: Arc<Inbox>,
     pub(super) keep_alive: Duration,
 }
@@ -95,7 +95,7 @@ impl Reader {
         while let Some(packet) = self.frames.next()? {
             match packet {
                 Incoming::Publish { topic, payload, acknowledge: id, retained } => {
-                    self.inbox.put(Message { topic, payload, arrived: Instant::now(), retained });
+                    self.inbox.put(MqttMessage { topic, payload, arrived: Instant::now(), retained });
                     if let Some(id) = id {
                         self.writer.write(&acknowledge(id)).map_err(|error| error.to_string())?;
                     }

@@ -1,8 +1,8 @@
 //! The feed override through four registers that the ladder reads, and the override in force read back.
 
 use super::connection::Link;
-use super::mailbox::{Letter, Mailbox, Register, in_force};
-use super::message::{Ask, first_number};
+use super::mailbox::{ControllerRegister, Mailbox, MailboxRequest, in_force};
+use super::message::{RequestedItem, first_number};
 use super::registers::RegisterLine;
 use crate::clock::Clock;
 use crate::driver::{Actuator, LadderRequest, SourceError};
@@ -16,14 +16,14 @@ const OVERRIDE: &str = "FEED_OVERRIDE";
 pub struct NcLinkActuator {
     line: RegisterLine,
     mailbox: Mailbox,
-    last: Letter,
+    last: MailboxRequest,
 }
 
 impl NcLinkActuator {
     /// A mailbox that begins at this register.
     #[must_use]
-    pub fn new(link: Link, first: Register) -> Self {
-        Self { line: RegisterLine::new(link), mailbox: Mailbox::new(first), last: Letter::Release }
+    pub fn new(link: Link, first: ControllerRegister) -> Self {
+        Self { line: RegisterLine::new(link), mailbox: Mailbox::new(first), last: MailboxRequest::Release }
     }
 
     /// The last letter once more, with or without a request. What could not be read back is not written.
@@ -40,12 +40,12 @@ impl Actuator for NcLinkActuator {
     }
 
     fn write_feed_override(&mut self, _: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.last = Letter::Override(wanted);
+        self.last = MailboxRequest::Override(wanted);
         self.post(None)
     }
 
     fn release(&mut self, _: &dyn Clock) -> Result<(), SourceError> {
-        self.last = Letter::Release;
+        self.last = MailboxRequest::Release;
         self.post(None)
     }
 
@@ -54,7 +54,7 @@ impl Actuator for NcLinkActuator {
     }
 
     fn read_feed_override(&mut self, _: &dyn Clock) -> Result<OverridePct, SourceError> {
-        let answers = self.line.read(vec![Ask::value(OVERRIDE)])?;
+        let answers = self.line.read(vec![RequestedItem::value(OVERRIDE)])?;
         let found = match answers.first() {
             Some(Some(Ok(values))) => first_number(values).ok_or(Absence::OutOfRange),
             _ => Err(Absence::Refused),

@@ -1,11 +1,11 @@
 //! One client of one device: a connection to the broker, and questions with their answers.
 
-use super::message::{self, Answer, Ask};
+use super::message::{self, NcLinkAnswer, RequestedItem};
 use super::model::Model;
 use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use crate::driver::SourceError;
-use crate::mqtt::{self, Client, Message, MqttError, Qos};
+use crate::mqtt::{self, MqttClient, MqttError, MqttMessage, Qos};
 use crate::tls::TlsFiles;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -67,7 +67,7 @@ pub struct Unasked {
 /// A connection to a device through its broker. Broken, it stays broken: open another one.
 pub struct Connection {
     link: Link,
-    client: Client,
+    client: MqttClient,
     unasked: VecDeque<Unasked>,
     /// Unasked messages that waited too long or made no sense.
     lost: u64,
@@ -84,7 +84,7 @@ impl Connection {
         options.tls.clone_from(&link.tls);
         options.deadline = link.deadline;
         let fault = |error| broker_fault(link, error);
-        let client = Client::connect(&options).map_err(fault)?;
+        let client = MqttClient::connect(&options).map_err(fault)?;
         let answers = [Subject::ProbeAnswer, Subject::QueryAnswer, Subject::SetAnswer];
         let more: &[Subject] = if samples { &[Subject::Sample, Subject::Event] } else { &[] };
         let filters: Vec<String> = answers.iter().chain(more).map(|subject| subject.filter(&link.serial)).collect();
@@ -110,7 +110,7 @@ impl Connection {
     ///
     /// # Errors
     /// See [`SourceError`]; a refusal of single items is in the answers.
-    pub fn query(&mut self, asks: &[Ask]) -> Result<Vec<Option<Answer>>, SourceError> {
+    pub fn query(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         self.request(Subject::Query, asks, "the query of its values")
     }
 
@@ -118,7 +118,7 @@ impl Connection {
     ///
     /// # Errors
     /// See [`SourceError`]; a refusal of single items is in the answers.
-    pub fn set(&mut self, asks: &[Ask]) -> Result<Vec<Option<Answer>>, SourceError> {
+    pub fn set(&mut self, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         self.request(Subject::Set, asks, "the setting of registers")
     }
 
@@ -141,7 +141,12 @@ impl Connection {
         self.lost + self.client.dropped()
     }
 
-    fn request(&mut self, subject: Subject, asks: &[Ask], what: &str) -> Result<Vec<Option<Answer>>, SourceError> {
+    fn request(
+        &mut self,
+        subject: Subject,
+        asks: &[RequestedItem],
+        what: &str,
+    ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         let id = identifier();
         let answer = self.exchange(subject, &id, &message::request(&id, asks), what)?;
         message::answers(&answer, asks).map_err(|why| match message::refusal(&answer) {
@@ -172,7 +177,7 @@ impl Connection {
 
     /// The answer itself; why it cannot be read, where it may have been it; `None` for anything else, as the late answer
     /// to an earlier question.
-    fn answer_to(&self, subject: Subject, id: &str, message: &Message) -> Option<Result<Value, String>> {
+    fn answer_to(&self, subject: Subject, id: &str, message: &MqttMessage) -> Option<Result<Value, String>> {
         let wanted = match subject {
             Subject::Probe => Subject::ProbeAnswer,
             Subject::Set => Subject::SetAnswer,
@@ -185,7 +190,7 @@ impl Connection {
         }
     }
 
-    fn keep_unasked(&mut self, message: &Message) {
+    fn keep_unasked(&mut self, message: &MqttMessage) {
         let Some((subject, tail)) = Subject::of(&message.topic, &self.link.serial) else { return };
         if !matches!(subject, Subject::Sample | Subject::Event) {
             return;

@@ -21,20 +21,20 @@ use std::str::FromStr;
 
 /// A register of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Register {
+pub struct ControllerRegister {
     /// Its kind: X, Y, F, G, R, W, D, B or P.
     pub kind: char,
     /// Its number.
     pub index: u32,
 }
 
-impl fmt::Display for Register {
+impl fmt::Display for ControllerRegister {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}{}", self.kind, self.index)
     }
 }
 
-impl FromStr for Register {
+impl FromStr for ControllerRegister {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -50,14 +50,14 @@ impl FromStr for Register {
 
 /// What the gateway asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Letter {
+pub enum MailboxRequest {
     /// This override beside the dial.
     Override(OverridePct),
     /// The dial alone.
     Release,
 }
 
-impl Letter {
+impl MailboxRequest {
     /// What stands in the registers +1 and +0; `None` when it is no letter.
     #[must_use]
     pub fn of(enable: i64, percent: i64) -> Option<Self> {
@@ -72,7 +72,7 @@ impl Letter {
 /// The four registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mailbox {
-    first: Register,
+    first: ControllerRegister,
     heartbeat: u8,
 }
 
@@ -91,28 +91,28 @@ impl Mailbox {
 
     /// The mailbox that begins at this register.
     #[must_use]
-    pub fn new(first: Register) -> Self {
+    pub fn new(first: ControllerRegister) -> Self {
         Self { first, heartbeat: 0 }
     }
 
     /// Can a mailbox begin there? It must be memory that clients may write and that forgets without power.
     #[must_use]
-    pub fn may_begin(at: Register) -> bool {
+    pub fn may_begin(at: ControllerRegister) -> bool {
         matches!(at.kind, 'R' | 'W' | 'D')
     }
 
     /// The register this far behind the first.
     #[must_use]
-    pub fn word(&self, offset: u32) -> Register {
-        Register { index: self.first.index + offset, ..self.first }
+    pub fn word(&self, offset: u32) -> ControllerRegister {
+        ControllerRegister { index: self.first.index + offset, ..self.first }
     }
 
     /// A letter as registers with their values, in the order in which they are to be written.
-    pub fn post(&mut self, letter: Letter, request: Option<LadderRequest>) -> [(Register, i64); 4] {
+    pub fn post(&mut self, letter: MailboxRequest, request: Option<LadderRequest>) -> [(ControllerRegister, i64); 4] {
         self.heartbeat = self.heartbeat % 100 + 1;
         let (percent, enable) = match letter {
-            Letter::Override(wanted) => (wanted, 1),
-            Letter::Release => (OverridePct::FULL, 0),
+            MailboxRequest::Override(wanted) => (wanted, 1),
+            MailboxRequest::Release => (OverridePct::FULL, 0),
         };
         [
             (self.word(Self::OVERRIDE), i64::from(percent.percent())),
@@ -156,29 +156,29 @@ mod tests {
 
     #[test]
     fn registers_are_read_and_printed() {
-        assert_eq!("d100".parse(), Ok(Register { kind: 'D', index: 100 }));
-        assert_eq!(Register { kind: 'R', index: 7 }.to_string(), "R7");
+        assert_eq!("d100".parse(), Ok(ControllerRegister { kind: 'D', index: 100 }));
+        assert_eq!(ControllerRegister { kind: 'R', index: 7 }.to_string(), "R7");
         for bad in ["", "D", "Q1", "D-1", "D1x", "D99999999"] {
-            assert!(bad.parse::<Register>().is_err(), "{bad}");
+            assert!(bad.parse::<ControllerRegister>().is_err(), "{bad}");
         }
         assert!(
-            !Mailbox::may_begin(Register { kind: 'B', index: 1 })
-                && !Mailbox::may_begin(Register { kind: 'G', index: 1 })
+            !Mailbox::may_begin(ControllerRegister { kind: 'B', index: 1 })
+                && !Mailbox::may_begin(ControllerRegister { kind: 'G', index: 1 })
         );
     }
 
     #[test]
     fn a_letter_moves_the_heartbeat_last_and_never_to_zero() {
-        let mut mailbox = Mailbox::new(Register { kind: 'D', index: 100 });
+        let mut mailbox = Mailbox::new(ControllerRegister { kind: 'D', index: 100 });
         let wanted = OverridePct::new(80).expect("exists");
         let mut last = 0;
         for _ in 0..250 {
-            let words = mailbox.post(Letter::Override(wanted), None);
+            let words = mailbox.post(MailboxRequest::Override(wanted), None);
             let (heartbeat, value) = words[3];
-            assert_eq!(heartbeat, Register { kind: 'D', index: 103 });
+            assert_eq!(heartbeat, ControllerRegister { kind: 'D', index: 103 });
             assert!(value != last && (1..=100).contains(&value));
             last = value;
-            assert_eq!(words[0], (Register { kind: 'D', index: 100 }, 80));
+            assert_eq!(words[0], (ControllerRegister { kind: 'D', index: 100 }, 80));
         }
     }
 
@@ -186,10 +186,13 @@ mod tests {
     fn a_letter_is_read_back_from_its_registers() {
         for percent in 0..=254 {
             let wanted = OverridePct::new(percent).expect("exists");
-            assert_eq!(Letter::of(1, i64::from(percent)), Some(Letter::Override(wanted)));
+            assert_eq!(MailboxRequest::of(1, i64::from(percent)), Some(MailboxRequest::Override(wanted)));
         }
-        assert_eq!(Letter::of(0, 80), Some(Letter::Release));
-        assert_eq!((Letter::of(1, 255), Letter::of(1, -1), Letter::of(7, 80)), (None, None, None));
+        assert_eq!(MailboxRequest::of(0, 80), Some(MailboxRequest::Release));
+        assert_eq!(
+            (MailboxRequest::of(1, 255), MailboxRequest::of(1, -1), MailboxRequest::of(7, 80)),
+            (None, None, None)
+        );
     }
 
     #[test]

@@ -19,14 +19,14 @@ pub struct Params {
 
 /// One data item of a request, under the name by which the device knows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ask {
+pub struct RequestedItem {
     /// Node number or path.
     pub id: String,
     /// What of it.
     pub params: Params,
 }
 
-impl Ask {
+impl RequestedItem {
     /// The value of an item.
     #[must_use]
     pub fn value(id: &str) -> Self {
@@ -71,11 +71,11 @@ impl Ask {
 }
 
 /// What a device said about one item.
-pub type Answer = Result<Vec<Value>, String>;
+pub type NcLinkAnswer = Result<Vec<Value>, String>;
 
 /// The request for values, or to write them.
-pub(super) fn request(id: &str, asks: &[Ask]) -> Vec<u8> {
-    let items: Vec<Value> = asks.iter().map(Ask::json).collect();
+pub(super) fn request(id: &str, asks: &[RequestedItem]) -> Vec<u8> {
+    let items: Vec<Value> = asks.iter().map(RequestedItem::json).collect();
     let key = if asks.iter().any(|ask| ask.params.value.is_some()) { "values" } else { "ids" };
     json!({"@id": id, key: items}).to_string().into_bytes()
 }
@@ -89,7 +89,7 @@ pub(super) fn identifier(message: &Value) -> Option<String> {
 ///
 /// # Errors
 /// The message as a whole is a refusal, or has no list of answers.
-pub(super) fn answers(message: &Value, asks: &[Ask]) -> Result<Vec<Option<Answer>>, String> {
+pub(super) fn answers(message: &Value, asks: &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, String> {
     let items = list(message, &["values", "results"]);
     if items.is_empty() {
         return match refusal(message) {
@@ -105,7 +105,7 @@ pub(super) fn answers(message: &Value, asks: &[Ask]) -> Result<Vec<Option<Answer
         return Ok(items.iter().map(|item| Some(answer(item))).collect());
     }
     let mut used = vec![false; items.len()];
-    let mut find = |ask: &Ask| {
+    let mut find = |ask: &RequestedItem| {
         let named = |(at, item): &(usize, &Value)| !used[*at] && id(item).is_some_and(|id| same_name(&id, &ask.id));
         let (at, item) = items.iter().enumerate().find(named)?;
         used[at] = true;
@@ -118,7 +118,7 @@ fn same_name(a: &str, b: &str) -> bool {
     a.trim_start_matches('/').eq_ignore_ascii_case(b.trim_start_matches('/'))
 }
 
-fn answer(item: &Value) -> Answer {
+fn answer(item: &Value) -> NcLinkAnswer {
     match refusal(item) {
         Some(reason) => Err(reason),
         None => match field(item, &["values", "value"]) {
@@ -154,23 +154,24 @@ mod tests {
 
     #[test]
     fn requests_are_written_as_recorded() {
-        let query = Ask {
+        let query = RequestedItem {
             id: "/STATUS".to_owned(),
             params: Params { indexes: vec!["1".into(), "3-5".into()], ..Params::default() },
         };
         let expected =
             r#"{"@id":"m1","ids":[{"id":"/STATUS","params":{"operation":"get_value","indexes":["1","3-5"]}}]}"#;
         assert_eq!(String::from_utf8_lossy(&request("m1", &[query])), expected);
-        let set = Ask { id: "/STATUS".to_owned(), params: Params { value: Some(json!(7)), ..Params::default() } };
+        let set =
+            RequestedItem { id: "/STATUS".to_owned(), params: Params { value: Some(json!(7)), ..Params::default() } };
         let expected = r#"{"@id":"m1","values":[{"id":"/STATUS","params":{"operation":"set_value","value":7}}]}"#;
         assert_eq!(String::from_utf8_lossy(&request("m1", &[set])), expected);
-        let register = String::from_utf8_lossy(&request("m1", &[Ask::write("R", 5, -1)])).into_owned();
+        let register = String::from_utf8_lossy(&request("m1", &[RequestedItem::write("R", 5, -1)])).into_owned();
         assert!(register.contains(r#""index":5"#) && register.contains(r#""value":-1"#), "{register}");
     }
 
     #[test]
     fn recorded_answers_are_understood() {
-        let asks = [Ask::value("/STATUS")];
+        let asks = [RequestedItem::value("/STATUS")];
         let ok = parsed(r#"{"@id":"m1","values":[{"id":"/STATUS","code":"OK","values":[42]}]}"#);
         assert_eq!(identifier(&ok).as_deref(), Some("m1"));
         assert_eq!(answers(&ok, &asks), Ok(vec![Some(Ok(vec![json!(42)]))]));
@@ -182,7 +183,8 @@ mod tests {
 
     #[test]
     fn answers_out_of_order_or_left_out_find_their_question() {
-        let asks = [Ask::value("STATUS"), Ask::value("FEED_SPEED"), Ask::value("PART_COUNT")];
+        let asks =
+            [RequestedItem::value("STATUS"), RequestedItem::value("FEED_SPEED"), RequestedItem::value("PART_COUNT")];
         let message = parsed(r#"{"values":[{"id":"/PART_COUNT","value":3},{"id":"/STATUS","code":"NG"}]}"#);
         let expected = vec![Some(Err("NG".to_owned())), None, Some(Ok(vec![json!(3)]))];
         assert_eq!(answers(&message, &asks), Ok(expected));
@@ -190,14 +192,14 @@ mod tests {
 
     #[test]
     fn the_same_item_asked_twice_gets_both_answers() {
-        let asks = [Ask::elements("REG", &[1]), Ask::elements("REG", &[2])];
+        let asks = [RequestedItem::elements("REG", &[1]), RequestedItem::elements("REG", &[2])];
         let message = parsed(r#"{"values":[{"id":"REG","values":[10]},{"id":"REG","values":[20]}]}"#);
         assert_eq!(answers(&message, &asks), Ok(vec![Some(Ok(vec![json!(10)])), Some(Ok(vec![json!(20)]))]));
     }
 
     #[test]
     fn a_refusal_of_everything_and_nonsense_are_told() {
-        let asks = [Ask::value("STATUS")];
+        let asks = [RequestedItem::value("STATUS")];
         assert_eq!(answers(&parsed(r#"{"code":"NG","reason":"busy"}"#), &asks), Err("busy".to_owned()));
         assert!(answers(&parsed("[1]"), &asks).is_err_and(|why| why.contains("values")));
     }

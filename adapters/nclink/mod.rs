@@ -62,7 +62,7 @@ mod track;
 
 pub use actuator::NcLinkActuator;
 pub(crate) use decode::last_part;
-pub use message::{Answer, Ask, Params};
+pub use message::{NcLinkAnswer, Params, RequestedItem};
 pub use open::{open, open_sampled};
 pub use source::{BlockSink, NcLinkSource};
-pub use track::{ChannelTrack, Track};
+pub use track::{ChannelTrack, SampleTracks};

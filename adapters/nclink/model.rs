@@ -14,7 +14,7 @@ const DEPTH_MAX: usize = 16;
 
 /// A data item or configuration item.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Item {
+pub struct ModelItem {
     /// Node number.
     pub id: String,
     /// See the [module](self); in capitals, without a leading `/`.
@@ -44,7 +44,7 @@ pub struct Model {
     /// Name of the device.
     pub name: String,
     /// Everything that can be asked for.
-    pub items: Vec<Item>,
+    pub items: Vec<ModelItem>,
     /// What it sends by itself.
     pub samples: Vec<SampleChannel>,
     by_name: HashMap<String, usize>,
@@ -77,7 +77,7 @@ impl Model {
 
     /// The item that a device means by this name: node number, or path with or without a leading `/` and its device.
     #[must_use]
-    pub fn find(&self, name: &str) -> Option<&Item> {
+    pub fn find(&self, name: &str) -> Option<&ModelItem> {
         let index = self.by_name.get(name).or_else(|| self.by_name.get(&normal(name)))?;
         self.items.get(*index)
     }
@@ -117,7 +117,7 @@ impl Model {
         if let Some(source) = text(item, &["source"]) {
             self.by_name.entry(normal(&format!("{source}/{path}"))).or_insert(self.items.len());
         }
-        self.items.push(Item {
+        self.items.push(ModelItem {
             id,
             path,
             settable,

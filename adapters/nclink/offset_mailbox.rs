@@ -17,7 +17,7 @@
 //! worse than one that nobody follows up. When the power comes on nothing is shifted. A letter that is not taken within a
 //! second is withdrawn (+3 gets the number in +7), so that it is not taken at some later time.
 
-use super::mailbox::Register;
+use super::mailbox::ControllerRegister;
 use crate::clock::Clock;
 use crate::driver::SourceError;
 use crate::offset::{Axis, OffsetSink};
@@ -28,7 +28,7 @@ const SETTLE_NS: i64 = 100_000_000;
 const LOOKS: u32 = 10;
 
 /// Registers of a controller, however they are reached.
-pub(crate) trait Registers: Send {
+pub(crate) trait RegisterAccess: Send {
     /// The address.
     fn name(&self) -> &str;
 
@@ -36,19 +36,19 @@ pub(crate) trait Registers: Send {
     ///
     /// # Errors
     /// The controller refuses, or the line failed.
-    fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError>;
+    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError>;
 
     /// Writes registers, in this order.
     ///
     /// # Errors
     /// The controller refuses, or the line failed.
-    fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError>;
+    fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError>;
 }
 
 /// Where the registers lie, and what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OffsetMailbox {
-    first: Register,
+    first: ControllerRegister,
 }
 
 /// What stands in the registers.
@@ -74,25 +74,25 @@ impl OffsetMailbox {
 
     /// The mailbox that begins at this register.
     #[must_use]
-    pub fn new(first: Register) -> Self {
+    pub fn new(first: ControllerRegister) -> Self {
         Self { first }
     }
 
     /// Can one begin there? It must be memory for numbers with a sign that clients may write and that forgets without power.
     #[must_use]
-    pub fn may_begin(at: Register) -> bool {
+    pub fn may_begin(at: ControllerRegister) -> bool {
         matches!(at.kind, 'W' | 'D')
     }
 
     /// The register this far behind the first.
     #[must_use]
-    pub fn word(&self, offset: u32) -> Register {
-        Register { index: self.first.index + offset, ..self.first }
+    pub fn word(&self, offset: u32) -> ControllerRegister {
+        ControllerRegister { index: self.first.index + offset, ..self.first }
     }
 
     /// Its first register and its last.
     #[must_use]
-    pub fn ends(&self) -> [Register; 2] {
+    pub fn ends(&self) -> [ControllerRegister; 2] {
         [self.first, self.word(Self::LENGTH - 1)]
     }
 
@@ -113,7 +113,7 @@ impl OffsetMailbox {
 
     /// A letter that wants these shifts, as registers in the order in which they are to be written.
     #[must_use]
-    pub fn post(&self, wanted_um: [i64; 3], found: &Letters) -> [(Register, i64); 4] {
+    pub fn post(&self, wanted_um: [i64; 3], found: &Letters) -> [(ControllerRegister, i64); 4] {
         let [x, y, z] = wanted_um;
         let number = found.taken.rem_euclid(100) + 1;
         [(self.word(0), x), (self.word(1), y), (self.word(2), z), (self.word(Self::NUMBER), number)]
@@ -121,7 +121,7 @@ impl OffsetMailbox {
 
     /// What the ladder writes when it has taken a letter.
     #[must_use]
-    pub fn taken(&self, in_force_um: [i64; 3], number: i64) -> [(Register, i64); 4] {
+    pub fn taken(&self, in_force_um: [i64; 3], number: i64) -> [(ControllerRegister, i64); 4] {
         let [x, y, z] = in_force_um;
         let at = |offset| self.word(Self::LADDERS + offset);
         [(at(0), x), (at(1), y), (at(2), z), (at(3), number)]
@@ -135,9 +135,9 @@ pub(crate) struct LadderOffsets<R> {
     mailbox: OffsetMailbox,
 }
 
-impl<R: Registers> LadderOffsets<R> {
+impl<R: RegisterAccess> LadderOffsets<R> {
     /// A mailbox that begins at this register.
-    pub(crate) fn new(registers: R, first: Register) -> Self {
+    pub(crate) fn new(registers: R, first: ControllerRegister) -> Self {
         Self { registers, mailbox: OffsetMailbox::new(first) }
     }
 
@@ -171,7 +171,7 @@ impl<R: Registers> LadderOffsets<R> {
     }
 }
 
-impl<R: Registers> OffsetSink for LadderOffsets<R> {
+impl<R: RegisterAccess> OffsetSink for LadderOffsets<R> {
     fn name(&self) -> &str {
         self.registers.name()
     }
@@ -218,7 +218,7 @@ mod tests {
     use crate::clock::ScaledClock;
     use std::sync::{Arc, Mutex};
 
-    const FIRST: Register = Register { kind: 'D', index: 110 };
+    const FIRST: ControllerRegister = ControllerRegister { kind: 'D', index: 110 };
 
     /// Registers with rungs that work, unless they are deaf.
     #[derive(Clone, Default)]
@@ -231,12 +231,12 @@ mod tests {
         deaf: bool,
     }
 
-    impl Registers for Control {
+    impl RegisterAccess for Control {
         fn name(&self) -> &str {
             "nclink://x"
         }
 
-        fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+        fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
             assert_eq!((first, count), (FIRST, OffsetMailbox::LENGTH));
             let mut inner = self.0.lock().expect("whole");
             if !inner.deaf && !inner.running && inner.words[3] != inner.words[7] {
@@ -245,7 +245,7 @@ mod tests {
             Ok((inner.words.to_vec(), Some(!inner.running)))
         }
 
-        fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+        fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
             let mut inner = self.0.lock().expect("whole");
             words.iter().for_each(|(at, value)| inner.words[usize::try_from(at.index - 110).expect("ours")] = *value);
             Ok(())
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn w_registers_have_sixteen_bits_with_a_sign() {
-        let signed = |kind, word| OffsetMailbox::new(Register { kind, index: 0 }).signed(word);
+        let signed = |kind, word| OffsetMailbox::new(ControllerRegister { kind, index: 0 }).signed(word);
         assert_eq!((signed('W', 65_531), signed('D', 65_531), signed('D', 0xFFFF_FFFB)), (-5, 65_531, -5));
     }
 }

@@ -3,9 +3,9 @@
 use super::connection::Link;
 use super::decode::{ChannelWord, status_word};
 use super::liberal::integer;
-use super::mailbox::Register;
-use super::message::{Answer, Ask};
-use super::offset_mailbox::Registers;
+use super::mailbox::ControllerRegister;
+use super::message::{NcLinkAnswer, RequestedItem};
+use super::offset_mailbox::RegisterAccess;
 use super::registers::{RegisterLine, path};
 use crate::driver::SourceError;
 use crate::words::execution;
@@ -27,20 +27,20 @@ impl NcLinkRegisters {
     }
 }
 
-impl Registers for NcLinkRegisters {
+impl RegisterAccess for NcLinkRegisters {
     fn name(&self) -> &str {
         self.line.name()
     }
 
-    fn look(&mut self, first: Register, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
+    fn look(&mut self, first: ControllerRegister, count: u32) -> Result<(Vec<i64>, Option<bool>), SourceError> {
         let indexes: Vec<u32> = (first.index..first.index + count).collect();
         let state = match self.line.requires(CHANNEL_WORDS) {
-            Ok(()) => Ask::elements(CHANNEL_WORDS, &[self.f_channel]),
-            Err(SourceError::Refused { .. }) => Ask::value(STATUS),
+            Ok(()) => RequestedItem::elements(CHANNEL_WORDS, &[self.f_channel]),
+            Err(SourceError::Refused { .. }) => RequestedItem::value(STATUS),
             Err(error) => return Err(error),
         };
         let by_word = state.id == CHANNEL_WORDS;
-        let answers = self.line.read(vec![Ask::elements(&path(first), &indexes), state])?;
+        let answers = self.line.read(vec![RequestedItem::elements(&path(first), &indexes), state])?;
         let numbers = match answers.first() {
             Some(Some(Ok(values))) => values.iter().filter_map(integer).collect(),
             _ => Vec::new(),
@@ -48,12 +48,12 @@ impl Registers for NcLinkRegisters {
         Ok((numbers, answers.get(1).and_then(|answer| at_rest(answer.as_ref(), by_word))))
     }
 
-    fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
+    fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
         self.line.write(words)
     }
 }
 
-fn at_rest(answer: Option<&Answer>, by_word: bool) -> Option<bool> {
+fn at_rest(answer: Option<&NcLinkAnswer>, by_word: bool) -> Option<bool> {
     let value = answer?.as_ref().ok()?.first()?;
     if by_word {
         return integer(value).map(|word| ChannelWord(word).at_rest());

@@ -2,7 +2,7 @@
 
 use super::actuator::NcLinkActuator;
 use super::connection::Link;
-use super::mailbox::Register;
+use super::mailbox::ControllerRegister;
 use super::offset_mailbox::LadderOffsets;
 use super::offsets::NcLinkRegisters;
 use super::source::{BlockSink, NcLinkSource};
@@ -38,6 +38,6 @@ pub fn open_sampled(address: &Address, target: &NcLinkTarget, sink: Option<Block
     Ok(Opened { sources: vec![Box::new(source)], actuator, offsets, simulated: None, refused: Refused::default() })
 }
 
-fn offsets(link: Link, f_channel: u32, first: Register) -> Box<dyn OffsetSink> {
+fn offsets(link: Link, f_channel: u32, first: ControllerRegister) -> Box<dyn OffsetSink> {
     Box::new(LadderOffsets::new(NcLinkRegisters::new(link, f_channel), first))
 }

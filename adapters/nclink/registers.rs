@@ -2,8 +2,8 @@
 //! write. Made when it is needed, and anew after the line broke.
 
 use super::connection::{Connection, Link};
-use super::mailbox::Register;
-use super::message::{Answer, Ask};
+use super::mailbox::ControllerRegister;
+use super::message::{NcLinkAnswer, RequestedItem};
 use super::model::Model;
 use crate::driver::SourceError;
 
@@ -28,8 +28,8 @@ impl RegisterLine {
     ///
     /// # Errors
     /// The first that is refused, or the line.
-    pub(super) fn write(&mut self, words: &[(Register, i64)]) -> Result<(), SourceError> {
-        let asks = words.iter().map(|(at, value)| Ask::write(&path(*at), at.index, *value)).collect();
+    pub(super) fn write(&mut self, words: &[(ControllerRegister, i64)]) -> Result<(), SourceError> {
+        let asks = words.iter().map(|(at, value)| RequestedItem::write(&path(*at), at.index, *value)).collect();
         let answers = self.exchange(asks, Connection::set)?;
         for ((at, _), answer) in words.iter().zip(answers) {
             let no = match answer {
@@ -46,7 +46,7 @@ impl RegisterLine {
     ///
     /// # Errors
     /// The device has not one of them, or the line failed.
-    pub(super) fn read(&mut self, asks: Vec<Ask>) -> Result<Vec<Option<Answer>>, SourceError> {
+    pub(super) fn read(&mut self, asks: Vec<RequestedItem>) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         self.exchange(asks, Connection::query)
     }
 
@@ -60,9 +60,9 @@ impl RegisterLine {
 
     fn exchange(
         &mut self,
-        mut asks: Vec<Ask>,
-        act: impl FnOnce(&mut Connection, &[Ask]) -> Result<Vec<Option<Answer>>, SourceError>,
-    ) -> Result<Vec<Option<Answer>>, SourceError> {
+        mut asks: Vec<RequestedItem>,
+        act: impl FnOnce(&mut Connection, &[RequestedItem]) -> Result<Vec<Option<NcLinkAnswer>>, SourceError>,
+    ) -> Result<Vec<Option<NcLinkAnswer>>, SourceError> {
         self.with(|connection, model, link| {
             for ask in &mut asks {
                 ask.id = named(link, model, &ask.id, ask.params.value.is_some())?;
@@ -92,7 +92,7 @@ impl RegisterLine {
 }
 
 /// The list that holds this register.
-pub(super) fn path(at: Register) -> String {
+pub(super) fn path(at: ControllerRegister) -> String {
     format!("CONTROLLER/VARIABLE@REG_{}", at.kind)
 }
 

@@ -9,7 +9,7 @@ pub const VALUES_MAX: usize = 1_000_000;
 
 /// The values of one item.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct ItemColumn {
     /// Path of the item, or its name as the device writes it when the model does not know it.
     pub path: String,
     /// In the order of time; `None` where the device had no number. Words are not numbers.
@@ -32,7 +32,7 @@ pub struct SampleBlock {
     /// Instants of the longest column.
     pub instants: usize,
     /// In the order of the message.
-    pub columns: Vec<Column>,
+    pub columns: Vec<ItemColumn>,
 }
 
 impl SampleBlock {
@@ -86,7 +86,7 @@ fn name(value: &Value) -> Option<String> {
 
 /// A value may itself be a list: several values within one interval. `[]` is none.
 #[expect(clippy::cast_precision_loss, reason = "a message holds at most a million values")]
-fn column(data: &[Value], path: String, interval_ms: f64) -> Column {
+fn column(data: &[Value], path: String, interval_ms: f64) -> ItemColumn {
     let mut values = Vec::with_capacity(data.len());
     let mut word = None;
     for value in data {
@@ -101,7 +101,7 @@ fn column(data: &[Value], path: String, interval_ms: f64) -> Column {
         }
     }
     let per_instant = if data.is_empty() { 1.0 } else { values.len() as f64 / data.len() as f64 };
-    Column { path, step_ms: interval_ms / per_instant.max(1.0), values, word }
+    ItemColumn { path, step_ms: interval_ms / per_instant.max(1.0), values, word }
 }
 
 #[cfg(test)]
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!((block.channel.as_str(), block.interval_ms), ("s1", 1.0));
         assert_eq!(
             block.columns[1],
-            Column { path: "FEED_SPEED".to_owned(), values: vec![None; 4], step_ms: 1.0, word: None }
+            ItemColumn { path: "FEED_SPEED".to_owned(), values: vec![None; 4], step_ms: 1.0, word: None }
         );
     }
 

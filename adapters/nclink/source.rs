@@ -1,12 +1,12 @@
 //! An NC-Link device as a source.
 
 use super::connection::{Connection, Link, Unasked};
-use super::map::{self, Layout, Plan};
-use super::message::Answer;
+use super::map::{self, NcLinkLayout, NcLinkPoll};
+use super::message::NcLinkAnswer;
 use super::model::Model;
 use super::sample::SampleBlock;
 use super::topic::Subject;
-use super::track::Track;
+use super::track::SampleTracks;
 use crate::address::NcLinkTarget;
 use crate::channel::ChannelId;
 use crate::clock::Clock;
@@ -20,19 +20,19 @@ pub type BlockSink = Box<dyn FnMut(&SampleBlock, Instant) + Send>;
 /// Reads a device at the pace of its address. Connects at the first poll, and anew after the line broke.
 pub struct NcLinkSource {
     link: Link,
-    layout: Layout,
+    layout: NcLinkLayout,
     period: Duration,
     channels: Vec<ChannelId>,
-    session: Option<Session>,
-    track: Track,
+    session: Option<NcLinkSession>,
+    track: SampleTracks,
     sink: Option<BlockSink>,
 }
 
 /// What holds as long as the connection does.
-struct Session {
+struct NcLinkSession {
     connection: Connection,
     model: Model,
-    plan: Plan,
+    plan: NcLinkPoll,
     by_path: bool,
     /// Has any answer been of use? Until then the other way of naming is tried once.
     understood: bool,
@@ -46,9 +46,17 @@ impl NcLinkSource {
     #[must_use]
     pub fn new(name: &str, target: &NcLinkTarget, login: Option<(String, String)>) -> Self {
         let link = Link::of(name, target, login);
-        let layout = Layout { f_channel: target.f_channel, spindle_axis: target.spindle_axis };
+        let layout = NcLinkLayout { f_channel: target.f_channel, spindle_axis: target.spindle_axis };
         let period = Duration::from_millis(target.period_ms);
-        Self { link, layout, period, channels: map::channels(), session: None, track: Track::default(), sink: None }
+        Self {
+            link,
+            layout,
+            period,
+            channels: map::channels(),
+            session: None,
+            track: SampleTracks::default(),
+            sink: None,
+        }
     }
 
     /// Whole blocks of every sample channel go there from now on.
@@ -58,7 +66,7 @@ impl NcLinkSource {
 
     /// What the sample channels have brought so far.
     #[must_use]
-    pub fn track(&self) -> &Track {
+    pub fn track(&self) -> &SampleTracks {
         &self.track
     }
 
@@ -71,7 +79,7 @@ impl NcLinkSource {
     fn poll(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let mut session = match self.session.take() {
             Some(session) => session,
-            None => Session::open(&self.link, self.layout)?,
+            None => NcLinkSession::open(&self.link, self.layout)?,
         };
         let answers = session.ask(self.layout, clock);
         // What came by itself is taken in any case: a device that does not answer may still send.
@@ -103,12 +111,12 @@ impl NcLinkSource {
     }
 }
 
-impl Session {
-    fn open(link: &Link, layout: Layout) -> Result<Self, SourceError> {
+impl NcLinkSession {
+    fn open(link: &Link, layout: NcLinkLayout) -> Result<Self, SourceError> {
         let mut connection = Connection::open(link, true)?;
         let model = connection.probe()?;
         let by_path = model.names_by_path();
-        let plan = Plan::of(&model, layout, by_path);
+        let plan = NcLinkPoll::of(&model, layout, by_path);
         if plan.asks().is_empty() {
             return Err(SourceError::Decode {
                 source_name: link.name.clone(),
@@ -120,15 +128,19 @@ impl Session {
     }
 
     /// Asks a device that was silent for its model again.
-    fn renew(&mut self, layout: Layout) -> Result<(), SourceError> {
+    fn renew(&mut self, layout: NcLinkLayout) -> Result<(), SourceError> {
         self.model = self.connection.probe()?;
-        self.plan = Plan::of(&self.model, layout, self.by_path);
+        self.plan = NcLinkPoll::of(&self.model, layout, self.by_path);
         self.doubtful = false;
         Ok(())
     }
 
     /// One query for everything. When a device refuses everything it is asked once by its other names.
-    fn ask(&mut self, layout: Layout, clock: &dyn Clock) -> Result<(Vec<Option<Answer>>, Stamp), SourceError> {
+    fn ask(
+        &mut self,
+        layout: NcLinkLayout,
+        clock: &dyn Clock,
+    ) -> Result<(Vec<Option<NcLinkAnswer>>, Stamp), SourceError> {
         if self.doubtful {
             self.renew(layout)?;
         }
@@ -142,7 +154,7 @@ impl Session {
             }
             self.turned = true;
             self.by_path = !self.by_path;
-            self.plan = Plan::of(&self.model, layout, self.by_path);
+            self.plan = NcLinkPoll::of(&self.model, layout, self.by_path);
         }
     }
 }

@@ -27,7 +27,7 @@ pub struct ChannelTrack {
 
 /// Every sample channel, and the last events.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Track {
+pub struct SampleTracks {
     channels: BTreeMap<String, ChannelTrack>,
     events: Vec<String>,
     event_count: u64,
@@ -36,7 +36,7 @@ pub struct Track {
     why: Option<String>,
 }
 
-impl Track {
+impl SampleTracks {
     /// Every sample channel by its name.
     pub fn channels(&self) -> impl Iterator<Item = (&str, &ChannelTrack)> {
         self.channels.iter().map(|(name, channel)| (name.as_str(), channel))
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_missing_millisecond_is_counted() {
-        let mut track = Track::default();
+        let mut track = SampleTracks::default();
         for (begin_ms, instants) in [(0, 200), (200, 200), (401, 200), (801, 200), (900, 10)] {
             track.block(&block(begin_ms, instants));
         }
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn events_are_kept_as_words_and_bounded() {
-        let mut track = Track::default();
+        let mut track = SampleTracks::default();
         (0..100).for_each(|number| track.event(&json!({"event": {"number": number, "text": "x"}})));
         assert_eq!((track.event_count(), track.events().len()), (100, EVENTS_KEPT));
         assert_eq!(track.events().last().map(String::as_str), Some("99 x"));

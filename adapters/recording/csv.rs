@@ -110,7 +110,8 @@ pub fn read_path(path: &Path) -> Result<ReadRecording, RecordingError> {
 pub fn read_csv(input: impl Read, file: &str) -> Result<ReadRecording, RecordingError> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(input);
     let header = reader.headers().map_err(|error| unreadable(file, &error))?.clone();
-    let mut table = Table::new(&header).map_err(|reason| RecordingError::Header { file: file.to_owned(), reason })?;
+    let mut table =
+        CsvLayout::new(&header).map_err(|reason| RecordingError::Header { file: file.to_owned(), reason })?;
     let mut record = csv::StringRecord::new();
     loop {
         match reader.read_record(&mut record) {
@@ -132,7 +133,7 @@ fn line_of(error: &csv::Error) -> u64 {
 }
 
 /// What the cells of a column turned out to be.
-enum Kind {
+enum CellType {
     /// Not seen a filled cell yet.
     Undecided,
     Numbers,
@@ -141,12 +142,12 @@ enum Kind {
 
 struct Building {
     name: String,
-    kind: Kind,
+    kind: CellType,
     numbers: Numbers,
     words: Words,
 }
 
-struct Table {
+struct CsvLayout {
     time: usize,
     utc: bool,
     run: Option<usize>,
@@ -158,7 +159,7 @@ struct Table {
     refused: u64,
 }
 
-impl Table {
+impl CsvLayout {
     fn new(header: &csv::StringRecord) -> Result<Self, String> {
         let names: Vec<&str> = header.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
         let position = |wanted: &str| names.iter().position(|name| *name == wanted);
@@ -268,9 +269,9 @@ impl Building {
         let text = TEXT_COLUMNS.contains(&name) || name.ends_with("_missing") || name == "time_utc";
         let known = crate::channel::ChannelId::of(name).is_some();
         let kind = match (text, known) {
-            (true, _) => Kind::Words,
-            (false, true) => Kind::Numbers,
-            (false, false) => Kind::Undecided,
+            (true, _) => CellType::Words,
+            (false, true) => CellType::Numbers,
+            (false, false) => CellType::Undecided,
         };
         Self { name: name.to_owned(), kind, numbers: Numbers::default(), words: Words::default() }
     }
@@ -278,7 +279,7 @@ impl Building {
     /// Would this cell fit? The first filled cell of an unknown column decides whether it holds numbers.
     fn check(&self, cell: &str) -> Result<(), String> {
         match self.kind {
-            Kind::Numbers if !cell.is_empty() && number(cell).is_none() => Err(format!(
+            CellType::Numbers if !cell.is_empty() && number(cell).is_none() => Err(format!(
                 "{cell:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
             )),
             _ => Ok(()),
@@ -286,14 +287,14 @@ impl Building {
     }
 
     fn push(&mut self, cell: &str) {
-        if matches!(self.kind, Kind::Undecided) && !cell.is_empty() {
-            self.kind = if number(cell).is_some() { Kind::Numbers } else { Kind::Words };
+        if matches!(self.kind, CellType::Undecided) && !cell.is_empty() {
+            self.kind = if number(cell).is_some() { CellType::Numbers } else { CellType::Words };
             // Every row so far was empty in both forms, so the other form can be dropped now.
         }
         match self.kind {
-            Kind::Numbers => self.numbers.push(number(cell)),
-            Kind::Words => self.words.push(cell),
-            Kind::Undecided => {
+            CellType::Numbers => self.numbers.push(number(cell)),
+            CellType::Words => self.words.push(cell),
+            CellType::Undecided => {
                 self.numbers.push(None);
                 self.words.push("");
             }
@@ -302,8 +303,8 @@ impl Building {
 
     fn finish(self) -> (String, Cells) {
         let cells = match self.kind {
-            Kind::Words => Cells::Words(self.words),
-            Kind::Numbers | Kind::Undecided => Cells::Numbers(self.numbers),
+            CellType::Words => Cells::Words(self.words),
+            CellType::Numbers | CellType::Undecided => Cells::Numbers(self.numbers),
         };
         (self.name, cells)
     }

@@ -1,7 +1,7 @@
 //! The way to the mailbox of the simulated machine's ladder.
 
 use super::Simulated;
-use super::ladder::Letter;
+use super::ladder::LadderInput;
 use crate::clock::Clock;
 use crate::driver::{Actuator, LadderRequest, SourceError};
 use crate::units::OverridePct;
@@ -17,7 +17,7 @@ impl SimulatedOverride {
         Self { name, machine }
     }
 
-    fn post(&self, clock: &dyn Clock, letter: Letter) -> Result<(), SourceError> {
+    fn post(&self, clock: &dyn Clock, letter: LadderInput) -> Result<(), SourceError> {
         self.refuse_unless_booted(clock)?;
         self.machine.locked().post(clock.now_ns(), letter);
         Ok(())
@@ -35,7 +35,7 @@ impl Actuator for SimulatedOverride {
     }
 
     fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        self.post(clock, Letter::Override(wanted))
+        self.post(clock, LadderInput::Override(wanted))
     }
 
     fn read_feed_override(&mut self, clock: &dyn Clock) -> Result<OverridePct, SourceError> {
@@ -50,10 +50,10 @@ impl Actuator for SimulatedOverride {
     }
 
     fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
-        self.post(clock, Letter::Release)
+        self.post(clock, LadderInput::Release)
     }
 
     fn ask(&mut self, clock: &dyn Clock, request: LadderRequest) -> Result<(), SourceError> {
-        self.post(clock, Letter::Ask(request))
+        self.post(clock, LadderInput::Ask(request))
     }
 }

@@ -1,7 +1,7 @@
 //! The controller of the simulated machine as a source.
 
 use super::Simulated;
-use super::device::{Device, nanoseconds};
+use super::device::{PolledDevice, nanoseconds};
 use super::moment::{Moment, Panel};
 use super::noise::{Purpose, normal};
 use crate::address::SimulatedMachine;
@@ -18,18 +18,18 @@ enum Get {
     Number(fn(&Moment) -> f64),
     /// The actual speed, with the noise of its encoder.
     Speed,
-    Text(fn(&Panel) -> Word),
+    Text(fn(&Panel) -> CachedText),
 }
 
 /// A word that is made into text only when it changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Word {
+enum CachedText {
     Plain(&'static str),
     Numbered(char, u16),
     Edge(u8, u16),
 }
 
-impl Word {
+impl CachedText {
     fn text(self) -> Arc<str> {
         match self {
             Self::Plain(word) => Arc::from(word),
@@ -40,9 +40,9 @@ impl Word {
     }
 }
 
-type Entry = (&'static str, Get);
+type ChannelGetter = (&'static str, Get);
 
-const COMMON: [Entry; 25] = [
+const COMMON: [ChannelGetter; 25] = [
     ("spindle_programmed_rpm", Get::Number(|moment| moment.panel.spindle_programmed_rpm)),
     ("spindle_speed_rpm", Get::Speed),
     ("feed_programmed_mm_min", Get::Number(|moment| moment.panel.feed_programmed_mm_min.round())),
@@ -62,26 +62,26 @@ const COMMON: [Entry; 25] = [
     ("hydraulics_on", Get::Number(|moment| f64::from(u8::from(moment.panel.hydraulics_on)))),
     ("drive_on", Get::Number(|moment| f64::from(u8::from(moment.panel.drives_on)))),
     ("part_count", Get::Number(|moment| f64::from(moment.panel.part_count))),
-    ("mode", Get::Text(|panel| Word::Plain(panel.mode))),
-    ("execution", Get::Text(|panel| Word::Plain(panel.execution))),
-    ("program", Get::Text(|panel| Word::Numbered('O', panel.program))),
-    ("block", Get::Text(|panel| Word::Numbered('N', panel.block))),
-    ("tool", Get::Text(|panel| Word::Edge(panel.tool, panel.edge))),
-    ("alarm", Get::Text(|panel| Word::Plain(panel.alarm))),
+    ("mode", Get::Text(|panel| CachedText::Plain(panel.mode))),
+    ("execution", Get::Text(|panel| CachedText::Plain(panel.execution))),
+    ("program", Get::Text(|panel| CachedText::Numbered('O', panel.program))),
+    ("block", Get::Text(|panel| CachedText::Numbered('N', panel.block))),
+    ("tool", Get::Text(|panel| CachedText::Edge(panel.tool, panel.edge))),
+    ("alarm", Get::Text(|panel| CachedText::Plain(panel.alarm))),
 ];
 
-const ANNOTATIONS: [Entry; 3] = [
-    ("operation", Get::Text(|panel| Word::Plain(panel.operation))),
+const ANNOTATIONS: [ChannelGetter; 3] = [
+    ("operation", Get::Text(|panel| CachedText::Plain(panel.operation))),
     ("depth_of_cut_mm", Get::Number(|moment| moment.panel.depth_of_cut_mm)),
     ("diameter_mm", Get::Number(|moment| tenth(moment.panel.diameter_mm))),
 ];
 
-const MILL_POSITION: [Entry; 2] = [
+const MILL_POSITION: [ChannelGetter; 2] = [
     ("y_axis_position_mm", Get::Number(|moment| thousandth(moment.panel.position_mm[1]))),
     ("y_axis_velocity_mm_min", Get::Number(|moment| tenth(moment.panel.velocity_mm_min[1]))),
 ];
 
-const MILL_ANNOTATIONS: [Entry; 2] = [
+const MILL_ANNOTATIONS: [ChannelGetter; 2] = [
     ("width_of_cut_mm", Get::Number(|moment| moment.panel.width_of_cut_mm)),
     ("teeth", Get::Number(|moment| moment.panel.teeth)),
 ];
@@ -95,36 +95,37 @@ fn thousandth(number: f64) -> f64 {
 }
 
 /// A channel, where its value comes from, and the last text it had.
-struct Output {
+struct ControllerChannel {
     channel: ChannelId,
     get: Get,
-    last: Option<(Word, Arc<str>)>,
+    last: Option<(CachedText, Arc<str>)>,
 }
 
 /// The controller of the simulated machine.
 pub struct SimulatedController {
     name: String,
     machine: Simulated,
-    device: Device,
+    device: PolledDevice,
     channels: Vec<ChannelId>,
-    outputs: Vec<Output>,
+    outputs: Vec<ControllerChannel>,
     seed: u64,
 }
 
 impl SimulatedController {
     pub(super) fn new(name: String, machine: Simulated) -> Self {
         let settings = *machine.settings();
-        let device = Device::new(settings.controller, settings.seed, machine.origin_ns());
+        let device = PolledDevice::new(settings.controller, settings.seed, machine.origin_ns());
         let mill = settings.machine == SimulatedMachine::Mill;
         let mut entries = COMMON.to_vec();
-        let optional: [(bool, &[Entry]); 3] = [
+        let optional: [(bool, &[ChannelGetter]); 3] = [
             (settings.annotations, &ANNOTATIONS),
             (mill, &MILL_POSITION),
             (mill && settings.annotations, &MILL_ANNOTATIONS),
         ];
         optional.iter().filter(|(wanted, _)| *wanted).for_each(|(_, more)| entries.extend_from_slice(more));
-        let output = |(name, get): Entry| Some(Output { channel: ChannelId::of(name)?, get, last: None });
-        let outputs: Vec<Output> = entries.into_iter().filter_map(output).collect();
+        let output =
+            |(name, get): ChannelGetter| Some(ControllerChannel { channel: ChannelId::of(name)?, get, last: None });
+        let outputs: Vec<ControllerChannel> = entries.into_iter().filter_map(output).collect();
         let channels = outputs.iter().map(|output| output.channel).collect();
         Self { name, machine, device, channels, outputs, seed: settings.seed }
     }
@@ -142,7 +143,7 @@ impl SimulatedController {
     }
 }
 
-impl Output {
+impl ControllerChannel {
     fn reading(&mut self, moment: &Moment, unrest_rpm: f64, stamp: Stamp) -> Reading {
         match self.get {
             Get::Number(get) => Reading::number(self.channel, stamp, get(moment)),
@@ -151,7 +152,7 @@ impl Output {
         }
     }
 
-    fn text(&mut self, word: Word) -> Arc<str> {
+    fn text(&mut self, word: CachedText) -> Arc<str> {
         match &self.last {
             Some((last, text)) if *last == word => text.clone(),
             _ => {

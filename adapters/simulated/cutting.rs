@@ -1,6 +1,6 @@
 //! What a cut takes, and what it does to the edge. Kienzle's law with a wear term; the simulator's own form.
 
-use super::frame::{Frame, Stage};
+use super::frame::{MachineSnapshot, Stage};
 use super::program::Cut;
 use super::settings::CutLevel;
 
@@ -29,7 +29,7 @@ pub(super) struct Circumstances {
 }
 
 /// Power, loss and force of a cut.
-pub(super) fn load(frame: &Frame, stage: &Stage, cut: &Cut, now: &Circumstances, level: CutLevel) -> Load {
+pub(super) fn load(frame: &MachineSnapshot, stage: &Stage, cut: &Cut, now: &Circumstances, level: CutLevel) -> Load {
     if now.engaged <= 0.0 || now.feed_mm_min <= 0.0 || now.speed_rad_s < 0.5 {
         return Load::default();
     }
@@ -64,7 +64,7 @@ fn without_loss(stage: &Stage, sum_w: f64, speed_rad_s: f64) -> f64 {
     2.0 * sum_w / (b + (b * b + 4.0 * a * sum_w).sqrt())
 }
 
-fn turning_force(frame: &Frame, cut: &Cut, now: &Circumstances) -> f64 {
+fn turning_force(frame: &MachineSnapshot, cut: &Cut, now: &Circumstances) -> f64 {
     let feed_mm = now.feed_mm_min / (now.speed_rad_s * 60.0 / std::f64::consts::TAU);
     let speed_m_min = (now.speed_rad_s * now.diameter_mm * 0.03).max(10.0);
     let chip_n = frame.kc11_n_mm2 * feed_mm.powf(1.0 - frame.chip_exponent) * (speed_m_min / 150.0).powf(-0.08);
@@ -72,7 +72,7 @@ fn turning_force(frame: &Frame, cut: &Cut, now: &Circumstances) -> f64 {
 }
 
 /// Mean tangential force from the removal rate; chip thickness averaged over the arc.
-fn milling_force(frame: &Frame, cut: &Cut, now: &Circumstances) -> f64 {
+fn milling_force(frame: &MachineSnapshot, cut: &Cut, now: &Circumstances) -> f64 {
     let turns_min = now.speed_rad_s * 60.0 / std::f64::consts::TAU;
     let share = (cut.width_mm / now.diameter_mm).clamp(1e-3, 1.0);
     let chip_mm = (now.feed_mm_min / (turns_min * cut.teeth.max(1.0)) * share.sqrt()).max(1e-3);
@@ -102,7 +102,7 @@ mod tests {
     /// The published cut: diameter 79 mm, 800 rpm, 0.153 mm/rev, 1 mm deep takes about 790 W.
     #[test]
     fn a_known_cut_takes_about_the_known_power() {
-        let frame = Frame::of(SimulatedMachine::Lathe);
+        let frame = MachineSnapshot::of(SimulatedMachine::Lathe);
         let cut = Cut { depth_mm: 1.0, ..Cut::default() };
         let now = Circumstances {
             speed_rad_s: 800.0 * std::f64::consts::TAU / 60.0,

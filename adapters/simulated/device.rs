@@ -11,7 +11,7 @@ pub(super) const DEADLINE: Duration = Duration::from_millis(200);
 
 /// A device that is polled: when requests begin and end, and which of the device's own beats an answer shows.
 #[derive(Debug, Clone)]
-pub(super) struct Device {
+pub(super) struct PolledDevice {
     settings: DeviceSettings,
     seed: u64,
     origin_ns: TimeNs,
@@ -19,7 +19,7 @@ pub(super) struct Device {
     poll: i64,
 }
 
-impl Device {
+impl PolledDevice {
     pub(super) fn new(settings: DeviceSettings, seed: u64, origin_ns: TimeNs) -> Self {
         Self { settings, seed, origin_ns, poll: 0 }
     }

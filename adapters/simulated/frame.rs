@@ -22,7 +22,7 @@ pub(super) struct Stage {
 
 /// A machine's numbers.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct MachineSnapshot {
     pub(super) lathe: bool,
     pub(super) stages: &'static [Stage],
     /// Inertia of spindle, chuck and motor at the spindle, kg m2.
@@ -54,7 +54,7 @@ static LATHE_STAGES: [Stage; 2] = [
 static MILL_STAGES: [Stage; 1] =
     [Stage { field_w: 90.0, dry_nm: 0.35, viscous: 0.0085, windage: 2.2e-6, transmission: 0.06, copper: 1.4 }];
 
-static LATHE: Frame = Frame {
+static LATHE: MachineSnapshot = MachineSnapshot {
     lathe: true,
     stages: &LATHE_STAGES,
     inertia_kg_m2: 0.22,
@@ -71,7 +71,7 @@ static LATHE: Frame = Frame {
     wear_n_mm2: 190.0,
 };
 
-static MILL: Frame = Frame {
+static MILL: MachineSnapshot = MachineSnapshot {
     lathe: false,
     stages: &MILL_STAGES,
     inertia_kg_m2: 0.018,
@@ -88,7 +88,7 @@ static MILL: Frame = Frame {
     wear_n_mm2: 120.0,
 };
 
-impl Frame {
+impl MachineSnapshot {
     pub(super) fn of(machine: SimulatedMachine) -> &'static Self {
         match machine {
             SimulatedMachine::Lathe => &LATHE,

@@ -71,7 +71,7 @@ impl LadderCounts {
 
 /// What comes into the ladder from outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Letter {
+pub(super) enum LadderInput {
     Override(OverridePct),
     Release,
     Ask(LadderRequest),
@@ -99,7 +99,7 @@ pub(super) struct Ladder {
     settings: LadderSettings,
     dial: OverridePct,
     mail: Option<Mail>,
-    letters: VecDeque<(TimeNs, Letter)>,
+    letters: VecDeque<(TimeNs, LadderInput)>,
     feed_hold: Option<Latch>,
     stop: Option<Latch>,
     counts: LadderCounts,
@@ -119,13 +119,13 @@ impl Ladder {
     }
 
     /// Takes a letter; it has its effect a few scans later, in the order in which letters came.
-    pub(super) fn post(&mut self, at_ns: TimeNs, letter: Letter) {
+    pub(super) fn post(&mut self, at_ns: TimeNs, letter: LadderInput) {
         match letter {
-            Letter::Override(_) => self.counts.overrides += 1,
-            Letter::Release => self.counts.releases += 1,
-            Letter::Ask(LadderRequest::FeedHold) => self.counts.feed_holds += 1,
-            Letter::Ask(LadderRequest::Stop) => self.counts.stops += 1,
-            Letter::Dial(_) => {}
+            LadderInput::Override(_) => self.counts.overrides += 1,
+            LadderInput::Release => self.counts.releases += 1,
+            LadderInput::Ask(LadderRequest::FeedHold) => self.counts.feed_holds += 1,
+            LadderInput::Ask(LadderRequest::Stop) => self.counts.stops += 1,
+            LadderInput::Dial(_) => {}
         }
         if self.letters.len() >= LETTERS_MAX {
             self.letters.pop_back();
@@ -147,13 +147,13 @@ impl Ladder {
         }
     }
 
-    fn take(&mut self, at_ns: TimeNs, letter: Letter) {
+    fn take(&mut self, at_ns: TimeNs, letter: LadderInput) {
         match letter {
-            Letter::Override(override_pct) => self.mail = Some(Mail { override_pct, alive_ns: at_ns }),
-            Letter::Release => self.mail = None,
-            Letter::Ask(LadderRequest::FeedHold) => _ = self.feed_hold.get_or_insert(Latch { since_ns: at_ns }),
-            Letter::Ask(LadderRequest::Stop) => _ = self.stop.get_or_insert(Latch { since_ns: at_ns }),
-            Letter::Dial(dial) => self.dial = dial,
+            LadderInput::Override(override_pct) => self.mail = Some(Mail { override_pct, alive_ns: at_ns }),
+            LadderInput::Release => self.mail = None,
+            LadderInput::Ask(LadderRequest::FeedHold) => _ = self.feed_hold.get_or_insert(Latch { since_ns: at_ns }),
+            LadderInput::Ask(LadderRequest::Stop) => _ = self.stop.get_or_insert(Latch { since_ns: at_ns }),
+            LadderInput::Dial(dial) => self.dial = dial,
         }
     }
 
@@ -224,11 +224,11 @@ mod tests {
             ladder.scan(ms * MS_NS);
             ladder.in_force().percent()
         };
-        ladder.post(0, Letter::Override(pct(70)));
+        ladder.post(0, LadderInput::Override(pct(70)));
         assert_eq!((at(&mut ladder, 23), at(&mut ladder, 24), at(&mut ladder, 1023)), (100, 70, 70));
         assert_eq!(at(&mut ladder, 1024), 100, "the sign of life has stopped");
-        ladder.post(2000 * MS_NS, Letter::Override(pct(70)));
-        ladder.post(2500 * MS_NS, Letter::Override(pct(70)));
+        ladder.post(2000 * MS_NS, LadderInput::Override(pct(70)));
+        ladder.post(2500 * MS_NS, LadderInput::Override(pct(70)));
         assert_eq!((at(&mut ladder, 3400), at(&mut ladder, 3524)), (70, 100));
         assert_eq!((ladder.counts().overrides, ladder.counts().heartbeats_lost), (3, 2));
     }
@@ -237,13 +237,13 @@ mod tests {
     fn the_dial_is_the_operators() {
         let mut ladder = Ladder::new(LadderSettings::default());
         ladder.turn(pct(60));
-        ladder.post(0, Letter::Override(pct(120)));
+        ladder.post(0, LadderInput::Override(pct(120)));
         ladder.scan(SECOND_NS / 2);
         assert_eq!(ladder.in_force(), pct(60), "the lesser one counts");
         let product = LadderSettings { rule: LadderRule::Product, ..LadderSettings::default() };
         let mut ladder = Ladder::new(product);
         ladder.turn(pct(50));
-        ladder.post(0, Letter::Override(pct(120)));
+        ladder.post(0, LadderInput::Override(pct(120)));
         ladder.scan(SECOND_NS / 2);
         assert_eq!(ladder.in_force(), pct(60));
         ladder.turn(pct(0));
@@ -253,11 +253,11 @@ mod tests {
     #[test]
     fn a_request_is_latched_once_until_the_operator_comes() {
         let mut ladder = Ladder::new(LadderSettings::default());
-        ladder.post(0, Letter::Ask(LadderRequest::FeedHold));
-        ladder.post(SECOND_NS, Letter::Ask(LadderRequest::FeedHold));
+        ladder.post(0, LadderInput::Ask(LadderRequest::FeedHold));
+        ladder.post(SECOND_NS, LadderInput::Ask(LadderRequest::FeedHold));
         ladder.scan(2 * SECOND_NS);
         assert!(ladder.holds(2 * SECOND_NS) && ladder.holds(44 * SECOND_NS) && !ladder.holds(46 * SECOND_NS));
-        ladder.post(50 * SECOND_NS, Letter::Ask(LadderRequest::Stop));
+        ladder.post(50 * SECOND_NS, LadderInput::Ask(LadderRequest::Stop));
         ladder.scan(51 * SECOND_NS);
         assert!(ladder.stop_asked() && !ladder.attended(44.0) && ladder.attended(45.0) && !ladder.stop_asked());
         assert_eq!(ladder.counts().writes(), 3);

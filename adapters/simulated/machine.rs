@@ -1,8 +1,8 @@
 //! The simulated machine as a whole: one step after the other from its origin, whatever is asked of it and when.
 
 use super::cutting::{self, Circumstances, Load};
-use super::frame::Frame;
-use super::ladder::{Ladder, LadderCounts, Letter};
+use super::frame::MachineSnapshot;
+use super::ladder::{Ladder, LadderCounts, LadderInput};
 use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
 use super::plant::{Plant, Spin};
 use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
@@ -29,7 +29,7 @@ const REMEMBERED: usize = 800;
 
 pub(super) struct Machine {
     settings: SimulatedSettings,
-    frame: &'static Frame,
+    frame: &'static MachineSnapshot,
     origin_ns: TimeNs,
     /// Steps made so far; the newest moment is that of step `steps - 1`.
     steps: i64,
@@ -53,7 +53,7 @@ pub(super) struct Machine {
 impl Machine {
     /// A machine at work, or on an experiment in place of its day.
     pub(super) fn new(settings: SimulatedSettings, origin_ns: TimeNs, experiment: Option<&[ExperimentStep]>) -> Self {
-        let frame = Frame::of(settings.machine);
+        let frame = MachineSnapshot::of(settings.machine);
         let rng = |stream: u64| Pcg64Mcg::seed_from_u64(settings.seed.wrapping_mul(31).wrapping_add(stream));
         let planner = Planner::new(settings, rng(1));
         let planner = match experiment {
@@ -85,7 +85,7 @@ impl Machine {
     }
 
     /// The ladder takes a letter at `at_ns`, or at once when the machine is already further.
-    pub(super) fn post(&mut self, at_ns: TimeNs, letter: Letter) {
+    pub(super) fn post(&mut self, at_ns: TimeNs, letter: LadderInput) {
         self.ladder.post(at_ns, letter);
     }
 

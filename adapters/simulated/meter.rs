@@ -2,7 +2,7 @@
 //! meters add.
 
 use super::Simulated;
-use super::device::{DEADLINE, Device, nanoseconds, timeout};
+use super::device::{DEADLINE, PolledDevice, nanoseconds, timeout};
 use super::noise::{Purpose, normal, uniform};
 use super::settings::MeterSettings;
 use crate::channel::ChannelId;
@@ -59,7 +59,7 @@ impl MeterValues {
 pub struct SimulatedMeter {
     name: String,
     machine: Simulated,
-    device: Device,
+    device: PolledDevice,
     settings: MeterSettings,
     channels: Vec<ChannelId>,
     seed: u64,
@@ -70,7 +70,7 @@ impl SimulatedMeter {
         let settings = *machine.settings();
         // Another seed than the controller's, so that their lines are not slow together.
         let seed = settings.seed.wrapping_add(0x5EED);
-        let device = Device::new(settings.meter.device, seed, machine.origin_ns());
+        let device = PolledDevice::new(settings.meter.device, seed, machine.origin_ns());
         let channels = CHANNELS.iter().filter_map(|name| ChannelId::of(name)).collect();
         Self { name, machine, device, settings: settings.meter, channels, seed }
     }

@@ -41,7 +41,7 @@ pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSett
 use crate::clock::TimeNs;
 use crate::offset::Axis;
 use crate::units::OverridePct;
-use ladder::Letter;
+use ladder::LadderInput;
 use machine::Machine;
 use moment::Integrals;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -129,7 +129,7 @@ impl Simulated {
 
     /// The operator turns the dial of the feed override at `at_ns`.
     pub fn turn_dial(&self, at_ns: TimeNs, dial: OverridePct) {
-        self.locked().post(at_ns, Letter::Dial(dial));
+        self.locked().post(at_ns, LadderInput::Dial(dial));
     }
 
     /// What was written to the controller since the beginning, as the controller itself has counted it.

@@ -1,6 +1,6 @@
 //! The physics between a demanded speed and what meters see: spindle dynamics, losses, heat, supply.
 
-use super::frame::Frame;
+use super::frame::MachineSnapshot;
 use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -32,7 +32,7 @@ pub(super) enum Spin {
 /// State of the physics.
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
-    frame: &'static Frame,
+    frame: &'static MachineSnapshot,
     tau_s: f64,
     start_peak_w: f64,
     rng: Pcg64Mcg,
@@ -59,7 +59,7 @@ pub(super) struct Plant {
 }
 
 impl Plant {
-    pub(super) fn new(frame: &'static Frame, tau_s: f64, start_peak_w: f64, rng: Pcg64Mcg) -> Self {
+    pub(super) fn new(frame: &'static MachineSnapshot, tau_s: f64, start_peak_w: f64, rng: Pcg64Mcg) -> Self {
         Self {
             frame,
             tau_s,

@@ -15,13 +15,13 @@ const CHUNK: usize = 16 * 1024;
 
 /// A TCP connection, with or without TLS, that one thread reads while others write.
 #[derive(Debug)]
-pub struct Line {
+pub struct TcpConnection {
     tcp: TcpStream,
     host: String,
     tls: Option<Mutex<ClientConnection>>,
 }
 
-impl Line {
+impl TcpConnection {
     /// Takes over a connection to `host`, and with TLS agrees with the other side. The time limits are those of the
     /// connection.
     ///

@@ -7,7 +7,7 @@
 mod line;
 mod words;
 
-pub use line::{Line, Lines};
+pub use line::{Lines, TcpConnection};
 pub use words::TlsError;
 
 use rustls::pki_types::pem::PemObject;

@@ -17,7 +17,7 @@ pub const AMPLITUDE: &str = "A rms";
 
 /// What a stream carries.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Header {
+pub struct WaveformHeader {
     /// `waveform/1`.
     pub format: String,
     /// Samples per second and channel.
@@ -43,7 +43,7 @@ pub enum FrameError {
     Frame(String),
 }
 
-impl Header {
+impl WaveformHeader {
     /// Currents of a number of phases.
     #[must_use]
     pub fn currents(rate_hz: f64, channels: &[&str], scale_a: f64, full_scale: i16) -> Self {
@@ -103,7 +103,7 @@ impl Header {
 
 /// Some samples of every channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Frame {
+pub struct WaveformFrame {
     /// Counts frames and wraps.
     pub sequence: u32,
     /// Time of the first sample on the sampler's clock, ns.
@@ -124,7 +124,7 @@ pub(super) fn head(bytes: &[u8; FRAME_HEAD], channels: usize) -> Result<(u32, i6
     Ok((u32::from_le_bytes([s0, s1, s2, s3]), first_ns, 2 * usize::from(count) * channels))
 }
 
-impl Frame {
+impl WaveformFrame {
     /// The frame on the wire. At most 4096 samples per channel are sent.
     #[must_use]
     pub fn bytes(&self, channels: usize) -> Vec<u8> {
@@ -151,8 +151,11 @@ mod tests {
 
     #[test]
     fn a_frame_survives_the_wire() {
-        let frame =
-            Frame { sequence: 7, first_ns: 1_700_000_000_123_456_789, samples: vec![1, -2, 3, -4, 32767, -32768] };
+        let frame = WaveformFrame {
+            sequence: 7,
+            first_ns: 1_700_000_000_123_456_789,
+            samples: vec![1, -2, 3, -4, 32767, -32768],
+        };
         let bytes = frame.bytes(3);
         let (sequence, first_ns, body) = head(bytes.first_chunk().expect("a head"), 3).expect("a frame");
         assert_eq!((sequence, first_ns, body), (7, frame.first_ns, 12));
@@ -162,12 +165,12 @@ mod tests {
 
     #[test]
     fn a_header_says_what_is_wrong_with_it() {
-        let header = Header::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767);
-        assert_eq!(Header::parse(header.line().trim()), Ok(header.clone()));
+        let header = WaveformHeader::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767);
+        assert_eq!(WaveformHeader::parse(header.line().trim()), Ok(header.clone()));
         for (from, to, part) in
             [("waveform/1", "waveform/2", "format"), ("1000", "0", "rate_hz"), ("[0.01,", "[", "scales")]
         {
-            let error = Header::parse(&header.line().replacen(from, to, 1)).expect_err(part).to_string();
+            let error = WaveformHeader::parse(&header.line().replacen(from, to, 1)).expect_err(part).to_string();
             assert!(error.contains(part), "{error}");
         }
     }
@@ -176,7 +179,7 @@ mod tests {
         #[test]
         fn no_bytes_make_it_panic(bytes in proptest::collection::vec(0_u8.., 16), text in "\\PC{0,80}") {
             let _ = head(bytes.first_chunk().expect("sixteen"), 3);
-            let _ = Header::parse(&text);
+            let _ = WaveformHeader::parse(&text);
         }
     }
 }

@@ -5,7 +5,7 @@
 //! lie in the order of their index, each at a multiple of its own size. Scales are in milliampere or, where the converter
 //! only knows voltage, millivolt: then `a_per_v` says what the transducer makes of an ampere.
 
-use super::frame::Header;
+use super::frame::WaveformHeader;
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS};
 use std::fs::File;
@@ -17,7 +17,7 @@ const CHANNELS_MAX: usize = 8;
 
 /// How one element lies in the buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
+struct ElementLayout {
     big: bool,
     signed: bool,
     bits: u32,
@@ -29,7 +29,7 @@ struct Layout {
 struct Element {
     name: String,
     index: u32,
-    layout: Layout,
+    layout: ElementLayout,
     /// Ampere per count.
     scale_a: f64,
     timestamp: bool,
@@ -95,7 +95,7 @@ fn elements(sysfs: &Path, a_per_v: f64) -> io::Result<Vec<Element>> {
         }
         let text = std::fs::read_to_string(scan("type"))?;
         let unknown = || Error::new(ErrorKind::InvalidData, format!("in_{name}_type {:?}", text.trim()));
-        let layout = Layout::parse(text.trim()).ok_or_else(unknown)?;
+        let layout = ElementLayout::parse(text.trim()).ok_or_else(unknown)?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
         let index = number(&scan("index"))? as u32;
         let timestamp = name == "timestamp";
@@ -124,7 +124,7 @@ fn place(elements: &mut [Element]) -> usize {
     end.next_multiple_of(widest)
 }
 
-impl Layout {
+impl ElementLayout {
     fn parse(text: &str) -> Option<Self> {
         let (order, rest) = text.split_once(':')?;
         let big = match order {
@@ -167,13 +167,13 @@ impl Iio {
 }
 
 impl Sampler for Iio {
-    fn header(&self) -> Header {
+    fn header(&self) -> WaveformHeader {
         let names: Vec<&str> = self.channels().map(|element| element.name.as_str()).collect();
         let scale =
             self.channels().map(|element| element.scale_a * f64::from(1_u32 << Self::coarse(element))).collect();
         let bits = self.channels().map(|element| element.layout.bits.min(16)).min().unwrap_or(16);
         let full_scale = i16::try_from((1_i32 << (bits - 1)) - 1).unwrap_or(i16::MAX).max(1);
-        Header { scale, ..Header::currents(self.rate_hz, &names, 1.0, full_scale) }
+        WaveformHeader { scale, ..WaveformHeader::currents(self.rate_hz, &names, 1.0, full_scale) }
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {
@@ -206,11 +206,15 @@ mod tests {
 
     #[test]
     fn the_types_of_the_kernels_documentation() {
-        let layout = Layout::parse("le:s12/16>>4").expect("a type");
-        assert_eq!(layout, Layout { big: false, signed: true, bits: 12, bytes: 2, shift: 4 });
+        let layout = ElementLayout::parse("le:s12/16>>4").expect("a type");
+        assert_eq!(layout, ElementLayout { big: false, signed: true, bits: 12, bytes: 2, shift: 4 });
         assert_eq!(layout.read(&[0xF0, 0xFF]), -1);
-        assert_eq!(Layout::parse("be:u24/32>>8").expect("a type").read(&[0x01, 0x02, 0x03, 0xFF]), 0x0001_0203);
-        assert!(["xx:s16/16>>0", "le:s17/16>>0", "le:s16/12>>0", ""].iter().all(|text| Layout::parse(text).is_none()));
+        assert_eq!(ElementLayout::parse("be:u24/32>>8").expect("a type").read(&[0x01, 0x02, 0x03, 0xFF]), 0x0001_0203);
+        assert!(
+            ["xx:s16/16>>0", "le:s17/16>>0", "le:s16/12>>0", ""]
+                .iter()
+                .all(|text| ElementLayout::parse(text).is_none())
+        );
     }
 
     #[test]

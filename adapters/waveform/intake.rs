@@ -1,6 +1,6 @@
 //! What every stream of samples goes through, whoever sends it: gap, clipping, clock, counts.
 
-use super::frame::Header;
+use super::frame::WaveformHeader;
 use super::timebase::TimeBase;
 use crate::clock::TimeNs;
 
@@ -37,14 +37,14 @@ pub struct Counts {
 /// Header, clock and counts of one stream.
 #[derive(Debug, Clone, Default)]
 pub struct Intake {
-    header: Option<Header>,
+    header: Option<WaveformHeader>,
     time: TimeBase,
     counts: Counts,
 }
 
 impl Intake {
     /// The sampler begins anew with this header, perhaps on another clock.
-    pub(super) fn connected(&mut self, header: Header) {
+    pub(super) fn connected(&mut self, header: WaveformHeader) {
         self.header = Some(header);
         self.time = TimeBase::default();
         self.counts.connections += 1;
@@ -52,7 +52,7 @@ impl Intake {
 
     /// What the stream carries, once it has come.
     #[must_use]
-    pub fn header(&self) -> Option<&Header> {
+    pub fn header(&self) -> Option<&WaveformHeader> {
         self.header.as_ref()
     }
 
@@ -71,7 +71,7 @@ impl Intake {
     /// Takes samples whose first was taken at `first_ns` on the sampler's clock, with `gap` missing before them.
     pub(super) fn block(
         &mut self,
-        header: &Header,
+        header: &WaveformHeader,
         first_ns: TimeNs,
         gap: u64,
         raw: Vec<i16>,
@@ -92,13 +92,13 @@ impl Intake {
 }
 
 /// When the sample behind `count` of them is due.
-pub(super) fn end_ns(header: &Header, first_ns: TimeNs, count: usize) -> TimeNs {
+pub(super) fn end_ns(header: &WaveformHeader, first_ns: TimeNs, count: usize) -> TimeNs {
     first_ns.saturating_add(header.duration_ns(f64::from(u32::try_from(count).unwrap_or(u32::MAX))))
 }
 
 /// How many samples are missing between the time that was due and the time that came; rounded, and negative where some came
 /// again.
-pub(super) fn missing(header: &Header, due_ns: TimeNs, first_ns: TimeNs) -> i64 {
+pub(super) fn missing(header: &WaveformHeader, due_ns: TimeNs, first_ns: TimeNs) -> i64 {
     let sample_ns = header.duration_ns(1.0).max(1);
     (first_ns.saturating_sub(due_ns) + sample_ns / 2).div_euclid(sample_ns)
 }

@@ -37,7 +37,7 @@ mod sampled;
 mod simulated;
 mod timebase;
 
-pub use frame::{AMPLITUDE, Frame, FrameError, Header};
+pub use frame::{AMPLITUDE, FrameError, WaveformFrame, WaveformHeader};
 pub use iio::Iio;
 pub use intake::{Block, Counts, Intake};
 pub use producer::{Producer, Sampler};

@@ -1,6 +1,6 @@
 //! The other side: serves what a sampler gives to whoever connects.
 
-use super::frame::{Frame, Header};
+use super::frame::{WaveformFrame, WaveformHeader};
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Something that samples, at its own pace.
 pub trait Sampler: Send {
     /// What it samples.
-    fn header(&self) -> Header;
+    fn header(&self) -> WaveformHeader;
 
     /// Waits for the next samples: time of the first one, ns since 1970, and the samples, all channels of one instant
     /// together. `None` at the end.
@@ -87,14 +87,14 @@ fn serve(listener: &TcpListener, mut sampler: Box<dyn Sampler>, stop: &AtomicBoo
         while let Ok((stream, _)) = listener.accept() {
             listeners.extend(greeted(stream, &header).ok().filter(|_| listeners.len() < LISTENERS_MAX));
         }
-        let bytes = Frame { sequence, first_ns, samples }.bytes(channels);
+        let bytes = WaveformFrame { sequence, first_ns, samples }.bytes(channels);
         listeners.retain_mut(|listener| listener.write_all(&bytes).is_ok());
         sequence = sequence.wrapping_add(1);
     }
     Ok(())
 }
 
-fn greeted(mut stream: TcpStream, header: &Header) -> io::Result<TcpStream> {
+fn greeted(mut stream: TcpStream, header: &WaveformHeader) -> io::Result<TcpStream> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(PATIENCE))?;

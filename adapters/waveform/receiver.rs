@@ -1,6 +1,6 @@
 //! A connection to a stream, with deadline, gaps, clipping and clock.
 
-use super::frame::{FRAME_HEAD, FrameError, HEADER_MAX, Header, head, samples};
+use super::frame::{FRAME_HEAD, FrameError, HEADER_MAX, WaveformHeader, head, samples};
 use super::intake::{Block, Intake, end_ns, missing};
 use crate::address::Endpoint;
 use crate::clock::{Clock, TimeNs};
@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 /// No block within this time is a failure.
 const DEADLINE: Duration = Duration::from_secs(2);
 
-struct Open {
+struct OpenStream {
     stream: TcpStream,
-    header: Header,
+    header: WaveformHeader,
     next: Option<(u32, i64)>,
 }
 
@@ -22,7 +22,7 @@ struct Open {
 pub struct Receiver {
     name: String,
     at: Endpoint,
-    open: Option<Open>,
+    open: Option<OpenStream>,
     intake: Intake,
 }
 
@@ -54,15 +54,15 @@ impl Receiver {
         Ok(block)
     }
 
-    fn connect(&mut self, until: Instant) -> Result<Open, SourceError> {
+    fn connect(&mut self, until: Instant) -> Result<OpenStream, SourceError> {
         let connected = stream::connect(&self.at, until);
         let mut stream = connected.map_err(|error| self.line(&format!("cannot connect: {error}")))?;
         let header = self.header_line(&mut stream, until)?;
         self.intake.connected(header.clone());
-        Ok(Open { stream, header, next: None })
+        Ok(OpenStream { stream, header, next: None })
     }
 
-    fn header_line(&self, stream: &mut TcpStream, until: Instant) -> Result<Header, SourceError> {
+    fn header_line(&self, stream: &mut TcpStream, until: Instant) -> Result<WaveformHeader, SourceError> {
         let mut line = Vec::new();
         while line.last() != Some(&b'\n') {
             if line.len() >= HEADER_MAX {
@@ -72,10 +72,10 @@ impl Receiver {
             stream::fill(stream, &mut byte, until).map_err(|short| self.short(short))?;
             line.extend(byte);
         }
-        Header::parse(String::from_utf8_lossy(&line).trim()).map_err(|error| self.decode(&error))
+        WaveformHeader::parse(String::from_utf8_lossy(&line).trim()).map_err(|error| self.decode(&error))
     }
 
-    fn block(&mut self, open: &mut Open, clock: &dyn Clock, until: Instant) -> Result<Block, SourceError> {
+    fn block(&mut self, open: &mut OpenStream, clock: &dyn Clock, until: Instant) -> Result<Block, SourceError> {
         let mut bytes = [0; FRAME_HEAD];
         stream::fill(&mut open.stream, &mut bytes, until).map_err(|short| self.short(short))?;
         let channels = open.header.channels.len();
@@ -85,7 +85,14 @@ impl Receiver {
         Ok(self.taken(open, sequence, first_ns, samples(&body), clock.now_ns()))
     }
 
-    fn taken(&mut self, open: &mut Open, sequence: u32, first_ns: i64, raw: Vec<i16>, arrived_ns: TimeNs) -> Block {
+    fn taken(
+        &mut self,
+        open: &mut OpenStream,
+        sequence: u32,
+        first_ns: i64,
+        raw: Vec<i16>,
+        arrived_ns: TimeNs,
+    ) -> Block {
         let out_of_turn = open.next.filter(|(wanted, _)| *wanted != sequence);
         let gap = out_of_turn.map_or(0, |(_, due_ns)| missing(&open.header, due_ns, first_ns).max(1).unsigned_abs());
         let count = raw.len() / open.header.channels.len();

@@ -1,6 +1,6 @@
 //! A file of samples as a sampler: CSV with a header, `time_s` first, then one column per channel in ampere.
 
-use super::frame::{COUNT_MAX, Header};
+use super::frame::{COUNT_MAX, WaveformHeader};
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use std::fs::File;
@@ -73,9 +73,9 @@ impl Recorded {
 }
 
 impl Sampler for Recorded {
-    fn header(&self) -> Header {
+    fn header(&self) -> WaveformHeader {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
-        Header::currents(self.rate_hz, &names, self.scale_a, FULL_SCALE)
+        WaveformHeader::currents(self.rate_hz, &names, self.scale_a, FULL_SCALE)
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {

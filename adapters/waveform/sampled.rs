@@ -4,12 +4,12 @@
 //! It says of each block when its first value was true, on its own clock; that is mapped to the gateway's as the clock of
 //! any sampler. A value that is none is a gap, as is a time that is missing; values that come twice are taken once.
 //!
-//! What is sampled is not the current of a phase but its amplitude, as the drive knows it ([`Header::amplitude`]).
+//! What is sampled is not the current of a phase but its amplitude, as the drive knows it ([`WaveformHeader::amplitude`]).
 
-use super::frame::Header;
+use super::frame::WaveformHeader;
 use super::intake::{Block, Intake, end_ns, missing};
 use crate::clock::TimeNs;
-use crate::nclink::sample::{self, Column};
+use crate::nclink::sample::{self, ItemColumn};
 
 /// Resolution in which the values are kept, A: 0.01, up to 327 A.
 const SCALE_A: f64 = 0.01;
@@ -43,7 +43,7 @@ impl SampledCurrent {
 
     /// The current out of a block of the controller's that arrived at `arrived_ns`, in pieces without a gap.
     pub fn take(&mut self, block: &sample::SampleBlock, arrived_ns: TimeNs) -> Vec<Block> {
-        let wanted = |column: &&Column| column.step_ms > 0.0 && self.is_current(&column.path);
+        let wanted = |column: &&ItemColumn| column.step_ms > 0.0 && self.is_current(&column.path);
         let Some(column) = block.columns.iter().find(wanted) else { return Vec::new() };
         let header = self.header_of(1e3 / column.step_ms);
         let begin_ns = block.begin_ms.saturating_mul(1_000_000);
@@ -61,8 +61,8 @@ impl SampledCurrent {
     }
 
     /// A new rate begins anew.
-    fn header_of(&mut self, rate_hz: f64) -> Header {
-        let header = Header::amplitude(rate_hz, SCALE_A, FULL_SCALE);
+    fn header_of(&mut self, rate_hz: f64) -> WaveformHeader {
+        let header = WaveformHeader::amplitude(rate_hz, SCALE_A, FULL_SCALE);
         if self.intake.header() != Some(&header) {
             self.due_ns = None;
             self.intake.connected(header.clone());
@@ -73,7 +73,7 @@ impl SampledCurrent {
     /// Values without a gap between them, the first of which is number `at` of its block.
     fn part(
         &mut self,
-        header: &Header,
+        header: &WaveformHeader,
         begin_ns: TimeNs,
         at: usize,
         part: &[Option<f64>],
@@ -108,7 +108,8 @@ mod tests {
     use super::*;
 
     fn block(begin_ms: i64, values: &[Option<f64>]) -> sample::SampleBlock {
-        let column = |path: &str| Column { path: path.to_owned(), values: values.to_vec(), step_ms: 1.0, word: None };
+        let column =
+            |path: &str| ItemColumn { path: path.to_owned(), values: values.to_vec(), step_ms: 1.0, word: None };
         let columns = vec![column("AXIS@0/MOTOR/CURRENT"), column("AXIS@5/MOTOR/CURRENT")];
         sample::SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants: values.len(), columns }
     }

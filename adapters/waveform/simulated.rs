@@ -1,6 +1,6 @@
 //! The built-in machine's spindle current: three phases of an inverter, as a sampler sees them.
 
-use super::frame::Header;
+use super::frame::WaveformHeader;
 use super::producer::Sampler;
 use crate::clock::{Clock, SECOND_NS, TimeNs};
 use crate::simulated::Simulated;
@@ -64,8 +64,8 @@ impl SimulatedCurrent {
 }
 
 impl Sampler for SimulatedCurrent {
-    fn header(&self) -> Header {
-        Header::currents(self.rate_hz, &["i_u", "i_v", "i_w"], SCALE_A, 32767)
+    fn header(&self) -> WaveformHeader {
+        WaveformHeader::currents(self.rate_hz, &["i_u", "i_v", "i_w"], SCALE_A, 32767)
     }
 
     fn next(&mut self) -> io::Result<Option<(i64, Vec<i16>)>> {

@@ -19,7 +19,7 @@ use crate::driver::{Source, SourceError};
 use crate::merge::{Merge, SourceId};
 use crate::reading::Reading;
 use queue::Queue;
-use stats::Ledger;
+use stats::WorkerCounters;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -73,7 +73,7 @@ pub struct Poll {
 struct Shared {
     stop: AtomicBool,
     queue: Mutex<Queue>,
-    ledger: Mutex<Ledger>,
+    ledger: Mutex<WorkerCounters>,
 }
 
 /// A source on its own thread.
@@ -95,7 +95,7 @@ impl Worker {
     ) -> Result<Self, std::io::Error> {
         let name = source.name().to_owned();
         let period = settings.period.unwrap_or_else(|| source.period());
-        let ledger = Ledger::new(period, settings.deadline, clock.now_ns());
+        let ledger = WorkerCounters::new(period, settings.deadline, clock.now_ns());
         let shared = Arc::new(Shared {
             stop: AtomicBool::new(false),
             queue: Mutex::new(Queue::new(settings.queue_polls)),

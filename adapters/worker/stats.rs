@@ -130,7 +130,7 @@ impl Window {
 }
 
 /// Where the worker's thread writes and [`WorkerStats`] are read.
-pub(super) struct Ledger {
+pub(super) struct WorkerCounters {
     period: Duration,
     deadline: Duration,
     state: WorkerState,
@@ -157,7 +157,7 @@ pub(super) struct Ledger {
     latest: VecDeque<i64>,
 }
 
-impl Ledger {
+impl WorkerCounters {
     pub(super) fn new(period: Duration, deadline: Duration, now_ns: TimeNs) -> Self {
         Self {
             period,

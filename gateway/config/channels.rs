@@ -4,7 +4,7 @@ use super::Source;
 use super::check_value::Scalar;
 use super::read::{Origin, Reading, Values};
 use adapters::channel::{Kind, NewChannel};
-use adapters::fanuc::own::{OwnChannel, OwnItem, Pace};
+use adapters::fanuc::own::{OwnChannel, OwnItem, ReadWith};
 use rules::estimators::Estimates;
 
 /// Adds the channels below a source to it, and reports what cannot be added.
@@ -54,7 +54,7 @@ fn own_channel(values: &Values) -> Option<Result<OwnChannel, Refused>> {
     }
     let (en, zh) = (format!("{read}, as configured"), format!("用户通道 {read}"));
     let new = NewChannel { name, unit, range, kind: Kind::Held, en, zh };
-    let pace = if pace == "fast" { Pace::Fast } else { Pace::Slow };
+    let pace = if pace == "fast" { ReadWith::Fast } else { ReadWith::Slow };
     let path = number("path").map(|path| path as u8);
     Some(Ok(OwnChannel { new, item: found.item, bit: found.bit, scale, offset, pace, path }))
 }

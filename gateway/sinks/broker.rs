@@ -2,7 +2,7 @@
 
 use super::SinkError;
 use adapters::address::{Endpoint, Keys, Login, endpoint, tls_files};
-use adapters::mqtt::{Client, Message, MqttError, Options, Outgoing, Qos, Version, Will};
+use adapters::mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
 use adapters::tls::TlsFiles;
 use std::sync::Arc;
 use std::time::Duration;
@@ -96,7 +96,7 @@ pub fn broker_files(tls: Option<&TlsFiles>, login: &Login) -> Vec<(String, Strin
 /// A connection to a broker, waited for asynchronously. Without one, nothing can be sent.
 #[derive(Debug, Default)]
 pub(super) struct Link {
-    client: Option<Arc<Client>>,
+    client: Option<Arc<MqttClient>>,
 }
 
 impl Link {
@@ -110,7 +110,7 @@ impl Link {
         self.leave().await;
         let options = broker.options(name, will)?;
         let place = place(broker);
-        let connected = blocking(move || Client::connect(&options)).await?;
+        let connected = blocking(move || MqttClient::connect(&options)).await?;
         self.client = Some(Arc::new(connected.map_err(|error| line(&place, error))?));
         Ok(())
     }
@@ -160,7 +160,7 @@ impl Link {
     }
 
     /// The next message of a subscription; an error when the connection is over. May be dropped while it waits.
-    pub(super) async fn next(&self, broker: &BrokerTarget) -> Result<Message, SinkError> {
+    pub(super) async fn next(&self, broker: &BrokerTarget) -> Result<MqttMessage, SinkError> {
         loop {
             let Some(client) = &self.client else { return Err(not_connected(&place(broker))) };
             match client.receive(Duration::ZERO) {

@@ -13,7 +13,7 @@ use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::control::{Reply, RequestedChange};
 use crate::history::{Item, Outbox};
 use adapters::address::Keys;
-use adapters::mqtt::{Message, Outgoing, Qos, Will};
+use adapters::mqtt::{MqttMessage, Outgoing, Qos, Will};
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
 
@@ -47,7 +47,7 @@ pub(super) struct MqttSink {
     link: Link,
     requests: Requests,
     /// A message that has come and is not answered yet.
-    asked: Option<Message>,
+    asked: Option<MqttMessage>,
 }
 
 impl MqttSink {
@@ -57,7 +57,7 @@ impl MqttSink {
     }
 
     /// Hands a message to the gate and publishes what became of it.
-    async fn answer(&mut self, message: Message) -> Result<(), SinkError> {
+    async fn answer(&mut self, message: MqttMessage) -> Result<(), SinkError> {
         let document = if message.retained { Err(RETAINED.to_owned()) } else { document_of(&message.payload) };
         let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
         let change = document.and_then(Document::change);

@@ -3,7 +3,7 @@
 use super::nanoseconds;
 use adapters::Stamp;
 use adapters::clock::TimeNs;
-use adapters::waveform::{AMPLITUDE, Block, Header};
+use adapters::waveform::{AMPLITUDE, Block, WaveformHeader};
 use rules::estimators::spindle_current::{Design, Feature, FeatureKind, LowPass, PhaseFeature, Span, ThreePhase};
 
 /// The low-pass of the source of the method, Hz, and its greatest share of the rate.
@@ -23,7 +23,7 @@ enum Phases {
 
 /// See the [module](self).
 pub(super) struct Chain {
-    header: Header,
+    header: WaveformHeader,
     phases: Phases,
     delay_s: f64,
     least_a: f64,
@@ -47,7 +47,7 @@ pub(super) struct Sums {
 }
 
 impl Chain {
-    pub(super) fn new(header: &Header) -> Result<Self, String> {
+    pub(super) fn new(header: &WaveformHeader) -> Result<Self, String> {
         let rate_hz = header.rate_hz;
         let least_a = LEAST_SHARE * f64::from(header.full_scale) * header.scale[0].abs();
         let text = |refusal: rules::estimators::regression::Refusal| refusal.to_string();
@@ -66,7 +66,7 @@ impl Chain {
         Ok(Self { header: header.clone(), phases, delay_s: design.delay_s(), least_a })
     }
 
-    pub(super) fn fits(&self, header: &Header) -> bool {
+    pub(super) fn fits(&self, header: &WaveformHeader) -> bool {
         self.header == *header
     }
 
@@ -142,7 +142,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     /// One second of three phases of 10 A rms at 47 Hz.
-    fn block(header: &Header) -> Block {
+    fn block(header: &WaveformHeader) -> Block {
         let sample = |k: i32, phase: i32| {
             let angle = TAU * (47.0 * f64::from(k) / header.rate_hz - f64::from(phase) / 3.0);
             #[expect(clippy::cast_possible_truncation, reason = "within sixteen bits")]
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_sine_gives_its_root_mean_square_in_the_middle() {
-        let header = Header::currents(1000.0, &["u", "v", "w"], 0.01, 32767);
+        let header = WaveformHeader::currents(1000.0, &["u", "v", "w"], 0.01, 32767);
         let mut chain = Chain::new(&header).expect("three phases");
         let mut sums = Sums::default();
         chain.push(&block(&header), &mut sums);
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn an_amplitude_is_its_own_root_mean_square() {
-        let mut chain = Chain::new(&Header::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
+        let mut chain = Chain::new(&WaveformHeader::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
         let mut sums = Sums::default();
         chain.push(&Block { first_ns: 0, gap: 0, clipped: 0, raw: vec![-1234; 1000] }, &mut sums);
         let (stamp, value_a) = sums.reading().expect("a second");
@@ -177,11 +177,11 @@ mod tests {
 
     #[test]
     fn no_current_is_a_value_and_two_phases_are_refused() {
-        let header = Header::currents(1000.0, &["u"], 0.01, 32767);
+        let header = WaveformHeader::currents(1000.0, &["u"], 0.01, 32767);
         let mut sums = Sums::default();
         let still = Block { first_ns: 10, gap: 0, clipped: 0, raw: vec![1; 100] };
         Chain::new(&header).expect("one phase").push(&still, &mut sums);
         assert!(sums.reading().is_some_and(|(_, value_a)| value_a < 0.02));
-        assert!(Chain::new(&Header::currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
+        assert!(Chain::new(&WaveformHeader::currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
     }
 }

@@ -5,7 +5,7 @@
 use super::nanoseconds;
 use crate::log::{Notice, Severity};
 use adapters::clock::TimeNs;
-use adapters::waveform::{Block, Header};
+use adapters::waveform::{Block, WaveformHeader};
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ impl ExcerptWriter {
     }
 
     /// Takes a block and the greatest feature in it, A.
-    pub(super) fn push(&mut self, header: &Header, block: &Block, feature_a: Option<f64>) {
+    pub(super) fn push(&mut self, header: &WaveformHeader, block: &Block, feature_a: Option<f64>) {
         let now_ns = block.first_ns;
         self.samples += block.raw.len();
         self.blocks.push_back(block.clone());
@@ -62,7 +62,7 @@ impl ExcerptWriter {
         }
     }
 
-    fn write(&mut self, header: &Header, now_ns: TimeNs) {
+    fn write(&mut self, header: &WaveformHeader, now_ns: TimeNs) {
         let file = self.directory.join(format!("waveform-{now_ns}.csv"));
         let done = std::fs::create_dir_all(&self.directory)
             .and_then(|()| std::fs::write(&file, self.text(header)))
@@ -76,7 +76,7 @@ impl ExcerptWriter {
         }
     }
 
-    fn text(&self, header: &Header) -> String {
+    fn text(&self, header: &WaveformHeader) -> String {
         let mut text = format!("time_s,{}\n", header.channels.join(","));
         let sample_s = 1.0 / header.rate_hz;
         let begin_ns = self.blocks.front().map_or(0, |block| block.first_ns);
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn a_high_current_leaves_one_file_with_what_was_before_and_behind() {
         let directory = tempfile::tempdir().expect("a directory");
-        let header = Header::currents(1000.0, &["u"], 0.01, 32767);
+        let header = WaveformHeader::currents(1000.0, &["u"], 0.01, 32767);
         let mut excerpt_writer = ExcerptWriter::new(directory.path(), 20.0);
         for k in 0_i64..1000 {
             let block = Block { first_ns: k * 20_000_000, gap: 0, clipped: 0, raw: vec![100; 20] };

@@ -4,7 +4,7 @@ use super::chain::{Chain, Sums};
 use super::excerpt_writer::ExcerptWriter;
 use adapters::address::WaveformKeep;
 use adapters::driver::Fact;
-use adapters::waveform::{Block, Header, Intake};
+use adapters::waveform::{Block, Intake, WaveformHeader};
 use adapters::{Absence, ChannelId, Reading, SourceError};
 
 /// Blocks in, one reading of `spindle_current_a` out whenever it is asked for.
@@ -36,7 +36,12 @@ impl Features {
     ///
     /// # Errors
     /// [`SourceError::Decode`]: a stream that is no spindle current.
-    pub(super) fn feed(&mut self, source_name: &str, header: &Header, block: &Block) -> Result<(), SourceError> {
+    pub(super) fn feed(
+        &mut self,
+        source_name: &str,
+        header: &WaveformHeader,
+        block: &Block,
+    ) -> Result<(), SourceError> {
         if block.gap > 0 || self.chain.as_ref().is_none_or(|chain| !chain.fits(header)) {
             let unsuitable = |what| SourceError::Decode {
                 source_name: source_name.to_owned(),

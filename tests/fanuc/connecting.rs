@@ -2,7 +2,7 @@
 
 use crate::support::{controller, number, opened, poll, serve, text, value};
 use adapters::Absence;
-use adapters::fanuc::server::{Fault, ServerSettings};
+use adapters::fanuc::server::{InjectedFault, ServerSettings};
 use adapters::fanuc::wire::Number;
 
 /// Everything that is asked of a control, by its function.
@@ -57,7 +57,7 @@ fn answers_that_end_early_are_no_machine_that_is_off() {
     let mut opened = opened(&server, "timeout_ms=200&duty_pct=100");
     let source = opened.sources[0].as_mut();
     poll(source).expect("well");
-    for fault in [Fault::Truncated, Fault::Reset] {
+    for fault in [InjectedFault::Truncated, InjectedFault::Reset] {
         server.fault(fault);
         for _ in 0..3 {
             let error = poll(source).expect_err("nothing whole comes");
@@ -65,6 +65,6 @@ fn answers_that_end_early_are_no_machine_that_is_off() {
             assert!(error.to_string().contains("bytes"), "{fault:?}: {error}");
         }
     }
-    server.fault(Fault::None);
+    server.fault(InjectedFault::None);
     poll(source).expect("well again");
 }

@@ -1,7 +1,7 @@
 //! Everything that goes wrong on a line, seeded: typed results, no panic, nothing left open, and the way back.
 
 use crate::support::{controller, number, opened, poll, serve};
-use adapters::fanuc::server::{Fault, ServerSettings};
+use adapters::fanuc::server::{InjectedFault, ServerSettings};
 use adapters::{Source, SourceError};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -21,11 +21,11 @@ fn kind(result: &Result<Vec<adapters::Reading>, SourceError>) -> &'static str {
     }
 }
 
-fn after(fault: Fault, source: &mut dyn Source, server: &adapters::fanuc::server::Server) -> &'static str {
+fn after(fault: InjectedFault, source: &mut dyn Source, server: &adapters::fanuc::server::Server) -> &'static str {
     poll(source).expect("well before the fault");
     server.fault(fault);
     let found = kind(&poll(source));
-    server.fault(Fault::None);
+    server.fault(InjectedFault::None);
     assert_eq!(number(&poll(source).expect("well after the fault"), "spindle_speed_rpm"), 1200.0, "{fault:?}");
     found
 }
@@ -36,17 +36,17 @@ fn every_fault_has_its_name_and_the_next_poll_is_well() {
     let mut opened = opened(&server, "timeout_ms=600");
     let source = opened.sources[0].as_mut();
     let expected = [
-        (Fault::Silence, "timeout"),
-        (Fault::Delay(Duration::from_millis(20)), "answered"),
-        (Fault::Delay(Duration::from_millis(1200)), "timeout"),
-        (Fault::ByteByByte(Duration::from_millis(5)), "timeout"),
-        (Fault::Truncated, "timeout"),
-        (Fault::Reset, "line"),
-        (Fault::WrongEcho, "no sense"),
-        (Fault::WrongMagic, "no sense"),
-        (Fault::WrongCount, "no sense"),
-        (Fault::HugeLength, "no sense"),
-        (Fault::PowerOff, "line"),
+        (InjectedFault::Silence, "timeout"),
+        (InjectedFault::Delay(Duration::from_millis(20)), "answered"),
+        (InjectedFault::Delay(Duration::from_millis(1200)), "timeout"),
+        (InjectedFault::ByteByByte(Duration::from_millis(5)), "timeout"),
+        (InjectedFault::Truncated, "timeout"),
+        (InjectedFault::Reset, "line"),
+        (InjectedFault::WrongEcho, "no sense"),
+        (InjectedFault::WrongMagic, "no sense"),
+        (InjectedFault::WrongCount, "no sense"),
+        (InjectedFault::HugeLength, "no sense"),
+        (InjectedFault::PowerOff, "line"),
     ];
     for (fault, name) in expected {
         assert_eq!(after(fault, source, &server), name, "{fault:?}");
@@ -58,7 +58,10 @@ fn every_fault_has_its_name_and_the_next_poll_is_well() {
 fn an_answer_may_come_byte_by_byte() {
     let server = serve(controller(4), ServerSettings::default());
     let mut opened = opened(&server, "timeout_ms=20000");
-    assert_eq!(after(Fault::ByteByByte(Duration::from_micros(1)), opened.sources[0].as_mut(), &server), "answered");
+    assert_eq!(
+        after(InjectedFault::ByteByByte(Duration::from_micros(1)), opened.sources[0].as_mut(), &server),
+        "answered"
+    );
 }
 
 fn wait_for(mut holds: impl FnMut() -> bool, what: &str) {
@@ -77,12 +80,12 @@ fn a_machine_that_is_switched_off_is_off_and_comes_back() {
     let mut opened = opened(&server, "timeout_ms=500");
     let source = opened.sources[0].as_mut();
     poll(source).expect("on");
-    server.fault(Fault::PowerOff);
+    server.fault(InjectedFault::PowerOff);
     assert_eq!(kind(&poll(source)), "line", "the moment of power-off is a broken line");
     for _ in 0..5 {
         assert_eq!(kind(&poll(source)), "off");
     }
-    server.fault(Fault::None);
+    server.fault(InjectedFault::None);
     assert_eq!(kind(&poll(source)), "answered");
 }
 
@@ -103,22 +106,22 @@ fn seeded_flapping_gives_typed_results_and_leaves_nothing_open() {
     let before = own();
     for _ in 0..POLLS {
         let fault = match random.random_range(0..60) {
-            0 => Fault::Silence,
-            1 => Fault::Truncated,
-            2..=4 => Fault::Reset,
-            5..=7 => Fault::WrongEcho,
-            8..=10 => Fault::WrongMagic,
-            11..=13 => Fault::WrongCount,
-            14..=16 => Fault::HugeLength,
-            17..=19 => Fault::PowerOff,
-            20..=22 => Fault::NoSession,
-            23 => Fault::Delay(Duration::from_millis(90)),
-            _ => Fault::None,
+            0 => InjectedFault::Silence,
+            1 => InjectedFault::Truncated,
+            2..=4 => InjectedFault::Reset,
+            5..=7 => InjectedFault::WrongEcho,
+            8..=10 => InjectedFault::WrongMagic,
+            11..=13 => InjectedFault::WrongCount,
+            14..=16 => InjectedFault::HugeLength,
+            17..=19 => InjectedFault::PowerOff,
+            20..=22 => InjectedFault::NoSession,
+            23 => InjectedFault::Delay(Duration::from_millis(90)),
+            _ => InjectedFault::None,
         };
         server.fault(fault);
         *kinds.entry(kind(&poll(source))).or_default() += 1;
     }
-    server.fault(Fault::None);
+    server.fault(InjectedFault::None);
     poll(source).expect("well again");
     wait_for(|| server.sessions() == 1, "one connection is left");
     wait_for(|| own().0 <= before.0 + 8 && own().1 <= before.1 + 8, "no open file and no thread is left");

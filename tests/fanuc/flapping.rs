@@ -5,7 +5,7 @@ use crate::support::{address, controller, serve};
 use adapters::address::Target;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::fanuc::open::native;
-use adapters::fanuc::server::{Fault, Server, ServerSettings};
+use adapters::fanuc::server::{InjectedFault, Server, ServerSettings};
 use adapters::worker::{Worker, WorkerSettings, WorkerState};
 use adapters::{ChannelId, Reading, Source, SourceError};
 use rand::{Rng, SeedableRng};
@@ -29,17 +29,17 @@ impl Clock for JumpingClock {
 }
 
 /// What goes wrong in a stretch of five minutes, from the seed.
-fn fault(stretch: i64) -> Fault {
+fn fault(stretch: i64) -> InjectedFault {
     let mut random = Pcg64Mcg::seed_from_u64(20_261_121 ^ stretch.unsigned_abs());
     match random.random_range(0..20) {
-        0 => Fault::Reset,
-        1 => Fault::WrongEcho,
-        2 => Fault::WrongMagic,
-        3 | 4 => Fault::PowerOff,
-        5 => Fault::NoSession,
-        6 => Fault::WrongCount,
-        7 => Fault::Silence,
-        _ => Fault::None,
+        0 => InjectedFault::Reset,
+        1 => InjectedFault::WrongEcho,
+        2 => InjectedFault::WrongMagic,
+        3 | 4 => InjectedFault::PowerOff,
+        5 => InjectedFault::NoSession,
+        6 => InjectedFault::WrongCount,
+        7 => InjectedFault::Silence,
+        _ => InjectedFault::None,
     }
 }
 
@@ -65,7 +65,7 @@ impl Source for Flapping {
     fn read(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         // A short fault every five minutes, so that most of the day is well.
         let (stretch, within_s) = (clock.now_ns() / (300 * SECOND_NS), clock.now_ns() / SECOND_NS % 300);
-        self.server.fault(if within_s < 30 { fault(stretch) } else { Fault::None });
+        self.server.fault(if within_s < 30 { fault(stretch) } else { InjectedFault::None });
         self.inner.read(clock, out)
     }
 }

@@ -9,8 +9,8 @@ use crate::support::{number, poll, serve};
 use crate::units::{CASES, control};
 use crate::vendor::opened_in;
 use adapters::address::Endpoint;
-use adapters::fanuc::answer::{Alarm, Message, PastAlarm, SpeedUnit, Status, System};
-use adapters::fanuc::item::{Area, Word};
+use adapters::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
+use adapters::fanuc::item::{Area, BlockWord};
 use adapters::fanuc::server::{Controller, ProgramFile, Server, ServerSettings, ToolGroup};
 use adapters::fanuc::vendor::VendorSettings;
 use adapters::fanuc::wire::Number;
@@ -65,7 +65,14 @@ pub(crate) fn machine(version: u16) -> Controller {
     control.executed = (0, "N120 G01 X10.5 F1200\nN130 Z-2.\nM30\n%".into());
     control.clock = [2026, 11, 24, 21, 5, 9];
     control.timers = [(12345, 6000), (2345, 5000), (345, 4000), (45, 3000)];
-    control.modal([(Word::F, 1200), (Word::M, 3), (Word::S, 8000), (Word::T, 12), (Word::R, 77), (Word::H, 7)]);
+    control.modal([
+        (BlockWord::F, 1200),
+        (BlockWord::M, 3),
+        (BlockWord::S, 8000),
+        (BlockWord::T, 12),
+        (BlockWord::R, 77),
+        (BlockWord::H, 7),
+    ]);
     control.g_codes.extend(
         [(0, 1), (1, 17), (13, 543)].map(|(group, code)| (group, Number::decimal(code, i16::from(code == 543)))),
     );
@@ -80,7 +87,7 @@ fn texts(control: &mut Controller) {
     let past = |alarm, minute| PastAlarm { alarm, at: [2026, 11, 24, 20, minute, 7] };
     control.alarm_history =
         vec![past(alarm(5010, 3, 0, "END OF RECORD"), 15), past(alarm(417, 6, 2, "SERVO ALARM"), 16)];
-    control.messages = vec![Message { number: 2001, kind: 0, text: "CHANGE THE BOX OF PARTS".into() }];
+    control.messages = vec![OperatorMessage { number: 2001, kind: 0, text: "CHANGE THE BOX OF PARTS".into() }];
     let file = |number, bytes, comment: &str| ProgramFile { number, bytes, comment: comment.into() };
     control.programs = vec![file(1000, 2048, "MAIN"), file(1234, 512, "POCKET")];
 }

@@ -7,7 +7,7 @@ use crate::support::{controller, number, opened, poll, serve, text, value};
 use crate::vendor::{self, library};
 use adapters::Absence;
 use adapters::fanuc::answer::Alarm;
-use adapters::fanuc::item::{Area, Word};
+use adapters::fanuc::item::{Area, BlockWord};
 use adapters::fanuc::server::{Controller, ServerSettings};
 use adapters::fanuc::wire::Number;
 use std::time::Duration;
@@ -21,7 +21,7 @@ fn two_paths(version: u16) -> Controller {
     second.spindles[0].quantities = [7, 4000, 1, 800, 7, 800].map(|value| Number::decimal(value, 0));
     second.axes[0].positions[1] = Number::decimal(4_500, 3);
     (second.program, second.sequence) = ((2001, 2001), 60);
-    second.modal([(Word::F, 40), (Word::S, 810), (Word::T, 1212)]);
+    second.modal([(BlockWord::F, 40), (BlockWord::S, 810), (BlockWord::T, 1212)]);
     control.memory.set(Area::G, 1012, !60);
     control.memory.set(Area::G, 1030, 90);
     control

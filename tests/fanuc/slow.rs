@@ -9,7 +9,7 @@ use adapters::clock::{Clock, SystemClock};
 use adapters::driver::FactValue;
 use adapters::fanuc::line::Connect;
 use adapters::fanuc::open::{self, OpenedFanuc};
-use adapters::fanuc::server::{Fault, ServerSettings};
+use adapters::fanuc::server::{InjectedFault, ServerSettings};
 use adapters::fanuc::vendor::Vendor;
 use adapters::merge::{Delay, Merge, SourceId, SourcePlan};
 use adapters::worker::{Worker, WorkerSettings};
@@ -84,7 +84,7 @@ fn fact(facts: &[adapters::Fact], name: &str) -> f64 {
 
 fn native(delay_ms: u64, seconds: f64) -> Seen {
     let server = serve(controller(4), ServerSettings::default());
-    server.fault(Fault::Delay(Duration::from_millis(delay_ms)));
+    server.fault(InjectedFault::Delay(Duration::from_millis(delay_ms)));
     let address: Address = format!("fanuc://{}", server.address()).parse().expect("usable");
     let Target::Fanuc { at, path, options, .. } = address.target() else { panic!("{address}") };
     watched(open::native(address.text(), at, *path, options), seconds)

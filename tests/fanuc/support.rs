@@ -2,7 +2,7 @@
 
 use adapters::address::Address;
 use adapters::clock::{Clock, SystemClock};
-use adapters::fanuc::item::{Area, Word};
+use adapters::fanuc::item::{Area, BlockWord};
 use adapters::fanuc::server::{Controller, Server, ServerSettings};
 use adapters::fanuc::wire::Number;
 use adapters::open::{Opened, open};
@@ -32,7 +32,7 @@ pub(crate) fn controller(version: u16) -> Controller {
     control.axes[1].current = Number::decimal(31, 1);
     control.program = (1001, 1001);
     control.sequence = 120;
-    control.modal([(Word::F, 250), (Word::S, 1200), (Word::T, 303)]);
+    control.modal([(BlockWord::F, 250), (BlockWord::S, 1200), (BlockWord::T, 303)]);
     control.parameter(6711, 3, Number::decimal(17, 0));
     control.parameter(1001, 0, Number::decimal(0, 0));
     control.diagnosis(403, 1, Number::decimal(48, 0));

@@ -5,7 +5,7 @@ use crate::support::{CUT, controller, number, poll, serve, text, value};
 use adapters::address::{Address, Endpoint, FanucOptions, Target};
 use adapters::clock::SystemClock;
 use adapters::fanuc::focas::Focas;
-use adapters::fanuc::item::{Area, Item, Stretch, Write};
+use adapters::fanuc::item::{Area, FocasItem, Stretch, Write};
 use adapters::fanuc::line::Connect;
 use adapters::fanuc::open::{self, OpenedFanuc};
 use adapters::fanuc::server::ServerSettings;
@@ -186,10 +186,10 @@ fn what_is_written_is_read_back_through_the_library() {
     vendor.write(&Write::Pmc { stretch, values: vec![0xA5, 80, 7] }).expect("written");
     vendor.write(&Write::Macro { number: 500, mantissa: -25, places: 1 }).expect("written");
     let mut out = Vec::new();
-    vendor.ask(&[Item::Pmc(stretch).on(1), Item::Macro(500).on(1)], &mut out).expect("answers");
+    vendor.ask(&[FocasItem::Pmc(stretch).on(1), FocasItem::Macro(500).on(1)], &mut out).expect("answers");
     let expected = [
-        adapters::fanuc::answer::Answer::Memory(vec![0xA5, 80, 7]),
-        adapters::fanuc::answer::Answer::Number(Some(-2.5)),
+        adapters::fanuc::answer::FocasAnswer::Memory(vec![0xA5, 80, 7]),
+        adapters::fanuc::answer::FocasAnswer::Number(Some(-2.5)),
     ];
     assert_eq!(out.into_iter().map(|result| result.expect("a value")).collect::<Vec<_>>(), expected);
 }

@@ -6,7 +6,7 @@ use super::process::{Gateway, get, program, run, stdout, text, wait_for};
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::fanuc::item::Area;
-use adapters::fanuc::server::{Controller, Memory, Served, Server, ServerSettings, SimulatedControl};
+use adapters::fanuc::server::{Controller, Memory, ServedControl, Server, ServerSettings, SimulatedControl};
 use adapters::simulated::{LadderSettings, Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
 use adapters::{Actuator, LadderRule};
@@ -170,7 +170,7 @@ impl Rungs {
     }
 }
 
-impl Served for Built {
+impl ServedControl for Built {
     fn now(&mut self) -> Option<&mut Controller> {
         let now_ns = self.clock.now_ns();
         let Self { control, rungs, .. } = self;

@@ -3,7 +3,7 @@
 use crate::broker::Broker;
 use crate::stand::{SERIAL, source, until};
 use adapters::clock::SystemClock;
-use adapters::mqtt::{Client, Options, Qos};
+use adapters::mqtt::{MqttClient, Options, Qos};
 use adapters::nclink::topic::Subject;
 use adapters::{Absence, Reading, Source, SourceError};
 use serde_json::{Value, json};
@@ -23,7 +23,7 @@ struct Scripted {
 
 impl Scripted {
     fn start(port: u16, mut script: Script) -> Self {
-        let client = Client::connect(&Options::new("127.0.0.1", port, "scripted")).expect("the broker is there");
+        let client = MqttClient::connect(&Options::new("127.0.0.1", port, "scripted")).expect("the broker is there");
         let asked = [Subject::Probe, Subject::Query, Subject::Set].map(|subject| subject.filter(SERIAL));
         client.subscribe(&asked, Qos::AtMostOnce).expect("granted");
         let stop = Arc::new(AtomicBool::new(false));

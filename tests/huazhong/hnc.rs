@@ -6,11 +6,11 @@ use crate::stand::until;
 use adapters::address::Endpoint;
 use adapters::clock::SystemClock;
 use adapters::driver::Actuator;
-use adapters::hnc::item::Item;
+use adapters::hnc::item::HncItem;
 use adapters::hnc::line::{HncLine, HncSettings};
 use adapters::hnc::sampling::Sampled;
 use adapters::hnc::{HncActuator, HncSource};
-use adapters::nclink::mailbox::Register;
+use adapters::nclink::mailbox::ControllerRegister;
 use adapters::units::OverridePct;
 use adapters::{Absence, Reading, Source, SourceError};
 use std::sync::mpsc;
@@ -117,7 +117,7 @@ fn not_yet_and_refused_never_show_what_was_scribbled() {
     }
     let line = line(&library);
     library.fault("later HNC_RegGetValue");
-    assert!(line.read(Item::Register(6, 5)).expect("alive").is_err());
+    assert!(line.read(HncItem::Register(6, 5)).expect("alive").is_err());
     library.well();
     cut(&poll(&mut source).expect("well afterwards"));
 }
@@ -223,13 +223,13 @@ fn what_cannot_be_loaded_listened_at_or_connected_says_so() {
 fn registers_are_written_and_the_override_in_force_is_read_back() {
     let library = library(&[]);
     let line = line(&library);
-    let mut actuator = HncActuator::new(line.clone(), Register { kind: 'D', index: 100 });
+    let mut actuator = HncActuator::new(line.clone(), ControllerRegister { kind: 'D', index: 100 });
     let clock = SystemClock::new();
     assert_eq!(actuator.read_feed_override(&clock).map(OverridePct::percent), Ok(80));
     let wanted = OverridePct::new(65).expect("exists");
     actuator.write_feed_override(&clock, wanted).expect("written");
     assert_eq!(actuator.read_feed_override(&clock), Ok(wanted));
-    let word = |index| line.read(Item::Register(6, index)).expect("alive").expect("a value");
+    let word = |index| line.read(HncItem::Register(6, index)).expect("alive").expect("a value");
     let heartbeat = word(103);
     actuator.write_feed_override(&clock, wanted).expect("written");
     assert_ne!(word(103), heartbeat, "the heartbeat moves with every letter");

@@ -4,7 +4,7 @@ use crate::broker::{Broker, program};
 use crate::stand::{SERIAL, Served, Stand, address, link, source, until};
 use adapters::clock::{Clock, SystemClock};
 use adapters::nclink::connection::Connection;
-use adapters::nclink::{Answer, Ask, Params};
+use adapters::nclink::{NcLinkAnswer, Params, RequestedItem};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::{Absence, Reading, Source, SourceError};
 use serde_json::json;
@@ -23,7 +23,7 @@ fn text(readings: &[Reading], channel: &str) -> String {
     reading.value.clone().ok().and_then(|value| value.as_text().map(str::to_owned)).unwrap_or_default()
 }
 
-fn said_no(answer: &Option<Answer>, why: &str) -> bool {
+fn said_no(answer: &Option<NcLinkAnswer>, why: &str) -> bool {
     matches!(answer, Some(Err(reason)) if reason == why)
 }
 
@@ -37,8 +37,12 @@ fn probe_query_and_set_with_the_simulated_device() {
     let d = model.find("CONTROLLER/VARIABLE@REG_D").expect("registers");
     assert!(d.settable && !model.find("FEED_OVERRIDE").expect("there").settable);
 
-    let asks =
-        [Ask::value("010305"), Ask::value("/CONTROLLER/PROGRAM"), Ask::value("nothing"), Ask::elements(&d.id, &[7])];
+    let asks = [
+        RequestedItem::value("010305"),
+        RequestedItem::value("/CONTROLLER/PROGRAM"),
+        RequestedItem::value("nothing"),
+        RequestedItem::elements(&d.id, &[7]),
+    ];
     let answers = client.query(&asks).expect("answered");
     assert_eq!(answers[0], Some(Ok(vec![json!(100)])), "the override in force");
     assert!(matches!(&answers[1], Some(Ok(values)) if values[0].as_str().is_some_and(|name| name.contains("O"))));
@@ -46,17 +50,27 @@ fn probe_query_and_set_with_the_simulated_device() {
     assert_eq!(answers[3], Some(Ok(vec![json!(0)])));
 
     // Accepted, and read back; a bit on its own.
-    let set = client.set(&[Ask::write(&d.id, 7, 40_000)]).expect("answered");
+    let set = client.set(&[RequestedItem::write(&d.id, 7, 40_000)]).expect("answered");
     assert_eq!(set, [Some(Ok(Vec::new()))]);
     let bit = Params { value: Some(json!(1)), index: Some(7), bit: Some(3), ..Params::default() };
-    client.set(&[Ask { id: d.id.clone(), params: bit }]).expect("answered");
-    assert_eq!(client.query(&[Ask::elements(&d.id, &[7])]).expect("answered"), [Some(Ok(vec![json!(40_008)]))]);
+    client.set(&[RequestedItem { id: d.id.clone(), params: bit }]).expect("answered");
+    assert_eq!(
+        client.query(&[RequestedItem::elements(&d.id, &[7])]).expect("answered"),
+        [Some(Ok(vec![json!(40_008)]))]
+    );
 
     // Refused, each for its own reason.
     let f = model.find("CONTROLLER/VARIABLE@REG_F").expect("registers").id.clone();
-    let no_value =
-        Ask { id: d.id.clone(), params: Params { value: Some(json!("x")), index: Some(7), ..Params::default() } };
-    let refused = [Ask::write("010305", 0, 50), Ask::write(&f, 2560, 1), Ask::write(&d.id, 9999, 1), no_value];
+    let no_value = RequestedItem {
+        id: d.id.clone(),
+        params: Params { value: Some(json!("x")), index: Some(7), ..Params::default() },
+    };
+    let refused = [
+        RequestedItem::write("010305", 0, 50),
+        RequestedItem::write(&f, 2560, 1),
+        RequestedItem::write(&d.id, 9999, 1),
+        no_value,
+    ];
     let answers = client.set(&refused).expect("answered");
     let reasons = ["NOT_SETABLE", "NOT_SETABLE", "INDEX_OUT_OF_RANGE", "NO_VALUE"];
     for (answer, reason) in answers.iter().zip(reasons) {
@@ -191,7 +205,12 @@ fn another_make_of_client_is_answered() {
 fn how_long_an_answer_takes() {
     let Some(stand) = Stand::start() else { return };
     let mut client = stand.connect();
-    let asks = [Ask::value("010303"), Ask::value("010305"), Ask::value("0103532102"), Ask::value("0103532103")];
+    let asks = [
+        RequestedItem::value("010303"),
+        RequestedItem::value("010305"),
+        RequestedItem::value("0103532102"),
+        RequestedItem::value("0103532103"),
+    ];
     let mut took: Vec<Duration> = (0..500)
         .map(|_| {
             let began = Instant::now();

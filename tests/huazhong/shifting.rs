@@ -9,7 +9,7 @@ use crate::stand::{Stand, address, until};
 use adapters::SourceError;
 use adapters::address::{Address, HncOffset, Target};
 use adapters::clock::SystemClock;
-use adapters::nclink::Ask;
+use adapters::nclink::RequestedItem;
 use adapters::nclink::connection::Connection;
 use adapters::offset::{Axis, OffsetSink};
 use adapters::simulated::{Simulated, SimulatedSettings};
@@ -43,7 +43,7 @@ fn offsets(port: u16, keys: &str) -> Box<dyn OffsetSink> {
 /// The eight registers as any client sees them.
 fn words(connection: &mut Connection) -> Vec<Value> {
     let indexes: Vec<u32> = (110..118).collect();
-    let answers = connection.query(&[Ask::elements(REGISTERS, &indexes)]).expect("answered");
+    let answers = connection.query(&[RequestedItem::elements(REGISTERS, &indexes)]).expect("answered");
     answers.into_iter().next().flatten().expect("an answer").expect("values")
 }
 

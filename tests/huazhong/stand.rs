@@ -5,7 +5,7 @@ use adapters::address::Address;
 use adapters::clock::{Clock, SystemClock};
 use adapters::mqtt::Options;
 use adapters::nclink::connection::{Connection, Link};
-use adapters::nclink::device::{Device, DeviceEvent};
+use adapters::nclink::device::{DeviceEvent, NcLinkDevice};
 use adapters::nclink::{NcLinkSource, open};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::{Reading, Source};
@@ -31,7 +31,7 @@ impl Served {
     pub(crate) fn start(port: u16, machine: &Simulated, clock: &Arc<dyn Clock>) -> Self {
         let (stop, connected) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(0)));
         let (stopping, up) = (stop.clone(), connected.clone());
-        let mut device = Device::new(SERIAL, machine, clock.clone());
+        let mut device = NcLinkDevice::new(SERIAL, machine, clock.clone());
         let thread = std::thread::spawn(move || {
             device.run(&Options::new("127.0.0.1", port, "device"), &stopping, |said| {
                 if said == DeviceEvent::Connected {

@@ -2,7 +2,7 @@
 
 use crate::stand::{Stand, address, until};
 use adapters::driver::{Actuator, LadderRequest};
-use adapters::nclink::Ask;
+use adapters::nclink::RequestedItem;
 use adapters::units::OverridePct;
 use adapters::{Address, SourceError};
 use serde_json::json;
@@ -43,7 +43,7 @@ fn an_override_goes_through_the_mailbox_and_is_read_back() {
     in_force(&stand, 100);
     assert_eq!(actuator.read_feed_override(clock.as_ref()), Ok(pct(100)));
     // The registers as any client sees them; the heartbeat has moved with every letter.
-    let words = stand.connect().query(&[Ask::elements("/CONTROLLER/VARIABLE@REG_D", &[100, 101, 102, 103])]);
+    let words = stand.connect().query(&[RequestedItem::elements("/CONTROLLER/VARIABLE@REG_D", &[100, 101, 102, 103])]);
     assert_eq!(words.expect("answered"), [Some(Ok(vec![json!(120), json!(1), json!(0), json!(2)]))]);
     actuator.write_feed_override(clock.as_ref(), pct(60)).expect("taken");
     in_force(&stand, 60);

@@ -7,7 +7,7 @@ use adapters::address::{Address, Target};
 use adapters::clock::{Clock, SECOND_NS, ScaledClock};
 use adapters::modbus::{profile, server::ModbusServer};
 use adapters::mqtt::Options;
-use adapters::nclink::device::Device;
+use adapters::nclink::device::NcLinkDevice;
 use adapters::simulated::{Moment, Simulated, SimulatedSettings};
 use adapters::waveform::{Producer, SimulatedCurrent};
 use adapters::{ChannelId, Sample};
@@ -104,7 +104,7 @@ fn compared(speed: f64, machine_s: i64) -> Option<Vec<Errors>> {
     let Target::Simulated(target) = address.target() else { panic!("simulated") };
     let machine = Simulated::new(address.text(), SimulatedSettings::of(target), clock.now_ns());
     let stop = Arc::new(AtomicBool::new(false));
-    let (mut device, stopping) = (Device::new("SIM1", &machine, clock.clone()), stop.clone());
+    let (mut device, stopping) = (NcLinkDevice::new("SIM1", &machine, clock.clone()), stop.clone());
     let options = Options::new("127.0.0.1", broker.1, "joint-device");
     let device = thread::spawn(move || device.run(&options, &stopping, |_| {}));
     let anywhere = SocketAddr::from(([127, 0, 0, 1], 0));

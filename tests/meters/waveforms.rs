@@ -3,7 +3,7 @@
 use super::partner::{number, poll};
 use adapters::address::Endpoint;
 use adapters::clock::{Clock, SystemClock};
-use adapters::waveform::{Frame, Header, Producer, Receiver, Recorded, Sampler};
+use adapters::waveform::{Producer, Receiver, Recorded, Sampler, WaveformFrame, WaveformHeader};
 use adapters::{Source, SourceError};
 use gateway::waveform::SpindleCurrent;
 use std::f64::consts::TAU;
@@ -21,8 +21,8 @@ fn endpoint(at: SocketAddr) -> Endpoint {
     Endpoint { host: at.ip().to_string(), port: at.port() }
 }
 
-fn header() -> Header {
-    Header::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767)
+fn header() -> WaveformHeader {
+    WaveformHeader::currents(1000.0, &["i_u", "i_v", "i_w"], 0.01, 32767)
 }
 
 /// Three phases of 10 A rms at 47 Hz, from sample `from` on.
@@ -51,7 +51,7 @@ fn sends(bytes: Vec<u8>) -> Endpoint {
 #[test]
 fn gaps_and_clipped_samples_are_counted() {
     let frame = |sequence: u32, from: i32, samples: Vec<i16>| {
-        Frame { sequence, first_ns: i64::from(from) * 1_000_000 + 1_000_000_000, samples }.bytes(3)
+        WaveformFrame { sequence, first_ns: i64::from(from) * 1_000_000 + 1_000_000_000, samples }.bytes(3)
     };
     let mut clipped = sine(60, 20);
     (clipped[0], clipped[4]) = (32767, -32768);
@@ -116,7 +116,7 @@ struct Fast {
 }
 
 impl Sampler for Fast {
-    fn header(&self) -> Header {
+    fn header(&self) -> WaveformHeader {
         header()
     }
 

@@ -1,8 +1,8 @@
 //! The control that stood behind the captured frames.
 
 use crate::fanuc::answer::{Alarm, Status, System};
-use crate::fanuc::item::{Area, Word};
-use crate::fanuc::server::{Axis, Controller};
+use crate::fanuc::item::{Area, BlockWord};
+use crate::fanuc::server::{Controller, ControllerAxis};
 use crate::fanuc::wire::Number;
 
 pub(super) fn controller(version: u16) -> Controller {
@@ -29,7 +29,7 @@ pub(super) fn controller(version: u16) -> Controller {
         Alarm { number: 100, kind: 3, axis: 0, text: "PARAMETER ENABLE SWITCH ON".into() },
         Alarm { number: 417, kind: 6, axis: 2, text: "SERVO ALARM".into() },
     ];
-    control.modal([(Word::F, 1200), (Word::M, 3), (Word::T, 12)]);
+    control.modal([(BlockWord::F, 1200), (BlockWord::M, 3), (BlockWord::T, 12)]);
     control.macros.insert(500, Some(25.4));
     control.parameter(6711, 3, Number::decimal(456, 0));
     [3106, 3107, 9936].into_iter().for_each(|number| control.parameter(number, 3, Number::decimal(0, 0)));
@@ -44,14 +44,14 @@ pub(super) fn controller(version: u16) -> Controller {
     control
 }
 
-fn axes() -> Vec<Axis> {
+fn axes() -> Vec<ControllerAxis> {
     let values = [
         ('X', -31, [123_456, 223_456, 1000, 500]),
         ('Y', 52, [-98_765, -198_765, 2000, 0]),
         ('Z', 118, [10_500, -10_500, -3000, -250]),
     ];
     let axis = |(name, load, positions): (char, i32, [i32; 4])| {
-        let mut axis = Axis::new(&name.to_string());
+        let mut axis = ControllerAxis::new(&name.to_string());
         axis.load = Number::decimal(load, 0);
         axis.positions = positions.map(|position| Number::decimal(position, 3));
         axis

@@ -10,14 +10,14 @@ mod fixture;
 mod rows;
 mod values;
 
-use super::answer::ItemResult;
+use super::answer::FocasItemResult;
 use super::decode;
-use super::item::{Item, Write};
+use super::item::{FocasItem, Write};
 use super::opening::Generation;
 use super::request;
 use super::server::{Controller, answer_body};
-use super::wire::{Frame, FrameKind, Request, frame, replies, request_body, requests};
-use rows::{Row, Says};
+use super::wire::{FocasFrame, FrameKind, Request, frame, replies, request_body, requests};
+use rows::{CapturedCall, Says};
 
 const VERSIONS: [u16; 3] = [2, 3, 4];
 
@@ -85,7 +85,7 @@ fn whole(version: u16, kind: &str, blocks: &[Vec<u8>]) -> Vec<u8> {
 }
 
 /// The two captured frames of a row.
-fn captured(row: &Row, version: u16) -> (Vec<u8>, Vec<u8>) {
+fn captured(row: &CapturedCall, version: u16) -> (Vec<u8>, Vec<u8>) {
     let questions: Vec<(Vec<u8>, Vec<u8>)> = row.asked.split('|').map(|text| question(text.trim())).collect();
     let answers: Vec<&str> = row.answered.split('|').collect();
     assert_eq!(questions.len(), answers.len(), "{}", row.call);
@@ -94,14 +94,14 @@ fn captured(row: &Row, version: u16) -> (Vec<u8>, Vec<u8>) {
     (whole(1, "2101", &questions), whole(version, "2102", &answers))
 }
 
-fn asked(row: &Row, generation: Generation) -> Vec<Request> {
+fn asked(row: &CapturedCall, generation: Generation) -> Vec<Request> {
     match &row.says {
         Says::Written(write) => vec![request::writing(write, generation)],
         Says::Read(items, _) => items.iter().map(|item| request::reading(*item, generation)).collect(),
     }
 }
 
-fn rows(version: u16) -> impl Iterator<Item = Row> {
+fn rows(version: u16) -> impl Iterator<Item = CapturedCall> {
     rows::all().into_iter().filter(move |row| row.versions.contains(&version))
 }
 
@@ -126,17 +126,17 @@ fn the_client_reads_the_same_values() {
     }
 }
 
-fn decoded(items: &[Item], generation: Generation, bytes: &[u8]) -> Vec<ItemResult> {
-    let frame = Frame::of(bytes).expect("a frame");
+fn decoded(items: &[FocasItem], generation: Generation, bytes: &[u8]) -> Vec<FocasItemResult> {
+    let frame = FocasFrame::of(bytes).expect("a frame");
     assert_eq!((frame.kind, Generation::of(frame.version)), (FrameKind::Answer, generation));
     let replies = replies(&frame.body).expect("blocks");
-    let one = |(item, reply): (&Item, &super::wire::Reply<'_>)| {
+    let one = |(item, reply): (&FocasItem, &super::wire::Reply<'_>)| {
         reply.answers(&request::reading(*item, generation)).expect("the answer to the question");
         match reply.code {
             0 => decode::answer(*item, generation, reply.data)
-                .map_err(|error| super::answer::ItemError::Malformed(error.to_string())),
-            code => Err(super::answer::ItemError::Refused(super::answer::Refusal {
-                code: super::code::ReturnCode(code),
+                .map_err(|error| super::answer::FocasItemError::Malformed(error.to_string())),
+            code => Err(super::answer::FocasItemError::Refused(super::answer::Refusal {
+                code: super::code::FocasReturnCode(code),
                 detail: reply.detail,
             })),
         }
@@ -146,7 +146,7 @@ fn decoded(items: &[Item], generation: Generation, bytes: &[u8]) -> Vec<ItemResu
 }
 
 fn served(controller: &mut Controller, version: u16, bytes: &[u8]) -> Vec<u8> {
-    let request = Frame::of(bytes).expect("a frame");
+    let request = FocasFrame::of(bytes).expect("a frame");
     let asked = requests(&request.body).expect("blocks");
     frame(version, FrameKind::Answer, &answer_body(controller, &asked))
 }
@@ -173,9 +173,9 @@ fn a_write_and_its_reading_agree_in_every_generation() {
         let write = Write::Macro { number: 512, mantissa: -25, places: 1 };
         let body = request_body(&[request::writing(&write, generation)]);
         served(&mut controller, version, &frame(1, FrameKind::Request, &body));
-        let items = [Item::Macro(512)];
+        let items = [FocasItem::Macro(512)];
         let body = request_body(&[request::reading(items[0], generation)]);
         let answer = served(&mut controller, version, &frame(1, FrameKind::Request, &body));
-        assert_eq!(decoded(&items, generation, &answer), [Ok(super::answer::Answer::Number(Some(-2.5)))]);
+        assert_eq!(decoded(&items, generation, &answer), [Ok(super::answer::FocasAnswer::Number(Some(-2.5)))]);
     }
 }

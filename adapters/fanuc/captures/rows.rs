@@ -1,19 +1,19 @@
 //! The captured calls about state, speeds, program and positions; the others stand in `values`.
 
-use crate::fanuc::answer::{Answer, ItemError, ItemResult, Refusal, SpeedUnit, Status, System};
-use crate::fanuc::code::ReturnCode;
-use crate::fanuc::item::{Area, Item, Position, Servo, Spindle, Stretch, Write};
+use crate::fanuc::answer::{FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
+use crate::fanuc::code::FocasReturnCode;
+use crate::fanuc::item::{Area, FocasItem, Position, Servo, Spindle, Stretch, Write};
 
 /// What the row is about.
 pub(super) enum Says {
     /// Items and their values.
-    Read(Vec<Item>, Vec<ItemResult>),
+    Read(Vec<FocasItem>, Vec<FocasItemResult>),
     /// A write.
     Written(Write),
 }
 
 /// One call of the vendor's client.
-pub(super) struct Row {
+pub(super) struct CapturedCall {
     pub(super) call: &'static str,
     pub(super) versions: &'static [u16],
     pub(super) asked: &'static str,
@@ -30,61 +30,61 @@ pub(super) fn read(
     versions: &'static [u16],
     asked: &'static str,
     answered: &'static str,
-    says: Vec<(Item, Answer)>,
-) -> Row {
+    says: Vec<(FocasItem, FocasAnswer)>,
+) -> CapturedCall {
     let (items, answers) = says.into_iter().map(|(item, answer)| (item, Ok(answer))).unzip();
-    Row { call, versions, asked, answered, says: Says::Read(items, answers) }
+    CapturedCall { call, versions, asked, answered, says: Says::Read(items, answers) }
 }
 
-pub(super) fn write(call: &'static str, versions: &'static [u16], asked: &'static str, write: Write) -> Row {
-    Row { call, versions, asked, answered: "", says: Says::Written(write) }
+pub(super) fn write(call: &'static str, versions: &'static [u16], asked: &'static str, write: Write) -> CapturedCall {
+    CapturedCall { call, versions, asked, answered: "", says: Says::Written(write) }
 }
 
 pub(super) fn refused(
     call: &'static str,
     asked: &'static str,
     answered: &'static str,
-    item: Item,
+    item: FocasItem,
     code: i16,
     detail: i16,
-) -> Row {
-    let refusal = Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail }));
-    Row { call, versions: ALL, asked, answered, says: Says::Read(vec![item], vec![refusal]) }
+) -> CapturedCall {
+    let refusal = Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail }));
+    CapturedCall { call, versions: ALL, asked, answered, says: Says::Read(vec![item], vec![refusal]) }
 }
 
-pub(super) fn number(value: f64) -> Answer {
-    Answer::Number(Some(value))
+pub(super) fn number(value: f64) -> FocasAnswer {
+    FocasAnswer::Number(Some(value))
 }
 
-fn numbers(values: &[f64], places: usize) -> Answer {
+fn numbers(values: &[f64], places: usize) -> FocasAnswer {
     let mut values: Vec<Option<f64>> = values.iter().map(|value| Some(*value)).collect();
     values.resize(places.max(values.len()), Some(0.0));
-    Answer::Numbers(values)
+    FocasAnswer::Numbers(values)
 }
 
-pub(super) fn data(kind: i16, value: f64) -> Answer {
-    Answer::Data { kind, values: vec![Some(value)] }
+pub(super) fn data(kind: i16, value: f64) -> FocasAnswer {
+    FocasAnswer::Data { kind, values: vec![Some(value)] }
 }
 
 /// One quantity of the only spindle.
-fn spindle(what: Spindle, value: f64) -> (Item, Answer) {
-    (Item::Spindles(what), numbers(&[value], 1))
+fn spindle(what: Spindle, value: f64) -> (FocasItem, FocasAnswer) {
+    (FocasItem::Spindles(what), numbers(&[value], 1))
 }
 
-fn count(which: i16, count: i32) -> (Item, Answer) {
-    (Item::Count(which), Answer::Whole(count))
+fn count(which: i16, count: i32) -> (FocasItem, FocasAnswer) {
+    (FocasItem::Count(which), FocasAnswer::Whole(count))
 }
 
-fn names(names: &[&str]) -> Answer {
-    Answer::Names(names.iter().map(ToString::to_string).collect())
+fn names(names: &[&str]) -> FocasAnswer {
+    FocasAnswer::Names(names.iter().map(ToString::to_string).collect())
 }
 
-pub(super) fn modal(value: i32) -> Answer {
-    Answer::Modal { value, flags: [0x40, 0] }
+pub(super) fn modal(value: i32) -> FocasAnswer {
+    FocasAnswer::Modal { value, flags: [0x40, 0] }
 }
 
 /// Every captured call, in the order of the captures.
-pub(super) fn all() -> Vec<Row> {
+pub(super) fn all() -> Vec<CapturedCall> {
     let mut rows = state();
     rows.extend(speeds());
     rows.extend(meters());
@@ -94,11 +94,11 @@ pub(super) fn all() -> Vec<Row> {
     rows
 }
 
-fn state() -> Vec<Row> {
-    use Answer::Whole;
+fn state() -> Vec<CapturedCall> {
+    use FocasAnswer::Whole;
     let status = Status { automatic: 1, run: 3, motion: 1, ..Status::default() };
     let system = |axes_max| {
-        Answer::System(System {
+        FocasAnswer::System(System {
             additional: 0x0402,
             axes_max,
             kind: "0".into(),
@@ -108,45 +108,45 @@ fn state() -> Vec<Row> {
             axes: "03".into(),
         })
     };
-    let (short, long) = (Answer::Status(status), Answer::Status(status));
-    let flags = [(Item::HandleRetrace, Whole(0)), (Item::ToolMode, Whole(0))];
+    let (short, long) = (FocasAnswer::Status(status), FocasAnswer::Status(status));
+    let flags = [(FocasItem::HandleRetrace, Whole(0)), (FocasItem::ToolMode, Whole(0))];
     vec![
         read(
             "cnc_sysinfo",
             NEWER,
             "1/18",
             "0402 0020 2030 204d 44344631 32372e30 3033",
-            vec![(Item::System, system(32))],
+            vec![(FocasItem::System, system(32))],
         ),
         read(
             "cnc_sysinfo",
             OLDER,
             "1/18",
             "0402 0008 2030 204d 44344631 32372e30 3033",
-            vec![(Item::System, system(8))],
+            vec![(FocasItem::System, system(8))],
         ),
         read(
             "cnc_statinfo",
             ALL,
             "1/19 | 1/e1 | 1/98",
             "0001000300010000000000000000 | 0000 | 0000",
-            [(Item::Status, short)].into_iter().chain(flags.clone()).collect(),
+            [(FocasItem::Status, short)].into_iter().chain(flags.clone()).collect(),
         ),
         read(
             "cnc_statinfo2",
             ALL,
             "1/e2 | 1/e1 | 1/98",
             "0001000300010000000000000000 0000000000000000 | 0000 | 0000",
-            [(Item::StatusLong, long)].into_iter().chain(flags).collect(),
+            [(FocasItem::StatusLong, long)].into_iter().chain(flags).collect(),
         ),
     ]
 }
 
-fn speeds() -> Vec<Row> {
-    let none = |parameter| (Item::Parameter(parameter, 0), data(3, 0.0));
+fn speeds() -> Vec<CapturedCall> {
+    let none = |parameter| (FocasItem::Parameter(parameter, 0), data(3, 0.0));
     vec![
-        read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(Item::Feed, number(1200.0))]),
-        read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(Item::SpindleSpeed, number(8000.0))]),
+        read("cnc_actf", ALL, "1/24", "000004b0000a0000", vec![(FocasItem::Feed, number(1200.0))]),
+        read("cnc_acts", ALL, "1/25", "00001f40000a0000", vec![(FocasItem::SpindleSpeed, number(8000.0))]),
         read(
             "cnc_acts2",
             NEWER,
@@ -162,11 +162,11 @@ fn speeds() -> Vec<Row> {
             "0001 | 53310000 | 0003 | 0003 | 000004b0000a0000 | 00001f40000a0000 | 0001",
             vec![
                 count(3, 1),
-                (Item::SpindleNames(1), names(&["S1"])),
-                (Item::FeedUnit, Answer::Unit(SpeedUnit::MmMin)),
-                (Item::SpindleUnit, Answer::Unit(SpeedUnit::Rpm)),
-                (Item::Feed, number(1200.0)),
-                (Item::SpindleSpeed, number(8000.0)),
+                (FocasItem::SpindleNames(1), names(&["S1"])),
+                (FocasItem::FeedUnit, FocasAnswer::Unit(SpeedUnit::MmMin)),
+                (FocasItem::SpindleUnit, FocasAnswer::Unit(SpeedUnit::Rpm)),
+                (FocasItem::Feed, number(1200.0)),
+                (FocasItem::SpindleSpeed, number(8000.0)),
                 count(3, 1),
             ],
         ),
@@ -177,22 +177,22 @@ fn speeds() -> Vec<Row> {
             "000004b0000a0000 | 00001f40000a0000 | 0000 | 00000c2200000003 ..4x8 | 00000c2300000003 ..4x8 \
              | 000026d000000003 ..4x8 | 0000 | 00",
             vec![
-                (Item::Feed, number(1200.0)),
-                (Item::SpindleSpeed, number(8000.0)),
-                (Item::FeedUnit, Answer::Unit(SpeedUnit::MmMin)),
+                (FocasItem::Feed, number(1200.0)),
+                (FocasItem::SpindleSpeed, number(8000.0)),
+                (FocasItem::FeedUnit, FocasAnswer::Unit(SpeedUnit::MmMin)),
                 none(3106),
                 none(3107),
                 none(9936),
-                (Item::ModalGroup(4), Answer::Groups(vec![0])),
-                (Item::Pmc(Stretch::bytes(Area::G, 28, 1)), Answer::Memory(vec![0])),
+                (FocasItem::ModalGroup(4), FocasAnswer::Groups(vec![0])),
+                (FocasItem::Pmc(Stretch::bytes(Area::G, 28, 1)), FocasAnswer::Memory(vec![0])),
             ],
         ),
     ]
 }
 
-fn meters() -> Vec<Row> {
-    let servo = (Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
-    let axis_names = (Item::AxisNames, names(&["X", "Y", "Z"]));
+fn meters() -> Vec<CapturedCall> {
+    let servo = (FocasItem::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 32));
+    let axis_names = (FocasItem::AxisNames, names(&["X", "Y", "Z"]));
     vec![
         read(
             "cnc_rdspmeter",
@@ -201,7 +201,7 @@ fn meters() -> Vec<Row> {
             "0001 | 53310000 | 00000113000a0001 | 00001f4c000a0000 | 0001",
             vec![
                 count(1, 1),
-                (Item::SpindleNames(-1), names(&["S1"])),
+                (FocasItem::SpindleNames(-1), names(&["S1"])),
                 spindle(Spindle::Load, 27.5),
                 spindle(Spindle::MotorSpeed, 8012.0),
                 count(1, 1),
@@ -215,7 +215,7 @@ fn meters() -> Vec<Row> {
             vec![
                 spindle(Spindle::Load, 27.5),
                 spindle(Spindle::MotorSpeed, 8012.0),
-                (Item::SpindleNames(0), names(&["S1"])),
+                (FocasItem::SpindleNames(0), names(&["S1"])),
             ],
         ),
         read(
@@ -238,12 +238,12 @@ fn meters() -> Vec<Row> {
             OLDER,
             "1/56 1 | 1/89",
             "ffffffe1000a0000 00000034000a0000 00000076000a0000 ..8x5 | 58000000590000005a000000",
-            vec![(Item::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 8)), axis_names],
+            vec![(FocasItem::Servos(Servo::Load), numbers(&[-31.0, 52.0, 118.0], 8)), axis_names],
         ),
     ]
 }
 
-fn program() -> Vec<Row> {
+fn program() -> Vec<CapturedCall> {
     let path = "//CNC_MEM/USER/PATH1/O1234";
     vec![
         read(
@@ -251,41 +251,42 @@ fn program() -> Vec<Row> {
             ALL,
             "1/1c",
             "000004d2000003e8",
-            vec![(Item::Program, Answer::Program { running: 1234, main: 1000 })],
+            vec![(FocasItem::Program, FocasAnswer::Program { running: 1234, main: 1000 })],
         ),
         read(
             "cnc_exeprgname",
             ALL,
             "1/cf",
             "000004d2 4f31323334 ..31x1",
-            vec![(Item::ProgramName, Answer::Named { number: 1234, name: "O1234".into() })],
+            vec![(FocasItem::ProgramName, FocasAnswer::Named { number: 1234, name: "O1234".into() })],
         ),
         read(
             "cnc_exeprgname2",
             ALL,
             "1/fc",
             "2f2f434e435f4d454d2f555345522f50415448312f4f31323334 ..230x1",
-            vec![(Item::ProgramPath, Answer::Text(path.into()))],
+            vec![(FocasItem::ProgramPath, FocasAnswer::Text(path.into()))],
         ),
-        read("cnc_rdseqnum", ALL, "1/1d", "00000078", vec![(Item::Sequence, Answer::Whole(120))]),
+        read("cnc_rdseqnum", ALL, "1/1d", "00000078", vec![(FocasItem::Sequence, FocasAnswer::Whole(120))]),
     ]
 }
 
-fn dynamic() -> Vec<Row> {
+fn dynamic() -> Vec<CapturedCall> {
     let head = || {
         vec![
-            (Item::AlarmBits, Answer::Whole(0)),
-            (Item::Program, Answer::Program { running: 1234, main: 1000 }),
-            (Item::Sequence, Answer::Whole(120)),
-            (Item::Feed, number(1200.0)),
-            (Item::SpindleSpeed, number(8000.0)),
+            (FocasItem::AlarmBits, FocasAnswer::Whole(0)),
+            (FocasItem::Program, FocasAnswer::Program { running: 1234, main: 1000 }),
+            (FocasItem::Sequence, FocasAnswer::Whole(120)),
+            (FocasItem::Feed, number(1200.0)),
+            (FocasItem::SpindleSpeed, number(8000.0)),
         ]
     };
     let kinds = [Position::Absolute, Position::Machine, Position::Relative, Position::ToGo];
-    let one = kinds.iter().zip([123.456, 223.456, 1.0, 0.5]).map(|(kind, at)| (Item::Position(*kind, 1), number(at)));
+    let one =
+        kinds.iter().zip([123.456, 223.456, 1.0, 0.5]).map(|(kind, at)| (FocasItem::Position(*kind, 1), number(at)));
     let every = [[123.456, -98.765, 10.5], [223.456, -198.765, -10.5], [1.0, 2.0, -3.0], [0.5, 0.0, -0.25]];
     let all = |places| {
-        let position = move |(kind, at): (&Position, [f64; 3])| (Item::Position(*kind, -1), numbers(&at, places));
+        let position = move |(kind, at): (&Position, [f64; 3])| (FocasItem::Position(*kind, -1), numbers(&at, places));
         head().into_iter().chain(kinds.iter().zip(every).map(position)).collect::<Vec<_>>()
     };
     vec![

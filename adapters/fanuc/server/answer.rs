@@ -5,10 +5,10 @@ use super::controller::{Controller, Data};
 use super::encode::{long, longs, shorts, text};
 use super::{message, program, tool, write};
 use crate::fanuc::answer::System;
-use crate::fanuc::item::{Area, Spindle, Stretch, Width};
+use crate::fanuc::item::{Area, PmcWidth, Spindle, Stretch};
 use crate::fanuc::opening::Generation;
 use crate::fanuc::request::function as f;
-use crate::fanuc::wire::{Device, Number, ReplyBlock, Request, reply_body};
+use crate::fanuc::wire::{CncOrPmc, Number, ReplyBlock, Request, reply_body};
 
 /// What a question yields: data, or a return code.
 pub(super) type Data8 = Result<Vec<u8>, i16>;
@@ -35,7 +35,7 @@ fn answer(controller: &mut Controller, request: &Request) -> ReplyBlock {
         return refused(*refusal);
     }
     // PMC memory is the first path's, whatever the block says.
-    let path = if request.device == Device::Pmc { 1 } else { request.path };
+    let path = if request.device == CncOrPmc::Pmc { 1 } else { request.path };
     let Some(own) = controller.path(path) else { return refused((PATH, 0)) };
     match data(own, request) {
         Ok(data) => ReplyBlock { code: 0, detail: 0, data },
@@ -45,15 +45,15 @@ fn answer(controller: &mut Controller, request: &Request) -> ReplyBlock {
 
 fn data(controller: &mut Controller, request: &Request) -> Data8 {
     match (request.device, request.function) {
-        (Device::Pmc, f::PMC_READ) => memory(controller, request),
-        (Device::Pmc, _)
+        (CncOrPmc::Pmc, f::PMC_READ) => memory(controller, request),
+        (CncOrPmc::Pmc, _)
         | (_, f::MACRO_WRITE | f::WORK_OFFSET_WRITE | f::TOOL_OFFSET_WRITE | f::PANEL_SIGNALS_WRITE) => {
             write::take(controller, request).map(|()| {
                 controller.writes += 1;
                 Vec::new()
             })
         }
-        (Device::Cnc, _) => state(controller, request).unwrap_or_else(|| motion(controller, request)),
+        (CncOrPmc::Cnc, _) => state(controller, request).unwrap_or_else(|| motion(controller, request)),
     }
 }
 
@@ -189,7 +189,7 @@ fn parameter(controller: &Controller, request: &Request, table: &std::collection
 pub(super) fn stretch(request: &Request) -> Result<Stretch, i16> {
     let [from, to, area, width, _] = request.arguments;
     let at = |at: i32| u16::try_from(at).map_err(|_| NUMBER);
-    let (area, width) = (Area::of_number(area).ok_or(ATTRIB)?, Width::of_number(width).ok_or(ATTRIB)?);
+    let (area, width) = (Area::of_number(area).ok_or(ATTRIB)?, PmcWidth::of_number(width).ok_or(ATTRIB)?);
     Ok(Stretch { area, from: at(from)?, to: at(to)?, width })
 }
 

@@ -1,7 +1,7 @@
 //! Positions, names and units of the axes, and what spindles and drives show.
 
 use super::answer::{ATTRIB, Data8};
-use super::controller::{Axis, Controller};
+use super::controller::{Controller, ControllerAxis};
 use super::encode::{longs, shorts};
 use crate::fanuc::answer::SpeedUnit;
 use crate::fanuc::item::{Position, Servo, Spindle};
@@ -38,7 +38,7 @@ pub(super) fn places(controller: &Controller, of: impl Fn(usize) -> Option<Numbe
 
 pub(super) fn servos(controller: &Controller, what: i32) -> Data8 {
     let (what, _) = Servo::ALL.iter().find(|(_, number)| *number == what).ok_or(ATTRIB)?;
-    let quantity = |axis: &Axis| match what {
+    let quantity = |axis: &ControllerAxis| match what {
         Servo::Load => axis.load,
         Servo::Speed => axis.speed,
         Servo::Current => axis.current,
@@ -60,7 +60,7 @@ pub(super) fn positions(controller: &Controller, what: i32, axis: i32) -> Data8 
 /// Four bytes per name, and one name for each of its positions where they are asked for.
 pub(super) fn names(controller: &Controller, which: i32) -> Vec<u8> {
     let times = if which == NAMES_OF_POSITIONS { Position::ALL.len() } else { 1 };
-    let name = |axis: &Axis| {
+    let name = |axis: &ControllerAxis| {
         let mut bytes = [0; 4];
         axis.name.bytes().take(3).zip(&mut bytes).for_each(|(letter, place)| *place = letter);
         bytes.repeat(times)
@@ -84,7 +84,7 @@ pub(super) fn count(controller: &Controller, which: i32) -> Vec<u8> {
 /// Units as numbered on the wire: of the feed (3 on newer controls, 0 on older ones), of the spindle's speed, and of the
 /// positions (1 and 2), of those in pairs for the work and the machine coordinates of every axis.
 pub(super) fn units(controller: &Controller, which: i32) -> Vec<u8> {
-    let unit = |axis: &Axis| match (axis.rotary, controller.inch) {
+    let unit = |axis: &ControllerAxis| match (axis.rotary, controller.inch) {
         (true, _) => DEGREES,
         (_, true) => INCH,
         _ => MM,

@@ -1,8 +1,8 @@
 //! What a control holds, as plain values.
 
 use super::Memory;
-use crate::fanuc::answer::{Alarm, Message, PastAlarm, SpeedUnit, Status, System};
-use crate::fanuc::item::Word;
+use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit, Status, System};
+use crate::fanuc::item::BlockWord;
 use crate::fanuc::opening::{Generation, Opening};
 use crate::fanuc::poll;
 use crate::fanuc::wire::Number;
@@ -15,7 +15,7 @@ const FEED_SHOWN: i32 = 3107;
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Axis {
+pub struct ControllerAxis {
     /// Its name: a letter, or a letter and a number.
     pub name: String,
     /// Does it turn? Its positions are degrees then.
@@ -30,7 +30,7 @@ pub struct Axis {
     pub positions: [Number; 4],
 }
 
-impl Axis {
+impl ControllerAxis {
     /// A standing axis at zero. A, B and C turn, by custom.
     #[must_use]
     pub fn new(name: &str) -> Self {
@@ -107,7 +107,7 @@ pub struct Controller {
     /// Its spindles.
     pub spindles: Vec<SpindleState>,
     /// Its axes.
-    pub axes: Vec<Axis>,
+    pub axes: Vec<ControllerAxis>,
     /// Numbers of the running and the main program.
     pub program: (i32, i32),
     /// Path of the running program.
@@ -123,13 +123,13 @@ pub struct Controller {
     /// Alarms that have been, the oldest first.
     pub alarm_history: Vec<PastAlarm>,
     /// Messages to the operator.
-    pub messages: Vec<Message>,
+    pub messages: Vec<OperatorMessage>,
     /// Programs in memory.
     pub programs: Vec<ProgramFile>,
     /// G codes in force by their group, as the program writes them.
     pub g_codes: BTreeMap<i16, Number>,
     /// Modal words.
-    pub modal_words: BTreeMap<Word, Number>,
+    pub modal_words: BTreeMap<BlockWord, Number>,
     /// Modal codes by their group.
     pub modal_groups: BTreeMap<i32, u8>,
     /// Custom macro variables; `None` is vacant. What is not here does not exist.
@@ -186,7 +186,7 @@ impl Controller {
             feed: zero,
             feed_unit: SpeedUnit::MmMin,
             spindles: vec![SpindleState { quantities: [zero; 6] }],
-            axes: axes.iter().map(|name| Axis::new(&name.to_string())).collect(),
+            axes: axes.iter().map(|name| ControllerAxis::new(&name.to_string())).collect(),
             program: (0, 0),
             program_path: String::new(),
             sequence: 0,
@@ -197,7 +197,7 @@ impl Controller {
             messages: Vec::new(),
             programs: Vec::new(),
             g_codes: BTreeMap::new(),
-            modal_words: Word::ALL.into_iter().map(|(word, _)| (word, zero)).collect(),
+            modal_words: BlockWord::ALL.into_iter().map(|(word, _)| (word, zero)).collect(),
             modal_groups: (0..=40).map(|group| (group, 0)).collect(),
             macros: (1..=33).chain(100..=199).chain(500..=999).map(|number| (number, None)).collect(),
             parameters: BTreeMap::new(),
@@ -221,7 +221,7 @@ impl Controller {
     /// The same with these axes in the place of its own; they stand at zero.
     #[must_use]
     pub fn with_axes(mut self, axes: &[impl ToString]) -> Self {
-        self.axes = axes.iter().map(|name| Axis::new(&name.to_string())).collect();
+        self.axes = axes.iter().map(|name| ControllerAxis::new(&name.to_string())).collect();
         self.opening.axes = u16::try_from(axes.len()).unwrap_or(0);
         self.system.axes = format!("{:02}", axes.len());
         self
@@ -264,7 +264,7 @@ impl Controller {
     }
 
     /// Puts modal words without decimals there.
-    pub fn modal(&mut self, words: impl IntoIterator<Item = (Word, i32)>) {
+    pub fn modal(&mut self, words: impl IntoIterator<Item = (BlockWord, i32)>) {
         self.modal_words.extend(words.into_iter().map(|(word, value)| (word, Number::decimal(value, 0))));
     }
 

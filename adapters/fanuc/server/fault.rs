@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// What happens to the next answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Fault {
+pub enum InjectedFault {
     /// Nothing.
     #[default]
     None,
@@ -32,7 +32,7 @@ pub enum Fault {
     PowerOff,
 }
 
-impl Fault {
+impl InjectedFault {
     /// The bytes as they are spoiled.
     #[must_use]
     pub(super) fn spoil(self, mut bytes: Vec<u8>) -> Vec<u8> {

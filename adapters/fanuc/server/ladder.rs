@@ -79,7 +79,7 @@ pub enum MailboxState {
 
 /// The rungs and what they remember.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Ladder {
+pub struct PmcLadder {
     /// The path whose signals it writes, from 1.
     pub path: u8,
     /// Area and first byte of the mailbox.
@@ -101,13 +101,13 @@ pub struct Ladder {
 /// The bytes of a path lie so far behind those of the one before.
 const PATH_STEP: u16 = 20;
 
-impl Default for Ladder {
+impl Default for PmcLadder {
     fn default() -> Self {
         Self::of_path(1)
     }
 }
 
-impl Ladder {
+impl PmcLadder {
     /// The rungs of a path from 1: R900 and so on for the first, R920 and so on for the second.
     #[must_use]
     pub fn of_path(path: u8) -> Self {
@@ -209,7 +209,7 @@ fn limited(percent: u8) -> u8 {
 mod tests {
     use super::*;
 
-    fn scans(ladder: &mut Ladder, memory: &mut Memory, from_ms: i64, to_ms: i64) -> u8 {
+    fn scans(ladder: &mut PmcLadder, memory: &mut Memory, from_ms: i64, to_ms: i64) -> u8 {
         let mut now_ns = from_ms * 1_000_000;
         while now_ns <= to_ms * 1_000_000 {
             ladder.scan(memory, now_ns);
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_wish_is_taken_limited_and_dropped_when_the_heartbeat_stops() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         assert_eq!(scans(&mut ladder, &mut memory, 0, 50), 100);
         ask(&mut memory, 80, 1);
         assert_eq!(scans(&mut ladder, &mut memory, 50, 100), 80);
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn the_dial_multiplies_and_is_sovereign_at_zero() {
         let rule = LadderRule::Product;
-        let (mut ladder, mut memory) = (Ladder { rule, ..Ladder::default() }, Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder { rule, ..PmcLadder::default() }, Memory::default());
         scans(&mut ladder, &mut memory, 0, 10);
         ask(&mut memory, 120, 1);
         ladder.dial = OverridePct::new(50).expect("exists");
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn nothing_is_above_the_dial_unless_the_maker_says_so() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         scans(&mut ladder, &mut memory, 0, 10);
         ladder.dial = OverridePct::new(80).expect("exists");
         assert_eq!(scans(&mut ladder, &mut memory, 20, 40), 80, "the dial alone");
@@ -264,11 +264,11 @@ mod tests {
 
     #[test]
     fn a_request_is_latched_once_until_it_is_acknowledged() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         memory.set(Area::R, 905, 1);
         scans(&mut ladder, &mut memory, 0, 20);
         assert_eq!(memory.byte(Area::R, 906), 0, "a leftover latches nothing");
-        let mut bits = |bits: u8, ladder: &mut Ladder| {
+        let mut bits = |bits: u8, ladder: &mut PmcLadder| {
             memory.set(Area::R, 905, bits);
             scans(ladder, &mut memory, 20, 40);
             (memory.byte(Area::R, 906), memory.byte(Area::G, 8))
@@ -284,14 +284,14 @@ mod tests {
 
     #[test]
     fn a_direct_write_is_taken_back_in_the_next_scan() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         memory.set(Area::G, 12, feed_override::encode(OverridePct::new(50).expect("exists")));
         assert_eq!(scans(&mut ladder, &mut memory, 0, 8), 100);
     }
 
     #[test]
     fn a_number_that_was_left_over_is_no_heartbeat() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         ask(&mut memory, 80, 7);
         assert_eq!(scans(&mut ladder, &mut memory, 0, 0), 100);
         assert_eq!(memory.byte(Area::R, 904), 2);
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn the_second_override_goes_to_its_own_byte() {
-        let (mut ladder, mut memory) = (Ladder::default(), Memory::default());
+        let (mut ladder, mut memory) = (PmcLadder::default(), Memory::default());
         memory.set(Area::R, 910, 70);
         assert_eq!(scans(&mut ladder, &mut memory, 0, 8), 100);
         assert_eq!(feed_override::decode(memory.byte(Area::G, 13)).percent(), 70);

@@ -2,8 +2,8 @@
 
 use super::answer::answer_body;
 use super::controller::Controller;
-use super::fault::Fault;
-use crate::fanuc::wire::{Frame, FrameKind, HEADER_LEN, Header, frame, requests};
+use super::fault::InjectedFault;
+use crate::fanuc::wire::{FocasFrame, FocasHeader, FrameKind, HEADER_LEN, frame, requests};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -11,12 +11,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// A control that is served.
-pub trait Served: Send {
+pub trait ServedControl: Send {
     /// Brings the values up to date and shows them; `None` while the control is switched off.
     fn now(&mut self) -> Option<&mut Controller>;
 }
 
-impl Served for Controller {
+impl ServedControl for Controller {
     fn now(&mut self) -> Option<&mut Controller> {
         Some(self)
     }
@@ -38,9 +38,9 @@ impl Default for ServerSettings {
 }
 
 struct Shared {
-    served: Mutex<Box<dyn Served>>,
+    served: Mutex<Box<dyn ServedControl>>,
     settings: ServerSettings,
-    fault: Mutex<Fault>,
+    fault: Mutex<InjectedFault>,
     stop: AtomicBool,
     sessions: AtomicUsize,
     opened: AtomicU64,
@@ -61,13 +61,17 @@ impl Server {
     ///
     /// # Errors
     /// The system gives no thread, or the listener is broken.
-    pub fn start(listener: TcpListener, served: Box<dyn Served>, settings: ServerSettings) -> std::io::Result<Self> {
+    pub fn start(
+        listener: TcpListener,
+        served: Box<dyn ServedControl>,
+        settings: ServerSettings,
+    ) -> std::io::Result<Self> {
         let address = listener.local_addr()?;
         listener.set_nonblocking(true)?;
         let shared = Arc::new(Shared {
             served: Mutex::new(served),
             settings,
-            fault: Mutex::new(Fault::None),
+            fault: Mutex::new(InjectedFault::None),
             stop: AtomicBool::new(false),
             sessions: AtomicUsize::new(0),
             opened: AtomicU64::new(0),
@@ -85,7 +89,7 @@ impl Server {
     }
 
     /// From now on this goes wrong.
-    pub fn fault(&self, fault: Fault) {
+    pub fn fault(&self, fault: InjectedFault) {
         *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = fault;
     }
 
@@ -132,18 +136,18 @@ fn begin(stream: TcpStream, shared: &Arc<Shared>) {
     let own = shared.clone();
     // Without a thread for it the connection is closed, which is what a busy controller does.
     let _no_thread = std::thread::Builder::new().name("focas-session".to_owned()).spawn(move || {
-        let mut session = Session { stream, shared: own, counted: false };
+        let mut session = ClientSession { stream, shared: own, counted: false };
         let _ended = session.run();
     });
 }
 
-struct Session {
+struct ClientSession {
     stream: TcpStream,
     shared: Arc<Shared>,
     counted: bool,
 }
 
-impl Drop for Session {
+impl Drop for ClientSession {
     fn drop(&mut self) {
         if self.counted {
             self.shared.sessions.fetch_sub(1, Ordering::SeqCst);
@@ -164,7 +168,7 @@ impl From<std::io::Error> for End {
     }
 }
 
-impl Session {
+impl ClientSession {
     fn run(&mut self) -> Result<(), End> {
         self.stream.set_nonblocking(false)?;
         self.stream.set_nodelay(true)?;
@@ -176,17 +180,17 @@ impl Session {
         }
     }
 
-    fn fault(&self) -> Fault {
+    fn fault(&self) -> InjectedFault {
         *self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn frame(&mut self) -> Result<Frame, End> {
+    fn frame(&mut self) -> Result<FocasFrame, End> {
         let mut head = [0; HEADER_LEN];
         self.fill(&mut head)?;
-        let header = Header::of(&head).map_err(|_| End::Closed)?;
+        let header = FocasHeader::of(&head).map_err(|_| End::Closed)?;
         let mut body = vec![0; header.body_len];
         self.fill(&mut body)?;
-        Ok(Frame { version: header.version, kind: header.kind, body })
+        Ok(FocasFrame { version: header.version, kind: header.kind, body })
     }
 
     fn fill(&mut self, mut buffer: &mut [u8]) -> Result<(), End> {
@@ -197,7 +201,7 @@ impl Session {
                 Ok(count) => buffer = &mut buffer[count..],
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                     waited += LOOK;
-                    let over = waited >= self.shared.settings.idle || self.fault() == Fault::PowerOff;
+                    let over = waited >= self.shared.settings.idle || self.fault() == InjectedFault::PowerOff;
                     if over || self.shared.stop.load(Ordering::SeqCst) {
                         return Err(End::Closed);
                     }
@@ -208,18 +212,18 @@ impl Session {
         Ok(())
     }
 
-    fn answer(&mut self, request: &Frame) -> Result<(), End> {
+    fn answer(&mut self, request: &FocasFrame) -> Result<(), End> {
         let fault = self.fault();
-        if fault == Fault::PowerOff {
+        if fault == InjectedFault::PowerOff {
             return Err(End::Closed);
         }
         let reply = self.reply(request)?;
         let opening = !matches!(request.kind, FrameKind::Request);
-        self.send(reply, if opening { Fault::None } else { fault })?;
+        self.send(reply, if opening { InjectedFault::None } else { fault })?;
         if matches!(request.kind, FrameKind::Close) { Err(End::Closed) } else { Ok(()) }
     }
 
-    fn reply(&mut self, request: &Frame) -> Result<Vec<u8>, End> {
+    fn reply(&mut self, request: &FocasFrame) -> Result<Vec<u8>, End> {
         let shared = self.shared.clone();
         let mut served = shared.served.lock().unwrap_or_else(PoisonError::into_inner);
         let controller = served.now().ok_or(End::Closed)?;
@@ -241,7 +245,7 @@ impl Session {
     }
 
     fn take_place(&mut self) -> bool {
-        if self.fault() == Fault::NoSession {
+        if self.fault() == InjectedFault::NoSession {
             return false;
         }
         let most = self.shared.settings.sessions_max;
@@ -251,19 +255,19 @@ impl Session {
         self.counted
     }
 
-    fn send(&mut self, bytes: Vec<u8>, fault: Fault) -> Result<(), End> {
+    fn send(&mut self, bytes: Vec<u8>, fault: InjectedFault) -> Result<(), End> {
         let bytes = fault.spoil(bytes);
         match fault {
-            Fault::Silence => Ok(()),
-            Fault::Reset => {
+            InjectedFault::Silence => Ok(()),
+            InjectedFault::Reset => {
                 self.stream.write_all(&bytes)?;
                 Err(End::Closed)
             }
-            Fault::ByteByByte(pause) => bytes.iter().try_for_each(|byte| {
+            InjectedFault::ByteByByte(pause) => bytes.iter().try_for_each(|byte| {
                 std::thread::sleep(pause);
                 self.stream.write_all(&[*byte]).map_err(End::from)
             }),
-            Fault::Delay(delay) => {
+            InjectedFault::Delay(delay) => {
                 std::thread::sleep(delay);
                 self.stream.write_all(&bytes).map_err(End::from)
             }

@@ -1,14 +1,14 @@
 //! The simulated machine behind a control.
 
 use super::controller::{Controller, Data};
-use super::ladder::{Ladder, SCAN_NS};
-use super::listen::Served;
+use super::ladder::{PmcLadder, SCAN_NS};
+use super::listen::ServedControl;
 use super::{screen, second_path};
 use crate::address::SimulatedMachine;
 use crate::clock::{Clock, TimeNs};
 use crate::driver::{Actuator, LadderRequest, LadderRule};
 use crate::fanuc::answer::{Alarm, Status};
-use crate::fanuc::item::{Area, Word};
+use crate::fanuc::item::{Area, BlockWord};
 use crate::fanuc::wire::Number;
 use crate::simulated::{Moment, Panel, Simulated};
 use crate::units::OverridePct;
@@ -23,9 +23,9 @@ pub struct SimulatedControl {
     machine: Simulated,
     clock: Arc<dyn Clock>,
     controller: Controller,
-    ladder: Ladder,
+    ladder: PmcLadder,
     /// The rungs of the further paths.
-    further: Vec<Ladder>,
+    further: Vec<PmcLadder>,
     scanned_ns: TimeNs,
     written: OverridePct,
     requests: [Requested; 2],
@@ -56,7 +56,7 @@ impl SimulatedControl {
         controller.parameters.insert(3115, Data { kind: 0, values: vec![Number::decimal(0, 0); axes.len()] });
         screen::parameters(&mut controller);
         let scanned_ns = clock.now_ns();
-        let (ladder, written) = (Ladder::default(), OverridePct::FULL);
+        let (ladder, written) = (PmcLadder::default(), OverridePct::FULL);
         let requests = LadderRequest::ALL.map(|request| Requested { request, told: false, stood: false });
         let further = Vec::new();
         Self { machine, clock, controller, ladder, further, scanned_ns, written, requests }
@@ -71,7 +71,7 @@ impl SimulatedControl {
             control.measure_in_inches(false);
             screen::parameters(control);
         }
-        let mut ladder = Ladder::of_path(2);
+        let mut ladder = PmcLadder::of_path(2);
         (ladder.dial, ladder.rule) = (self.ladder.dial, self.ladder.rule);
         self.further = vec![ladder];
         self
@@ -85,7 +85,7 @@ impl SimulatedControl {
     }
 
     /// The rungs of every path.
-    fn every(&mut self) -> impl Iterator<Item = &mut Ladder> {
+    fn every(&mut self) -> impl Iterator<Item = &mut PmcLadder> {
         std::iter::once(&mut self.ladder).chain(&mut self.further)
     }
 
@@ -130,13 +130,13 @@ impl SimulatedControl {
     }
 }
 
-impl Served for SimulatedControl {
+impl ServedControl for SimulatedControl {
     fn now(&mut self) -> Option<&mut Controller> {
         let now_ns = self.clock.now_ns();
         let moment = self.machine.moment(now_ns);
         if !moment.panel.booted {
             self.controller.memory.power_off();
-            self.every().for_each(Ladder::power_off);
+            self.every().for_each(PmcLadder::power_off);
             self.scanned_ns = now_ns;
             return None;
         }
@@ -165,9 +165,9 @@ fn show(control: &mut Controller, moment: &Moment) {
     control.program_path = format!("//CNC_MEM/USER/PATH1/O{:04}", panel.program);
     control.sequence = i32::from(panel.block);
     control.executed = (i32::from(panel.block), format!("N{} F{:.0}\n%", panel.block, panel.feed_programmed_mm_min));
-    let modal = [(Word::F, panel.feed_programmed_mm_min), (Word::S, panel.spindle_programmed_rpm.abs())];
+    let modal = [(BlockWord::F, panel.feed_programmed_mm_min), (BlockWord::S, panel.spindle_programmed_rpm.abs())];
     control.modal_words.extend(modal.map(|(word, value)| (word, whole(value))));
-    control.modal([(Word::T, i32::from(panel.tool))]);
+    control.modal([(BlockWord::T, i32::from(panel.tool))]);
     let parts = i32::try_from(panel.part_count).unwrap_or(i32::MAX);
     control.parameters.insert(6711, Data { kind: 3, values: vec![Number::decimal(parts, 0)] });
     control.diagnosis(403, 1, whole(moment.electric.motor_temperature_c));

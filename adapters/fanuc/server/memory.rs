@@ -1,6 +1,6 @@
 //! PMC memory: areas of bytes, numbers in them little-endian.
 
-use crate::fanuc::item::{Area, Stretch, Width};
+use crate::fanuc::item::{Area, PmcWidth, Stretch};
 use std::collections::BTreeMap;
 
 /// Bytes of each area. The signals of path 2 begin at G1000 and F1000, those of path 3 at 2000.
@@ -83,6 +83,6 @@ impl Memory {
     }
 }
 
-fn swapped(bytes: &[u8], width: Width) -> Vec<u8> {
+fn swapped(bytes: &[u8], width: PmcWidth) -> Vec<u8> {
     bytes.chunks(usize::from(width.bytes())).flat_map(|element| element.iter().rev().copied()).collect()
 }

@@ -3,7 +3,7 @@
 use super::answer::{Data8, NUMBER};
 use super::controller::Controller;
 use super::encode::{long, longs, shorts, text};
-use crate::fanuc::answer::{Alarm, Message, PastAlarm};
+use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm};
 use crate::fanuc::request::{ALARM_TEXT_LEN, HISTORY_TEXT_LEN, MESSAGE_TEXT_LEN};
 
 /// At most so many records in one answer.
@@ -37,12 +37,16 @@ pub(super) fn history(controller: &Controller, first: i32, last: i32) -> Data8 {
 
 /// Messages to the operator: all of them, or those of one kind.
 pub(super) fn messages(controller: &Controller, kind: i32, most: usize) -> Vec<u8> {
-    let record = |message: &Message| {
+    let record = |message: &OperatorMessage| {
         let told = long(message.text.len().min(MESSAGE_TEXT_LEN));
         [longs(&[message.number, message.kind, told]), text(&message.text, MESSAGE_TEXT_LEN)].concat()
     };
     let wanted = controller.messages.iter().filter(|message| kind == -1 || message.kind == kind);
     let found: Vec<u8> = wanted.take(most.min(RECORDS_MAX)).flat_map(record).collect();
     // A client that asks for one kind wants to hear that there is none of it.
-    if found.is_empty() { record(&Message { number: -1, kind: kind.max(0), text: String::new() }) } else { found }
+    if found.is_empty() {
+        record(&OperatorMessage { number: -1, kind: kind.max(0), text: String::new() })
+    } else {
+        found
+    }
 }

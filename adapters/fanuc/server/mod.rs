@@ -33,8 +33,8 @@ mod tool;
 mod write;
 
 pub use answer::answer_body;
-pub use controller::{Axis, Controller, Data, ProgramFile, SpindleState, ToolGroup};
-pub use fault::Fault;
-pub use listen::{Served, Server, ServerSettings};
+pub use controller::{Controller, ControllerAxis, Data, ProgramFile, SpindleState, ToolGroup};
+pub use fault::InjectedFault;
+pub use listen::{ServedControl, Server, ServerSettings};
 pub use machine::SimulatedControl;
 pub use memory::Memory;

@@ -3,7 +3,7 @@
 use super::answer::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ProgramFile};
 use super::encode::{long, longs, shorts, text};
-use crate::fanuc::item::Word;
+use crate::fanuc::item::BlockWord;
 use crate::fanuc::wire::{Number, Request};
 
 /// The folder that older clients and the library mean when they name none.
@@ -66,7 +66,7 @@ pub(super) fn folder(controller: &Controller, request: &Request) -> Data8 {
 }
 
 pub(super) fn modal_word(controller: &Controller, number: i32) -> Data8 {
-    let word = Word::of_number(number).ok_or(NUMBER)?;
+    let word = BlockWord::of_number(number).ok_or(NUMBER)?;
     let value = controller.modal_words.get(&word).ok_or(NUMBER)?;
     let places = u8::try_from(value.exponent).unwrap_or(0) & 0x07;
     Ok([&longs(&[value.mantissa])[..], &[0x40, places, 0, 0]].concat())
@@ -95,12 +95,14 @@ pub(super) fn g_codes(controller: &Controller, group: i32) -> Data8 {
 
 /// Words of the block: letter, number of the M, flags, value, places. `which` counts the letters from A.
 pub(super) fn commands(controller: &Controller, which: i32) -> Data8 {
-    let letter = |word: Word| format!("{word:?}").bytes().next().unwrap_or(b'?');
-    let is_wanted = |word: Word| which == -1 || i32::from(letter(word) - b'A') == which;
+    let letter = |word: BlockWord| format!("{word:?}").bytes().next().unwrap_or(b'?');
+    let is_wanted = |word: BlockWord| which == -1 || i32::from(letter(word) - b'A') == which;
     let words = controller.modal_words.iter().filter(|(word, value)| {
-        !matches!(word, Word::Unused14 | Word::Unused15) && is_wanted(**word) && (which != -1 || value.mantissa != 0)
+        !matches!(word, BlockWord::Unused14 | BlockWord::Unused15)
+            && is_wanted(**word)
+            && (which != -1 || value.mantissa != 0)
     });
-    let record = |(word, value): (&Word, &Number)| {
+    let record = |(word, value): (&BlockWord, &Number)| {
         let head = vec![letter(*word), 0, 0, 1];
         [head, longs(&[value.mantissa, i32::from(value.exponent)])].concat()
     };

@@ -4,8 +4,8 @@
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
 use super::machine::whole;
 use crate::clock::TimeNs;
-use crate::fanuc::answer::{Alarm, Message, PastAlarm, SpeedUnit};
-use crate::fanuc::item::Word;
+use crate::fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};
+use crate::fanuc::item::BlockWord;
 use crate::fanuc::wire::Number;
 use crate::simulated::{Moment, Panel};
 use crate::words::execution;
@@ -64,7 +64,7 @@ pub(super) fn show(control: &mut Controller, moment: &Moment, now_ns: TimeNs) {
         control.clock = clock;
     }
     let turning = panel.spindle_speed_rpm.abs() > 1.0;
-    control.modal([(Word::M, if turning { 3 } else { 5 }), (Word::H, i32::from(panel.tool))]);
+    control.modal([(BlockWord::M, if turning { 3 } else { 5 }), (BlockWord::H, i32::from(panel.tool))]);
     control.g_codes.insert(0, Number::decimal(i32::from(!panel.rapid), 0));
     control.parameter(6712, LONG, whole(f64::from(panel.part_count)));
     temperatures(control, moment);
@@ -134,7 +134,11 @@ fn tools(control: &mut Controller, panel: &Panel) {
 fn messages(control: &mut Controller, panel: &Panel) {
     control.messages.clear();
     if panel.part_count > 0 && panel.part_count.is_multiple_of(BOX_OF_PARTS) {
-        control.messages.push(Message { number: PARTS_MESSAGE, kind: 0, text: "CHANGE THE BOX OF PARTS".to_owned() });
+        control.messages.push(OperatorMessage {
+            number: PARTS_MESSAGE,
+            kind: 0,
+            text: "CHANGE THE BOX OF PARTS".to_owned(),
+        });
     }
     let known = control.alarm_history.last().is_some_and(|past| past.alarm.text == panel.alarm);
     if panel.execution != execution::ACTIVE && !panel.alarm.is_empty() && !known {

@@ -3,11 +3,11 @@
 //! first path it waits for it, and its operator acknowledges what its ladder has latched.
 
 use super::controller::Controller;
-use super::ladder::Ladder;
+use super::ladder::PmcLadder;
 use super::machine::{status, whole};
 use super::memory::Memory;
 use crate::driver::LadderRequest;
-use crate::fanuc::item::{Area, Word};
+use crate::fanuc::item::{Area, BlockWord};
 use crate::fanuc::poll::signal;
 use crate::fanuc::wire::Number;
 use crate::simulated::Moment;
@@ -22,7 +22,7 @@ const FULL: u8 = 100;
 const SPINDLE_AT: u16 = 30;
 
 /// The moment on the screen of a path from 2.
-pub(super) fn show(control: &mut Controller, memory: &mut Memory, ladder: &mut Ladder, moment: &Moment) {
+pub(super) fn show(control: &mut Controller, memory: &mut Memory, ladder: &mut PmcLadder, moment: &Moment) {
     let (panel, path) = (&moment.panel, ladder.path);
     let first_cuts = panel.feed_mm_min > 0.0 && !panel.rapid;
     if !first_cuts {
@@ -45,9 +45,10 @@ pub(super) fn show(control: &mut Controller, memory: &mut Memory, ladder: &mut L
     }
     let program = i32::from(panel.program) + PROGRAM_STEP * (i32::from(path) - 1);
     (control.program, control.sequence) = ((program, program), i32::from(panel.block));
-    let modal = [(Word::F, panel.feed_programmed_mm_min / 2.0), (Word::S, panel.spindle_programmed_rpm.abs() / 2.0)];
+    let modal =
+        [(BlockWord::F, panel.feed_programmed_mm_min / 2.0), (BlockWord::S, panel.spindle_programmed_rpm.abs() / 2.0)];
     control.modal_words.extend(modal.map(|(word, value)| (word, whole(value))));
-    control.modal([(Word::T, 20 + i32::from(panel.tool))]);
+    control.modal([(BlockWord::T, 20 + i32::from(panel.tool))]);
     // Half the speed at half the load.
     let power = whole(moment.truth.spindle_power_w / 40.0).mantissa.saturating_mul(10);
     control.diagnosis(4902, 2, Number::decimal(power, 0));

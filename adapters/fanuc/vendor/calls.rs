@@ -1,15 +1,15 @@
 //! Items as calls of the library, and the structures that it fills in as answers.
 
-use super::child::{Session, pmc_words};
+use super::child::{FocasSession, pmc_words};
 use super::layout::{
     LONG_LEN, LoadElm, MAX_AXIS, ODBDY2_ALL_LEN, OdbAct, OdbAlmMsg2, OdbAxDt, OdbExePrg, OdbM, OdbPro, OdbSeq,
     OdbSpLoad, OdbSpn, OdbSt, OdbSys, PMC_HEAD_LEN, SpeedElm, ZOFS_LEN,
 };
 use super::structure::{Bytes, POSITION_PLACES, checked, decimal, filled};
 use crate::child::Guarded;
-use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Refusal, SpeedUnit, Status, System};
-use crate::fanuc::code::ReturnCode;
-use crate::fanuc::item::{Item, Servo, Spindle, Stretch, Width, Word};
+use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
+use crate::fanuc::code::FocasReturnCode;
+use crate::fanuc::item::{BlockWord, FocasItem, PmcWidth, Servo, Spindle, Stretch};
 use std::mem::{offset_of, size_of};
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.
@@ -23,93 +23,93 @@ fn count(found: i16, most: usize) -> usize {
     usize::try_from(found).unwrap_or(0).min(most)
 }
 
-impl Session {
-    pub(super) fn read(&mut self, item: Item) -> ItemResult {
+impl FocasSession {
+    pub(super) fn read(&mut self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
-            Item::System => self.system().map(Answer::System),
-            Item::Status => self.status().map(Answer::Status),
-            Item::Feed => filled(size_of::<OdbAct>(), |out| f.cnc_actf(h, out)).map(|bytes| act(&bytes)),
-            Item::SpindleSpeed => filled(size_of::<OdbAct>(), |out| f.cnc_acts(h, out)).map(|bytes| act(&bytes)),
-            Item::Spindles(Spindle::Load) => self.spindle_meter(0, 0),
-            Item::Spindles(Spindle::MotorSpeed) => self.spindle_meter(1, size_of::<LoadElm>()),
-            Item::Spindles(Spindle::Gear) => {
+            FocasItem::System => self.system().map(FocasAnswer::System),
+            FocasItem::Status => self.status().map(FocasAnswer::Status),
+            FocasItem::Feed => filled(size_of::<OdbAct>(), |out| f.cnc_actf(h, out)).map(|bytes| act(&bytes)),
+            FocasItem::SpindleSpeed => filled(size_of::<OdbAct>(), |out| f.cnc_acts(h, out)).map(|bytes| act(&bytes)),
+            FocasItem::Spindles(Spindle::Load) => self.spindle_meter(0, 0),
+            FocasItem::Spindles(Spindle::MotorSpeed) => self.spindle_meter(1, size_of::<LoadElm>()),
+            FocasItem::Spindles(Spindle::Gear) => {
                 let bytes = filled(size_of::<OdbSpn>(), |out| f.cnc_rdspgear(h, -1, out))?;
                 let gear = bytes.i16(offset_of!(OdbSpn, data));
-                Ok(Answer::Numbers(vec![Some(f64::from(gear))]))
+                Ok(FocasAnswer::Numbers(vec![Some(f64::from(gear))]))
             }
-            Item::Servos(Servo::Load) => self.servo_meter().map(|(_, loads)| Answer::Numbers(loads)),
-            Item::AxisNames => self.servo_meter().map(|(names, _)| Answer::Names(names)),
-            Item::Servos(Servo::Current) => self.servo_current(),
-            Item::Program | Item::ProgramName | Item::Sequence => self.program(item),
-            Item::AlarmBits => {
+            FocasItem::Servos(Servo::Load) => self.servo_meter().map(|(_, loads)| FocasAnswer::Numbers(loads)),
+            FocasItem::AxisNames => self.servo_meter().map(|(names, _)| FocasAnswer::Names(names)),
+            FocasItem::Servos(Servo::Current) => self.servo_current(),
+            FocasItem::Program | FocasItem::ProgramName | FocasItem::Sequence => self.program(item),
+            FocasItem::AlarmBits => {
                 let mut bits = 0;
-                checked(f.cnc_alarm2(h, &mut bits)).map(|()| Answer::Whole(bits))
+                checked(f.cnc_alarm2(h, &mut bits)).map(|()| FocasAnswer::Whole(bits))
             }
-            Item::Alarms(most) => self.alarms(most.min(COUNT_MAX)),
-            Item::ModalWord(word) => self.modal(word),
-            Item::ModalGroup(group @ 0..) => {
+            FocasItem::Alarms(most) => self.alarms(most.min(COUNT_MAX)),
+            FocasItem::ModalWord(word) => self.modal(word),
+            FocasItem::ModalGroup(group @ 0..) => {
                 let bytes = filled(LONG_LEN, |out| f.cnc_modal(h, group, 0, out))?;
-                Ok(Answer::Groups(vec![bytes.array::<1>(4)[0]]))
+                Ok(FocasAnswer::Groups(vec![bytes.array::<1>(4)[0]]))
             }
-            Item::Macro(number) => self.variable(number),
-            Item::Parameter(..) | Item::Diagnosis(..) => self.data(item),
-            Item::Timer(timer) => {
+            FocasItem::Macro(number) => self.variable(number),
+            FocasItem::Parameter(..) | FocasItem::Diagnosis(..) => self.data(item),
+            FocasItem::Timer(timer) => {
                 let which = i16::try_from(timer.number()).unwrap_or(0);
                 let bytes = filled(8, |out| f.cnc_rdtimer(h, which, out))?;
-                Ok(Answer::Time { minutes: bytes.i32(0), milliseconds: bytes.i32(4) })
+                Ok(FocasAnswer::Time { minutes: bytes.i32(0), milliseconds: bytes.i32(4) })
             }
-            Item::ToolOffset(number, kind) => {
+            FocasItem::ToolOffset(number, kind) => {
                 let short = |number: u16| i16::try_from(number).unwrap_or(i16::MAX);
                 let bytes = filled(8, |out| f.cnc_rdtofs(h, short(number), short(kind), 8, out))?;
-                Ok(Answer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
+                Ok(FocasAnswer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
             }
-            Item::ExecutedText(_) | Item::Messages(_) | Item::GCodes => self.text(item),
-            Item::HistoryCount | Item::AlarmHistory(..) => self.history(item),
-            Item::ToolGroup | Item::ToolLife(_) => self.tool_life(item),
-            Item::Spindles(Spindle::Speed) => {
+            FocasItem::ExecutedText(_) | FocasItem::Messages(_) | FocasItem::GCodes => self.text(item),
+            FocasItem::HistoryCount | FocasItem::AlarmHistory(..) => self.history(item),
+            FocasItem::ToolGroup | FocasItem::ToolLife(_) => self.tool_life(item),
+            FocasItem::Spindles(Spindle::Speed) => {
                 // The call does not say how many spindles there are.
                 let mut found = 8;
                 filled(4 * 8, |out| f.cnc_rdspdlname(h, &mut found, out))?;
                 let bytes = filled(36, |out| f.cnc_acts2(h, -1, out))?;
                 let speed = |at: usize| Some(f64::from(bytes.i32(4 + 4 * at)));
-                Ok(Answer::Numbers((0..count(found, 8)).map(speed).collect()))
+                Ok(FocasAnswer::Numbers((0..count(found, 8)).map(speed).collect()))
             }
-            Item::Pmc(stretch) => self.memory(stretch),
-            Item::WorkOffset(number, axis) => {
+            FocasItem::Pmc(stretch) => self.memory(stretch),
+            FocasItem::WorkOffset(number, axis) => {
                 let number = i16::try_from(number).unwrap_or(i16::MAX);
                 let bytes = filled(ZOFS_LEN, |out| f.cnc_rdzofs(h, number, axis, 8, out))?;
-                Ok(Answer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
+                Ok(FocasAnswer::Number(decimal(bytes.i32(4), POSITION_PLACES)))
             }
-            _ => Err(ItemError::NotOffered),
+            _ => Err(FocasItemError::NotOffered),
         }
     }
 
-    fn program(&self, item: Item) -> ItemResult {
+    fn program(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
-            Item::Program => {
+            FocasItem::Program => {
                 let bytes = filled(size_of::<OdbPro>(), |out| f.cnc_rdprgnum(h, out))?;
                 let number = |at| i32::from(bytes.i16(at));
-                Ok(Answer::Program {
+                Ok(FocasAnswer::Program {
                     running: number(offset_of!(OdbPro, data)),
                     main: number(offset_of!(OdbPro, mdata)),
                 })
             }
-            Item::ProgramName => {
+            FocasItem::ProgramName => {
                 let bytes = filled(size_of::<OdbExePrg>(), |out| f.cnc_exeprgname(h, out))?;
                 let (number, name) = (bytes.i32(offset_of!(OdbExePrg, o_num)), bytes.text(0, 36));
-                Ok(Answer::Named { number, name })
+                Ok(FocasAnswer::Named { number, name })
             }
-            Item::Sequence => {
+            FocasItem::Sequence => {
                 let bytes = filled(size_of::<OdbSeq>(), |out| f.cnc_rdseqnum(h, out))?;
-                Ok(Answer::Whole(bytes.i32(offset_of!(OdbSeq, data))))
+                Ok(FocasAnswer::Whole(bytes.i32(offset_of!(OdbSeq, data))))
             }
-            _ => Err(ItemError::NotOffered),
+            _ => Err(FocasItemError::NotOffered),
         }
     }
 
-    pub(super) fn system(&self) -> Result<System, ItemError> {
+    pub(super) fn system(&self) -> Result<System, FocasItemError> {
         let bytes = filled(size_of::<OdbSys>(), |out| self.functions.cnc_sysinfo(self.handle, out))?;
         Ok(System {
             additional: bytes.i16(offset_of!(OdbSys, addinfo)),
@@ -122,7 +122,7 @@ impl Session {
         })
     }
 
-    fn status(&self) -> Result<Status, ItemError> {
+    fn status(&self) -> Result<Status, FocasItemError> {
         let bytes = filled(size_of::<OdbSt>(), |out| self.functions.cnc_statinfo(self.handle, out))?;
         Ok(Status {
             automatic: bytes.i16(offset_of!(OdbSt, aut)),
@@ -136,15 +136,15 @@ impl Session {
     }
 
     /// Load or speed; the half that was not asked for is not written.
-    fn spindle_meter(&self, kind: i16, offset: usize) -> ItemResult {
+    fn spindle_meter(&self, kind: i16, offset: usize) -> FocasItemResult {
         let mut found = 4;
         let length = size_of::<OdbSpLoad>() * 4;
         let bytes = filled(length, |out| self.functions.cnc_rdspmeter(self.handle, kind, &mut found, out))?;
         let at = |spindle| spindle * size_of::<OdbSpLoad>() + offset;
-        Ok(Answer::Numbers((0..count(found, 4)).map(|spindle| bytes.element(at(spindle))).collect()))
+        Ok(FocasAnswer::Numbers((0..count(found, 4)).map(|spindle| bytes.element(at(spindle))).collect()))
     }
 
-    fn servo_meter(&self) -> Result<(Vec<String>, Vec<Option<f64>>), ItemError> {
+    fn servo_meter(&self) -> Result<(Vec<String>, Vec<Option<f64>>), FocasItemError> {
         let mut found = i16::try_from(MAX_AXIS).unwrap_or(32);
         let length = size_of::<LoadElm>() * MAX_AXIS;
         let bytes = filled(length, |out| self.functions.cnc_rdsvmeter(self.handle, &mut found, out))?;
@@ -155,7 +155,7 @@ impl Session {
     }
 
     /// Class 2 (axis drives), type 2 (current in amperes).
-    fn servo_current(&self) -> ItemResult {
+    fn servo_current(&self) -> FocasItemResult {
         let (mut kind, mut found) = (2, i16::try_from(MAX_AXIS).unwrap_or(32));
         let length = size_of::<OdbAxDt>() * MAX_AXIS;
         let call = |out: &mut Guarded| self.functions.cnc_rdaxisdata(self.handle, 2, &mut kind, 1, &mut found, out);
@@ -164,10 +164,10 @@ impl Session {
             let at = axis * size_of::<OdbAxDt>();
             decimal(bytes.i32(at + offset_of!(OdbAxDt, data)), bytes.i16(at + offset_of!(OdbAxDt, dec)))
         };
-        Ok(Answer::Numbers((0..count(found, MAX_AXIS)).map(value).collect()))
+        Ok(FocasAnswer::Numbers((0..count(found, MAX_AXIS)).map(value).collect()))
     }
 
-    fn alarms(&self, most: u16) -> ItemResult {
+    fn alarms(&self, most: u16) -> FocasItemResult {
         let mut found = i16::try_from(most).unwrap_or(8);
         let length = size_of::<OdbAlmMsg2>() * usize::from(most);
         let bytes = filled(length, |out| self.functions.cnc_rdalmmsg2(self.handle, -1, &mut found, out))?;
@@ -181,11 +181,11 @@ impl Session {
                 text: bytes.text(at + offset_of!(OdbAlmMsg2, alm_msg), length),
             }
         };
-        Ok(Answer::Alarms((0..count(found, usize::from(most))).map(alarm).collect()))
+        Ok(FocasAnswer::Alarms((0..count(found, usize::from(most))).map(alarm).collect()))
     }
 
     /// Feed with its decimals and its unit, once per poll.
-    pub(super) fn feed_with_unit(&mut self) -> Result<(Option<f64>, SpeedUnit), ItemError> {
+    pub(super) fn feed_with_unit(&mut self) -> Result<(Option<f64>, SpeedUnit), FocasItemError> {
         if let Some(known) = self.speed {
             return Ok(known);
         }
@@ -197,47 +197,47 @@ impl Session {
         Ok(found)
     }
 
-    fn modal(&self, word: Word) -> ItemResult {
-        let number = word.number_in_library().ok_or(ItemError::NotOffered)?;
+    fn modal(&self, word: BlockWord) -> FocasItemResult {
+        let number = word.number_in_library().ok_or(FocasItemError::NotOffered)?;
         let bytes = filled(LONG_LEN, |out| self.functions.cnc_modal(self.handle, number, 0, out))?;
         let [first, second] = bytes.array(8);
-        Ok(Answer::Modal { value: bytes.i32(4), flags: [first, second] })
+        Ok(FocasAnswer::Modal { value: bytes.i32(4), flags: [first, second] })
     }
 
-    pub(super) fn every_axis(&self) -> Result<Bytes, ItemError> {
+    pub(super) fn every_axis(&self) -> Result<Bytes, FocasItemError> {
         let length = i16::try_from(ODBDY2_ALL_LEN).unwrap_or(540);
         filled(ODBDY2_ALL_LEN, |out| self.functions.cnc_rddynamic2(self.handle, -1, length, out))
     }
 
     /// Places after the point of the positions of every axis: three in millimetres, four in inches on most machines.
-    pub(super) fn figures(&self) -> Result<Vec<i16>, ItemError> {
+    pub(super) fn figures(&self) -> Result<Vec<i16>, FocasItemError> {
         let (mut found, mut entered) = (i16::try_from(MAX_AXIS).unwrap_or(32), Guarded::new(2 * MAX_AXIS));
         let call = |out: &mut Guarded| self.functions.cnc_getfigure(self.handle, 0, &mut found, &mut entered, out);
         let bytes = filled(2 * MAX_AXIS, call)?;
         Ok((0..count(found, MAX_AXIS)).map(|axis| bytes.i16(2 * axis)).collect())
     }
 
-    fn variable(&self, number: u16) -> ItemResult {
-        let number = i16::try_from(number).map_err(|_| ItemError::NotOffered)?;
+    fn variable(&self, number: u16) -> FocasItemResult {
+        let number = i16::try_from(number).map_err(|_| FocasItemError::NotOffered)?;
         let bytes = filled(size_of::<OdbM>(), |out| self.functions.cnc_rdmacro(self.handle, number, 10, out))?;
         let (value, places) = (bytes.i32(offset_of!(OdbM, mcr_val)), bytes.i16(offset_of!(OdbM, dec_val)));
-        Ok(Answer::Number(decimal(value, places)))
+        Ok(FocasAnswer::Number(decimal(value, places)))
     }
 
     /// A parameter or a diagnosis number, of no axis, of one or of all. Its size is found out once.
-    fn data(&mut self, item: Item) -> ItemResult {
+    fn data(&mut self, item: FocasItem) -> FocasItemResult {
         let (number, axis) = match item {
-            Item::Parameter(number, axis) | Item::Diagnosis(number, axis) => (number, axis),
-            _ => return Err(ItemError::NotOffered),
+            FocasItem::Parameter(number, axis) | FocasItem::Diagnosis(number, axis) => (number, axis),
+            _ => return Err(FocasItemError::NotOffered),
         };
-        let number = i16::try_from(number).map_err(|_| ItemError::NotOffered)?;
+        let number = i16::try_from(number).map_err(|_| FocasItemError::NotOffered)?;
         let places = if axis == -1 { MAX_AXIS } else { 1 };
         let known = self.sizes.get(&item).copied();
         for size in SIZES.into_iter().filter(|size| known.is_none_or(|known| known == *size)) {
             let length = i16::try_from(4 + size * places).unwrap_or(i16::MAX);
             let (f, h) = (&self.functions, self.handle);
             let found = filled(4 + 8 * MAX_AXIS, |out| match item {
-                Item::Parameter(..) => f.cnc_rdparam(h, number, axis, length, out),
+                FocasItem::Parameter(..) => f.cnc_rdparam(h, number, axis, length, out),
                 _ => f.cnc_diagnoss(h, number, axis, length, out),
             });
             match found {
@@ -245,29 +245,29 @@ impl Session {
                     self.sizes.insert(item, size);
                     let count = if axis == -1 { self.axes_max } else { 1 };
                     let values = (0..count).map(|at| sized(&bytes, 4 + at * size, size)).collect();
-                    return Ok(Answer::Data { kind: i16::try_from(size).unwrap_or(0), values });
+                    return Ok(FocasAnswer::Data { kind: i16::try_from(size).unwrap_or(0), values });
                 }
-                Err(ItemError::Refused(refusal)) if refusal.code == ReturnCode::LENGTH => {}
+                Err(FocasItemError::Refused(refusal)) if refusal.code == FocasReturnCode::LENGTH => {}
                 Err(error) => return Err(error),
             }
         }
-        Err(ItemError::Refused(Refusal { code: ReturnCode::LENGTH, detail: 0 }))
+        Err(FocasItemError::Refused(Refusal { code: FocasReturnCode::LENGTH, detail: 0 }))
     }
 
-    fn memory(&self, stretch: Stretch) -> ItemResult {
+    fn memory(&self, stretch: Stretch) -> FocasItemResult {
         let total = PMC_HEAD_LEN + stretch.len();
-        let length = u16::try_from(total).map_err(|_| ItemError::NotOffered)?;
+        let length = u16::try_from(total).map_err(|_| FocasItemError::NotOffered)?;
         let (area, width) = pmc_words(stretch);
         let (from, to) = (stretch.from, stretch.to);
         let call = |out: &mut Guarded| self.functions.pmc_rdpmcrng(self.handle, area, width, from, to, length, out);
         let bytes = filled(total, call)?;
         let step = usize::from(stretch.width.bytes());
         let element = |at: usize| match stretch.width {
-            Width::Byte => i32::from(bytes.array::<1>(at)[0]),
-            Width::Word => i32::from(bytes.i16(at)),
-            Width::Long => bytes.i32(at),
+            PmcWidth::Byte => i32::from(bytes.array::<1>(at)[0]),
+            PmcWidth::Word => i32::from(bytes.i16(at)),
+            PmcWidth::Long => bytes.i32(at),
         };
-        Ok(Answer::Memory((PMC_HEAD_LEN..total).step_by(step).map(element).collect()))
+        Ok(FocasAnswer::Memory((PMC_HEAD_LEN..total).step_by(step).map(element).collect()))
     }
 }
 
@@ -281,6 +281,6 @@ fn sized(bytes: &Bytes, at: usize, size: usize) -> Option<f64> {
     }
 }
 
-fn act(bytes: &Bytes) -> Answer {
-    Answer::Number(Some(f64::from(bytes.i32(offset_of!(OdbAct, data)))))
+fn act(bytes: &Bytes) -> FocasAnswer {
+    FocasAnswer::Number(Some(f64::from(bytes.i32(offset_of!(OdbAct, data)))))
 }

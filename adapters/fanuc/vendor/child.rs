@@ -3,12 +3,12 @@
 use super::dynamic;
 use super::ffi::Functions;
 use super::layout::{MAX_AXIS, ZOFS_LEN};
-use super::message::{Ask, Tell};
+use super::message::{FocasReply, FocasRequest};
 use super::structure::{Bytes, checked};
 use crate::child::{Guarded, Missing, serve_words};
-use crate::fanuc::answer::{Answer, ItemError, ItemResult, SpeedUnit};
-use crate::fanuc::code::{Consequence, ReturnCode};
-use crate::fanuc::item::{Item, Question, Stretch, Write};
+use crate::fanuc::answer::{FocasAnswer, FocasItemError, FocasItemResult, SpeedUnit};
+use crate::fanuc::code::{Consequence, FocasReturnCode};
+use crate::fanuc::item::{FocasItem, Question, Stretch, Write};
 use crate::fanuc::opening::{Generation, Opening};
 use crate::reading::Absence;
 use std::collections::HashMap;
@@ -20,38 +20,38 @@ use std::path::Path;
 /// # Errors
 /// The line to the parent failed.
 pub fn child() -> std::io::Result<()> {
-    let mut session: Option<Session> = None;
-    serve_words(|ask: Result<Ask, String>, tell| match (ask, &mut session) {
-        (Ok(Ask::Read(questions)), Some(session)) => session.read_each(&questions, tell),
+    let mut session: Option<FocasSession> = None;
+    serve_words(|ask: Result<FocasRequest, String>, tell| match (ask, &mut session) {
+        (Ok(FocasRequest::Read(questions)), Some(session)) => session.read_each(&questions, tell),
         (Ok(ask), _) => tell(&answer(&mut session, ask)),
-        (Err(confused), _) => tell(&Tell::Confused(confused)),
+        (Err(confused), _) => tell(&FocasReply::Confused(confused)),
     })
 }
 
-fn answer(session: &mut Option<Session>, ask: Ask) -> Tell {
-    if let Ask::Open { vendor_library, host, port, path, timeout_s } = ask {
+fn answer(session: &mut Option<FocasSession>, ask: FocasRequest) -> FocasReply {
+    if let FocasRequest::Open { vendor_library, host, port, path, timeout_s } = ask {
         *session = None;
-        return match Session::open(&vendor_library, &host, port, path, timeout_s) {
+        return match FocasSession::open(&vendor_library, &host, port, path, timeout_s) {
             Ok((opened, opening)) => {
                 *session = Some(opened);
-                Tell::Opened(opening)
+                FocasReply::Opened(opening)
             }
             Err(told) => *told,
         };
     }
-    let Some(session) = session else { return Tell::Confused("there is no connection".to_owned()) };
+    let Some(session) = session else { return FocasReply::Confused("there is no connection".to_owned()) };
     match ask {
-        Ask::Write(write) => session.write(&write),
-        Ask::Open { .. } | Ask::Read(_) => Tell::Confused("not on this connection".to_owned()),
+        FocasRequest::Write(write) => session.write(&write),
+        FocasRequest::Open { .. } | FocasRequest::Read(_) => FocasReply::Confused("not on this connection".to_owned()),
     }
 }
 
-fn without(name: &str) -> Box<Tell> {
-    Box::new(Tell::Unloadable(format!("the library has no {name}")))
+fn without(name: &str) -> Box<FocasReply> {
+    Box::new(FocasReply::Unloadable(format!("the library has no {name}")))
 }
 
 /// A connection of the library. Whoever opened it closes it, on the same thread.
-pub(super) struct Session {
+pub(super) struct FocasSession {
     pub(super) functions: Functions,
     pub(super) handle: u16,
     /// The path that the connection was made for and that is written to.
@@ -65,31 +65,37 @@ pub(super) struct Session {
     /// The feed with its unit, which is one call.
     pub(super) speed: Option<(Option<f64>, SpeedUnit)>,
     /// Bytes of a value of the parameters and diagnosis numbers that have been read.
-    pub(super) sizes: HashMap<Item, usize>,
+    pub(super) sizes: HashMap<FocasItem, usize>,
     /// Places after the point of the axes of each path: the calls for positions give whole numbers.
     places: HashMap<u8, Vec<i16>>,
 }
 
-impl Drop for Session {
+impl Drop for FocasSession {
     fn drop(&mut self) {
         let _without = self.functions.cnc_freelibhndl(self.handle);
         let _without = self.functions.cnc_exitprocess();
     }
 }
 
-impl Session {
-    fn open(library: &Path, host: &str, port: u16, path: u8, timeout_s: i32) -> Result<(Self, Opening), Box<Tell>> {
-        let functions = Functions::load(library).map_err(|why| Box::new(Tell::Unloadable(why)))?;
-        let host = CString::new(host).map_err(|error| Box::new(Tell::Unloadable(error.to_string())))?;
+impl FocasSession {
+    fn open(
+        library: &Path,
+        host: &str,
+        port: u16,
+        path: u8,
+        timeout_s: i32,
+    ) -> Result<(Self, Opening), Box<FocasReply>> {
+        let functions = Functions::load(library).map_err(|why| Box::new(FocasReply::Unloadable(why)))?;
+        let host = CString::new(host).map_err(|error| Box::new(FocasReply::Unloadable(error.to_string())))?;
         // Level 0 never writes a file, whatever is named.
         let started = functions.cnc_startupprocess(0, c"focas.log");
         if let Ok(code @ (i16::MIN..=-1 | 1..)) = started {
-            return Err(Box::new(Tell::Code(ReturnCode(code))));
+            return Err(Box::new(FocasReply::Code(FocasReturnCode(code))));
         }
         let mut handle = 0;
         match functions.cnc_allclibhndl3(&host, port, timeout_s, &mut handle) {
             Ok(0) => {}
-            Ok(code) => return Err(Box::new(Tell::Code(ReturnCode(code)))),
+            Ok(code) => return Err(Box::new(FocasReply::Code(FocasReturnCode(code)))),
             Err(Missing(name)) => return Err(without(name)),
         }
         let mut session = Self {
@@ -105,7 +111,7 @@ impl Session {
         };
         match session.turn_to(path) {
             Ok(0) => {}
-            Ok(code) => return Err(Box::new(Tell::Code(ReturnCode(code)))),
+            Ok(code) => return Err(Box::new(FocasReply::Code(FocasReturnCode(code)))),
             Err(Missing(name)) => return Err(without(name)),
         }
         let opening = session.opening();
@@ -139,38 +145,38 @@ impl Session {
     }
 
     /// Reads until an answer cannot be trusted. A connection that is dead answers nothing any more.
-    fn read_each(&mut self, questions: &[Question], tell: &mut dyn FnMut(&Tell)) {
+    fn read_each(&mut self, questions: &[Question], tell: &mut dyn FnMut(&FocasReply)) {
         (self.dynamic, self.speed) = (None, None);
-        let mut dead: Option<ItemError> = None;
+        let mut dead: Option<FocasItemError> = None;
         for question in questions {
             let result = match &dead {
                 Some(error) => Err(error.clone()),
                 None => self.read_on(*question),
             };
-            let malformed = matches!(result, Err(ItemError::Malformed(_)));
+            let malformed = matches!(result, Err(FocasItemError::Malformed(_)));
             dead = result.as_ref().err().filter(|error| is_dead(error)).cloned().or(dead);
-            tell(&Tell::Read(result));
+            tell(&FocasReply::Read(result));
             if malformed {
                 return;
             }
         }
     }
 
-    fn read_on(&mut self, question: Question) -> ItemResult {
+    fn read_on(&mut self, question: Question) -> FocasItemResult {
         checked(self.turn_to(question.path))?;
-        if matches!(question.item, Item::Position(_, -1)) && self.dynamic.is_none() {
+        if matches!(question.item, FocasItem::Position(_, -1)) && self.dynamic.is_none() {
             self.dynamic = Some(self.every_axis()?);
         }
-        if matches!(question.item, Item::Position(_, -1)) && !self.places.contains_key(&self.path) {
+        if matches!(question.item, FocasItem::Position(_, -1)) && !self.places.contains_key(&self.path) {
             let places = self.figures()?;
             self.places.insert(self.path, places);
         }
-        if matches!(question.item, Item::Feed | Item::FeedUnit) {
+        if matches!(question.item, FocasItem::Feed | FocasItem::FeedUnit) {
             match self.feed_with_unit() {
-                Ok((_, unit)) if question.item == Item::FeedUnit => return Ok(Answer::Unit(unit)),
-                Ok((feed, _)) => return Ok(Answer::Number(feed)),
+                Ok((_, unit)) if question.item == FocasItem::FeedUnit => return Ok(FocasAnswer::Unit(unit)),
+                Ok((feed, _)) => return Ok(FocasAnswer::Number(feed)),
                 // A control or library without this call tells the feed without its unit.
-                Err(error) if question.item == Item::Feed && error.absence() == Absence::NotSupported => {}
+                Err(error) if question.item == FocasItem::Feed && error.absence() == Absence::NotSupported => {}
                 Err(error) => return Err(error),
             }
         }
@@ -180,12 +186,12 @@ impl Session {
         known.map_or_else(|| self.read(question.item), Ok)
     }
 
-    fn write(&mut self, write: &Write) -> Tell {
+    fn write(&mut self, write: &Write) -> FocasReply {
         let turned = self.turn_to(self.own);
         match turned.and_then(|code| if code == 0 { self.written(write) } else { Ok(code) }) {
-            Ok(0) => Tell::Written,
-            Ok(code) => Tell::Code(ReturnCode(code)),
-            Err(Missing(name)) => Tell::Confused(format!("the library has no {name}")),
+            Ok(0) => FocasReply::Written,
+            Ok(code) => FocasReply::Code(FocasReturnCode(code)),
+            Err(Missing(name)) => FocasReply::Confused(format!("the library has no {name}")),
         }
     }
 
@@ -217,8 +223,8 @@ impl Session {
     }
 }
 
-fn is_dead(error: &ItemError) -> bool {
-    matches!(error, ItemError::Refused(refusal) if refusal.code.consequence() == Consequence::Reconnect)
+fn is_dead(error: &FocasItemError) -> bool {
+    matches!(error, FocasItemError::Refused(refusal) if refusal.code.consequence() == Consequence::Reconnect)
 }
 
 pub(super) fn pmc_words(stretch: Stretch) -> (i16, i16) {

@@ -1,11 +1,11 @@
 //! The parent's side: the library through its child.
 
 use super::KIND;
-use super::message::{Ask, Tell};
+use super::message::{FocasReply, FocasRequest};
 use crate::address::Endpoint;
-use crate::child::{ChildCounts, ChildError, ChildSettings, Client, Taken};
-use crate::fanuc::answer::{ItemError, ItemResult, Refusal};
-use crate::fanuc::code::{Consequence, ReturnCode};
+use crate::child::{ChildClient, ChildCounts, ChildError, ChildSettings, Taken};
+use crate::fanuc::answer::{FocasItemError, FocasItemResult, Refusal};
+use crate::fanuc::code::{Consequence, FocasReturnCode};
 use crate::fanuc::focas::{Focas, FocasError};
 use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
@@ -36,7 +36,7 @@ pub struct VendorSettings {
 
 /// A controller through the vendor's library.
 pub struct Vendor {
-    child: Client<Question>,
+    child: ChildClient<Question>,
     settings: VendorSettings,
     opening: Opening,
 }
@@ -52,7 +52,7 @@ impl Vendor {
         child.program.clone_from(&settings.program);
         child.environment.clone_from(&settings.environment);
         child.pause_min = Duration::ZERO;
-        let mut child = Client::new(child);
+        let mut child = ChildClient::new(child);
         let opening = open(&mut child, &settings)?;
         Ok(Self { child, settings, opening })
     }
@@ -70,7 +70,7 @@ impl Vendor {
     }
 
     /// Asks a child in which the connection is open; opens it in a new child.
-    fn request(&mut self, ask: &Ask) -> Result<Result<Tell, ChildError>, FocasError> {
+    fn request(&mut self, ask: &FocasRequest) -> Result<Result<FocasReply, ChildError>, FocasError> {
         if !self.child.is_running() {
             self.opening = open(&mut self.child, &self.settings)?;
         }
@@ -78,20 +78,20 @@ impl Vendor {
     }
 
     /// Reads as many of the questions as one child survives; the answers, in order, at least one.
-    fn read(&mut self, questions: &[Question]) -> Result<Vec<ItemResult>, FocasError> {
+    fn read(&mut self, questions: &[Question]) -> Result<Vec<FocasItemResult>, FocasError> {
         if !self.child.is_running() {
             self.opening = open(&mut self.child, &self.settings)?;
         }
         let mut answers = Vec::with_capacity(questions.len());
         let take = |told| {
             answers.push(match told {
-                Tell::Read(result) => result,
-                other => Err(ItemError::Malformed(format!("{other:?}"))),
+                FocasReply::Read(result) => result,
+                other => Err(FocasItemError::Malformed(format!("{other:?}"))),
             });
-            if matches!(answers.last(), Some(Err(ItemError::Malformed(_)))) { Taken::Suspect } else { Taken::Good }
+            if matches!(answers.last(), Some(Err(FocasItemError::Malformed(_)))) { Taken::Suspect } else { Taken::Good }
         };
-        if let Err((fatal, error)) = self.child.told_each(questions, &Ask::Read(questions.to_vec()), take) {
-            answers.push(Err(ItemError::Failed(format!("the library failed in {fatal:?}: {error}"))));
+        if let Err((fatal, error)) = self.child.told_each(questions, &FocasRequest::Read(questions.to_vec()), take) {
+            answers.push(Err(FocasItemError::Failed(format!("the library failed in {fatal:?}: {error}"))));
         }
         Ok(answers)
     }
@@ -102,8 +102,8 @@ fn seconds(timeout: Duration) -> i32 {
     i32::try_from(timeout.as_secs_f64().ceil().max(1.0) as u32).unwrap_or(1)
 }
 
-fn open(child: &mut Client<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
-    let ask = Ask::Open {
+fn open(child: &mut ChildClient<Question>, settings: &VendorSettings) -> Result<Opening, FocasError> {
+    let ask = FocasRequest::Open {
         vendor_library: settings.vendor_library.clone(),
         host: settings.at.host.clone(),
         port: settings.at.port,
@@ -111,11 +111,11 @@ fn open(child: &mut Client<Question>, settings: &VendorSettings) -> Result<Openi
         timeout_s: seconds(settings.timeout),
     };
     let opened = match child.told(&ask).map_err(|error| FocasError::Library(error.to_string()))? {
-        Tell::Opened(opening) => return Ok(opening),
-        Tell::Code(ReturnCode(-16)) => FocasError::Unreachable(ReturnCode::SOCKET.to_string()),
-        Tell::Code(ReturnCode(-17)) => FocasError::NoSession,
-        Tell::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
-        Tell::Unloadable(what) => FocasError::Unusable(format!("{}: {what}", settings.vendor_library.display())),
+        FocasReply::Opened(opening) => return Ok(opening),
+        FocasReply::Code(FocasReturnCode(-16)) => FocasError::Unreachable(FocasReturnCode::SOCKET.to_string()),
+        FocasReply::Code(FocasReturnCode(-17)) => FocasError::NoSession,
+        FocasReply::Code(code) => FocasError::Refused(Refusal { code, detail: 0 }),
+        FocasReply::Unloadable(what) => FocasError::Unusable(format!("{}: {what}", settings.vendor_library.display())),
         other => FocasError::Library(format!("{other:?}")),
     };
     child.end();
@@ -127,12 +127,12 @@ impl Focas for Vendor {
         &self.opening
     }
 
-    fn ask(&mut self, questions: &[Question], out: &mut Vec<ItemResult>) -> Result<(), FocasError> {
+    fn ask(&mut self, questions: &[Question], out: &mut Vec<FocasItemResult>) -> Result<(), FocasError> {
         let before = out.len();
         let mut rest = questions;
         while !rest.is_empty() {
             let answers = match self.child.survived(rest) {
-                0 => vec![Err(ItemError::NotOffered)],
+                0 => vec![Err(FocasItemError::NotOffered)],
                 count => self.read(&rest[..count]).inspect_err(|_| out.truncate(before))?,
             };
             rest = rest.get(answers.len()..).unwrap_or_default();
@@ -142,13 +142,13 @@ impl Focas for Vendor {
     }
 
     fn write(&mut self, write: &Write) -> Result<(), FocasError> {
-        match self.request(&Ask::Write(write.clone()))? {
-            Ok(Tell::Written) => Ok(()),
-            Ok(Tell::Code(code)) if code.consequence() == Consequence::Reconnect => {
+        match self.request(&FocasRequest::Write(write.clone()))? {
+            Ok(FocasReply::Written) => Ok(()),
+            Ok(FocasReply::Code(code)) if code.consequence() == Consequence::Reconnect => {
                 Err(FocasError::Broken(code.to_string()))
             }
-            Ok(Tell::Code(code)) => Err(FocasError::Refused(Refusal { code, detail: 0 })),
-            Ok(Tell::Confused(_)) => Err(FocasError::Refused(Refusal { code: ReturnCode::FUNC, detail: 0 })),
+            Ok(FocasReply::Code(code)) => Err(FocasError::Refused(Refusal { code, detail: 0 })),
+            Ok(FocasReply::Confused(_)) => Err(FocasError::Refused(Refusal { code: FocasReturnCode::FUNC, detail: 0 })),
             Ok(other) => Err(FocasError::Library(format!("{other:?}"))),
             Err(error) => Err(FocasError::Library(error.to_string())),
         }

@@ -2,25 +2,26 @@
 
 use super::layout::OdbDy2;
 use super::structure::{Bytes, decimal};
-use crate::fanuc::answer::Answer;
-use crate::fanuc::item::{Item, Position};
+use crate::fanuc::answer::FocasAnswer;
+use crate::fanuc::item::{FocasItem, Position};
 use std::mem::{offset_of, size_of};
 
 /// What the call for the positions of every axis says besides: it asks for all of this in one frame. `places` are the places
 /// after the point of every axis.
-pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize, places: &[i16]) -> Option<Answer> {
+pub(super) fn of(item: FocasItem, dynamic: &Bytes, axes_max: usize, places: &[i16]) -> Option<FocasAnswer> {
     let whole = |at| dynamic.i32(at);
-    let number = |at| Answer::Number(Some(f64::from(whole(at))));
+    let number = |at| FocasAnswer::Number(Some(f64::from(whole(at))));
     Some(match item {
         // Without its unit and decimals: only where `cnc_rdspeed` is not to be had.
-        Item::Feed => number(offset_of!(OdbDy2, actf)),
-        Item::SpindleSpeed => number(offset_of!(OdbDy2, acts)),
-        Item::Sequence => Answer::Whole(whole(offset_of!(OdbDy2, seqnum))),
-        Item::AlarmBits => Answer::Whole(whole(offset_of!(OdbDy2, alarm))),
-        Item::Program => {
-            Answer::Program { running: whole(offset_of!(OdbDy2, prgnum)), main: whole(offset_of!(OdbDy2, prgmnum)) }
-        }
-        Item::Position(what, -1) => {
+        FocasItem::Feed => number(offset_of!(OdbDy2, actf)),
+        FocasItem::SpindleSpeed => number(offset_of!(OdbDy2, acts)),
+        FocasItem::Sequence => FocasAnswer::Whole(whole(offset_of!(OdbDy2, seqnum))),
+        FocasItem::AlarmBits => FocasAnswer::Whole(whole(offset_of!(OdbDy2, alarm))),
+        FocasItem::Program => FocasAnswer::Program {
+            running: whole(offset_of!(OdbDy2, prgnum)),
+            main: whole(offset_of!(OdbDy2, prgmnum)),
+        },
+        FocasItem::Position(what, -1) => {
             let place = match what {
                 Position::Absolute => 0,
                 Position::Machine => 1,
@@ -28,7 +29,7 @@ pub(super) fn of(item: Item, dynamic: &Bytes, axes_max: usize, places: &[i16]) -
                 Position::ToGo => 3,
             };
             let at = |axis: usize| size_of::<OdbDy2>() + 4 * (place * axes_max + axis);
-            Answer::Numbers(
+            FocasAnswer::Numbers(
                 (0..axes_max).map(|axis| decimal(whole(at(axis)), places.get(axis).copied().unwrap_or(0))).collect(),
             )
         }

@@ -1,7 +1,7 @@
 //! What parent and child say, as JSON: small, and legible in a debugger.
 
-use crate::fanuc::answer::ItemResult;
-use crate::fanuc::code::ReturnCode;
+use crate::fanuc::answer::FocasItemResult;
+use crate::fanuc::code::FocasReturnCode;
 use crate::fanuc::item::{Question, Write};
 use crate::fanuc::opening::Opening;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// From the parent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Ask {
+pub(super) enum FocasRequest {
     /// Load the library and connect.
     Open {
         /// The library's file.
@@ -31,17 +31,17 @@ pub(super) enum Ask {
 
 /// From the child.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Tell {
+pub(super) enum FocasReply {
     /// Connected.
     Opened(Opening),
     /// The library could not be loaded, or lacks what nothing works without.
     Unloadable(String),
     /// A return code of opening or writing.
-    Code(ReturnCode),
+    Code(FocasReturnCode),
     /// Written.
     Written,
     /// One item.
-    Read(ItemResult),
+    Read(FocasItemResult),
     /// The request made no sense, or there is no connection.
     Confused(String),
 }

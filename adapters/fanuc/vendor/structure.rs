@@ -2,22 +2,22 @@
 
 use super::layout::LoadElm;
 use crate::child::{Guarded, Missing};
-use crate::fanuc::answer::{ItemError, Refusal};
-use crate::fanuc::code::ReturnCode;
+use crate::fanuc::answer::{FocasItemError, Refusal};
+use crate::fanuc::code::FocasReturnCode;
 use std::mem::offset_of;
 
 /// Decimals of offsets that the library gives without them (increment system IS-B, millimetres).
 pub(super) const POSITION_PLACES: i16 = 3;
 
 /// Why a call has no structure.
-fn missing(_: Missing) -> ItemError {
-    ItemError::NotOffered
+fn missing(_: Missing) -> FocasItemError {
+    FocasItemError::NotOffered
 }
 
-pub(super) fn checked(code: Result<i16, Missing>) -> Result<(), ItemError> {
+pub(super) fn checked(code: Result<i16, Missing>) -> Result<(), FocasItemError> {
     match code.map_err(missing)? {
         0 => Ok(()),
-        code => Err(ItemError::Refused(Refusal { code: ReturnCode(code), detail: 0 })),
+        code => Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail: 0 })),
     }
 }
 
@@ -25,10 +25,10 @@ pub(super) fn checked(code: Result<i16, Missing>) -> Result<(), ItemError> {
 pub(super) fn filled(
     length: usize,
     call: impl FnOnce(&mut Guarded) -> Result<i16, Missing>,
-) -> Result<Bytes, ItemError> {
+) -> Result<Bytes, FocasItemError> {
     let mut buffer = Guarded::new(length);
     checked(call(&mut buffer))?;
-    buffer.bytes().map(Bytes).map_err(|overrun| ItemError::Malformed(overrun.to_string()))
+    buffer.bytes().map(Bytes).map_err(|overrun| FocasItemError::Malformed(overrun.to_string()))
 }
 
 /// The bytes of a structure, read little-endian by offset; what lies beyond the end is zero.

@@ -1,10 +1,10 @@
 //! Calls of the library whose answers are texts and records: the block that runs, messages, G codes, remembered alarms and
 //! tool life.
 
-use super::child::Session;
+use super::child::FocasSession;
 use super::structure::{Bytes, checked, filled};
-use crate::fanuc::answer::{Alarm, Answer, ItemError, ItemResult, Message, PastAlarm};
-use crate::fanuc::item::Item;
+use crate::fanuc::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, OperatorMessage, PastAlarm};
+use crate::fanuc::item::FocasItem;
 
 /// `ODBGCD`: group, flag, text of eight bytes.
 const G_CODE_LEN: usize = 12;
@@ -18,72 +18,74 @@ const HISTORY_LEN: usize = 48;
 /// At most so many remembered alarms at a time.
 const HISTORY_MAX: u16 = 10;
 
-impl Session {
-    pub(super) fn text(&self, item: Item) -> ItemResult {
+impl FocasSession {
+    pub(super) fn text(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
-            Item::ExecutedText(most) => {
+            FocasItem::ExecutedText(most) => {
                 let (mut length, mut block) = (most.clamp(1, 1000), 0);
                 let bytes = filled(1024, |out| f.cnc_rdexecprog(h, &mut length, &mut block, out))?;
-                Ok(Answer::Named { number: i32::from(block), name: bytes.text(0, usize::from(length)) })
+                Ok(FocasAnswer::Named { number: i32::from(block), name: bytes.text(0, usize::from(length)) })
             }
-            Item::Messages(most) => {
+            FocasItem::Messages(most) => {
                 let mut found = i16::try_from(most.clamp(1, 5)).unwrap_or(1);
                 let bytes = filled(MESSAGE_LEN * 5, |out| f.cnc_rdopmsg3(h, -1, &mut found, out))?;
                 let count = usize::try_from(found).unwrap_or(0).min(5);
-                Ok(Answer::Messages((0..count).map(|at| message(&bytes, at * MESSAGE_LEN)).collect()))
+                Ok(FocasAnswer::Messages((0..count).map(|at| message(&bytes, at * MESSAGE_LEN)).collect()))
             }
-            Item::GCodes => {
+            FocasItem::GCodes => {
                 let mut found = G_CODES_MAX;
                 let room = G_CODE_LEN * usize::from(G_CODES_MAX.unsigned_abs());
                 let bytes = filled(room, |out| f.cnc_rdgcode(h, -1, 0, &mut found, out))?;
                 let count = usize::try_from(found.min(G_CODES_MAX)).unwrap_or(0);
-                Ok(Answer::Names((0..count).map(|at| bytes.text(at * G_CODE_LEN + 4, 8)).collect()))
+                Ok(FocasAnswer::Names((0..count).map(|at| bytes.text(at * G_CODE_LEN + 4, 8)).collect()))
             }
-            _ => Err(ItemError::NotOffered),
+            _ => Err(FocasItemError::NotOffered),
         }
     }
 
-    pub(super) fn history(&self, item: Item) -> ItemResult {
+    pub(super) fn history(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
-            Item::HistoryCount => {
+            FocasItem::HistoryCount => {
                 let mut count = 0;
-                checked(f.cnc_rdalmhisno(h, &mut count)).map(|()| Answer::Whole(i32::from(count)))
+                checked(f.cnc_rdalmhisno(h, &mut count)).map(|()| FocasAnswer::Whole(i32::from(count)))
             }
-            Item::AlarmHistory(first, last) => {
+            FocasItem::AlarmHistory(first, last) => {
                 let last = last.min(first.saturating_add(HISTORY_MAX - 1));
                 let count = usize::from(last.saturating_sub(first)) + 1;
                 let length = HISTORY_HEAD_LEN + HISTORY_LEN * count;
                 let asked = u16::try_from(length).unwrap_or(u16::MAX);
                 let bytes = filled(length, |out| f.cnc_rdalmhistry(h, first, last, asked, out))?;
                 let record = |at: usize| past_alarm(&bytes, HISTORY_HEAD_LEN + at * HISTORY_LEN);
-                Ok(Answer::History((0..count).map(record).collect()))
+                Ok(FocasAnswer::History((0..count).map(record).collect()))
             }
-            _ => Err(ItemError::NotOffered),
+            _ => Err(FocasItemError::NotOffered),
         }
     }
 
-    pub(super) fn tool_life(&self, item: Item) -> ItemResult {
+    pub(super) fn tool_life(&self, item: FocasItem) -> FocasItemResult {
         let (f, h) = (&self.functions, self.handle);
         match item {
-            Item::ToolGroup => filled(24, |out| f.cnc_rdtlusegrp(h, out)).map(|bytes| Answer::Whole(bytes.i32(4))),
-            Item::ToolLife(group) => {
-                let group = i16::try_from(group).map_err(|_| ItemError::NotOffered)?;
+            FocasItem::ToolGroup => {
+                filled(24, |out| f.cnc_rdtlusegrp(h, out)).map(|bytes| FocasAnswer::Whole(bytes.i32(4)))
+            }
+            FocasItem::ToolLife(group) => {
+                let group = i16::try_from(group).map_err(|_| FocasItemError::NotOffered)?;
                 let life = filled(8, |out| f.cnc_rdlife(h, group, out))?.i32(4);
                 let count = filled(8, |out| f.cnc_rdcount(h, group, out))?.i32(4);
                 let tools = filled(8, |out| f.cnc_rdntool(h, group, out))?.i32(4);
-                Ok(Answer::Life { tools, life, count })
+                Ok(FocasAnswer::Life { tools, life, count })
             }
-            _ => Err(ItemError::NotOffered),
+            _ => Err(FocasItemError::NotOffered),
         }
     }
 }
 
-fn message(bytes: &Bytes, at: usize) -> Message {
+fn message(bytes: &Bytes, at: usize) -> OperatorMessage {
     let length = usize::try_from(bytes.i16(at + 4)).unwrap_or(0).min(256);
     let (number, kind) = (i32::from(bytes.i16(at)), i32::from(bytes.i16(at + 2)));
-    Message { number, kind, text: bytes.text(at + 6, length) }
+    OperatorMessage { number, kind, text: bytes.text(at + 6, length) }
 }
 
 fn past_alarm(bytes: &Bytes, at: usize) -> PastAlarm {

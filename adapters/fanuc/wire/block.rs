@@ -9,14 +9,14 @@ const REPLY_LEN: usize = 16;
 
 /// Which half of the controller is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Device {
+pub enum CncOrPmc {
     /// The numerical control.
     Cnc,
     /// The programmable machine controller, where the ladder runs.
     Pmc,
 }
 
-impl Device {
+impl CncOrPmc {
     fn number(self) -> u16 {
         match self {
             Self::Cnc => 1,
@@ -37,7 +37,7 @@ impl Device {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
     /// Who is asked.
-    pub device: Device,
+    pub device: CncOrPmc,
     /// Path of the control from 1; PMC blocks always carry 1.
     pub path: u16,
     /// What is asked.
@@ -52,13 +52,13 @@ impl Request {
     /// A question to the control with its first arguments, on path 1.
     #[must_use]
     pub fn cnc(function: u16, first: &[i32]) -> Self {
-        Self { device: Device::Cnc, path: 1, function, arguments: padded(first), data: Vec::new() }
+        Self { device: CncOrPmc::Cnc, path: 1, function, arguments: padded(first), data: Vec::new() }
     }
 
     /// A question to the PMC.
     #[must_use]
     pub fn pmc(function: u16, first: &[i32]) -> Self {
-        Self { device: Device::Pmc, ..Self::cnc(function, first) }
+        Self { device: CncOrPmc::Pmc, ..Self::cnc(function, first) }
     }
 
     /// The same, writing these bytes.
@@ -72,7 +72,7 @@ impl Request {
     /// The same on another path; a question to the PMC has none.
     #[must_use]
     pub fn on_path(mut self, path: u16) -> Self {
-        if self.device == Device::Cnc {
+        if self.device == CncOrPmc::Cnc {
             self.path = path;
         }
         self
@@ -96,7 +96,7 @@ impl Request {
     fn read(cursor: &mut Cursor<'_>) -> Result<Self, WireError> {
         let length = usize::from(cursor.u16()?);
         let data_len = inner("length of a question", length, REQUEST_LEN)?;
-        let (device, path, function) = (Device::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
+        let (device, path, function) = (CncOrPmc::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
         let mut arguments = [0; 5];
         for argument in &mut arguments {
             *argument = cursor.i32()?;
@@ -155,7 +155,7 @@ fn blocks(cursor: &mut Cursor<'_>) -> Result<usize, WireError> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reply<'a> {
     /// Who answers.
-    pub device: Device,
+    pub device: CncOrPmc,
     /// Path, as asked.
     pub path: u16,
     /// Function, as asked.
@@ -172,7 +172,7 @@ impl<'a> Reply<'a> {
     fn read(cursor: &mut Cursor<'a>) -> Result<Self, WireError> {
         let length = usize::from(cursor.u16()?);
         let room = inner("length of an answer", length, REPLY_LEN)?;
-        let (device, path, function) = (Device::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
+        let (device, path, function) = (CncOrPmc::of(cursor.u16()?)?, cursor.u16()?, cursor.u16()?);
         let (code, detail, _unused) = (cursor.i16()?, cursor.i16()?, cursor.i16()?);
         let data_len = usize::from(cursor.u16()?);
         if data_len != room {

@@ -55,7 +55,7 @@ impl FrameKind {
 
 /// What stands before the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Header {
+pub struct FocasHeader {
     /// 1 from a client; from a controller its generation.
     pub version: u16,
     /// What the frame is.
@@ -64,7 +64,7 @@ pub struct Header {
     pub body_len: usize,
 }
 
-impl Header {
+impl FocasHeader {
     /// Looks at the first bytes of a frame.
     ///
     /// # Errors
@@ -84,8 +84,8 @@ impl Header {
 
 /// A whole frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Frame {
-    /// See [`Header::version`].
+pub struct FocasFrame {
+    /// See [`FocasHeader::version`].
     pub version: u16,
     /// What it is.
     pub kind: FrameKind,
@@ -93,7 +93,7 @@ pub struct Frame {
     pub body: Vec<u8>,
 }
 
-impl Frame {
+impl FocasFrame {
     /// Exactly one frame.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl Frame {
     pub fn of(bytes: &[u8]) -> Result<Self, WireError> {
         let short = WireError::Short { what: "header", needed: HEADER_LEN, left: bytes.len() };
         let (head, body) = bytes.split_first_chunk::<HEADER_LEN>().ok_or(short)?;
-        let header = Header::of(head)?;
+        let header = FocasHeader::of(head)?;
         let mut rest = Cursor::new("body", body);
         let body = rest.bytes(header.body_len)?.to_vec();
         rest.end()?;

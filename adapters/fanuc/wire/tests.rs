@@ -2,12 +2,12 @@
 
 use super::*;
 use crate::fanuc::decode;
-use crate::fanuc::item::{Item, Position};
+use crate::fanuc::item::{FocasItem, Position};
 use crate::fanuc::opening::Generation;
 use proptest::prelude::*;
 
 fn anything(bytes: &[u8]) {
-    if let Ok(frame) = Frame::of(bytes) {
+    if let Ok(frame) = FocasFrame::of(bytes) {
         let _ = replies(&frame.body);
         let _ = requests(&frame.body);
     }
@@ -21,15 +21,15 @@ fn anything(bytes: &[u8]) {
 }
 
 /// One item of every form of answer.
-const ITEMS: [Item; 8] = [
-    Item::System,
-    Item::Status,
-    Item::Alarms(8),
-    Item::AxisNames,
-    Item::Parameter(6711, -1),
-    Item::Position(Position::Machine, -1),
-    Item::ExecutedText(64),
-    Item::ProgramName,
+const ITEMS: [FocasItem; 8] = [
+    FocasItem::System,
+    FocasItem::Status,
+    FocasItem::Alarms(8),
+    FocasItem::AxisNames,
+    FocasItem::Parameter(6711, -1),
+    FocasItem::Position(Position::Machine, -1),
+    FocasItem::ExecutedText(64),
+    FocasItem::ProgramName,
 ];
 
 /// A frame whose structure is right up to a few bytes.
@@ -98,7 +98,7 @@ fn ten_million_frames() {
             if let Some(byte) = bytes.get_mut(at) {
                 *byte = byte.wrapping_add(u8::try_from(round % 251).unwrap_or(1)).rotate_left(round % 7);
             }
-            decoded += u32::from(Frame::of(&bytes).is_ok_and(|frame| replies(&frame.body).is_ok()));
+            decoded += u32::from(FocasFrame::of(&bytes).is_ok_and(|frame| replies(&frame.body).is_ok()));
             anything(&bytes);
             cases += 1;
         }
@@ -108,7 +108,7 @@ fn ten_million_frames() {
 
 #[test]
 fn an_announced_length_allocates_nothing() {
-    assert_eq!(Header::of(&[0xA0, 0xA0, 0xA0, 0xA0, 0, 4, 0x21, 2, 0xFF, 0xFF]), Err(WireError::TooLong(65535)));
+    assert_eq!(FocasHeader::of(&[0xA0, 0xA0, 0xA0, 0xA0, 0, 4, 0x21, 2, 0xFF, 0xFF]), Err(WireError::TooLong(65535)));
     assert!(matches!(replies(&[0xFF, 0xFF]), Err(WireError::Mismatch { .. })));
 }
 

@@ -1,8 +1,8 @@
 //! One request in, one answer out.
 
-use super::{Device, milliseconds, values};
+use super::{NcLinkDevice, milliseconds, values};
 use crate::nclink::liberal::{integer, list, text};
-use crate::nclink::mailbox::Register;
+use crate::nclink::mailbox::ControllerRegister;
 use crate::nclink::message::identifier;
 use crate::nclink::topic::Subject;
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 /// At most so many elements of a list are answered.
 const ELEMENTS_MAX: usize = 4096;
 
-impl Device {
+impl NcLinkDevice {
     pub(super) fn answer(&mut self, subject: Subject, said: &Value) -> Value {
         let id = identifier(said).unwrap_or_default();
         match subject {
@@ -57,7 +57,9 @@ impl Device {
             return Ok(indexes.iter().map(|index| json!(if *index == 23 { flag } else { 0 })).collect());
         }
         let kind = register_kind(&known.path).ok_or("NOT_SUPPORTED")?;
-        let read = |index: &u32| self.registers.read(Register { kind, index: *index }, &moment, milliseconds(now_ns));
+        let read = |index: &u32| {
+            self.registers.read(ControllerRegister { kind, index: *index }, &moment, milliseconds(now_ns))
+        };
         indexes.iter().map(|index| read(index).map(|value| json!(value)).ok_or("INDEX_OUT_OF_RANGE")).collect()
     }
 
@@ -78,7 +80,7 @@ impl Device {
         let kind = register_kind(&known.path).ok_or("NOT_SETABLE")?;
         let index =
             params.get("index").and_then(integer).and_then(|index| u32::try_from(index).ok()).ok_or("NO_INDEX")?;
-        let at = Register { kind, index };
+        let at = ControllerRegister { kind, index };
         let value = params.get("value").and_then(integer).ok_or("NO_VALUE")?;
         let Some(bit) = params.get("offset").and_then(integer) else { return self.registers.write(at, value) };
         let moment = self.machine.moment(self.clock.now_ns());

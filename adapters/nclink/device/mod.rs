@@ -22,10 +22,10 @@ mod values;
 use super::model::Model;
 use super::topic::Subject;
 use crate::clock::Clock;
-use crate::mqtt::{Client, Message, MqttError, Options, Qos, unique};
+use crate::mqtt::{MqttClient, MqttError, MqttMessage, Options, Qos, unique};
 use crate::simulated::Simulated;
-use registers::Registers;
-use sampling::Sampler;
+use registers::SimulatedRegisters;
+use sampling::ChannelSampler;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,25 +52,25 @@ pub enum DeviceEvent {
 }
 
 /// The simulated machine behind a serial number.
-pub struct Device {
+pub struct NcLinkDevice {
     serial: String,
     machine: Simulated,
     clock: Arc<dyn Clock>,
     model: Model,
     tree: Value,
-    registers: Registers,
-    samplers: Vec<Sampler>,
+    registers: SimulatedRegisters,
+    samplers: Vec<ChannelSampler>,
     alarm: &'static str,
 }
 
-impl Device {
+impl NcLinkDevice {
     /// A device that lives by this clock.
     #[must_use]
     pub fn new(serial: &str, machine: &Simulated, clock: Arc<dyn Clock>) -> Self {
         let tree = tree::of(machine.settings().machine, serial);
         let model = Model::parse(&tree).unwrap_or_default();
-        let samplers = model.samples.iter().filter_map(|channel| Sampler::new(channel, &model)).collect();
-        let registers = Registers::new(machine);
+        let samplers = model.samples.iter().filter_map(|channel| ChannelSampler::new(channel, &model)).collect();
+        let registers = SimulatedRegisters::new(machine);
         let serial = serial.to_owned();
         Self { serial, machine: machine.clone(), clock, model, tree, registers, samplers, alarm: "" }
     }
@@ -91,7 +91,7 @@ impl Device {
     }
 
     fn serve(&mut self, broker: &Options, stop: &AtomicBool, mut up: impl FnMut()) -> Result<(), MqttError> {
-        let client = Client::connect(broker)?;
+        let client = MqttClient::connect(broker)?;
         let asked = [Subject::Probe, Subject::Query, Subject::Set, Subject::Ping];
         client.subscribe(&asked.map(|subject| subject.filter(&self.serial)), Qos::AtMostOnce)?;
         let register = json!({"@id": unique(), "deviceid": self.serial}).to_string();
@@ -111,12 +111,12 @@ impl Device {
 
     /// Until the next upload, at most [`LOOK`].
     fn wait(&self) -> Duration {
-        let due_ns = self.samplers.iter().map(Sampler::due_ns).min().unwrap_or(i64::MAX);
+        let due_ns = self.samplers.iter().map(ChannelSampler::due_ns).min().unwrap_or(i64::MAX);
         let left_ns = (due_ns - self.clock.now_ns()).max(0).unsigned_abs();
         Duration::from_nanos(left_ns).min(LOOK)
     }
 
-    fn take(&mut self, client: &Client, message: &Message) -> Result<(), MqttError> {
+    fn take(&mut self, client: &MqttClient, message: &MqttMessage) -> Result<(), MqttError> {
         let Some((subject, tail)) = Subject::of(&message.topic, &self.serial) else { return Ok(()) };
         // Nothing at all counts as an empty request, as in other implementations.
         let said = if message.payload.is_empty() { Ok(json!({})) } else { serde_json::from_slice(&message.payload) };
@@ -138,7 +138,7 @@ impl Device {
         Some(if tail.is_empty() { topic } else { format!("{topic}/{tail}") })
     }
 
-    fn upload(&mut self, client: &Client) -> Result<(), MqttError> {
+    fn upload(&mut self, client: &MqttClient) -> Result<(), MqttError> {
         let now_ns = self.clock.now_ns();
         for sampler in &mut self.samplers {
             while let Some(message) = sampler.next(now_ns, &self.machine) {
@@ -150,7 +150,7 @@ impl Device {
     }
 
     /// An alarm that comes or goes is an event.
-    fn event(&mut self, client: &Client) -> Result<(), MqttError> {
+    fn event(&mut self, client: &MqttClient) -> Result<(), MqttError> {
         let now_ns = self.clock.now_ns();
         let alarm = self.machine.moment(now_ns).panel.alarm;
         if alarm == self.alarm {

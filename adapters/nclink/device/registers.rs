@@ -4,7 +4,7 @@
 use super::values::channel_word;
 use crate::clock::Clock;
 use crate::driver::Actuator;
-use crate::nclink::mailbox::{Letter, Mailbox, Register, request_of};
+use crate::nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest, request_of};
 use crate::nclink::offset_mailbox::OffsetMailbox;
 use crate::offset::{Axis, OffsetSink};
 use crate::simulated::{Moment, Simulated, SimulatedOffsets, SimulatedOverride};
@@ -22,8 +22,8 @@ const HEARTBEAT: u32 = 149;
 const MEMORY: [(char, u32, u32); 4] = [('R', 2288, 8), ('W', 200, 16), ('D', 200, 32), ('B', 8304, 32)];
 
 /// See the [module](self).
-pub(super) struct Registers {
-    memory: BTreeMap<Register, i64>,
+pub(super) struct SimulatedRegisters {
+    memory: BTreeMap<ControllerRegister, i64>,
     mailbox: Mailbox,
     ladder: SimulatedOverride,
     offset_mailbox: OffsetMailbox,
@@ -31,17 +31,17 @@ pub(super) struct Registers {
     heartbeat: Option<i64>,
 }
 
-impl Registers {
+impl SimulatedRegisters {
     pub(super) fn new(machine: &Simulated) -> Self {
-        let mailbox = Mailbox::new(super::MAILBOX.parse().unwrap_or(Register { kind: 'D', index: 100 }));
-        let first = super::OFFSETS.parse().unwrap_or(Register { kind: 'D', index: 110 });
+        let mailbox = Mailbox::new(super::MAILBOX.parse().unwrap_or(ControllerRegister { kind: 'D', index: 100 }));
+        let first = super::OFFSETS.parse().unwrap_or(ControllerRegister { kind: 'D', index: 110 });
         let (offset_mailbox, offsets) = (OffsetMailbox::new(first), machine.offsets());
         let (memory, ladder, heartbeat) = (BTreeMap::new(), machine.feed_override(), None);
         Self { memory, mailbox, ladder, offset_mailbox, offsets, heartbeat }
     }
 
     /// The value of a register; `None` where there is none.
-    pub(super) fn read(&self, at: Register, moment: &Moment, at_ms: i64) -> Option<i64> {
+    pub(super) fn read(&self, at: ControllerRegister, moment: &Moment, at_ms: i64) -> Option<i64> {
         match at.kind {
             'F' if at.index == CHANNEL => Some(channel_word(&moment.panel)),
             'F' if at.index == SYSTEM + HEARTBEAT => Some(at_ms & 0xffff),
@@ -55,7 +55,7 @@ impl Registers {
     }
 
     /// Writes a register, or says why not.
-    pub(super) fn write(&mut self, at: Register, value: i64) -> Result<(), &'static str> {
+    pub(super) fn write(&mut self, at: ControllerRegister, value: i64) -> Result<(), &'static str> {
         let Some((_, size, bits)) = MEMORY.iter().find(|(memory, ..)| *memory == at.kind) else {
             return Err("READ_ONLY");
         };
@@ -113,9 +113,9 @@ impl Registers {
             let _off = self.ladder.ask(clock, request);
         }
         // A machine that is off takes no letters; the client sees it by the override in force.
-        let _taken = match Letter::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
-            Some(Letter::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),
-            Some(Letter::Release) | None => self.ladder.release(clock),
+        let _taken = match MailboxRequest::of(word(Mailbox::ENABLE), word(Mailbox::OVERRIDE)) {
+            Some(MailboxRequest::Override(wanted)) => self.ladder.write_feed_override(clock, wanted),
+            Some(MailboxRequest::Release) | None => self.ladder.release(clock),
         };
     }
 }

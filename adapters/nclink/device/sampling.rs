@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 const BEHIND_NS: i64 = 2_000_000_000;
 
 /// One sample channel.
-pub(super) struct Sampler {
+pub(super) struct ChannelSampler {
     name: String,
     paths: Vec<String>,
     names: Vec<String>,
@@ -19,7 +19,7 @@ pub(super) struct Sampler {
     begin_ms: i64,
 }
 
-impl Sampler {
+impl ChannelSampler {
     /// `None` for a channel whose times are not whole milliseconds or whose upload holds no value.
     pub(super) fn new(channel: &SampleChannel, model: &Model) -> Option<Self> {
         let whole = |ms: f64| crate::nclink::liberal::integer(&json!(ms)).filter(|ms| *ms > 0);

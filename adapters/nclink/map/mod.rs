@@ -2,8 +2,8 @@
 
 use super::decode::{self, ChannelWord};
 use super::liberal::integer;
-use super::message::{Answer, Ask, first_number};
-use super::model::{Item, Model};
+use super::message::{NcLinkAnswer, RequestedItem, first_number};
+use super::model::{Model, ModelItem};
 use crate::channel::ChannelId;
 use crate::reading::{Absence, Reading, Stamp};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// What the address says about the controller behind the broker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct NcLinkLayout {
     /// Index of the channel's first F word.
     pub(super) f_channel: u32,
     /// Number of the spindle among the axes, where it is not 5.
@@ -32,9 +32,9 @@ enum How {
 }
 
 /// Path of an item, the channel it feeds, and how.
-type Row = (&'static str, &'static str, How);
+type ItemRow = (&'static str, &'static str, How);
 
-const FIXED: [Row; 10] = [
+const FIXED: [ItemRow; 10] = [
     ("FEED_SPEED", "feed_mm_min", How::Number),
     ("FEED_OVERRIDE", "feed_override_pct", How::Number),
     ("SPDL_OVERRIDE", "spindle_override_pct", How::Number),
@@ -84,25 +84,25 @@ pub(super) fn channels() -> Vec<ChannelId> {
 
 /// One item that is asked for at every poll.
 #[derive(Debug, Clone)]
-struct Entry {
+struct PolledItem {
     channel: ChannelId,
     how: How,
 }
 
 /// What is asked of this device, and what becomes of its answers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Plan {
-    asks: Vec<Ask>,
-    entries: Vec<Entry>,
+pub(super) struct NcLinkPoll {
+    asks: Vec<RequestedItem>,
+    entries: Vec<PolledItem>,
     operation: Option<ChannelId>,
     execution: Option<ChannelId>,
     /// Channels that this device does not have.
     absent: Vec<ChannelId>,
 }
 
-impl Plan {
+impl NcLinkPoll {
     /// The plan for a device; its items are named by path or by node number.
-    pub(super) fn of(model: &Model, layout: Layout, by_path: bool) -> Self {
+    pub(super) fn of(model: &Model, layout: NcLinkLayout, by_path: bool) -> Self {
         let mut plan =
             Self { operation: ChannelId::of("operation"), execution: ChannelId::of("execution"), ..Self::default() };
         for (path, channel, how) in FIXED {
@@ -128,17 +128,17 @@ impl Plan {
     fn add(&mut self, model: &Model, row: (&str, &str, How), indexes: &[u32], by_path: bool) {
         let (path, channel, how) = row;
         let (Some(item), Some(channel)) = (model.find(path), ChannelId::of(channel)) else { return };
-        self.asks.push(Ask::elements(name(item, by_path).as_str(), indexes));
-        self.entries.push(Entry { channel, how });
+        self.asks.push(RequestedItem::elements(name(item, by_path).as_str(), indexes));
+        self.entries.push(PolledItem { channel, how });
     }
 
     /// One request for everything.
-    pub(super) fn asks(&self) -> &[Ask] {
+    pub(super) fn asks(&self) -> &[RequestedItem] {
         &self.asks
     }
 
     /// The readings of one answer, with a reason for every channel that has none.
-    pub(super) fn readings(&self, answers: &[Option<Answer>], stamp: Stamp, out: &mut Vec<Reading>) {
+    pub(super) fn readings(&self, answers: &[Option<NcLinkAnswer>], stamp: Stamp, out: &mut Vec<Reading>) {
         let mut tapping = None;
         let mut word = None;
         for (entry, answer) in self.entries.iter().zip(answers) {
@@ -181,8 +181,8 @@ impl Plan {
     }
 }
 
-impl Entry {
-    fn value<'a>(&self, answer: &'a Option<Answer>) -> Result<&'a Value, Absence> {
+impl PolledItem {
+    fn value<'a>(&self, answer: &'a Option<NcLinkAnswer>) -> Result<&'a Value, Absence> {
         match answer {
             Some(Ok(values)) => values.first().ok_or(Absence::NotYetRead),
             Some(Err(_)) => Err(Absence::Refused),
@@ -190,7 +190,7 @@ impl Entry {
         }
     }
 
-    fn number(&self, answer: &Option<Answer>, stamp: Stamp) -> Reading {
+    fn number(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
         let found = self.value(answer).and_then(|value| {
             if value.is_null() {
                 Err(Absence::NotYetRead)
@@ -204,7 +204,7 @@ impl Entry {
         }
     }
 
-    fn text(&self, answer: &Option<Answer>, stamp: Stamp, text: impl Fn(&Value) -> Option<String>) -> Reading {
+    fn text(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp, text: impl Fn(&Value) -> Option<String>) -> Reading {
         // No value at all is the way in which some devices say that there is no alarm.
         let silent_alarm = matches!(answer, Some(Ok(values)) if values.is_empty()) && self.channel.name() == "alarm";
         let found = match silent_alarm {
@@ -218,13 +218,13 @@ impl Entry {
     }
 }
 
-fn name(item: &Item, by_path: bool) -> String {
+fn name(item: &ModelItem, by_path: bool) -> String {
     if by_path { format!("/{}", item.path) } else { item.id.clone() }
 }
 
 /// The axes of the model that feed channels: X, Y and Z by their letters, the spindle without one.
-fn axes(model: &Model, layout: Layout) -> Vec<(u32, Option<char>)> {
-    let number = |item: &Item| item.path.strip_prefix("AXIS@")?.split('/').next()?.parse().ok();
+fn axes(model: &Model, layout: NcLinkLayout) -> Vec<(u32, Option<char>)> {
+    let number = |item: &ModelItem| item.path.strip_prefix("AXIS@")?.split('/').next()?.parse().ok();
     let mut numbers: Vec<u32> = model.items.iter().filter_map(number).collect();
     numbers.sort_unstable();
     numbers.dedup();

@@ -1,6 +1,6 @@
 //! The simulated control: works through blocks, moves the axes, obeys the feed override.
 
-use super::super::frame::Frame;
+use super::super::frame::MachineSnapshot;
 use super::super::plant::{Demand, Plant};
 use super::super::settings::FRESH_EDGE_MM;
 use super::{Action, Cut, NcBlock, Planner, Rate};
@@ -75,7 +75,7 @@ pub(in super::super) struct Control {
 }
 
 impl Control {
-    pub(in super::super) fn new(planner: Planner, rng: Pcg64Mcg, frame: &Frame, wear_mm: f64) -> Self {
+    pub(in super::super) fn new(planner: Planner, rng: Pcg64Mcg, frame: &MachineSnapshot, wear_mm: f64) -> Self {
         Self {
             planner,
             rng,

@@ -1,6 +1,6 @@
 //! Experiments: stretches of commanded speed, feed and auxiliaries, run once.
 
-use super::{Action, Cut, Rate, Writer};
+use super::{Action, Cut, ProgramWriter, Rate};
 use crate::words::{execution, mode};
 
 /// Number of the program that an experiment runs under.
@@ -46,7 +46,7 @@ pub struct ExperimentStep {
 }
 
 /// Switches the machine on and writes every step.
-pub(super) fn write(out: &mut Writer<'_>, steps: &[ExperimentStep]) {
+pub(super) fn write(out: &mut ProgramWriter<'_>, steps: &[ExperimentStep]) {
     if steps.is_empty() {
         return;
     }
@@ -67,7 +67,7 @@ struct Place {
     z_mm: f64,
 }
 
-fn write_step(out: &mut Writer<'_>, step: &ExperimentStep, place: &mut Place) {
+fn write_step(out: &mut ProgramWriter<'_>, step: &ExperimentStep, place: &mut Place) {
     out.same(Action::Hydraulics(step.hydraulics_on)).same(Action::Coolant(step.coolant_on));
     out.same(Action::Override(step.override_pct));
     if step.new_edge {
@@ -97,7 +97,7 @@ fn write_step(out: &mut Writer<'_>, step: &ExperimentStep, place: &mut Place) {
 }
 
 /// Writes a cut along Z, from zero or from where the tool is; where it ends.
-fn write_cut(out: &mut Writer<'_>, cut: &ExperimentCut, step: &ExperimentStep, z_mm: f64) -> f64 {
+fn write_cut(out: &mut ProgramWriter<'_>, cut: &ExperimentCut, step: &ExperimentStep, z_mm: f64) -> f64 {
     let length_mm = cut.feed_mm_min * f64::from(step.override_pct) / 100.0 * step.seconds / 60.0;
     let begins_mm = if cut.onward { z_mm } else { 0.0 };
     if !cut.onward {

@@ -1,6 +1,6 @@
 //! Turned parts: facing, roughing and finishing of two diameters, and a thread on some.
 
-use super::{Action, Cut, Rate, Writer};
+use super::{Action, Cut, ProgramWriter, Rate};
 use crate::words::operation;
 
 /// A turned part. Diameters and lengths in mm, speeds in rpm.
@@ -87,16 +87,16 @@ const FINISHER: u8 = 2;
 const THREADER: u8 = 3;
 
 /// Writes the program of lot number `lot`. `vary` gives factors about 1 for the speed of each pass.
-pub(super) fn part(out: &mut Writer<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
+pub(super) fn part(out: &mut ProgramWriter<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
     turn(out, &PARTS[lot % PARTS.len()], vary);
 }
 
 /// The same for the short part.
-pub(super) fn pin(out: &mut Writer<'_>) {
+pub(super) fn pin(out: &mut ProgramWriter<'_>) {
     turn(out, &PIN, &mut || 1.0);
 }
 
-fn turn(out: &mut Writer<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
+fn turn(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     out.program = part.program;
     out.operation = "facing";
     out.put(Action::ToolChange(ROUGHER));
@@ -131,7 +131,7 @@ fn stage_for(speed_rpm: f64) -> u8 {
 }
 
 /// Another stage is engaged at rest only.
-fn change_stage(out: &mut Writer<'_>, from_rpm: f64, to_rpm: f64) {
+fn change_stage(out: &mut ProgramWriter<'_>, from_rpm: f64, to_rpm: f64) {
     if stage_for(from_rpm) != stage_for(to_rpm) {
         out.put(Action::Stop);
     }
@@ -141,7 +141,7 @@ fn turning(depth_mm: f64, from_mm: f64, to_mm: f64, air_mm: f64) -> Option<Cut> 
     Some(Cut { depth_mm, diameter_from_mm: from_mm, diameter_to_mm: to_mm, air_mm, ..Cut::default() })
 }
 
-fn face(out: &mut Writer<'_>, part: &Shaft) {
+fn face(out: &mut ProgramWriter<'_>, part: &Shaft) {
     out.put(Action::Rapid([part.stock_mm + 6.0, 0.0, -0.8]));
     let cut = turning(0.8, part.stock_mm, part.small_mm * 0.4, 3.0);
     let to = [part.small_mm * 0.4 - 2.0, 0.0, -0.8];
@@ -149,7 +149,14 @@ fn face(out: &mut Writer<'_>, part: &Shaft) {
     out.put(Action::Rapid([part.stock_mm + 6.0, 0.0, 2.0]));
 }
 
-fn rough(out: &mut Writer<'_>, part: &Shaft, from_mm: f64, to_mm: f64, length_mm: f64, vary: &mut dyn FnMut() -> f64) {
+fn rough(
+    out: &mut ProgramWriter<'_>,
+    part: &Shaft,
+    from_mm: f64,
+    to_mm: f64,
+    length_mm: f64,
+    vary: &mut dyn FnMut() -> f64,
+) {
     let mut diameter_mm = from_mm;
     while diameter_mm > to_mm + 0.01 {
         let depth_mm = part.rough_depth_mm.min((diameter_mm - to_mm) / 2.0);
@@ -168,7 +175,7 @@ fn rough(out: &mut Writer<'_>, part: &Shaft, from_mm: f64, to_mm: f64, length_mm
     }
 }
 
-fn finish(out: &mut Writer<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
+fn finish(out: &mut ProgramWriter<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     let stage = stage_for(part.finish_rpm);
     let passes = [
         (part.small_mm, 3.0, part.small_length_mm, part.finish_rpm),
@@ -189,7 +196,7 @@ fn finish(out: &mut Writer<'_>, part: &Shaft, vary: &mut dyn FnMut() -> f64) {
     }
 }
 
-fn thread(out: &mut Writer<'_>, part: &Shaft, pitch_mm: f64) {
+fn thread(out: &mut ProgramWriter<'_>, part: &Shaft, pitch_mm: f64) {
     out.put(Action::Rapid([part.stock_mm + 120.0, 0.0, 160.0]));
     change_stage(out, part.finish_rpm, 500.0);
     out.put(Action::ToolChange(THREADER)).put(Action::Spindle(500.0, 1));

@@ -1,6 +1,6 @@
 //! Milled parts: face milling, roughing and finishing of a pocket, drilled and tapped holes.
 
-use super::{Action, Cut, Rate, Writer};
+use super::{Action, Cut, ProgramWriter, Rate};
 use crate::words::operation;
 
 /// A milling tool and its data.
@@ -55,7 +55,7 @@ const TAP_SPEED_RPM: f64 = 480.0;
 const TAP: u8 = 5;
 
 /// Writes the program of lot number `lot`: lots differ in the number of pocket layers and holes.
-pub(super) fn part(out: &mut Writer<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
+pub(super) fn part(out: &mut ProgramWriter<'_>, lot: usize, vary: &mut dyn FnMut() -> f64) {
     let (program, layers, holes) = [(2001, 3, 4), (2002, 2, 8), (2003, 4, 2)][lot % 3];
     out.program = program;
     out.operation = "face milling";
@@ -92,7 +92,7 @@ fn round(speed_rpm: f64) -> f64 {
 }
 
 /// Changes to the tool at rest and runs up.
-fn take(out: &mut Writer<'_>, cutter: &Cutter, vary: &mut dyn FnMut() -> f64) {
+fn take(out: &mut ProgramWriter<'_>, cutter: &Cutter, vary: &mut dyn FnMut() -> f64) {
     out.put(Action::Rapid([0.0, 0.0, 250.0])).put(Action::Stop);
     out.put(Action::ToolChange(cutter.tool));
     out.put(Action::Spindle(round(cutter.speed_rpm * vary()), 1));
@@ -110,7 +110,7 @@ fn cut_of(cutter: &Cutter, air_mm: f64) -> Option<Cut> {
 }
 
 /// One straight pass in X.
-fn line(out: &mut Writer<'_>, cutter: &Cutter, from: [f64; 3], length_mm: f64) {
+fn line(out: &mut ProgramWriter<'_>, cutter: &Cutter, from: [f64; 3], length_mm: f64) {
     out.put(Action::Rapid([from[0] - 5.0, from[1], from[2] + 5.0])).put(Action::Rapid([
         from[0] - 5.0,
         from[1],
@@ -126,7 +126,7 @@ fn place(hole: i32) -> [f64; 2] {
     [25.0 * f64::from(hole % 4), 90.0 + 20.0 * f64::from(hole / 4)]
 }
 
-fn drill(out: &mut Writer<'_>, hole: i32) {
+fn drill(out: &mut ProgramWriter<'_>, hole: i32) {
     let [x, y] = place(hole);
     out.put(Action::Rapid([x, y, 3.0]));
     let (to, rate) = ([x, y, -22.0], Rate::PerMinute(DRILL.feed_mm_min));
@@ -134,7 +134,7 @@ fn drill(out: &mut Writer<'_>, hole: i32) {
     out.put(Action::Rapid([x, y, 10.0]));
 }
 
-fn tap(out: &mut Writer<'_>, hole: i32) {
+fn tap(out: &mut ProgramWriter<'_>, hole: i32) {
     let [x, y] = place(hole);
     if hole == 0 {
         out.put(Action::Rapid([0.0, 0.0, 250.0])).put(Action::Stop).put(Action::ToolChange(TAP));

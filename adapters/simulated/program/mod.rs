@@ -83,7 +83,7 @@ pub(super) struct NcBlock {
 }
 
 /// Writes blocks one after the other.
-pub(super) struct Writer<'a> {
+pub(super) struct ProgramWriter<'a> {
     blocks: &'a mut std::collections::VecDeque<NcBlock>,
     pub(super) mode: &'static str,
     pub(super) execution: &'static str,
@@ -92,7 +92,7 @@ pub(super) struct Writer<'a> {
     number: u16,
 }
 
-impl<'a> Writer<'a> {
+impl<'a> ProgramWriter<'a> {
     pub(super) fn new(blocks: &'a mut std::collections::VecDeque<NcBlock>, program: u16) -> Self {
         Self { blocks, mode: mode::AUTOMATIC, execution: execution::ACTIVE, program, operation: "", number: 0 }
     }

@@ -3,7 +3,7 @@
 use super::super::settings::SimulatedSettings;
 use super::experiment::{self, ExperimentStep};
 use super::short_day;
-use super::{Action, NcBlock, Writer, lathe, mill};
+use super::{Action, NcBlock, ProgramWriter, lathe, mill};
 use crate::address::SimulatedMachine;
 use crate::words::{execution, mode};
 use rand::Rng;
@@ -37,7 +37,7 @@ impl Planner {
 
     /// Appends the next piece of the day. `wear_mm` is that of the worst edge, with its tool.
     pub(in super::super) fn refill(&mut self, blocks: &mut VecDeque<NcBlock>, since_s: f64, worst: Option<(u8, f64)>) {
-        let mut out = Writer::new(blocks, 0);
+        let mut out = ProgramWriter::new(blocks, 0);
         if let Some(steps) = &mut self.experiment {
             return experiment::write(&mut out, &std::mem::take(steps));
         }
@@ -71,7 +71,7 @@ impl Planner {
         self.part(&mut out);
     }
 
-    fn morning(&mut self, out: &mut Writer<'_>) {
+    fn morning(&mut self, out: &mut ProgramWriter<'_>) {
         let first = self.day == 0;
         self.day += 1;
         self.lunch_taken = false;
@@ -88,7 +88,7 @@ impl Planner {
         out.aside(mode::AUTOMATIC, execution::PROGRAM_COMPLETED, Action::Wait(6.0));
     }
 
-    fn warm_up(&self, out: &mut Writer<'_>, dwell_s: f64) {
+    fn warm_up(&self, out: &mut ProgramWriter<'_>, dwell_s: f64) {
         let lathe = self.settings.machine == SimulatedMachine::Lathe;
         let speeds: &[(f64, u8)] = if lathe {
             &[(300.0, 1), (600.0, 1), (900.0, 1), (1200.0, 2), (1600.0, 2)]
@@ -106,7 +106,7 @@ impl Planner {
     }
 
     /// Unloading and loading, then the program, sometimes with trouble.
-    fn part(&mut self, out: &mut Writer<'_>) {
+    fn part(&mut self, out: &mut ProgramWriter<'_>) {
         let lot = self.parts / self.settings.day.parts_per_lot.max(1);
         if self.parts.is_multiple_of(self.settings.day.parts_per_lot.max(1)) {
             let hardness = if lot == 0 { 1.0 } else { self.rng.random_range(0.93..1.08) };
@@ -130,7 +130,7 @@ impl Planner {
     }
 
     /// The second part of a short day has an alarm before it; a pause follows; a worn edge is changed quickly.
-    fn short_part(&mut self, out: &mut Writer<'_>, worst: Option<(u8, f64)>) {
+    fn short_part(&mut self, out: &mut ProgramWriter<'_>, worst: Option<(u8, f64)>) {
         let of_day = self.parts % short_day::PARTS;
         self.parts += 1;
         short_day::part(
@@ -141,13 +141,13 @@ impl Planner {
         );
     }
 
-    fn new_edge(&mut self, out: &mut Writer<'_>, tool: u8) {
+    fn new_edge(&mut self, out: &mut ProgramWriter<'_>, tool: u8) {
         let fetch_s = self.rng.random_range(60.0..120.0);
         (out.mode, out.execution) = (mode::MANUAL, execution::READY);
         out.put(Action::ToolChange(tool)).put(Action::Wait(fetch_s)).put(Action::NewEdge);
     }
 
-    fn night(&mut self, out: &mut Writer<'_>) {
+    fn night(&mut self, out: &mut ProgramWriter<'_>) {
         self.up_since_s = None;
         (out.mode, out.execution) = (mode::MANUAL_DATA_INPUT, execution::ACTIVE);
         // Chips are spun off and the coolant is drained.
@@ -158,13 +158,13 @@ impl Planner {
     }
 }
 
-fn pause(out: &mut Writer<'_>, seconds: f64) {
+fn pause(out: &mut ProgramWriter<'_>, seconds: f64) {
     out.aside(mode::AUTOMATIC, execution::READY, Action::Hydraulics(false));
     out.aside(mode::AUTOMATIC, execution::READY, Action::Wait(seconds));
     out.aside(mode::AUTOMATIC, execution::READY, Action::Hydraulics(true));
 }
 
-fn alarm(out: &mut Writer<'_>) {
+fn alarm(out: &mut ProgramWriter<'_>) {
     out.aside(mode::AUTOMATIC, execution::STOPPED, Action::Alarm("1005 CHUCK PRESSURE LOW"));
     out.aside(mode::AUTOMATIC, execution::STOPPED, Action::Wait(25.0));
     out.aside(mode::AUTOMATIC, execution::READY, Action::Alarm(""));

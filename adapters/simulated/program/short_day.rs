@@ -1,6 +1,6 @@
 //! A whole day in five minutes, again and again: for a demonstration, in which nobody wants to wait for an evening.
 
-use super::{Action, Writer, lathe};
+use super::{Action, ProgramWriter, lathe};
 use crate::words::{execution, mode};
 
 /// Parts of one day.
@@ -19,7 +19,7 @@ const CLEAR_S: f64 = 5.0;
 const OFF_S: f64 = 10.0;
 
 /// Power-up and a short warm-up.
-pub(super) fn morning(out: &mut Writer<'_>) {
+pub(super) fn morning(out: &mut ProgramWriter<'_>) {
     (out.mode, out.execution) = (mode::MANUAL, execution::READY);
     out.put(Action::Mains(true)).put(Action::Wait(START_S));
     out.put(Action::Hydraulics(true)).put(Action::Drives(true)).put(Action::Wait(2.0));
@@ -33,7 +33,7 @@ pub(super) fn morning(out: &mut Writer<'_>) {
 }
 
 /// Part number `of_day` of the day, from 0; first the edge of `worn` is changed.
-pub(super) fn part(out: &mut Writer<'_>, of_day: u32, worn: Option<u8>, pause_s: f64) {
+pub(super) fn part(out: &mut ProgramWriter<'_>, of_day: u32, worn: Option<u8>, pause_s: f64) {
     if let Some(tool) = worn {
         (out.mode, out.execution) = (mode::MANUAL, execution::READY);
         out.put(Action::ToolChange(tool)).put(Action::Wait(EDGE_S)).put(Action::NewEdge);
@@ -55,7 +55,7 @@ pub(super) fn part(out: &mut Writer<'_>, of_day: u32, worn: Option<u8>, pause_s:
 }
 
 /// Off, until the next day begins at a multiple of `rhythm_s`.
-pub(super) fn night(out: &mut Writer<'_>, since_s: f64, rhythm_s: f64) {
+pub(super) fn night(out: &mut ProgramWriter<'_>, since_s: f64, rhythm_s: f64) {
     (out.mode, out.execution) = (mode::MANUAL, execution::READY);
     out.put(Action::Wait(CLEAR_S)).put(Action::Drives(false)).put(Action::Hydraulics(false)).put(Action::Mains(false));
     let off_s = rhythm_s - (since_s + CLEAR_S).rem_euclid(rhythm_s);

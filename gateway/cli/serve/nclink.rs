@@ -3,7 +3,7 @@
 use super::{Common, Running, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
 use adapters::mqtt::Options;
-use adapters::nclink::device::{Device, DeviceEvent, MAILBOX, OFFSETS};
+use adapters::nclink::device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
 use clap::Args;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,7 +38,7 @@ pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
     }
     let options = broker(&arguments.broker)?;
     let Running { machine, clock } = arguments.common.machine()?;
-    let mut device = Device::new(&arguments.serial, &machine, clock);
+    let mut device = NcLinkDevice::new(&arguments.serial, &machine, clock);
     let stop = Arc::new(AtomicBool::new(false));
     let (stopping, name) = (stop.clone(), format!("nclink://{}/{}", arguments.broker, arguments.serial));
     let run = move || device.run(&options, &stopping, |said| print(&line(&name, &said)));

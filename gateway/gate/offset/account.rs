@@ -9,7 +9,7 @@ use super::book::Book;
 use super::order::{Moved, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
-use adapters::offset::{Axis, LastWrite, Ledger, Left, OffsetSink, same};
+use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, same};
 
 /// No gate may ask for a greater shift than this, whatever its configuration says.
 const MOST_UM: f64 = 1000.0;
@@ -17,7 +17,7 @@ const MOST_UM: f64 = 1000.0;
 /// Holds the only sink of offsets there is. Blocks as long as the control takes to answer.
 pub struct Account {
     sink: Box<dyn OffsetSink>,
-    ledgers: [Ledger; Axis::ALL.len()],
+    ledgers: [OffsetShares; Axis::ALL.len()],
     book: Book,
 }
 
@@ -25,7 +25,7 @@ impl Account {
     /// With what the book knows of this control.
     #[must_use]
     pub fn new(sink: Box<dyn OffsetSink>, book: Book) -> Self {
-        let ledgers = Axis::ALL.map(|axis| Ledger::with(book.left(axis)));
+        let ledgers = Axis::ALL.map(|axis| OffsetShares::with(book.left(axis)));
         Self { sink, ledgers, book }
     }
 

@@ -119,7 +119,7 @@ impl SparkplugSink {
     }
 
     /// Takes what a message of the network asks for; true when there is something to attend to.
-    fn hear(&mut self, message: &adapters::mqtt::Message) -> bool {
+    fn hear(&mut self, message: &adapters::mqtt::MqttMessage) -> bool {
         let of_node = message.topic == self.target.topic("NCMD");
         if !of_node && message.topic != self.target.topic("DCMD") {
             return false;
