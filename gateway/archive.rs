@@ -12,13 +12,13 @@ const UNPACKED_MAX: u64 = 64 << 20;
 const FILES_MAX: usize = 2000;
 
 /// One file: its name in the archive, and its content.
-pub type Entry = (String, Vec<u8>);
+pub type ArchivedFile = (String, Vec<u8>);
 
 /// An archive of these files. `at_s` is the time they get, seconds since 1970.
 ///
 /// # Errors
 /// A name that no archive can hold.
-pub fn pack(files: &[Entry], at_s: u64) -> Result<Vec<u8>> {
+pub fn pack(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>> {
     let mut archive = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::default()));
     for (name, content) in files {
         let mut header = tar::Header::new_gnu();
@@ -34,7 +34,7 @@ pub fn pack(files: &[Entry], at_s: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// It is no such archive, or it holds too much.
-pub fn unpack(bytes: &[u8]) -> Result<Vec<Entry>> {
+pub fn unpack(bytes: &[u8]) -> Result<Vec<ArchivedFile>> {
     let mut archive = tar::Archive::new(GzDecoder::new(bytes).take(UNPACKED_MAX));
     let mut files = Vec::new();
     for entry in archive.entries()? {

@@ -145,7 +145,7 @@ pub struct Figure {
 
 /// All runs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Figures {
+pub struct BenchFigures {
     /// Ticks per run.
     pub ticks: u64,
     /// In the order of the stages; the last one is the whole box.
@@ -157,14 +157,14 @@ pub struct Figures {
 /// Counts allocations of this process, if somebody does.
 pub type Allocations = Option<fn() -> u64>;
 
-struct Bench<'a> {
+struct BenchRun<'a> {
     course: &'a Course,
     ticks: u64,
     allocations: Allocations,
     runs: Vec<Figure>,
 }
 
-impl Bench<'_> {
+impl BenchRun<'_> {
     #[expect(clippy::cast_precision_loss, reason = "rates")]
     fn run(&mut self, through: &'static str, mut each: impl FnMut(&Sample)) {
         // A tenth beforehand: rings and tables have their size, scripts have run.
@@ -183,9 +183,9 @@ impl Bench<'_> {
     }
 }
 
-struct Stored(Writer);
+struct BenchHistory(Writer);
 
-impl Store for Stored {
+impl Store for BenchHistory {
     fn sample(&mut self, sample: &Sample, extras: &[crate::history::ExtraValue<'_>]) {
         self.0.sample(sample, extras);
     }
@@ -199,9 +199,9 @@ impl Store for Stored {
 ///
 /// # Errors
 /// See [`BenchError`].
-pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Figures, BenchError> {
+pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<BenchFigures, BenchError> {
     let course = Course::simulated()?;
-    let mut bench = Bench { course: &course, ticks, allocations, runs: Vec::new() };
+    let mut bench = BenchRun { course: &course, ticks, allocations, runs: Vec::new() };
     bench.run("merge", |sample| {
         std::hint::black_box(sample);
     });
@@ -218,13 +218,13 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Fig
     bench.run("gate and records", |sample| whole.step(sample, &mut NoStore));
     let options = Options { when_full: WhenFull::Wait, extras: pipeline()?.series(), ..Options::default() };
     let path = directory.join("bench.db");
-    let (mut whole, mut store) = (pipeline()?, Stored(Writer::open(&path, options)?));
+    let (mut whole, mut store) = (pipeline()?, BenchHistory(Writer::open(&path, options)?));
     bench.run("history", |sample| whole.step(sample, &mut store));
     store.0.flush()?;
     let status = store.0.close();
     #[expect(clippy::cast_precision_loss, reason = "a rate")]
     let bytes_per_tick = status.bytes as f64 / status.rows.max(1) as f64;
-    Ok(Figures { ticks, runs: bench.runs, bytes_per_tick })
+    Ok(BenchFigures { ticks, runs: bench.runs, bytes_per_tick })
 }
 
 fn host() -> Result<Host, BenchError> {
@@ -239,7 +239,7 @@ fn pipeline() -> Result<Pipeline, BenchError> {
     Ok(Pipeline::new(fresh, host()?, Gate::new(config.gate)))
 }
 
-impl Figures {
+impl BenchFigures {
     /// Ticks per second through everything.
     #[must_use]
     pub fn ticks_per_s(&self) -> f64 {
@@ -278,7 +278,7 @@ impl Figures {
     }
 }
 
-impl fmt::Display for Figures {
+impl fmt::Display for BenchFigures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (wall, undisturbed) = (self.ticks_per_s(), self.undisturbed_ticks_per_s());
         writeln!(

@@ -17,14 +17,14 @@ use std::path::Path;
 
 /// What was read and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Default)]
-pub struct Report {
+pub struct CheckReport {
     /// What was read, one line each.
     pub read: Vec<String>,
     /// Everything that is wrong, in the order in which it was found.
     pub problems: Vec<Problem>,
 }
 
-impl Report {
+impl CheckReport {
     /// Nothing is wrong.
     #[must_use]
     pub fn fine(&self) -> bool {
@@ -32,7 +32,7 @@ impl Report {
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for line in &self.read {
             writeln!(f, "{line}")?;
@@ -57,8 +57,8 @@ impl From<script::Problem> for Problem {
 
 /// Checks the file, or without one the built-in configuration, and everything it names.
 #[must_use]
-pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String, String)>) -> Report {
-    let mut report = Report::default();
+pub fn check(file: Option<&Path>, environment: impl IntoIterator<Item = (String, String)>) -> CheckReport {
+    let mut report = CheckReport::default();
     match config::load(file, environment) {
         Ok(config) => {
             let name = file.map_or_else(|| config::BUILT_IN.to_owned(), |file| file.display().to_string());
@@ -118,7 +118,7 @@ fn reach(config: &Config) -> Option<String> {
 }
 
 /// Certificate and key can be read and fit together.
-fn check_certificate(config: &Config, report: &mut Report) {
+fn check_certificate(config: &Config, report: &mut CheckReport) {
     let Some((certificate, key)) = config.http.certificate.as_ref().filter(|_| config.http.tls) else { return };
     match Certificate::read(certificate, key) {
         Ok(read) => report.read.push(format!("{}: SHA-256 {}", certificate.display(), read.fingerprint)),
@@ -126,7 +126,7 @@ fn check_certificate(config: &Config, report: &mut Report) {
     }
 }
 
-fn check_scripts(config: &Config, report: &mut Report) {
+fn check_scripts(config: &Config, report: &mut CheckReport) {
     let directory = &config.scripts.directory;
     let shown = directory.display();
     let files = if directory.exists() {
@@ -158,7 +158,7 @@ fn below(directory: &Path, problem: script::Problem) -> Problem {
     problem
 }
 
-fn check_operations(config: &Config, report: &mut Report) {
+fn check_operations(config: &Config, report: &mut CheckReport) {
     let Some(path) = &config.operations.path else { return };
     match operations::read(path) {
         Ok(loaded) => {
@@ -169,7 +169,7 @@ fn check_operations(config: &Config, report: &mut Report) {
     }
 }
 
-fn check_model(config: &Config, report: &mut Report) {
+fn check_model(config: &Config, report: &mut CheckReport) {
     let Some(path) = &config.twin.model else { return };
     let name = path.display().to_string();
     let text = match std::fs::read_to_string(path) {
@@ -191,7 +191,7 @@ fn check_model(config: &Config, report: &mut Report) {
     }
 }
 
-fn check_thermal(config: &Config, report: &mut Report) {
+fn check_thermal(config: &Config, report: &mut CheckReport) {
     let Some(path) = &config.thermal.model else { return };
     let name = path.display().to_string();
     let read = std::fs::read_to_string(path)
@@ -207,7 +207,7 @@ fn check_thermal(config: &Config, report: &mut Report) {
 }
 
 /// The files that the addresses of the sinks name.
-fn check_sinks(name: &str, config: &Config, report: &mut Report) {
+fn check_sinks(name: &str, config: &Config, report: &mut CheckReport) {
     for sink in &config.sinks {
         let problems = sink.address.check();
         if problems.is_empty() {
@@ -231,13 +231,13 @@ fn check_sinks(name: &str, config: &Config, report: &mut Report) {
 }
 
 /// The files that the address of a broker names.
-fn check_broker(name: &str, source: &str, target: &NcLinkTarget, report: &mut Report) {
+fn check_broker(name: &str, source: &str, target: &NcLinkTarget, report: &mut CheckReport) {
     for (what, next) in broker_files(target.tls.as_ref(), &target.login) {
         report.problems.push(Problem::of(name, format!("source {source}: {what}"), next));
     }
 }
 
-fn check_sources(name: &str, config: &Config, report: &mut Report) {
+fn check_sources(name: &str, config: &Config, report: &mut CheckReport) {
     for source in &config.sources {
         match source.address.target() {
             Target::Replay(replay) => check_recording(&replay.file, report),
@@ -249,7 +249,7 @@ fn check_sources(name: &str, config: &Config, report: &mut Report) {
     }
 }
 
-fn check_library(path: &Path, report: &mut Report) {
+fn check_library(path: &Path, report: &mut CheckReport) {
     if !path.is_file() {
         let next =
             "`library=` in the address names it; the machine's maker delivers it, it cannot come with the gateway";
@@ -257,7 +257,7 @@ fn check_library(path: &Path, report: &mut Report) {
     }
 }
 
-fn check_recording(path: &Path, report: &mut Report) {
+fn check_recording(path: &Path, report: &mut CheckReport) {
     let name = path.display().to_string();
     let row = |problem: adapters::recording::RowProblem| Problem {
         file: name.clone(),

@@ -1,6 +1,6 @@
 //! What the history holds besides samples, as rows of JSON: the same for the API and the command line.
 
-use crate::history::{AlarmEntry, Command, Decision, Event, HistoryError, Part, Reader, Span, StateInterval};
+use crate::history::{AlarmEntry, Command, Decision, Event, HistoryError, Part, Reader, RecordSpan, StateInterval};
 use crate::pipeline::PartDetail;
 use adapters::clock::TimeNs;
 use serde_json::{Value, json};
@@ -69,7 +69,7 @@ pub struct Records {
 pub fn records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> Result<Records, HistoryError> {
     let filtered = query.state.is_some();
     let limit = if filtered { FILTERED_MAX } else { query.limit.saturating_add(1) };
-    let span = Span::between(query.from_ns, query.to_ns, limit);
+    let span = RecordSpan::between(query.from_ns, query.to_ns, limit);
     let mut rows: Vec<Value> = match kind {
         RecordKind::States => states(reader, span)?,
         RecordKind::Alarms => reader.alarms(span)?.iter().map(alarm).collect(),
@@ -109,7 +109,7 @@ fn known(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
 }
 
-fn states(reader: &Reader, span: Span) -> Result<Vec<Value>, HistoryError> {
+fn states(reader: &Reader, span: RecordSpan) -> Result<Vec<Value>, HistoryError> {
     let newest_ns = reader.span()?.map_or(span.to_ns, |(_, newest_ns)| newest_ns);
     Ok(reader.states(span)?.iter().map(|interval| state(interval, newest_ns)).collect())
 }

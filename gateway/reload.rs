@@ -193,7 +193,7 @@ impl Watch {
 }
 
 /// The newest scripts: ready to run, or what is wrong with them.
-pub type Loaded = Result<ScriptSet, Vec<Problem>>;
+pub type LoadedScripts = Result<ScriptSet, Vec<Problem>>;
 
 /// What a reload found.
 struct Fresh {
@@ -256,7 +256,7 @@ pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> R
 ///
 /// # Errors
 /// Everything that is wrong with the scripts or with the values.
-pub fn prepared(files: &[ScriptFile], settings: Option<&Path>) -> Loaded {
+pub fn prepared(files: &[ScriptFile], settings: Option<&Path>) -> LoadedScripts {
     let values = settings.map_or_else(|| Ok(SettingValues::default()), settings::read)?;
     prepare_with(files, &values)
 }
@@ -304,7 +304,7 @@ pub fn load_rest(
 
 /// The scripts that can be read and have no problems. Where a file could not be read, nobody has looked at the others yet:
 /// those that are not right by themselves are left out too.
-fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> Loaded {
+fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> LoadedScripts {
     // Values that cannot be used leave every setting at its default.
     let prepare = |files: &[ScriptFile]| prepared(files, settings).or_else(|_| prepare(files));
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
@@ -316,7 +316,7 @@ fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> Loa
     })
 }
 
-fn put_in_charge(loaded: Loaded, host: &mut Host) -> Result<usize, Vec<Problem>> {
+fn put_in_charge(loaded: LoadedScripts, host: &mut Host) -> Result<usize, Vec<Problem>> {
     match loaded {
         Ok(set) => {
             let count = set.len();

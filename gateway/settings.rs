@@ -77,7 +77,7 @@ pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Resu
     let after = SettingValues::parse(FILE, &body)?;
     let set = prepare_with(files, &after)?;
     let declared: Vec<&Declared> = set.declared().collect();
-    let words = changes(&before, &after, &declared).iter().map(Change::words).collect::<Vec<_>>().join(", ");
+    let words = changes(&before, &after, &declared).iter().map(SettingChange::words).collect::<Vec<_>>().join(", ");
     replace(&path, &signed(&body, by)).map_err(|error| {
         let (file, what) = (path.display().to_string(), format!("the settings cannot be written: {error}"));
         vec![Problem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
@@ -106,7 +106,7 @@ pub fn author(text: &str) -> String {
 
 /// A setting that has another value than before.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct SettingChange {
     /// `constant_load.target_w`
     pub path: String,
     /// For what.
@@ -119,7 +119,7 @@ pub struct Change {
     pub after: String,
 }
 
-impl Change {
+impl SettingChange {
     /// In words, for the audit and the history.
     #[must_use]
     pub fn words(&self) -> String {
@@ -138,7 +138,7 @@ impl Change {
 
 /// Every setting that has another value.
 #[must_use]
-pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<Change> {
+pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<SettingChange> {
     let mut found = Vec::new();
     for it in declared {
         let mut places = vec![Place::Machine];
@@ -154,7 +154,7 @@ pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Decla
             let usual = if place == Place::Machine { it.default.to_string() } else { "as the machine".to_owned() };
             let word = |value: Option<SettingValue>| value.map_or_else(|| usual.clone(), |value| value.to_string());
             let (before, after) = (word(old), word(new));
-            found.push(Change { path: it.path(), place, unit: it.unit.clone(), before, after });
+            found.push(SettingChange { path: it.path(), place, unit: it.unit.clone(), before, after });
         }
     }
     found

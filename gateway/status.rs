@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A number or a word.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Shown {
+pub enum NumberOrWord {
     /// In the unit beside it.
     Number(f64),
     /// A state word or name.
@@ -23,7 +23,7 @@ pub struct ChannelStatus {
     pub name: &'static str,
     /// The value.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<Shown>,
+    pub value: Option<NumberOrWord>,
     /// Unit of the value; `1` for pure numbers, empty for text.
     pub unit: &'static str,
     /// Seconds since the value was true; 0 between two readings.
@@ -168,7 +168,7 @@ pub struct FactStatus {
     /// What it is; a number's name ends in its unit.
     pub name: String,
     /// What is known.
-    pub value: Shown,
+    pub value: NumberOrWord,
 }
 
 /// A source and how it keeps its pace.
@@ -314,7 +314,7 @@ pub struct TickStatus {
 
 /// Something that does not work while the box goes on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Problem {
+pub struct StatusProblem {
     /// What and where.
     pub what: String,
     /// What to do next.
@@ -375,5 +375,5 @@ pub struct Status {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sinks: Vec<crate::sinks::SinkStatus>,
     /// What does not work while the box goes on.
-    pub problems: Vec<Problem>,
+    pub problems: Vec<StatusProblem>,
 }

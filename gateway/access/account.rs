@@ -3,7 +3,7 @@
 //! A refusal costs whoever provokes it nothing, so their number is limited: beyond it they are counted, and the next row says
 //! how many were left out.
 
-use crate::control::Post;
+use crate::control::OrderSender;
 use crate::history::Audit;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -39,12 +39,12 @@ impl Budget {
 /// See the [module](self).
 #[derive(Debug)]
 pub(super) struct Account {
-    post: Post,
+    post: OrderSender,
     refusals: Mutex<Budget>,
 }
 
 impl Account {
-    pub(super) fn new(post: Post) -> Self {
+    pub(super) fn new(post: OrderSender) -> Self {
         Self { post, refusals: Mutex::default() }
     }
 

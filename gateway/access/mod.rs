@@ -21,10 +21,12 @@ mod sign_in;
 mod token;
 mod tries;
 
-pub use persons::{Difference, Entry, FIRST, NAME_MAX, PERSONS_MAX, Persons, PersonsError, differences, path};
+pub use persons::{
+    FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, differences, path,
+};
 pub use role::Role;
-pub use sessions::{Key, key};
-pub use sign_in::{Access, Begun, Rules, SignInError};
+pub use sessions::{SessionKey, key};
+pub use sign_in::{Access, NewSession, Rules, SignInError};
 pub(crate) use token::random;
 pub use token::{Token, TokenError};
 pub use tries::{LOCKED_FOR, TRIES_MAX};

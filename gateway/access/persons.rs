@@ -24,7 +24,7 @@ pub const FIRST: &str = "admin";
 /// Somebody who is known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
+pub struct PersonEntry {
     /// Name, as it stands in the audit.
     pub name: String,
     /// What he or she may do.
@@ -40,7 +40,7 @@ pub struct Entry {
 #[serde(deny_unknown_fields)]
 pub struct Persons {
     schema: String,
-    persons: Vec<Entry>,
+    persons: Vec<PersonEntry>,
 }
 
 /// Why the persons could not be read or changed.
@@ -128,13 +128,13 @@ impl Persons {
 
     /// Everybody, in the order of the file.
     #[must_use]
-    pub fn all(&self) -> &[Entry] {
+    pub fn all(&self) -> &[PersonEntry] {
         &self.persons
     }
 
     /// The one of this name.
     #[must_use]
-    pub fn named(&self, name: &str) -> Option<&Entry> {
+    pub fn named(&self, name: &str) -> Option<&PersonEntry> {
         self.persons.iter().find(|entry| entry.name == name)
     }
 
@@ -152,7 +152,7 @@ impl Persons {
         }
         let token = Token::make()?;
         let (name, token_hash, by) = (name.to_owned(), token.hash()?, by.to_owned());
-        self.persons.push(Entry { name, role, token_hash, by });
+        self.persons.push(PersonEntry { name, role, token_hash, by });
         Ok(token)
     }
 
@@ -190,7 +190,7 @@ impl Persons {
         Ok(())
     }
 
-    fn entry(&mut self, name: &str) -> Result<&mut Entry, PersonsError> {
+    fn entry(&mut self, name: &str) -> Result<&mut PersonEntry, PersonsError> {
         let found = self.persons.iter_mut().find(|entry| entry.name == name);
         found.ok_or_else(|| PersonsError::Nobody(name.to_owned()))
     }
@@ -204,7 +204,7 @@ impl Persons {
 
 /// One difference between two readings of the file, for the audit.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Difference {
+pub struct PersonDifference {
     /// `added`, `removed`, `role` or `token`.
     pub outcome: &'static str,
     /// In words.
@@ -215,8 +215,8 @@ pub struct Difference {
 
 /// Everything in which `now` differs from `before`.
 #[must_use]
-pub fn differences(before: &Persons, now: &Persons) -> Vec<Difference> {
-    let told = |outcome, text, entry: &Entry| Difference { outcome, text, by: entry.by.clone() };
+pub fn differences(before: &Persons, now: &Persons) -> Vec<PersonDifference> {
+    let told = |outcome, text, entry: &PersonEntry| PersonDifference { outcome, text, by: entry.by.clone() };
     let changed = now.persons.iter().flat_map(|entry| {
         let Some(old) = before.named(&entry.name) else {
             return vec![told("added", format!("{} is {}", entry.name, entry.role), entry)];
@@ -227,7 +227,7 @@ pub fn differences(before: &Persons, now: &Persons) -> Vec<Difference> {
             .then(|| told("token", format!("{} has a new token", entry.name), entry));
         role.into_iter().chain(token).collect()
     });
-    let gone = before.persons.iter().filter(|old| now.named(&old.name).is_none()).map(|old| Difference {
+    let gone = before.persons.iter().filter(|old| now.named(&old.name).is_none()).map(|old| PersonDifference {
         outcome: "removed",
         text: format!("{} was {}", old.name, old.role),
         by: String::new(),

@@ -13,7 +13,7 @@ const SESSIONS_MAX: usize = 128;
 const PER_PERSON_MAX: usize = 8;
 
 /// The digest by which a session is found.
-pub type Key = [u8; 32];
+pub type SessionKey = [u8; 32];
 
 /// One of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,12 +31,12 @@ pub(super) struct Session {
 /// All of them.
 #[derive(Debug, Default)]
 pub(super) struct Sessions {
-    by_key: HashMap<Key, Session>,
+    by_key: HashMap<SessionKey, Session>,
 }
 
 /// The digest of what the cookie holds.
 #[must_use]
-pub fn key(cookie: &str) -> Key {
+pub fn key(cookie: &str) -> SessionKey {
     Sha256::digest(cookie.as_bytes()).into()
 }
 
@@ -65,12 +65,12 @@ impl Sessions {
 
     /// The session of this key, unless it has ended.
     #[must_use]
-    pub(super) fn find(&self, key: &Key, now: Instant) -> Option<&Session> {
+    pub(super) fn find(&self, key: &SessionKey, now: Instant) -> Option<&Session> {
         self.by_key.get(key).filter(|session| now < session.until)
     }
 
     /// Ends one.
-    pub(super) fn end(&mut self, key: &Key) {
+    pub(super) fn end(&mut self, key: &SessionKey) {
         self.by_key.remove(key);
     }
 

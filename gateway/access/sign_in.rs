@@ -2,11 +2,11 @@
 
 use super::account::Account;
 use super::persons::{Persons, PersonsError, differences};
-use super::sessions::{Key, Sessions, key};
+use super::sessions::{SessionKey, Sessions, key};
 use super::token::Token;
 use super::tries::Tries;
 use super::{Person, Role};
-use crate::control::Post;
+use crate::control::OrderSender;
 use crate::files::{Mark, mark};
 use crate::log::{Notice, Severity};
 use std::collections::HashMap;
@@ -47,7 +47,7 @@ pub enum SignInError {
 
 /// A session that has begun.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Begun {
+pub struct NewSession {
     /// What the cookie shall hold.
     pub cookie: String,
     /// Who signed in.
@@ -55,7 +55,7 @@ pub struct Begun {
 }
 
 #[derive(Debug)]
-struct Known {
+struct CachedPersons {
     mark: Mark,
     persons: Persons,
 }
@@ -72,10 +72,10 @@ struct Bearer {
 pub struct Access {
     rules: Rules,
     file: PathBuf,
-    known: Mutex<Known>,
+    known: Mutex<CachedPersons>,
     sessions: Mutex<Sessions>,
     tries: Mutex<Tries>,
-    bearers: Mutex<HashMap<Key, Bearer>>,
+    bearers: Mutex<HashMap<SessionKey, Bearer>>,
     /// One change of the file at a time.
     changing: tokio::sync::Mutex<()>,
     /// One hash at a time: it takes 19 MB and some hundredths of a second.
@@ -94,7 +94,7 @@ impl Access {
     /// Reads the persons of `file`; where there is none the first administrator is made, and the token is given to be shown
     /// once.
     #[must_use]
-    pub fn open(file: PathBuf, rules: Rules, post: Post) -> (Self, Option<Token>) {
+    pub fn open(file: PathBuf, rules: Rules, post: OrderSender) -> (Self, Option<Token>) {
         let (persons, first) = match first(&file) {
             Ok(found) => found,
             Err(error) => {
@@ -104,7 +104,7 @@ impl Access {
             }
         };
         let nobody = persons.all().first().map(|entry| entry.token_hash.clone()).unwrap_or_default();
-        let known = Mutex::new(Known { mark: mark(&file), persons });
+        let known = Mutex::new(CachedPersons { mark: mark(&file), persons });
         let access = Self {
             rules,
             file,
@@ -189,14 +189,14 @@ impl Access {
     ///
     /// # Errors
     /// Wrong name or token, too many tries, a busy box.
-    pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<Begun, SignInError> {
+    pub async fn sign_in(&self, name: &str, token: &Token, from: IpAddr) -> Result<NewSession, SignInError> {
         self.follow().await;
         let person = self.check(name, token, from, "login").await?;
         let hash = self.hash_of(&person.name).unwrap_or_default();
         let begun = lock(&self.sessions).begin((&person.name, &hash), self.rules.session, Instant::now());
         let cookie = begun.map_err(|_| SignInError::Busy)?;
         self.account.row("login", "done", &format!("{} from {from}", person.role), &person.name).await;
-        Ok(Begun { cookie, person })
+        Ok(NewSession { cookie, person })
     }
 
     /// Is this the token of this name? Wrong ones are counted and accounted for as `kind`.
@@ -243,7 +243,7 @@ impl Access {
 
     /// The same by its digest: what a stream keeps to see when its session has ended.
     #[must_use]
-    pub fn of_key(&self, key: &Key) -> Option<(Person, Instant)> {
+    pub fn of_key(&self, key: &SessionKey) -> Option<(Person, Instant)> {
         let sessions = lock(&self.sessions);
         let session = sessions.find(key, Instant::now())?;
         let known = lock(&self.known);
@@ -272,7 +272,7 @@ impl Access {
         Ok(person)
     }
 
-    fn kept_bearer(&self, digest: &Key) -> Option<Person> {
+    fn kept_bearer(&self, digest: &SessionKey) -> Option<Person> {
         let bearers = lock(&self.bearers);
         let bearer = bearers.get(digest).filter(|bearer| Instant::now() < bearer.until)?;
         let known = lock(&self.known);

@@ -17,11 +17,11 @@ pub enum Patience {
 }
 
 /// What is found.
-pub(super) type Found = Result<Lag, NotIdentifiable>;
+pub(super) type LagResult = Result<Lag, NotIdentifiable>;
 
 struct BackgroundThread {
     ask: SyncSender<Vec<Transient>>,
-    answers: Receiver<Found>,
+    answers: Receiver<LagResult>,
 }
 
 /// See the [module](self).
@@ -51,7 +51,7 @@ impl Background {
     }
 
     /// The answer for a pair, when it is due and there.
-    pub(super) fn answer(&mut self, pair: usize, now_ns: TimeNs) -> Option<Found> {
+    pub(super) fn answer(&mut self, pair: usize, now_ns: TimeNs) -> Option<LagResult> {
         let due = self.asked.is_some_and(|(asked, due_ns)| asked == pair && due_ns <= now_ns);
         let line = self.line.as_ref().filter(|_| due)?;
         let answer = match self.patience {

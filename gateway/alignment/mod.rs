@@ -58,7 +58,7 @@ pub struct Alignment {
 impl Alignment {
     /// Of these sources, in the order of the merge.
     #[must_use]
-    pub fn of(plans: &[SourcePlan], config: &config::Alignment, patience: Patience) -> Self {
+    pub fn of(plans: &[SourcePlan], config: &config::AlignmentConfig, patience: Patience) -> Self {
         let first = |channel: ChannelId| plans.iter().position(|plan| plan.channels.contains(&channel));
         let mut pairs: Vec<Pair> = Vec::new();
         for (name, purpose) in POWERS.into_iter().zip([config.spindle_power, config.total_power]) {

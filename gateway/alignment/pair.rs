@@ -1,6 +1,6 @@
 //! A controller and a meter: what is gathered, what is known, what is in force.
 
-use super::background::Found;
+use super::background::LagResult;
 use super::shown::AlignmentStatus;
 use crate::config::AlignmentUse;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -21,7 +21,7 @@ pub(super) struct Pair {
     purpose: AlignmentUse,
     pub(super) collector: Collector,
     pub(super) follower: Follower,
-    found: Option<Found>,
+    found: Option<LagResult>,
     pause_ns: i64,
     due_ns: TimeNs,
 }
@@ -80,7 +80,7 @@ impl Pair {
     }
 
     /// Takes an answer. The kind and the text of an event when there is something to tell.
-    pub(super) fn settle(&mut self, found: Found, now_ns: TimeNs, now_s: f64) -> Option<(&'static str, String)> {
+    pub(super) fn settle(&mut self, found: LagResult, now_ns: TimeNs, now_s: f64) -> Option<(&'static str, String)> {
         self.pause_ns = match &found {
             Ok(_) => PAUSE_NS.1,
             // That costs nothing, and the next change of speed may be the one that was missing.

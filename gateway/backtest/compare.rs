@@ -9,7 +9,7 @@ const SAME_NS: i64 = SECOND_NS;
 
 /// What a spell is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum SpellKind {
     /// An alarm that stands.
     Alarm,
     /// A feed hold or tool change that is asked for.
@@ -20,7 +20,7 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Spell {
     /// What it is.
-    pub kind: Kind,
+    pub kind: SpellKind,
     /// Which script.
     pub script: Arc<str>,
     /// Name of the alarm, or `feed_hold`, `tool_change`.
@@ -40,7 +40,7 @@ impl Spell {
         self.to_ns.unwrap_or(TimeNs::MAX)
     }
 
-    fn key(&self) -> (Kind, Arc<str>, Arc<str>) {
+    fn key(&self) -> (SpellKind, Arc<str>, Arc<str>) {
         (self.kind, self.script.clone(), self.name.clone())
     }
 }
@@ -70,7 +70,7 @@ impl Evidence {
 
 /// One difference.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Difference {
+pub enum SpellDifference {
     /// The running scripts have it, the edited ones do not.
     Lost(Spell, Evidence),
     /// The edited scripts have it, the running ones do not.
@@ -79,7 +79,7 @@ pub enum Difference {
     Shifted(Spell, Spell),
 }
 
-impl Difference {
+impl SpellDifference {
     /// When it begins.
     #[must_use]
     pub fn at_ns(&self) -> TimeNs {
@@ -99,11 +99,11 @@ impl Difference {
     }
 }
 
-type Key = (Kind, Arc<str>, Arc<str>);
-type Table<'a> = BTreeMap<Key, Vec<&'a Spell>>;
+type SpellKey = (SpellKind, Arc<str>, Arc<str>);
+type SpellTable<'a> = BTreeMap<SpellKey, Vec<&'a Spell>>;
 
-fn table(spells: &[Spell]) -> Table<'_> {
-    let mut table = Table::new();
+fn table(spells: &[Spell]) -> SpellTable<'_> {
+    let mut table = SpellTable::new();
     for spell in spells {
         table.entry(spell.key()).or_default().push(spell);
     }
@@ -127,9 +127,9 @@ pub(super) struct Sides<'a> {
 impl Sides<'_> {
     /// Every difference, in the order of time.
     #[must_use]
-    pub(super) fn differences(&self) -> Vec<Difference> {
+    pub(super) fn differences(&self) -> Vec<SpellDifference> {
         let tables = [self.recorded, self.running, self.edited].map(table);
-        let keys: BTreeSet<&Key> = tables.iter().flat_map(BTreeMap::keys).collect();
+        let keys: BTreeSet<&SpellKey> = tables.iter().flat_map(BTreeMap::keys).collect();
         let (from_ns, near_ns) = (self.from_ns, self.near_ns.max(SAME_NS));
         let mut found = Vec::new();
         for key in keys {
@@ -137,7 +137,7 @@ impl Sides<'_> {
                 tables.each_ref().map(|table| table.get(key).cloned().unwrap_or_default());
             Named { recorded, running, edited, from_ns, near_ns }.differences(&mut found);
         }
-        found.sort_by_key(Difference::at_ns);
+        found.sort_by_key(SpellDifference::at_ns);
         found
     }
 }
@@ -152,14 +152,14 @@ struct Named<'a> {
 }
 
 impl Named<'_> {
-    fn differences(&self, found: &mut Vec<Difference>) {
+    fn differences(&self, found: &mut Vec<SpellDifference>) {
         let mut named = BTreeSet::new();
         for spell in self.recorded.iter().filter(|spell| spell.from_ns >= self.from_ns) {
             let over_samples = self.meeting(spell, &self.running);
             match self.meeting(spell, &self.edited) {
                 None => {
                     let evidence = if over_samples.is_some() { Evidence::Both } else { Evidence::History };
-                    found.push(Difference::Lost((*spell).clone(), evidence));
+                    found.push(SpellDifference::Lost((*spell).clone(), evidence));
                     named.extend(over_samples);
                 }
                 // Where both sets have it over the stored samples, these are compared: storage has done the same to both.
@@ -173,24 +173,24 @@ impl Named<'_> {
         let known = |spell: &&&Spell| {
             [&self.running, &self.recorded].into_iter().any(|others| self.meeting(spell, others).is_some())
         };
-        found.extend(self.edited.iter().filter(|it| !known(it)).map(|it| Difference::Gained((*it).clone())));
+        found.extend(self.edited.iter().filter(|it| !known(it)).map(|it| SpellDifference::Gained((*it).clone())));
     }
 
-    fn of_running(&self, spell: &Spell) -> Option<Difference> {
+    fn of_running(&self, spell: &Spell) -> Option<SpellDifference> {
         match self.meeting(spell, &self.edited) {
             Some(at) => self.shifted(spell, self.edited[at]),
             None => {
                 let raised = self.meeting(spell, &self.recorded).is_some();
                 let evidence = if raised { Evidence::Both } else { Evidence::Samples };
-                Some(Difference::Lost(spell.clone(), evidence))
+                Some(SpellDifference::Lost(spell.clone(), evidence))
             }
         }
     }
 
-    fn shifted(&self, spell: &Spell, edited: &Spell) -> Option<Difference> {
+    fn shifted(&self, spell: &Spell, edited: &Spell) -> Option<SpellDifference> {
         let far = |a: TimeNs, b: TimeNs| a.abs_diff(b) > self.near_ns.unsigned_abs();
         let shifted = far(spell.from_ns, edited.from_ns) || far(spell.end_ns(), edited.end_ns());
-        shifted.then(|| Difference::Shifted(spell.clone(), edited.clone()))
+        shifted.then(|| SpellDifference::Shifted(spell.clone(), edited.clone()))
     }
 
     /// Of the others that stand at the same time, the place of the one that does so for longest.
@@ -211,7 +211,7 @@ mod tests {
         let (script, text) = (Arc::from("a.rhai"), Arc::from(""));
         let to_ns = to_s.map(|to_s| to_s * SECOND_NS);
         Spell {
-            kind: Kind::Alarm,
+            kind: SpellKind::Alarm,
             script,
             name: name.into(),
             text,
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    fn differences(recorded: &[Spell], running: &[Spell], edited: &[Spell], near_ns: i64) -> Vec<Difference> {
+    fn differences(recorded: &[Spell], running: &[Spell], edited: &[Spell], near_ns: i64) -> Vec<SpellDifference> {
         Sides { recorded, running, edited, from_ns: 0, near_ns }.differences()
     }
 
@@ -255,13 +255,14 @@ mod tests {
         let found = differences(&recorded, &running, &edited, 0);
         let words: Vec<(&str, i64)> = found.iter().map(|it| (it.word(), it.at_ns() / SECOND_NS)).collect();
         assert_eq!(words, [("lost", 10), ("lost", 20), ("lost", 40), ("gained", 50)]);
-        let evidence = |it: &Difference| if let Difference::Lost(_, evidence) = it { Some(*evidence) } else { None };
+        let evidence =
+            |it: &SpellDifference| if let SpellDifference::Lost(_, evidence) = it { Some(*evidence) } else { None };
         let by: Vec<_> = found.iter().filter_map(evidence).collect();
         assert_eq!(by, [Evidence::Both, Evidence::History, Evidence::Samples]);
         let before = [spell("a", -10, Some(12))];
         assert!(differences(&before, &[], &[], 0).is_empty(), "raised before the stretch");
         let found = differences(&before, &running[..1], &[], 0);
-        assert!(matches!(found[..], [Difference::Lost(_, Evidence::Both)]), "but it stood in it: {found:?}");
+        assert!(matches!(found[..], [SpellDifference::Lost(_, Evidence::Both)]), "but it stood in it: {found:?}");
     }
 
     #[test]
@@ -271,7 +272,7 @@ mod tests {
         let late = [spell("a", 14, Some(20))];
         assert!(differences(&recorded, &late, &late, 0).is_empty(), "both are late over the stored samples");
         let found = differences(&recorded, &[], &late, 0);
-        assert!(matches!(&found[..], [Difference::Shifted(..)]), "{found:?}");
+        assert!(matches!(&found[..], [SpellDifference::Shifted(..)]), "{found:?}");
         assert!(differences(&recorded, &[], &late, 5 * SECOND_NS).is_empty(), "within the pace of the samples");
     }
 }

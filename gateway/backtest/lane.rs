@@ -1,6 +1,6 @@
 //! What one set of scripts did on its way through the history.
 
-use super::compare::{Kind, Spell};
+use super::compare::{Spell, SpellKind};
 use super::seconds;
 use crate::pipeline::Tally;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -19,7 +19,7 @@ const PROBLEMS_MAX: usize = 20;
 
 /// What was asked for in all.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Asked {
+pub struct RequestTotals {
     /// For how long, ns.
     asked_ns: i64,
     /// Least request, %.
@@ -31,7 +31,7 @@ pub struct Asked {
     pub times: u64,
 }
 
-impl Asked {
+impl RequestTotals {
     fn add(&mut self, pct: Option<f64>, before: Option<f64>, step_ns: i64) {
         let Some(pct) = pct.filter(|pct| pct.is_finite()) else { return };
         self.times += u64::from(before.is_none());
@@ -63,7 +63,7 @@ pub struct Lane {
     /// Spells that have begun, by place in `spells`.
     open: Vec<usize>,
     left_out: u64,
-    asked: Asked,
+    asked: RequestTotals,
     pct: Option<f64>,
     notes: u64,
     problems: Vec<Problem>,
@@ -79,7 +79,7 @@ impl Lane {
             spells: Vec::new(),
             open: Vec::new(),
             left_out: 0,
-            asked: Asked::default(),
+            asked: RequestTotals::default(),
             pct: None,
             notes: 0,
             problems: Vec::new(),
@@ -104,12 +104,12 @@ impl Lane {
     fn take(&mut self, at_ns: TimeNs, decision: &Decision) {
         for change in &decision.alarms {
             let named = |spell: &Spell| {
-                spell.kind == Kind::Alarm && *spell.name == *change.name && *spell.script == *change.script
+                spell.kind == SpellKind::Alarm && *spell.name == *change.name && *spell.script == *change.script
             };
             if change.raised {
                 let (script, name, text) = (change.script.clone(), change.name.clone(), change.en.clone());
                 let level = change.level.word();
-                self.begin(Spell { kind: Kind::Alarm, script, name, text, level, from_ns: at_ns, to_ns: None });
+                self.begin(Spell { kind: SpellKind::Alarm, script, name, text, level, from_ns: at_ns, to_ns: None });
             } else {
                 self.finish(at_ns, named);
             }
@@ -128,14 +128,14 @@ impl Lane {
             // The first script's words count.
             requests.filter(|request| *request.stop.word() == *word).min_by_key(|request| request.script.clone())
         };
-        let over = |spell: &Spell| spell.kind == Kind::Stop && asked(&spell.name).is_none();
+        let over = |spell: &Spell| spell.kind == SpellKind::Stop && asked(&spell.name).is_none();
         self.finish(at_ns, over);
         for word in [Stop::FeedHold, Stop::ToolChange].map(Stop::word) {
             let Some(request) = asked(word) else { continue };
-            let standing = |at: &&usize| self.spells[**at].kind == Kind::Stop && *self.spells[**at].name == *word;
+            let standing = |at: &&usize| self.spells[**at].kind == SpellKind::Stop && *self.spells[**at].name == *word;
             if self.open.iter().find(standing).is_none() {
                 let (script, text, name) = (request.script.clone(), request.reason.clone(), Arc::from(word));
-                self.begin(Spell { kind: Kind::Stop, script, name, text, level: "", from_ns: at_ns, to_ns: None });
+                self.begin(Spell { kind: SpellKind::Stop, script, name, text, level: "", from_ns: at_ns, to_ns: None });
             }
         }
     }
@@ -180,7 +180,7 @@ impl Lane {
 
     /// What was asked for.
     #[must_use]
-    pub fn asked(&self) -> &Asked {
+    pub fn asked(&self) -> &RequestTotals {
         &self.asked
     }
 

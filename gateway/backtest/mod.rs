@@ -25,16 +25,16 @@ mod recorded;
 mod report;
 mod rows;
 
-pub use compare::{Difference, Evidence, Kind, Spell};
-pub use lane::{Asked, Lane};
+pub use compare::{Evidence, Spell, SpellDifference, SpellKind};
+pub use lane::{Lane, RequestTotals};
 pub use recorded::{Other, Recorded};
-pub use report::Report;
+pub use report::BacktestReport;
 
 use crate::history::{HistoryError, Query, Reader};
 use adapters::clock::{SECOND_NS, TimeNs};
 use compare::Sides;
 use recorded::Concerned;
-use rows::Rows;
+use rows::ChunkRows;
 use rules::script::ScriptSet;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ use std::time::Instant;
 pub const LEAD_IN_NS: i64 = 3600 * SECOND_NS;
 
 /// What to compare.
-pub struct Plan {
+pub struct BacktestPlan {
     /// The history.
     pub history: PathBuf,
     /// Beginning of the stretch.
@@ -63,9 +63,9 @@ pub struct Plan {
 ///
 /// # Errors
 /// A history that cannot be read.
-pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
+pub fn backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> {
     let began = Instant::now();
-    let Plan { history, from_ns, to_ns, every_ns, running, edited } = plan;
+    let BacktestPlan { history, from_ns, to_ns, every_ns, running, edited } = plan;
     let reader = Reader::open(&history)?;
     let mut query = Query::between(from_ns.saturating_sub(LEAD_IN_NS), to_ns.unwrap_or(TimeNs::MAX));
     query.series = rows::channels(&reader)?;
@@ -75,7 +75,7 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
         if query.series.is_empty() {
             return Ok(());
         }
-        let mut rows = Rows::new(every_ns);
+        let mut rows = ChunkRows::new(every_ns);
         reader.samples(&query, |chunk| {
             rows.each(chunk, &mut *take);
             ControlFlow::Continue(())
@@ -85,7 +85,7 @@ pub fn backtest(plan: Plan) -> Result<Report, HistoryError> {
     let recorded =
         span.map(|(first_ns, last_ns)| recorded::read(&reader, &concerned, first_ns, last_ns)).transpose()?;
     let recorded = recorded.unwrap_or_default();
-    Ok(Report {
+    Ok(BacktestReport {
         history,
         from_ns: raced.first_ns.unwrap_or(from_ns),
         to_ns: raced.last_ns.unwrap_or(from_ns),

@@ -54,13 +54,13 @@ impl Runner {
 
 /// Samples, and what has been found out about them on the way.
 #[derive(Default)]
-struct Batch {
+struct SampleBatch {
     samples: Vec<Sample>,
     used: usize,
     first: Vec<(Estimates, Decision)>,
 }
 
-impl Batch {
+impl SampleBatch {
     fn push(&mut self, sample: &Sample) {
         match self.samples.get_mut(self.used) {
             Some(place) => place.clone_from(sample),
@@ -141,10 +141,10 @@ pub(super) fn race(
 /// Gathers samples into batches.
 fn hand_on(
     read: impl FnOnce(&mut dyn FnMut(&Sample)) -> Result<(), HistoryError>,
-    to: &SyncSender<Batch>,
-    empty: &Receiver<Batch>,
+    to: &SyncSender<SampleBatch>,
+    empty: &Receiver<SampleBatch>,
 ) -> Result<(), HistoryError> {
-    let mut batch = Batch::default();
+    let mut batch = SampleBatch::default();
     let read = read(&mut |sample| {
         batch.push(sample);
         if batch.used >= BATCH {
@@ -156,7 +156,7 @@ fn hand_on(
     read
 }
 
-fn common(mut first: Runner, from: &Receiver<Batch>, to: &SyncSender<Batch>) {
+fn common(mut first: Runner, from: &Receiver<SampleBatch>, to: &SyncSender<SampleBatch>) {
     for mut batch in from {
         batch.first.clear();
         for sample in &batch.samples[..batch.used] {
@@ -189,7 +189,7 @@ impl Finish {
         Self { from_ns, lanes, running, edited, rows: 0, first_ns, last_ns, covered_ns: 0, differing_ns: 0 }
     }
 
-    fn take(&mut self, batch: &mut Batch) {
+    fn take(&mut self, batch: &mut SampleBatch) {
         for (sample, (estimates, decision)) in batch.samples[..batch.used].iter().zip(&batch.first) {
             self.step(sample, estimates, decision);
         }

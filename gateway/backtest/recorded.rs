@@ -4,9 +4,9 @@
 //! that was raised on the machine need not be raised over the stored samples. What the edited scripts lose is therefore told
 //! against what was raised, as far as the scripts that raised it are the running ones.
 
-use super::compare::{Kind, Spell};
+use super::compare::{Spell, SpellKind};
 use crate::active_scripts::{self, Versions};
-use crate::history::{AlarmEntry, Event, HistoryError, Reader, Span};
+use crate::history::{AlarmEntry, Event, HistoryError, Reader, RecordSpan};
 use adapters::clock::TimeNs;
 use rules::script::{Level, SCRIPT_STOPPED, ScriptSet};
 use std::collections::BTreeMap;
@@ -70,8 +70,8 @@ struct Timeline(Vec<(TimeNs, Versions)>);
 
 impl Timeline {
     fn read(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs) -> Result<Self, HistoryError> {
-        let before = reader.events_of(active_scripts::KIND, Span::between(TimeNs::MIN, from_ns, 1))?;
-        let within = reader.events_of(active_scripts::KIND, Span::between(from_ns, to_ns, READ_MAX))?;
+        let before = reader.events_of(active_scripts::KIND, RecordSpan::between(TimeNs::MIN, from_ns, 1))?;
+        let within = reader.events_of(active_scripts::KIND, RecordSpan::between(from_ns, to_ns, READ_MAX))?;
         let versions = |event: Event| Some((event.at_ns, active_scripts::versions(&event)?));
         Ok(Self(before.into_iter().chain(within).filter_map(versions).collect()))
     }
@@ -104,7 +104,7 @@ pub(super) fn read(
     let after_ns = to_ns.saturating_add(1);
     let timeline = Timeline::read(reader, from_ns, after_ns)?;
     let mut recorded = Recorded::default();
-    let alarms = reader.alarms(Span::between(from_ns, after_ns, READ_MAX))?;
+    let alarms = reader.alarms(RecordSpan::between(from_ns, after_ns, READ_MAX))?;
     recorded.more = alarms.len() >= READ_MAX as usize;
     for alarm in alarms {
         if alarm.source.ends_with(END) && alarm.code != SCRIPT_STOPPED {
@@ -147,7 +147,7 @@ impl Recorded {
 /// What stood at the end of the stretch has no end, as in the lanes.
 fn spell(alarm: &AlarmEntry, to_ns: TimeNs) -> Spell {
     Spell {
-        kind: Kind::Alarm,
+        kind: SpellKind::Alarm,
         script: alarm.source.as_str().into(),
         name: alarm.code.as_str().into(),
         text: alarm.en.as_str().into(),

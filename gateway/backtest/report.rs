@@ -1,7 +1,7 @@
 //! What a backtest found, in words and as JSON (`backtest/1`).
 
-use super::compare::{Difference, Evidence, Spell};
-use super::lane::{Asked, Lane};
+use super::compare::{Evidence, Spell, SpellDifference};
+use super::lane::{Lane, RequestTotals};
 use super::recorded::Recorded;
 use super::seconds;
 use crate::moment::utc;
@@ -15,7 +15,7 @@ use std::time::Duration;
 const SHOWN: usize = 200;
 
 /// What a backtest found; written out as words, and as `backtest/1`.
-pub struct Report {
+pub struct BacktestReport {
     /// The history.
     pub history: PathBuf,
     /// First sample that was compared.
@@ -29,7 +29,7 @@ pub struct Report {
     /// Time in which the two ask for another feed, s.
     pub differing_s: f64,
     /// Alarms and stops, in the order of time.
-    pub differences: Vec<Difference>,
+    pub differences: Vec<SpellDifference>,
     /// Trials of the edited scripts that fail: with them they would not come into charge.
     pub trials: Vec<Problem>,
     /// The alarms that were raised then.
@@ -42,7 +42,7 @@ pub struct Report {
     pub took: Duration,
 }
 
-impl Report {
+impl BacktestReport {
     /// Did the edited scripts lose an alarm or a stop, or fail?
     #[must_use]
     pub fn worse(&self) -> bool {
@@ -108,7 +108,7 @@ fn recorded(recorded: &Recorded) -> Value {
 }
 
 fn lane(lane: &Lane) -> Value {
-    let Asked { least_pct, greatest_pct, times, .. } = *lane.asked();
+    let RequestTotals { least_pct, greatest_pct, times, .. } = *lane.asked();
     json!({
         "scripts": lane.scripts(),
         "alarms_and_stops": lane.spells().len(),
@@ -125,15 +125,15 @@ fn lane(lane: &Lane) -> Value {
     })
 }
 
-fn difference(difference: &Difference) -> Value {
+fn difference(difference: &SpellDifference) -> Value {
     match difference {
-        Difference::Lost(one, evidence) => {
+        SpellDifference::Lost(one, evidence) => {
             let mut told = spell(one);
             told["evidence"] = evidence.word().into();
             told
         }
-        Difference::Gained(one) => spell(one),
-        Difference::Shifted(running, edited) => json!({ "running": spell(running), "edited": spell(edited) }),
+        SpellDifference::Gained(one) => spell(one),
+        SpellDifference::Shifted(running, edited) => json!({ "running": spell(running), "edited": spell(edited) }),
     }
 }
 
@@ -187,7 +187,7 @@ impl fmt::Display for Recorded {
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for BacktestReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (from, to, hours) = (utc(self.from_ns), utc(self.to_ns), self.covered_s / 3600.0);
         writeln!(f, "{from} to {to}: {} samples, {hours:.2} h ({:.0} samples/s)", self.rows, self.rows_per_s())?;
@@ -202,9 +202,11 @@ impl fmt::Display for Report {
         write!(f, "{}", self.recorded)?;
         for difference in self.differences.iter().take(SHOWN) {
             match difference {
-                Difference::Lost(spell, evidence) => writeln!(f, "  lost    {}{}", line(spell), remark(*evidence))?,
-                Difference::Gained(spell) => writeln!(f, "  gained  {}", line(spell))?,
-                Difference::Shifted(running, edited) => {
+                SpellDifference::Lost(spell, evidence) => {
+                    writeln!(f, "  lost    {}{}", line(spell), remark(*evidence))?
+                }
+                SpellDifference::Gained(spell) => writeln!(f, "  gained  {}", line(spell))?,
+                SpellDifference::Shifted(running, edited) => {
                     let later_s = seconds(edited.from_ns - running.from_ns);
                     writeln!(f, "  shifted {}; with the edited scripts {later_s:+.1} s", line(running))?;
                 }

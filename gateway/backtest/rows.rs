@@ -11,12 +11,12 @@ pub(super) fn channels(reader: &Reader) -> Result<Vec<String>, HistoryError> {
 }
 
 /// Goes through chunks; remembers the last row that was handed on.
-pub(super) struct Rows {
+pub(super) struct ChunkRows {
     every_ns: i64,
     last_ns: Option<TimeNs>,
 }
 
-impl Rows {
+impl ChunkRows {
     /// Rows closer together than `every_ns` are left out.
     pub(super) fn new(every_ns: i64) -> Self {
         Self { every_ns, last_ns: None }

@@ -3,7 +3,7 @@
 //! A test runs a whole box and fails when it leaves a file that no row here names. A box that has been restored decides as the one
 //! that was saved: whatever a decision depends on is in a row with another fate than [`Fate::Left`].
 
-use super::Places;
+use super::BackupPaths;
 use std::path::Path;
 
 /// What a backup makes of a file.
@@ -58,7 +58,7 @@ pub const LIST: &[Row] = &[
 
 /// What a backup makes of this file of the data directory, as far as names tell; `None`: nobody has thought of it.
 #[must_use]
-pub fn fate(places: &Places, path: &Path) -> Option<Fate> {
+pub fn fate(places: &BackupPaths, path: &Path) -> Option<Fate> {
     let below = path.strip_prefix(&places.data_dir).ok()?;
     let named = [&places.operations, &places.model, &places.thermal_model, &places.configuration];
     if named.into_iter().flatten().any(|it| it == path) {

@@ -12,10 +12,10 @@ pub mod list;
 mod restore;
 mod restored;
 
-pub use restore::{Ask, restore};
+pub use restore::{RestoreRequest, restore};
 pub use restored::take as take_restored;
 
-use crate::archive::Entry;
+use crate::archive::ArchivedFile;
 use crate::history::{HistoryError, Reader};
 use crate::moment;
 use adapters::clock::SECOND_NS;
@@ -33,7 +33,7 @@ const DELIVERED: &str = ".shipped";
 
 /// Where everything is.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub struct BackupPaths {
     /// Name of the machine.
     pub machine: String,
     /// The data directory.
@@ -52,7 +52,7 @@ pub struct Places {
     pub configuration: Option<PathBuf>,
 }
 
-impl Places {
+impl BackupPaths {
     /// Those of a configuration that was read from this file.
     #[must_use]
     pub fn of(config: &crate::config::Config, file: Option<&Path>) -> Self {
@@ -80,8 +80,8 @@ pub fn archive_name(what: &str, at_s: u64) -> String {
 ///
 /// # Errors
 /// The wear models of the history cannot be read.
-pub fn collect(places: &Places) -> Result<Vec<Entry>, HistoryError> {
-    let mut taken = Taken::default();
+pub fn collect(places: &BackupPaths) -> Result<Vec<ArchivedFile>, HistoryError> {
+    let mut taken = CopiedFiles::default();
     names(&places.scripts).into_iter().filter(|name| is_of_scripts(name)).for_each(|name| {
         taken.one(&places.scripts.join(&name), format!("scripts/{name}"));
     });
@@ -105,7 +105,7 @@ pub fn collect(places: &Places) -> Result<Vec<Entry>, HistoryError> {
 }
 
 /// The files that the configuration names, by their names in an archive.
-fn named(places: &Places) -> [(&'static str, &Option<PathBuf>); 3] {
+fn named(places: &BackupPaths) -> [(&'static str, &Option<PathBuf>); 3] {
     [
         ("operations.toml", &places.operations),
         ("model.toml", &places.model),
@@ -120,12 +120,12 @@ fn is_of_scripts(name: &str) -> bool {
 }
 
 #[derive(Default)]
-struct Taken {
-    files: Vec<Entry>,
+struct CopiedFiles {
+    files: Vec<ArchivedFile>,
     too_long: Vec<String>,
 }
 
-impl Taken {
+impl CopiedFiles {
     fn one(&mut self, path: &Path, name: String) {
         match std::fs::metadata(path) {
             Ok(file) if file.is_file() && file.len() > FILE_MAX => self.too_long.push(name),
@@ -153,7 +153,7 @@ fn below(directory: &Path) -> Vec<String> {
 }
 
 /// The models in force, one file for each.
-fn wear_models(history: &Path) -> Result<Vec<Entry>, HistoryError> {
+fn wear_models(history: &Path) -> Result<Vec<ArchivedFile>, HistoryError> {
     if !history.exists() {
         return Ok(Vec::new());
     }

@@ -2,8 +2,8 @@
 
 use super::list::{Fate, of_name};
 use super::restored;
-use super::{DATA, DELIVERED, Places, WEAR_MODELS, is_of_scripts, named, names};
-use crate::archive::Entry;
+use super::{BackupPaths, DATA, DELIVERED, WEAR_MODELS, is_of_scripts, named, names};
+use crate::archive::ArchivedFile;
 use crate::files::{replace, replace_durably};
 use crate::history::{Reader, store_wear_model};
 use crate::reload::read_directory;
@@ -19,7 +19,7 @@ const BEFORE_MAX: usize = 5;
 
 /// Who restores, when, and the archive of what is there now with its name.
 #[derive(Debug, Clone, Copy)]
-pub struct Ask<'a> {
+pub struct RestoreRequest<'a> {
     /// Who.
     pub by: &'a str,
     /// When.
@@ -45,7 +45,7 @@ struct Found {
 ///
 /// # Errors
 /// What is wrong with the backup, before anything was changed; or a file that cannot be written.
-pub fn restore(places: &Places, files: &[Entry], ask: Ask<'_>) -> Result<String, String> {
+pub fn restore(places: &BackupPaths, files: &[ArchivedFile], ask: RestoreRequest<'_>) -> Result<String, String> {
     let found = Found::of(places, files)?;
     if found.is_empty() {
         return Err("the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
@@ -68,7 +68,7 @@ pub fn restore(places: &Places, files: &[Entry], ask: Ask<'_>) -> Result<String,
 }
 
 impl Found {
-    fn of(places: &Places, files: &[Entry]) -> Result<Self, String> {
+    fn of(places: &BackupPaths, files: &[ArchivedFile]) -> Result<Self, String> {
         let mut found = Self::default();
         for (name, content) in files {
             let text = || String::from_utf8(content.clone()).map_err(|_| format!("{name} is no text"));
@@ -101,7 +101,7 @@ impl Found {
     }
 
     /// Everything as the box will read it.
-    fn check(&self, places: &Places) -> Result<(), String> {
+    fn check(&self, places: &BackupPaths) -> Result<(), String> {
         let of = |path: &Option<PathBuf>| {
             let path = path.as_ref()?;
             self.now.iter().find(|(it, _)| it == path).map(|(_, text)| text.as_str())
@@ -122,7 +122,7 @@ impl Found {
     }
 
     /// The scripts with the settings that will be in force, those that are there where the archive has none.
-    fn check_scripts(&self, places: &Places) -> Result<(), String> {
+    fn check_scripts(&self, places: &BackupPaths) -> Result<(), String> {
         if self.scripts.is_empty() && self.settings.is_none() {
             return Ok(());
         }

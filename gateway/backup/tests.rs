@@ -5,8 +5,8 @@ use crate::files::replace;
 use crate::settings::{self, Wish};
 use rules::script::{Place, SettingValue, shipped};
 
-fn places(below: &Path) -> Places {
-    Places {
+fn places(below: &Path) -> BackupPaths {
+    BackupPaths {
         machine: "Seven".to_owned(),
         data_dir: below.to_owned(),
         scripts: below.join("scripts"),
@@ -18,16 +18,16 @@ fn places(below: &Path) -> Places {
     }
 }
 
-fn ask(name: &str) -> Ask<'_> {
-    Ask { by: "Wu", at_ns: 7, before: (b"before", name) }
+fn ask(name: &str) -> RestoreRequest<'_> {
+    RestoreRequest { by: "Wu", at_ns: 7, before: (b"before", name) }
 }
 
-fn taken(places: &Places) -> Vec<Entry> {
+fn taken(places: &BackupPaths) -> Vec<ArchivedFile> {
     collect(places).expect("collected")
 }
 
 /// Scripts, a setting of the machine and one of a tool, an annotation, things learned.
-fn furnish(places: &Places) {
+fn furnish(places: &BackupPaths) {
     for file in shipped() {
         replace(&places.scripts.join(&file.name), &file.text).expect("written");
     }
@@ -94,10 +94,11 @@ fn an_empty_box_gets_everything_that_decides() {
     let first = taken(&old);
     restore(&new, &first, ask("x-before-restore-1.tar.gz")).expect("restored");
     assert!(take_restored(&new.data_dir).is_some());
-    let without_author = |files: Vec<Entry>| {
+    let without_author = |files: Vec<ArchivedFile>| {
         let body = |text: &[u8]| String::from_utf8_lossy(text).lines().skip(1).collect::<String>().into_bytes();
-        let each =
-            |(name, text): Entry| if name.ends_with("settings.toml") { (name, body(&text)) } else { (name, text) };
+        let each = |(name, text): ArchivedFile| {
+            if name.ends_with("settings.toml") { (name, body(&text)) } else { (name, text) }
+        };
         files.into_iter().map(each).collect::<Vec<_>>()
     };
     assert_eq!(without_author(taken(&new)), without_author(first.clone()));

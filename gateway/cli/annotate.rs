@@ -1,7 +1,7 @@
 //! `cnc-gateway annotate`: what only a person can measure, noted beside the history.
 
-use super::{CannotRun, CommandResult, Outcome, configuration, print};
-use crate::commission::annotations::{Given, Quantity, add, annotation};
+use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
+use crate::commission::annotations::{Quantity, TypedAnnotation, add, annotation};
 use crate::history::Reader;
 use crate::moment;
 use adapters::clock::{Clock, SystemClock};
@@ -43,11 +43,11 @@ pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
     // Without a history there is no newest sample yet; then the clock says what now is.
     let newest_ns = span.ok().flatten().map_or_else(|| SystemClock::new().now_ns(), |(_, newest_ns)| newest_ns);
     let AnnotateArguments { quantity, value, unit, at, sd, file, of, .. } = arguments;
-    let given = Given { value, unit, at, sd, file, of };
+    let given = TypedAnnotation { value, unit, at, sd, file, of };
     match annotation(quantity, given, newest_ns) {
         Err(refused) => {
             print(&format!("not noted: {refused}\n"));
-            Ok(Outcome::No)
+            Ok(CommandOutcome::No)
         }
         Ok(annotation) => {
             add(&config.gateway.data_dir, &annotation).map_err(|problem| CannotRun::new(problem, ""))?;
@@ -56,7 +56,7 @@ pub(super) fn run(arguments: AnnotateArguments) -> CommandResult {
                 |value| format!("{value} {}", quantity.unit()),
             );
             print(&format!("noted: {} {what} at {}\n", quantity.word(), moment::utc(annotation.at_ns)));
-            Ok(Outcome::Fine)
+            Ok(CommandOutcome::Fine)
         }
     }
 }

@@ -1,13 +1,13 @@
 //! `cnc-gateway arm`, `disarm`, `acknowledge`: orders of a person at the box to the gateway that runs there.
 
-use super::{CommandResult, Outcome, data_dir_of, print, print_json};
+use super::{CommandOutcome, CommandResult, data_dir_of, print, print_json};
 use crate::control::{self, Order};
 use clap::Args;
 use std::path::PathBuf;
 
 /// Which gateway, and who orders.
 #[derive(Debug, Args)]
-pub(super) struct Where {
+pub(super) struct OrderOptions {
     /// Who answers for it; stands in the audit.
     #[arg(long, value_name = "NAME")]
     by: String,
@@ -29,14 +29,14 @@ pub(super) struct ArmArguments {
     #[arg(long = "for", value_name = "TIME", value_parser = seconds)]
     seconds: Option<f64>,
     #[command(flatten)]
-    to: Where,
+    to: OrderOptions,
 }
 
 /// Arguments of `disarm` and `acknowledge`.
 #[derive(Debug, Args)]
 pub(super) struct OrderArguments {
     #[command(flatten)]
-    to: Where,
+    to: OrderOptions,
 }
 
 /// `90s`, `30m`, `8h`, or seconds.
@@ -69,13 +69,13 @@ pub(super) fn acknowledge(OrderArguments { to }: OrderArguments) -> CommandResul
     send(&to, &Order::Acknowledge { by: to.by.clone() })
 }
 
-fn send(to: &Where, order: &Order) -> CommandResult {
+fn send(to: &OrderOptions, order: &Order) -> CommandResult {
     let reply = control::order(&data_dir_of(to.config.as_deref(), to.data_dir.as_deref())?, order)?;
     match to.json {
         true => print_json(&serde_json::json!({ "schema": "order/1", "done": reply.done, "text": reply.text })),
         false => print(&format!("{}\n", reply.text)),
     }
-    Ok(if reply.done { Outcome::Fine } else { Outcome::No })
+    Ok(if reply.done { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! written.
 
 use super::history::cannot;
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::history::{AuditCheck, AuditEntry, Reader, audit_document};
 use crate::moment;
 use clap::Args;
@@ -33,7 +33,7 @@ pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResu
     if arguments.verify {
         let check = reader.verify_audit().map_err(|error| cannot(&error))?;
         show_check(&check, arguments.json);
-        return Ok(if check.broken.is_none() { Outcome::Fine } else { Outcome::No });
+        return Ok(if check.broken.is_none() { CommandOutcome::Fine } else { CommandOutcome::No });
     }
     let newest_ns = reader.span().map_err(|error| cannot(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
     let moment = |text: &Option<String>, otherwise: i64| {
@@ -46,7 +46,7 @@ pub(super) fn answer(arguments: &AuditArguments, reader: &Reader) -> CommandResu
         true => print_json(&audit_document(&rows)),
         false => rows.iter().for_each(|row| print(&line(row))),
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn show_check(check: &AuditCheck, json: bool) {

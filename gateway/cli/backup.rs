@@ -1,9 +1,9 @@
 //! `cnc-gateway backup` and `cnc-gateway restore`: what makes a box this box, as an archive, and its way back. At the box itself,
 //! whether the gateway runs or not.
 
-use super::{CannotRun, CommandResult, Outcome, configuration, print};
+use super::{CannotRun, CommandOutcome, CommandResult, configuration, print};
 use crate::archive::{pack, unpack};
-use crate::backup::{Ask, Places, archive_name, collect, copy_history};
+use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect, copy_history};
 use adapters::clock::{Clock, SECOND_NS, SystemClock};
 use clap::Args;
 use std::path::PathBuf;
@@ -47,7 +47,7 @@ fn cannot(what: impl ToString) -> CannotRun {
 pub(super) fn backup(arguments: &BackupArguments) -> CommandResult {
     let config = configuration(arguments.config.as_deref())?;
     let (_, at_s) = now();
-    let files = collect(&Places::of(&config, arguments.config.as_deref())).map_err(cannot)?;
+    let files = collect(&BackupPaths::of(&config, arguments.config.as_deref())).map_err(cannot)?;
     let archive = pack(&files, at_s).map_err(cannot)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
     std::fs::write(&out, &archive).map_err(|error| cannot(format!("{}: {error}", out.display())))?;
@@ -59,20 +59,20 @@ pub(super) fn backup(arguments: &BackupArguments) -> CommandResult {
         }
         None => print("the history is not in it; --history COPY.db copies it beside\n"),
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 pub(super) fn restore(arguments: &RestoreArguments) -> CommandResult {
     let config = configuration(arguments.config.as_deref())?;
-    let places = Places::of(&config, arguments.config.as_deref());
+    let places = BackupPaths::of(&config, arguments.config.as_deref());
     let shown = arguments.archive.display();
     let bytes = std::fs::read(&arguments.archive).map_err(|error| cannot(format!("{shown}: {error}")))?;
     let files = unpack(&bytes).map_err(|error| cannot(format!("{shown} is no backup: {error}")))?;
     let (at_ns, at_s) = now();
     let before = collect(&places).map_err(cannot)?;
     let before = pack(&before, at_s).map_err(cannot)?;
-    let ask = Ask { by: &arguments.by, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
+    let ask = RestoreRequest { by: &arguments.by, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
     let done = crate::backup::restore(&places, &files, ask).map_err(cannot)?;
     print(&format!("{done}\n"));
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

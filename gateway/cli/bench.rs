@@ -1,6 +1,6 @@
 //! `cnc-gateway bench`: ticks per second on this computer.
 
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::bench::{self, TICKS_MIN};
 use clap::Args;
 use std::path::PathBuf;
@@ -33,5 +33,5 @@ pub(super) fn run(arguments: &BenchArguments) -> CommandResult {
     } else {
         print(&figures.to_string());
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

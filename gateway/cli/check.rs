@@ -1,6 +1,6 @@
 //! `cnc-gateway check`: is everything right that the user wrote?
 
-use super::{CannotRun, CommandResult, Outcome};
+use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::check::check;
 use crate::config::{self, keys};
 use ::rules::script::{Declared, declarations, shipped};
@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &CheckArguments) -> CommandResult {
     } else {
         return tell(arguments);
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 /// The settings that the scripts of a configuration declare, or those that come with the gateway.
@@ -70,5 +70,5 @@ fn tell(arguments: &CheckArguments) -> CommandResult {
     } else {
         print!("{report}");
     }
-    Ok(if report.fine() { Outcome::Fine } else { Outcome::No })
+    Ok(if report.fine() { CommandOutcome::Fine } else { CommandOutcome::No })
 }

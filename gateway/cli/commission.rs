@@ -1,6 +1,6 @@
 //! `cnc-gateway commission`: what is known of this machine, what is missing, what to do next and why.
 
-use super::{CannotRun, CommandResult, Outcome, configuration, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, configuration, print, print_json};
 use crate::commission::annotations::{self, Annotation};
 use crate::commission::columns::Merged;
 use crate::commission::learn::{Learned, all, prepared};
@@ -106,7 +106,7 @@ fn tell(arguments: &CommissionArguments, text: &str, document: &Value) -> Comman
         print(text)
     }
     let missing = document["next"].as_str().is_some_and(|next| !next.is_empty());
-    Ok(if missing { Outcome::No } else { Outcome::Fine })
+    Ok(if missing { CommandOutcome::No } else { CommandOutcome::Fine })
 }
 
 fn span(history: &Path) -> Result<Option<(i64, i64)>, CannotRun> {
@@ -136,7 +136,7 @@ fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
         put(path, &plan::csv(&steps, limits.diameter_mm)).map_err(|problem| CannotRun::new(problem, ""))?;
     }
     print(&plan::text(&steps, limits.diameter_mm));
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 /// Writes everything that was learned; what and where.

@@ -1,6 +1,6 @@
 //! `cnc-gateway devices`: the `devices.xml` of this machine for an MTConnect agent.
 
-use super::{CannotRun, CommandResult, Outcome, print};
+use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::config;
 use crate::history::{Query, Reader};
 use crate::moment;
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
             CannotRun::new(format!("{} cannot be written: {error}", file.display()), "choose another place")
         })?,
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 /// The channels of which the history holds something; `None` before there is one.

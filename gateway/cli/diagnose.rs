@@ -1,7 +1,7 @@
 //! `cnc-gateway diagnose`: where model and recordings differ, which physics was left out, the model with it.
 
-use super::{CannotRun, CommandResult, Outcome};
-use crate::diagnosis::{Given, Outputs, read_hypotheses, read_model, read_recordings};
+use super::{CannotRun, CommandOutcome, CommandResult};
+use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings};
 use clap::Args;
 use rules::physics::explain::Language;
 use rules::twin::{self, Diagnosis, Model};
@@ -80,11 +80,11 @@ pub(super) fn diagnose(arguments: DiagnoseArguments) -> CommandResult {
         eprintln!("search: {}", diagnosis.debug);
     }
     outputs(&arguments).write(&diagnosis, &given.recording).map_err(|problem| CannotRun::new(problem, ""))?;
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 /// Model, hypotheses and recordings; every problem of all of them at once.
-fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, Given), CannotRun> {
+fn inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings), CannotRun> {
     let mut problems = Vec::new();
     let model = read_model(&arguments.model).map_err(|wrong| problems.extend(wrong));
     let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
@@ -101,15 +101,15 @@ pub(super) fn cannot_use(problems: &[String]) -> CannotRun {
 }
 
 /// Rows that were refused while reading belong to the quality of the recording.
-fn note_refusals(diagnosis: &mut Diagnosis, given: &Given) {
+fn note_refusals(diagnosis: &mut Diagnosis, given: &InputRecordings) {
     if given.refused > 0 {
         let column = given.refused_column.clone().unwrap_or_else(|| "time_s".to_owned());
         diagnosis.data_quality.push(twin::quality::Fault { fault: "refused_rows", column, rows: given.refused });
     }
 }
 
-fn outputs(arguments: &DiagnoseArguments) -> Outputs {
-    Outputs {
+fn outputs(arguments: &DiagnoseArguments) -> DiagnosisOutputs {
+    DiagnosisOutputs {
         json: arguments.json.clone(),
         html: arguments.html.clone(),
         rows: arguments.rows.clone(),

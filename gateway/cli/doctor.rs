@@ -1,8 +1,8 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::config;
-use crate::doctor::{self, Report};
+use crate::doctor::{self, DoctorReport};
 use crate::sinks::{self, SinkAddress};
 use adapters::Address;
 use adapters::driver::FactValue;
@@ -83,11 +83,11 @@ fn configured(file: &Path, wanted: &str) -> Result<Address, CannotRun> {
     })
 }
 
-fn outcome(well: bool) -> Outcome {
-    if well { Outcome::Fine } else { Outcome::No }
+fn outcome(well: bool) -> CommandOutcome {
+    if well { CommandOutcome::Fine } else { CommandOutcome::No }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &DoctorReport) -> String {
     let mut text = format!("{}\n", report.address);
     let mut line = |what: std::fmt::Arguments<'_>| {
         // Writing to a string does not fail.

@@ -1,6 +1,6 @@
 //! `cnc-gateway effects`: the catalogue of physical effects, listed and explained.
 
-use super::{CannotRun, CommandResult, Outcome};
+use super::{CannotRun, CommandOutcome, CommandResult};
 use clap::{Args, Subcommand, ValueEnum};
 use rules::physics::explain::{self, Language};
 
@@ -8,11 +8,11 @@ use rules::physics::explain::{self, Language};
 #[derive(Debug, Args)]
 pub(super) struct EffectsArguments {
     #[command(subcommand)]
-    what: What,
+    what: EffectsCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum EffectsCommand {
     /// Every effect with one sentence.
     List(Printing),
     /// Law, parameters, needs, what its absence looks like and the experiment that tells it apart.
@@ -54,12 +54,12 @@ impl From<Lang> for Language {
 /// Prints the catalogue or one effect.
 pub(super) fn effects(arguments: EffectsArguments) -> CommandResult {
     let text = match arguments.what {
-        What::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
-        What::List(printing) => explain::list(printing.lang.into()),
-        What::Show { kind, printing } => show(&kind, &printing)?,
+        EffectsCommand::List(printing) if printing.json => format!("{:#}\n", explain::list_json()),
+        EffectsCommand::List(printing) => explain::list(printing.lang.into()),
+        EffectsCommand::Show { kind, printing } => show(&kind, &printing)?,
     };
     print!("{text}");
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn show(kind: &str, printing: &Printing) -> Result<String, CannotRun> {

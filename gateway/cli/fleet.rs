@@ -1,10 +1,10 @@
 //! `cnc-gateway fleet`: many boxes, one database.
 
-use super::{CannotRun, CommandResult, Outcome, print};
-use crate::fleet::ingest::{self, Done, Settings};
+use super::{CannotRun, CommandOutcome, CommandResult, print};
+use crate::fleet::ingest::{self, Done, IngestSettings};
 use crate::fleet::{DatabaseSettings, SAME_FINDING, SAME_FINDING_PARQUET, SCHEMA, cluster};
 use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
-use crate::signals::{Request, Signals};
+use crate::signals::{SignalRequest, Signals};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -127,7 +127,7 @@ pub(super) fn run(fleet: Fleet) -> CommandResult {
                 Text::SameFinding => SAME_FINDING,
                 Text::SameFindingParquet => SAME_FINDING_PARQUET,
             });
-            Ok(Outcome::Fine)
+            Ok(CommandOutcome::Fine)
         }
     }
 }
@@ -142,12 +142,12 @@ async fn stream(arguments: &StreamArguments) -> CommandResult {
         true => format!("stream {name} created for {subjects}, on {replicas} server(s)\n"),
         false => format!("stream {name} is there: {messages} messages, {:.1} MB\n", bytes as f64 / 1e6),
     });
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 async fn ingest(arguments: &IngestArguments) -> CommandResult {
     let (servers, stream) = arguments.stream.settings()?;
-    let settings = Settings {
+    let settings = IngestSettings {
         servers,
         stream,
         consumer: arguments.consumer.clone(),
@@ -159,7 +159,7 @@ async fn ingest(arguments: &IngestArguments) -> CommandResult {
     };
     let mut signals =
         Signals::listen().map_err(|error| CannotRun::new(format!("signals cannot be heard: {error}"), ""))?;
-    let stopped = async { while signals.next().await != Request::Stop {} };
+    let stopped = async { while signals.next().await != SignalRequest::Stop {} };
     tokio::select! {
         ended = ingest::run(&settings) => {
             let Done { new, known, refused } = ended?;
@@ -168,5 +168,5 @@ async fn ingest(arguments: &IngestArguments) -> CommandResult {
         // What was not committed was not acknowledged: it is given out again.
         () = stopped => {}
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

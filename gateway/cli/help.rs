@@ -1,6 +1,6 @@
 //! `cnc-gateway help`: the chapters of the handbook, and what a command takes.
 
-use super::{Arguments, CannotRun, CommandResult, Outcome, print};
+use super::{Arguments, CannotRun, CommandOutcome, CommandResult, print};
 use crate::handbook::{chapter, contents, nearest_topic};
 use ::rules::script::{RECIPES, recipe};
 use adapters::channel::nearest;
@@ -29,7 +29,7 @@ pub(super) fn help(arguments: &HelpArguments) -> CommandResult {
         },
     };
     print(&text);
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn list() -> String {

@@ -1,6 +1,6 @@
 //! `cnc-gateway history`: what the box remembers.
 
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of};
 use crate::moment;
 use crate::records::{RecordKind, RecordQuery, document, records};
@@ -76,8 +76,8 @@ struct QueryArguments {
     #[arg(long, value_name = "SELECT", conflicts_with_all = ["resolution", "channels"])]
     sql: Option<String>,
     /// Form of the answer.
-    #[arg(long, value_enum, default_value_t = Form::Csv)]
-    format: Form,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Csv)]
+    format: OutputFormat,
     /// The same as --format json.
     #[arg(long)]
     json: bool,
@@ -87,7 +87,7 @@ struct QueryArguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Form {
+enum OutputFormat {
     Csv,
     Json,
 }
@@ -134,7 +134,7 @@ impl PartitionArguments {
             print(&format!("{date}: {} samples, {} diagnoses\n", written.samples, written.diagnoses));
             day_ns += DAY_NS;
         }
-        Ok(Outcome::Fine)
+        Ok(CommandOutcome::Fine)
     }
 }
 
@@ -155,7 +155,7 @@ pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
             let (query, _) = export.selection.query(&reader)?;
             let rows = reader.export(&query, &export.file).map_err(|error| cannot(&error))?;
             print(&format!("{rows} rows written to {}\n", export.file.display()));
-            Ok(Outcome::Fine)
+            Ok(CommandOutcome::Fine)
         }
         Question::Query(query) => query.answer(&reader, path),
         Question::Partitions(partitions) => partitions.write(&reader),
@@ -178,7 +178,7 @@ fn info(reader: &Reader, json: bool) -> CommandResult {
     } else {
         print(&info.to_string());
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 impl Selection {
@@ -206,7 +206,7 @@ impl Selection {
 impl QueryArguments {
     fn answer(&self, reader: &Reader, path: &Path) -> CommandResult {
         let (query, range) = self.selection.query(reader)?;
-        let json = self.json || self.format == Form::Json;
+        let json = self.json || self.format == OutputFormat::Json;
         let out = BufWriter::new(std::io::stdout().lock());
         let done = match (&self.records, &self.sql, self.resolution) {
             (Some(kind), ..) => self.answer_records(reader, *kind, range, json, out),
@@ -218,7 +218,7 @@ impl QueryArguments {
                 .map(|series| print_json(&samples::document(range, 0.0, series))),
             (None, None, None) => reader.export_csv(&query, out, path).map(drop),
         };
-        done.map(|()| Outcome::Fine).map_err(|error| cannot(&error))
+        done.map(|()| CommandOutcome::Fine).map_err(|error| cannot(&error))
     }
 
     fn answer_records(
@@ -235,7 +235,7 @@ impl QueryArguments {
             print_json(&document(kind, &query, found));
             return Ok(());
         }
-        let mut table = Table::new(out);
+        let mut table = CsvTable::new(out);
         found.rows.iter().filter_map(Value::as_object).try_for_each(|row| table.row(row)).map_err(output)
     }
 }
@@ -245,12 +245,12 @@ fn output(error: csv::Error) -> HistoryError {
 }
 
 /// Objects as lines of CSV.
-struct Table<W: Write> {
+struct CsvTable<W: Write> {
     csv: csv::Writer<W>,
     headed: bool,
 }
 
-impl<W: Write> Table<W> {
+impl<W: Write> CsvTable<W> {
     fn new(out: W) -> Self {
         Self { csv: csv::Writer::from_writer(out), headed: false }
     }
@@ -270,7 +270,7 @@ impl<W: Write> Table<W> {
 
 fn answer_sql(reader: &Reader, sql: &str, json: bool, out: impl Write) -> Result<(), HistoryError> {
     let mut rows = Vec::new();
-    let mut table = Table::new(out);
+    let mut table = CsvTable::new(out);
     let mut failed = None;
     reader.sql(sql, |names, values| {
         let row: Map<String, Value> = names.iter().cloned().zip(values.iter().map(json_of)).collect();

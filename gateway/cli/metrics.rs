@@ -1,6 +1,6 @@
 //! `cnc-gateway metrics`: what a plant with Prometheus and Grafana loads.
 
-use super::{CommandResult, Outcome, print};
+use super::{CommandOutcome, CommandResult, print};
 use crate::monitoring::{ALERTS, DASHBOARD};
 use clap::Subcommand;
 
@@ -19,5 +19,5 @@ pub(super) fn run(metrics: Metrics) -> CommandResult {
         Metrics::Dashboard => DASHBOARD,
         Metrics::Alerts => ALERTS,
     });
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

@@ -30,7 +30,7 @@ mod simulate;
 mod vendor_child;
 
 pub(crate) use crate::cannot_run::CannotRun;
-use crate::config::Log;
+use crate::config::LogConfig;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
 use ::rules::script::{Host, Problem, shipped};
@@ -41,7 +41,7 @@ use std::process::ExitCode;
 
 /// How a command ended when it could run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum CommandOutcome {
     /// Exit code 0.
     Fine,
     /// The command ran and its answer is no: exit code 1.
@@ -49,7 +49,7 @@ pub enum Outcome {
 }
 
 /// What every subcommand returns.
-pub type CommandResult = Result<Outcome, CannotRun>;
+pub type CommandResult = Result<CommandOutcome, CannotRun>;
 
 /// The edge box of one CNC machine: polls, merges, infers, decides, remembers and explains.
 #[derive(Debug, Parser)]
@@ -58,7 +58,7 @@ struct Arguments {
     #[command(flatten)]
     log: LogArguments,
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<CliCommand>,
     #[command(flatten)]
     run: run::RunArguments,
 }
@@ -76,13 +76,13 @@ struct LogArguments {
 
 impl LogArguments {
     /// Starts the log; `config` is what the configuration says.
-    fn start(self, config: &Log) {
+    fn start(self, config: &LogConfig) {
         log::start(self.log.unwrap_or(config.format), self.log_level.unwrap_or(config.level));
     }
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CliCommand {
     /// Poll, merge, infer, decide, store and serve (the default).
     Run(run::RunArguments),
     /// Let the gate of the gateway that runs on this box write to the machine for a time.
@@ -152,8 +152,8 @@ pub fn main() -> ExitCode {
     let done = dispatch(arguments);
     log::flush();
     match done {
-        Ok(Outcome::Fine) => ExitCode::SUCCESS,
-        Ok(Outcome::No) => ExitCode::from(1),
+        Ok(CommandOutcome::Fine) => ExitCode::SUCCESS,
+        Ok(CommandOutcome::No) => ExitCode::from(1),
         Err(cannot) => {
             eprintln!("cnc-gateway: {cannot}");
             ExitCode::from(2)
@@ -162,39 +162,39 @@ pub fn main() -> ExitCode {
 }
 
 fn dispatch(arguments: Arguments) -> CommandResult {
-    let command = arguments.command.unwrap_or(Command::Run(arguments.run));
-    if !matches!(command, Command::Run(_)) {
-        arguments.log.start(&Log { format: LogFormat::Off, level: tracing::Level::INFO });
+    let command = arguments.command.unwrap_or(CliCommand::Run(arguments.run));
+    if !matches!(command, CliCommand::Run(_)) {
+        arguments.log.start(&LogConfig { format: LogFormat::Off, level: tracing::Level::INFO });
     }
     match command {
-        Command::Run(run) => run::run(run, arguments.log),
-        Command::Arm(arm) => arm::arm(arm),
-        Command::Disarm(order) => arm::disarm(order),
-        Command::Acknowledge(order) => arm::acknowledge(order),
-        Command::Person(person) => person::run(person),
-        Command::Backup(arguments) => backup::backup(&arguments),
-        Command::Restore(arguments) => backup::restore(&arguments),
-        Command::Bench(bench) => bench::run(&bench),
-        Command::Check(check) => check::run(&check),
-        Command::Replay(replay) => replay::run(replay),
-        Command::History(history) => history::run(history),
-        Command::Simulate(simulate) => simulate::simulate(simulate),
-        Command::Diagnose(diagnose) => diagnose::diagnose(diagnose),
-        Command::Effects(effects) => effects::effects(effects),
-        Command::Identify(identify) => identify::identify(&identify),
-        Command::Commission(commission) => commission::run(&commission),
-        Command::Annotate(annotate) => annotate::run(annotate),
-        Command::Pulses(pulses) => pulses::run(&pulses),
-        Command::Rules(rules) => rules::run(&rules),
-        Command::Doctor(doctor) => doctor::doctor(&doctor),
-        Command::Devices(devices) => devices::run(&devices),
-        Command::Metrics(metrics) => metrics::run(metrics),
+        CliCommand::Run(run) => run::run(run, arguments.log),
+        CliCommand::Arm(arm) => arm::arm(arm),
+        CliCommand::Disarm(order) => arm::disarm(order),
+        CliCommand::Acknowledge(order) => arm::acknowledge(order),
+        CliCommand::Person(person) => person::run(person),
+        CliCommand::Backup(arguments) => backup::backup(&arguments),
+        CliCommand::Restore(arguments) => backup::restore(&arguments),
+        CliCommand::Bench(bench) => bench::run(&bench),
+        CliCommand::Check(check) => check::run(&check),
+        CliCommand::Replay(replay) => replay::run(replay),
+        CliCommand::History(history) => history::run(history),
+        CliCommand::Simulate(simulate) => simulate::simulate(simulate),
+        CliCommand::Diagnose(diagnose) => diagnose::diagnose(diagnose),
+        CliCommand::Effects(effects) => effects::effects(effects),
+        CliCommand::Identify(identify) => identify::identify(&identify),
+        CliCommand::Commission(commission) => commission::run(&commission),
+        CliCommand::Annotate(annotate) => annotate::run(annotate),
+        CliCommand::Pulses(pulses) => pulses::run(&pulses),
+        CliCommand::Rules(rules) => rules::run(&rules),
+        CliCommand::Doctor(doctor) => doctor::doctor(&doctor),
+        CliCommand::Devices(devices) => devices::run(&devices),
+        CliCommand::Metrics(metrics) => metrics::run(metrics),
         #[cfg(feature = "fleet")]
-        Command::Fleet(fleet) => fleet::run(fleet),
-        Command::Serve(served) => serve::run(&served),
-        Command::Help(topic) => help::help(&topic),
-        Command::VendorChild(child) => vendor_child::run(&child),
-        Command::DiagnosisChild => diagnosis_child::run(),
+        CliCommand::Fleet(fleet) => fleet::run(fleet),
+        CliCommand::Serve(served) => serve::run(&served),
+        CliCommand::Help(topic) => help::help(&topic),
+        CliCommand::VendorChild(child) => vendor_child::run(&child),
+        CliCommand::DiagnosisChild => diagnosis_child::run(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! `cnc-gateway person`: who may do more than read on the page. Works on the box itself, whether the gateway runs or not; one
 //! that runs follows within a second and writes every difference into the audit.
 
-use super::{CannotRun, CommandResult, Outcome, data_dir_of, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, data_dir_of, print, print_json};
 use crate::access::{self, Persons, PersonsError, Role};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
@@ -11,12 +11,12 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct PersonArguments {
     #[command(subcommand)]
-    what: What,
+    what: PersonCommand,
 }
 
 /// Which gateway, and how the answer is printed.
 #[derive(Debug, Args)]
-struct Where {
+struct GatewayOptions {
     /// Configuration of the gateway, for its data directory.
     #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
     config: Option<PathBuf>,
@@ -30,18 +30,18 @@ struct Where {
 
 /// Who makes the change; stands in the audit.
 #[derive(Debug, Args)]
-struct By {
+struct ChangedBy {
     /// Who makes the change; stands in the audit.
     #[arg(long, value_name = "NAME", default_value = "at the box")]
     by: String,
     #[command(flatten)]
-    at: Where,
+    at: GatewayOptions,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum PersonCommand {
     /// Everybody, with the role.
-    List(Where),
+    List(GatewayOptions),
     /// Somebody new. The token is printed once.
     Add {
         /// 1 to 40 letters, digits, spaces, or any of . - _
@@ -50,7 +50,7 @@ enum What {
         #[arg(long, value_enum)]
         role: Role,
         #[command(flatten)]
-        by: By,
+        by: ChangedBy,
     },
     /// Another role.
     Role {
@@ -60,52 +60,52 @@ enum What {
         #[arg(value_enum)]
         role: Role,
         #[command(flatten)]
-        by: By,
+        by: ChangedBy,
     },
     /// A new token in the place of the one before, printed once. Sessions end at once.
     Token {
         /// Whose.
         name: String,
         #[command(flatten)]
-        by: By,
+        by: ChangedBy,
     },
     /// Remove a person. Sessions end at once.
     Remove {
         /// Who.
         name: String,
         #[command(flatten)]
-        by: By,
+        by: ChangedBy,
     },
 }
 
 /// Does what the arguments say.
 pub(super) fn run(arguments: PersonArguments) -> CommandResult {
     match arguments.what {
-        What::List(at) => list(&at),
-        What::Add { name, role, by } => change(&by, |persons, by| {
+        PersonCommand::List(at) => list(&at),
+        PersonCommand::Add { name, role, by } => change(&by, |persons, by| {
             let token = persons.add(&name, role, by)?;
             Ok((format!("{} is {role}. The token, shown only now: {}", name.trim(), token.text()), Some(token)))
         }),
-        What::Role { name, role, by } => change(&by, |persons, by| {
+        PersonCommand::Role { name, role, by } => change(&by, |persons, by| {
             persons.give_role(&name, role, by)?;
             Ok((format!("{name} is {role}"), None))
         }),
-        What::Token { name, by } => change(&by, |persons, by| {
+        PersonCommand::Token { name, by } => change(&by, |persons, by| {
             let token = persons.give_token(&name, by)?;
             Ok((format!("the new token of {name}, shown only now: {}", token.text()), Some(token)))
         }),
-        What::Remove { name, by } => change(&by, |persons, _| {
+        PersonCommand::Remove { name, by } => change(&by, |persons, _| {
             persons.remove(&name)?;
             Ok((format!("{name} was removed"), None))
         }),
     }
 }
 
-fn file(at: &Where) -> Result<PathBuf, CannotRun> {
+fn file(at: &GatewayOptions) -> Result<PathBuf, CannotRun> {
     Ok(access::path(&data_dir_of(at.config.as_deref(), at.data_dir.as_deref())?))
 }
 
-fn list(at: &Where) -> CommandResult {
+fn list(at: &GatewayOptions) -> CommandResult {
     let path = file(at)?;
     let persons = Persons::read(&path).map_err(cannot)?;
     let Some(persons) = persons else {
@@ -122,12 +122,12 @@ fn list(at: &Where) -> CommandResult {
             .iter()
             .for_each(|it| print(&format!("{:8} {} (written by {})\n", it.role.word(), it.name, it.by)));
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 type Changed = (String, Option<access::Token>);
 
-fn change(by: &By, change: impl FnOnce(&mut Persons, &str) -> Result<Changed, PersonsError>) -> CommandResult {
+fn change(by: &ChangedBy, change: impl FnOnce(&mut Persons, &str) -> Result<Changed, PersonsError>) -> CommandResult {
     let path = file(&by.at)?;
     let mut persons = Persons::read(&path).map_err(cannot)?.unwrap_or_default();
     let (text, token) = match change(&mut persons, &by.by) {
@@ -135,12 +135,12 @@ fn change(by: &By, change: impl FnOnce(&mut Persons, &str) -> Result<Changed, Pe
         Err(error @ (PersonsError::Token(_) | PersonsError::File(..))) => return Err(cannot(error)),
         Err(error) => {
             tell(by.at.json, false, &error.to_string(), None);
-            return Ok(Outcome::No);
+            return Ok(CommandOutcome::No);
         }
     };
     persons.write(&path).map_err(cannot)?;
     tell(by.at.json, true, &text, token.as_ref());
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn tell(json: bool, done: bool, text: &str, token: Option<&access::Token>) {

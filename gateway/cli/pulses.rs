@@ -1,6 +1,6 @@
 //! `cnc-gateway pulses`: insert pulses into encoder lines, with proof; vectors to test a device against.
 
-use super::{CannotRun, CommandResult, Outcome, print};
+use super::{CannotRun, CommandOutcome, CommandResult, print};
 use crate::diagnosis::put;
 use crate::pulses::{stream, vectors};
 use clap::Args;
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &PulsesArguments) -> CommandResult {
     let proof = stream(BufReader::new(reader), BufWriter::new(writer), arguments.spacing_ns, arguments.insert)
         .map_err(|what| CannotRun::new(format!("{}: {what}", input.display()), ""))?;
     eprint!("{}", proof.text(arguments.spacing_ns));
-    Ok(if proof.holds(arguments.spacing_ns) { Outcome::Fine } else { Outcome::No })
+    Ok(if proof.holds(arguments.spacing_ns) { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
 fn write_vectors(directory: &Path) -> CommandResult {
@@ -67,5 +67,5 @@ fn write_vectors(directory: &Path) -> CommandResult {
     let document = json!({ "schema": "pulses/1", "edges_per_pulse": 4, "vectors": list });
     put(&directory.join("vectors.json"), &format!("{document:#}\n")).map_err(say)?;
     print(&format!("{} vectors in {}\n", all.len(), directory.display()));
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

@@ -1,8 +1,8 @@
 //! `cnc-gateway replay`: recordings through the same pipeline as fast as possible.
 
-use super::{CannotRun, CommandResult, Outcome, print_json, recipe_from, scripts_from};
+use super::{CannotRun, CommandOutcome, CommandResult, print_json, recipe_from, scripts_from};
 use crate::config;
-use crate::replay::{Plan, replay};
+use crate::replay::{ReplayPlan, replay};
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -34,8 +34,14 @@ pub(super) struct ReplayArguments {
 pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
     let ReplayArguments { files, history, scripts, operations, wear_models, json } = arguments;
     let operations = operations.as_deref().map(recipe_from).transpose()?;
-    let plan =
-        Plan { files, operations, models: wear_models, history, progress: std::io::stderr().is_terminal(), talk: true };
+    let plan = ReplayPlan {
+        files,
+        operations,
+        models: wear_models,
+        history,
+        progress: std::io::stderr().is_terminal(),
+        talk: true,
+    };
     let config = config::load(None, []).map_err(|problems| CannotRun::new(format!("{problems:?}"), ""))?;
     let summary = replay(&plan, scripts_from(scripts.as_deref())?, config.gate)?;
     if json {
@@ -43,5 +49,5 @@ pub(super) fn run(arguments: ReplayArguments) -> CommandResult {
     } else {
         super::print(&summary.to_string());
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }

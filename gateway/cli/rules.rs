@@ -1,9 +1,9 @@
 //! `cnc-gateway rules`: what scripts can see, call and set; their trials; edited ones over stored history.
 
 use super::effects::Lang;
-use super::{CannotRun, CommandResult, Outcome, print, print_json, refused};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json, refused};
 use crate::active_scripts;
-use crate::backtest::{Plan, backtest};
+use crate::backtest::{BacktestPlan, backtest};
 use crate::config::{self, Config};
 use crate::history::Reader;
 use crate::moment;
@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(super) struct RulesArguments {
     #[command(subcommand)]
-    what: What,
+    what: RulesCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum RulesCommand {
     /// Every method, variable, handler, function, trial function and setting of scripts, with units.
     Api {
         /// Language of the texts.
@@ -84,12 +84,12 @@ struct BacktestArguments {
 /// Does what was asked.
 pub(super) fn run(arguments: &RulesArguments) -> CommandResult {
     match &arguments.what {
-        What::Api { json: true, .. } => print_json(&script::api_json()),
-        What::Api { lang, .. } => print(&script::api(*lang == Lang::Zh)),
-        What::Test(arguments) => return test(arguments),
-        What::Backtest(arguments) => return compare(arguments),
+        RulesCommand::Api { json: true, .. } => print_json(&script::api_json()),
+        RulesCommand::Api { lang, .. } => print(&script::api(*lang == Lang::Zh)),
+        RulesCommand::Test(arguments) => return test(arguments),
+        RulesCommand::Backtest(arguments) => return compare(arguments),
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 pub(super) fn configuration(file: Option<&Path>) -> Result<Config, CannotRun> {
@@ -138,7 +138,7 @@ fn test(arguments: &TestArguments) -> CommandResult {
     } else {
         print(&told(&files, &results, &problems));
     }
-    Ok(if fine { Outcome::Fine } else { Outcome::No })
+    Ok(if fine { CommandOutcome::Fine } else { CommandOutcome::No })
 }
 
 /// Each file by itself, so that one that does not compile leaves the others their trials; then all of them together.
@@ -201,7 +201,7 @@ fn compare(arguments: &BacktestArguments) -> CommandResult {
     }
     #[expect(clippy::cast_possible_truncation, reason = "at most an hour")]
     let every_ns = (arguments.every * 1e9) as i64;
-    let report = backtest(Plan {
+    let report = backtest(BacktestPlan {
         from_ns: instant(&arguments.since, newest_ns)?,
         to_ns: arguments.until.as_deref().map(|until| instant(until, newest_ns)).transpose()?,
         history,
@@ -215,7 +215,7 @@ fn compare(arguments: &BacktestArguments) -> CommandResult {
     } else {
         print(&report.to_string());
     }
-    Ok(if report.worse() { Outcome::No } else { Outcome::Fine })
+    Ok(if report.worse() { CommandOutcome::No } else { CommandOutcome::Fine })
 }
 
 fn newest(history: &Path) -> Result<i64, CannotRun> {

@@ -1,9 +1,9 @@
 //! `cnc-gateway run`: the box, live.
 
-use super::{CannotRun, CommandResult, LogArguments, Outcome};
+use super::{CannotRun, CommandOutcome, CommandResult, LogArguments};
 use crate::config;
 use crate::demo;
-use crate::run::{self, Plan, open::MachineSpeed};
+use crate::run::{self, RunPlan, open::MachineSpeed};
 use clap::Args;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -51,10 +51,10 @@ pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
     let plan = plan(arguments)?;
     log.start(&plan.config.log);
     run::run(plan)?;
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
-fn plan(arguments: RunArguments) -> Result<Plan, CannotRun> {
+fn plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
     let overrides = overrides(&arguments);
     let listen_in_environment = std::env::var_os(format!("{}HTTP__LISTEN", config::ENVIRONMENT_PREFIX)).is_some();
     let port_named = arguments.config.is_some() || arguments.listen.is_some() || listen_in_environment;
@@ -74,7 +74,7 @@ fn plan(arguments: RunArguments) -> Result<Plan, CannotRun> {
     if arguments.config.is_none() {
         demo::furnish(&mut config, arguments.speed);
     }
-    Ok(Plan {
+    Ok(RunPlan {
         config,
         config_file: arguments.config,
         port_named,

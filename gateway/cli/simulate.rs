@@ -1,7 +1,7 @@
 //! `cnc-gateway simulate`: a model over a recording's inputs, or the simulated machine over a plan.
 
 use super::diagnose::cannot_use;
-use super::{CannotRun, CommandResult, Outcome};
+use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::{execute, put, read_model, read_recordings, simulation};
 use adapters::address::{Address, Target};
 use adapters::simulated::SimulatedSettings;
@@ -69,7 +69,7 @@ fn model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     }
     let text = if arguments.json { format!("{:#}\n", simulation.json()) } else { simulation.text() };
     put(Path::new("-"), &text).map_err(say)?;
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
@@ -89,7 +89,7 @@ fn experiment(machine: &str, arguments: &SimulateArguments) -> CommandResult {
     if let Some((before_mm, after_mm)) = instruments.flank_wear_mm {
         eprintln!("a microscope shows a flank wear of {before_mm:.4} mm before and {after_mm:.4} mm after");
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn settings(machine: &str) -> Result<SimulatedSettings, String> {

@@ -1,6 +1,6 @@
 //! `cnc-gateway vendor-child`: this program as the child process around a vendor's library. Never called by a person.
 
-use super::{CannotRun, CommandResult, Outcome};
+use super::{CannotRun, CommandOutcome, CommandResult};
 use clap::Args;
 
 /// Arguments of the child.
@@ -17,5 +17,7 @@ pub(super) fn run(arguments: &VendorChildArguments) -> CommandResult {
         adapters::hnc::KIND => adapters::hnc::child(),
         other => return Err(CannotRun::new(format!("no library is served as {other}"), "")),
     };
-    ended.map(|()| Outcome::Fine).map_err(|error| CannotRun::new(format!("the line to the gateway: {error}"), ""))
+    ended
+        .map(|()| CommandOutcome::Fine)
+        .map_err(|error| CannotRun::new(format!("the line to the gateway: {error}"), ""))
 }

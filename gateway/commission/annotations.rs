@@ -84,7 +84,7 @@ pub struct Annotation {
 
 /// What a person typed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Given {
+pub struct TypedAnnotation {
     /// The value.
     pub value: Option<f64>,
     /// Its unit.
@@ -103,7 +103,7 @@ pub struct Given {
 ///
 /// # Errors
 /// What is missing or impossible, and what to write.
-pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
+pub fn annotation(quantity: Quantity, given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
     if quantity == Quantity::Torque {
         return torque(given, newest_ns);
     }
@@ -135,7 +135,7 @@ pub fn annotation(quantity: Quantity, given: Given, newest_ns: TimeNs) -> Result
     Ok(Annotation { quantity, at_ns, value: Some(value), sd, file: None, of: given.of })
 }
 
-fn torque(given: Given, newest_ns: TimeNs) -> Result<Annotation, String> {
+fn torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation, String> {
     let usage =
         "write annotate torque --file sensor.csv --unit Nm; the file has columns time_s (its own clock) and torque_nm";
     let file = given.file.ok_or_else(|| format!("torque: the file is missing: {usage}"))?;
@@ -206,8 +206,13 @@ pub fn read(data_dir: &Path) -> Result<Vec<Annotation>, String> {
 mod tests {
     use super::*;
 
-    fn given(value: f64, unit: Option<&str>, at: Option<&str>) -> Given {
-        Given { value: Some(value), unit: unit.map(str::to_owned), at: at.map(str::to_owned), ..Given::default() }
+    fn given(value: f64, unit: Option<&str>, at: Option<&str>) -> TypedAnnotation {
+        TypedAnnotation {
+            value: Some(value),
+            unit: unit.map(str::to_owned),
+            at: at.map(str::to_owned),
+            ..TypedAnnotation::default()
+        }
     }
 
     #[test]
@@ -217,8 +222,8 @@ mod tests {
         assert!(refused(given(12.0, Some("um"), None)).contains("time is missing"));
         assert!(refused(given(12.0, Some("kg"), Some("now"))).contains("mm, um or in"));
         assert!(refused(given(12.0, Some("mm"), Some("now"))).contains("is the unit right?"));
-        assert!(refused(Given::default()).contains("value is missing"));
-        let torque = annotation(Quantity::Torque, Given::default(), 0).expect_err("no file");
+        assert!(refused(TypedAnnotation::default()).contains("value is missing"));
+        let torque = annotation(Quantity::Torque, TypedAnnotation::default(), 0).expect_err("no file");
         assert!(torque.contains("--file"), "{torque}");
     }
 

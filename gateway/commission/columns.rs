@@ -70,7 +70,7 @@ fn times_ns(recording: &Recording) -> Vec<TimeNs> {
 
 /// Flank wear between the microscope readings of one edge, in a straight line over time.
 pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
-    let readings: Vec<Wear<'_>> = annotations
+    let readings: Vec<WearReading<'_>> = annotations
         .iter()
         .filter(|it| it.quantity == Quantity::FlankWear)
         .filter_map(|it| Some((it.at_ns, it.value?, it.of.as_str())))
@@ -93,12 +93,13 @@ pub fn add_wear(recording: &mut Recording, annotations: &[Annotation]) {
 }
 
 /// A microscope reading: when, mm, of which edge.
-type Wear<'a> = (TimeNs, f64, &'a str);
+type WearReading<'a> = (TimeNs, f64, &'a str);
 
 /// The closest two readings of one edge with a time between them: an edge was in the machine from the one to the other.
-fn bracket<'a>(readings: &[Wear<'a>], at_ns: TimeNs) -> Option<(Wear<'a>, Wear<'a>)> {
-    let (before, after): (Vec<Wear<'_>>, Vec<Wear<'_>>) = readings.iter().copied().partition(|it| it.0 <= at_ns);
-    let pair = |one: &Wear<'a>| Some((*one, *after.iter().find(|it| it.2 == one.2 && it.1 >= one.1)?));
+fn bracket<'a>(readings: &[WearReading<'a>], at_ns: TimeNs) -> Option<(WearReading<'a>, WearReading<'a>)> {
+    let (before, after): (Vec<WearReading<'_>>, Vec<WearReading<'_>>) =
+        readings.iter().copied().partition(|it| it.0 <= at_ns);
+    let pair = |one: &WearReading<'a>| Some((*one, *after.iter().find(|it| it.2 == one.2 && it.1 >= one.1)?));
     let pairs = before.iter().filter_map(pair).filter(|(one, other)| other.0 - one.0 <= WEAR_REACHES_NS);
     pairs.min_by_key(|(one, other)| other.0 - one.0)
 }

@@ -15,7 +15,7 @@ use rules::estimators::wear::{Columns, Cut, Key, LearnedWear, WearOptions, WearR
 
 /// One part of the job.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Part {
+pub struct JobPart {
     /// Its word.
     pub name: &'static str,
     /// What is known, or why not.
@@ -29,7 +29,7 @@ pub struct Part {
 /// Everything that history and annotations tell.
 pub struct Learned {
     /// The parts, in the order in which to do them.
-    pub parts: Vec<Part>,
+    pub parts: Vec<JobPart>,
     /// No-load powers, where learned.
     pub no_load: Option<NoLoadLearned>,
     /// Load loss, where learned.
@@ -66,7 +66,7 @@ pub fn all(recording: &Recording, merged: Vec<Merged>, machine: &str, criterion_
 impl Learned {
     fn part(&mut self, name: &'static str, known: Result<String, Refusal>, next: &str, minutes: f64) {
         let (next, minutes) = if known.is_ok() { (String::new(), 0.0) } else { (next.to_owned(), minutes) };
-        self.parts.push(Part { name, known, next, minutes });
+        self.parts.push(JobPart { name, known, next, minutes });
     }
 
     fn no_load(&mut self, recording: &Recording) {

@@ -45,7 +45,7 @@ pub struct Limits {
 
 /// One step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct CommissionStep {
     /// How long, s.
     pub seconds: f64,
     /// Spindle speed, rpm.
@@ -62,8 +62,8 @@ const BETWEEN_S: f64 = 12.0;
 ///
 /// # Errors
 /// Levels that make no design.
-pub fn steps(which: Which, limits: &Limits) -> Result<Vec<Step>, String> {
-    let idle = |seconds: f64, rpm: f64| Step { seconds, rpm, cut: None };
+pub fn steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, String> {
+    let idle = |seconds: f64, rpm: f64| CommissionStep { seconds, rpm, cut: None };
     Ok(match which {
         Which::NoLoad => {
             let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied().unwrap_or(limits.cut_rpm);
@@ -92,7 +92,7 @@ pub fn steps(which: Which, limits: &Limits) -> Result<Vec<Step>, String> {
                 let depth = least + share * (greatest - least);
                 [
                     idle(BETWEEN_S, limits.cut_rpm),
-                    Step { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) },
+                    CommissionStep { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) },
                 ]
             };
             let last = idle(BETWEEN_S, limits.cut_rpm);
@@ -110,7 +110,7 @@ fn ends(values: &[f64]) -> (f64, f64) {
 }
 
 /// The nine cuts of one wear, in the order of the design.
-fn l27(limits: &Limits, wear: usize) -> Result<Vec<Step>, String> {
+fn l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
     let factor = |symbol: &str, values: &[f64]| {
         let factor = Factor::of(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
         Ok::<_, String>(Levels { factor, values: values.to_vec() })
@@ -127,20 +127,20 @@ fn l27(limits: &Limits, wear: usize) -> Result<Vec<Step>, String> {
     let pass = |values: &[f64]| {
         let rpm = (1000.0 * values[1] / (PI * limits.diameter_mm)).round();
         let cut = Some((values[2] * rpm, values[3]));
-        [Step { seconds: BETWEEN_S, rpm, cut: None }, Step { seconds: BETWEEN_S, rpm, cut }]
+        [CommissionStep { seconds: BETWEEN_S, rpm, cut: None }, CommissionStep { seconds: BETWEEN_S, rpm, cut }]
     };
     Ok(own.flat_map(|cut| pass(&cut.values)).collect())
 }
 
 /// Minutes that the steps take.
 #[must_use]
-pub fn minutes(steps: &[Step]) -> f64 {
+pub fn minutes(steps: &[CommissionStep]) -> f64 {
     steps.iter().map(|step| step.seconds).sum::<f64>() / 60.0
 }
 
 /// The list for a person.
 #[must_use]
-pub fn text(steps: &[Step], diameter_mm: f64) -> String {
+pub fn text(steps: &[CommissionStep], diameter_mm: f64) -> String {
     let mut text = format!(
         "{} steps, {:.0} min, work of {diameter_mm} mm\n step   s    rpm  feed mm/min  depth mm\n",
         steps.len(),
@@ -156,11 +156,11 @@ pub fn text(steps: &[Step], diameter_mm: f64) -> String {
 
 /// The plan as a recording of commanded inputs.
 #[must_use]
-pub fn csv(steps: &[Step], diameter_mm: f64) -> String {
+pub fn csv(steps: &[CommissionStep], diameter_mm: f64) -> String {
     let mut csv =
         String::from("time_s,run,spindle_programmed_rpm,feed_programmed_mm_min,depth_of_cut_mm,diameter_mm,engaged\n");
     let mut time_s = 0.0;
-    let mut row = |time_s: f64, step: &Step| {
+    let mut row = |time_s: f64, step: &CommissionStep| {
         let (feed, depth, engaged) = step.cut.map_or((0.0, 0.0, 0), |(feed, depth)| (feed, depth, 1));
         let _ = writeln!(csv, "{time_s},1,{},{feed:.3},{depth:.4},{diameter_mm},{engaged}", step.rpm);
     };

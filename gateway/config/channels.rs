@@ -1,14 +1,14 @@
 //! `[[source.channel]]`: the user's own channels, checked and handed to the address of their source.
 
-use super::Source;
+use super::SourceConfig;
 use super::check_value::Scalar;
-use super::read::{Origin, Reading, Values};
+use super::read::{ConfigInput, Origin, SectionValues};
 use adapters::channel::{Kind, NewChannel};
 use adapters::fanuc::own::{OwnChannel, OwnItem, ReadWith};
 use rules::estimators::Estimates;
 
 /// Adds the channels below a source to it, and reports what cannot be added.
-pub(super) fn add(reading: &mut Reading<'_>, source: &mut Source, values: &Values) {
+pub(super) fn add(reading: &mut ConfigInput<'_>, source: &mut SourceConfig, values: &SectionValues) {
     let mut own = Vec::new();
     for channel in &values.inner {
         match own_channel(channel) {
@@ -25,9 +25,9 @@ pub(super) fn add(reading: &mut Reading<'_>, source: &mut Source, values: &Value
     }
 }
 
-type Refused = (Origin, String, String);
+type ChannelRefusal = (Origin, String, String);
 
-fn own_channel(values: &Values) -> Option<Result<OwnChannel, Refused>> {
+fn own_channel(values: &SectionValues) -> Option<Result<OwnChannel, ChannelRefusal>> {
     let text = |key: &str| match &values.found.get(key)?.value {
         Scalar::Text(text) => Some(text.clone()),
         _ => None,

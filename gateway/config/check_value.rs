@@ -1,6 +1,6 @@
 //! One value against one row of the table of keys.
 
-use super::keys::{Key, Kind};
+use super::keys::{ConfigKey, ValueKind};
 use crate::sinks::SinkAddress;
 use adapters::Address;
 use adapters::address::AddressError;
@@ -19,15 +19,15 @@ pub(super) enum Scalar {
 }
 
 /// What is wrong, and what to do.
-pub(super) type Refusal = (String, String);
+pub(super) type ValueRefusal = (String, String);
 
 /// A value as it stands in the file.
-pub(super) fn check_written(key: &Key, value: &DeValue<'_>) -> Result<Scalar, Refusal> {
+pub(super) fn check_written(key: &ConfigKey, value: &DeValue<'_>) -> Result<Scalar, ValueRefusal> {
     match (key.kind, value) {
-        (Kind::Number(..), DeValue::Integer(number)) => check_scalar(key, &decimal(number)),
-        (Kind::Number(..), DeValue::Float(number)) => check_scalar(key, number.as_str()),
-        (Kind::Flag, DeValue::Boolean(flag)) => Ok(Scalar::Flag(*flag)),
-        (Kind::Number(..) | Kind::Flag, other) => Err(wrong_type(key, other)),
+        (ValueKind::Number(..), DeValue::Integer(number)) => check_scalar(key, &decimal(number)),
+        (ValueKind::Number(..), DeValue::Float(number)) => check_scalar(key, number.as_str()),
+        (ValueKind::Flag, DeValue::Boolean(flag)) => Ok(Scalar::Flag(*flag)),
+        (ValueKind::Number(..) | ValueKind::Flag, other) => Err(wrong_type(key, other)),
         (_, DeValue::String(text)) => check_scalar(key, text),
         (_, other) => Err(wrong_type(key, other)),
     }
@@ -37,7 +37,7 @@ fn decimal(number: &toml::de::DeInteger<'_>) -> String {
     i128::from_str_radix(number.as_str(), number.radix()).map_or_else(|_| number.to_string(), |value| value.to_string())
 }
 
-fn wrong_type(key: &Key, value: &DeValue<'_>) -> Refusal {
+fn wrong_type(key: &ConfigKey, value: &DeValue<'_>) -> ValueRefusal {
     let found = match value {
         DeValue::String(_) => "text",
         DeValue::Integer(_) | DeValue::Float(_) => "a number",
@@ -49,50 +49,50 @@ fn wrong_type(key: &Key, value: &DeValue<'_>) -> Refusal {
     (format!("`{}` is {found}; {} is needed", key.name, needed(key.kind)), example(key))
 }
 
-fn needed(kind: Kind) -> &'static str {
+fn needed(kind: ValueKind) -> &'static str {
     match kind {
-        Kind::Text => "text",
-        Kind::OneOf(_) => "a word",
-        Kind::Number(..) => "a number",
-        Kind::Flag => "true or false",
-        Kind::Path => "a path in quotes",
-        Kind::Listen => "HOST:PORT in quotes",
-        Kind::Address | Kind::SinkAddress => "an address in quotes",
+        ValueKind::Text => "text",
+        ValueKind::OneOf(_) => "a word",
+        ValueKind::Number(..) => "a number",
+        ValueKind::Flag => "true or false",
+        ValueKind::Path => "a path in quotes",
+        ValueKind::Listen => "HOST:PORT in quotes",
+        ValueKind::Address | ValueKind::SinkAddress => "an address in quotes",
     }
 }
 
-fn example(key: &Key) -> String {
+fn example(key: &ConfigKey) -> String {
     let value = match key.kind {
-        Kind::Text | Kind::Path => "\"...\"".to_owned(),
-        Kind::OneOf(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
-        Kind::Number(min, max) => format!("{:?}", 1.0_f64.clamp(min, max)),
-        Kind::Flag => "true".to_owned(),
-        Kind::Listen => "\"127.0.0.1:8080\"".to_owned(),
-        Kind::Address => "\"simulated://lathe\"".to_owned(),
-        Kind::SinkAddress => "\"mqtts://broker:8883/plant\"".to_owned(),
+        ValueKind::Text | ValueKind::Path => "\"...\"".to_owned(),
+        ValueKind::OneOf(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
+        ValueKind::Number(min, max) => format!("{:?}", 1.0_f64.clamp(min, max)),
+        ValueKind::Flag => "true".to_owned(),
+        ValueKind::Listen => "\"127.0.0.1:8080\"".to_owned(),
+        ValueKind::Address => "\"simulated://lathe\"".to_owned(),
+        ValueKind::SinkAddress => "\"mqtts://broker:8883/plant\"".to_owned(),
     };
     format!("for example {} = {value}", key.name)
 }
 
 /// A value as text without quotes, as in an environment variable.
-pub(super) fn check_scalar(key: &Key, text: &str) -> Result<Scalar, Refusal> {
+pub(super) fn check_scalar(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
     match key.kind {
-        Kind::Number(min, max) => number(key, text, min, max),
-        Kind::Flag => match text {
+        ValueKind::Number(min, max) => number(key, text, min, max),
+        ValueKind::Flag => match text {
             "true" => Ok(Scalar::Flag(true)),
             "false" => Ok(Scalar::Flag(false)),
             _ => Err((format!("`{}` is {text:?}; true or false is needed", key.name), String::new())),
         },
         _ if text.trim().is_empty() => Err((format!("`{}` is empty", key.name), example(key))),
-        Kind::OneOf(words) => word(key, text, words),
-        Kind::Listen => listen(key, text),
-        Kind::Address => address(text, text.parse::<Address>().map(drop)),
-        Kind::SinkAddress => address(text, text.parse::<SinkAddress>().map(drop)),
-        Kind::Text | Kind::Path => Ok(Scalar::Text(text.to_owned())),
+        ValueKind::OneOf(words) => word(key, text, words),
+        ValueKind::Listen => listen(key, text),
+        ValueKind::Address => address(text, text.parse::<Address>().map(drop)),
+        ValueKind::SinkAddress => address(text, text.parse::<SinkAddress>().map(drop)),
+        ValueKind::Text | ValueKind::Path => Ok(Scalar::Text(text.to_owned())),
     }
 }
 
-fn number(key: &Key, text: &str, min: f64, max: f64) -> Result<Scalar, Refusal> {
+fn number(key: &ConfigKey, text: &str, min: f64, max: f64) -> Result<Scalar, ValueRefusal> {
     let Ok(number) = text.replace('_', "").parse::<f64>() else {
         return Err((format!("`{}` is {text:?}; a number is needed", key.name), example(key)));
     };
@@ -102,7 +102,7 @@ fn number(key: &Key, text: &str, min: f64, max: f64) -> Result<Scalar, Refusal> 
     Err((format!("`{} = {text}` is outside {min} to {max}", key.name), format!("{}: {}", key.name, key.en)))
 }
 
-fn word(key: &Key, text: &str, words: &[&str]) -> Result<Scalar, Refusal> {
+fn word(key: &ConfigKey, text: &str, words: &[&str]) -> Result<Scalar, ValueRefusal> {
     if words.contains(&text) {
         return Ok(Scalar::Text(text.to_owned()));
     }
@@ -112,7 +112,7 @@ fn word(key: &Key, text: &str, words: &[&str]) -> Result<Scalar, Refusal> {
     Err((format!("`{}` cannot be {text:?}", key.name), next))
 }
 
-fn listen(key: &Key, text: &str) -> Result<Scalar, Refusal> {
+fn listen(key: &ConfigKey, text: &str) -> Result<Scalar, ValueRefusal> {
     let host = text.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok()).map(|(host, _)| host);
     let named = |host: &str| !host.is_empty() && host.chars().all(|c| c.is_ascii_alphanumeric() || "-.".contains(c));
     if text.parse::<std::net::SocketAddr>().is_ok() || host.is_some_and(named) {
@@ -125,7 +125,7 @@ fn listen(key: &Key, text: &str) -> Result<Scalar, Refusal> {
     ))
 }
 
-fn address(text: &str, parsed: Result<(), AddressError>) -> Result<Scalar, Refusal> {
+fn address(text: &str, parsed: Result<(), AddressError>) -> Result<Scalar, ValueRefusal> {
     match parsed {
         Ok(_) => Ok(Scalar::Text(text.to_owned())),
         Err(error) => {

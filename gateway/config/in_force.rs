@@ -4,7 +4,7 @@
 use super::channel_keys;
 use super::check_value::Scalar;
 use super::keys::{SECTIONS, keys_of};
-use super::read::{Origin, Reading, Values};
+use super::read::{ConfigInput, Origin, SectionValues};
 use serde::Serialize;
 
 /// One key.
@@ -25,7 +25,7 @@ pub struct InForce {
 /// Keys in the query of an address whose values are masked.
 const SECRET: [&str; 5] = ["password", "token", "secret", "key", "passphrase"];
 
-pub(super) fn in_force(reading: &Reading<'_>) -> Vec<InForce> {
+pub(super) fn in_force(reading: &ConfigInput<'_>) -> Vec<InForce> {
     let mut all = Vec::new();
     for section in SECTIONS.iter().filter(|section| section.name != channel_keys::SECTION) {
         if !section.repeated {
@@ -33,7 +33,7 @@ pub(super) fn in_force(reading: &Reading<'_>) -> Vec<InForce> {
             rows(&mut all, section.name, &format!("[{}]", section.name), get);
             continue;
         }
-        let list: &[Values] = if section.name == "sink" { &reading.sinks } else { &reading.sources };
+        let list: &[SectionValues] = if section.name == "sink" { &reading.sinks } else { &reading.sources };
         for (index, values) in list.iter().enumerate() {
             let get = |key: &str| values.found.get(key).map(|found| (&found.value, &found.origin));
             rows(&mut all, section.name, &format!("[[{}]] {}", section.name, index + 1), get);

@@ -8,7 +8,7 @@ pub use super::shown::{example, table};
 
 /// What a key accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum ValueKind {
     /// Any text that is not empty.
     Text,
     /// One of these words.
@@ -40,13 +40,13 @@ pub enum Absent {
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Key {
+pub struct ConfigKey {
     /// The section it belongs to.
     pub section: &'static str,
     /// Its name in that section; the unit comes last.
     pub name: &'static str,
     /// What it accepts.
-    pub kind: Kind,
+    pub kind: ValueKind,
     /// What holds when it is absent.
     pub absent: Absent,
     /// What it does, in English.
@@ -99,24 +99,24 @@ pub const SECTIONS: &[Section] = &[
 
 pub(super) const fn key(
     path: (&'static str, &'static str),
-    kind: Kind,
+    kind: ValueKind,
     absent: Absent,
     en: &'static str,
     zh: &'static str,
-) -> Key {
-    Key { section: path.0, name: path.1, kind, absent, en, zh }
+) -> ConfigKey {
+    ConfigKey { section: path.0, name: path.1, kind, absent, en, zh }
 }
 
 use Absent::{Default, Optional, Required};
-use Kind::{Address, Flag, Listen, Number, OneOf, Path, Text};
+use ValueKind::{Address, Flag, Listen, Number, OneOf, Path, Text};
 
 /// Every key the gateway knows.
-pub static KEYS: &[Key] = &ALL;
+pub static KEYS: &[ConfigKey] = &ALL;
 
 /// The rows of every part of the table, one part behind the other.
-static ALL: [Key; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()] = {
+static ALL: [ConfigKey; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()] = {
     let mut all = [CORE[0]; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + channel_keys::KEYS.len()];
-    let parts: [&[Key]; 5] = [CORE, GATE, OUTPUTS, THERMAL, &channel_keys::KEYS];
+    let parts: [&[ConfigKey]; 5] = [CORE, GATE, OUTPUTS, THERMAL, &channel_keys::KEYS];
     let (mut part, mut filled) = (0, 0);
     while part < parts.len() {
         let mut index = 0;
@@ -131,7 +131,7 @@ static ALL: [Key; CORE.len() + GATE.len() + OUTPUTS.len() + THERMAL.len() + chan
 };
 
 /// Every key but those of the gate, of the outputs, of the thermal law and of channels.
-const CORE: &[Key] = &[
+const CORE: &[ConfigKey] = &[
     key(
         ("gateway", "name"),
         Text,
@@ -327,13 +327,13 @@ const CORE: &[Key] = &[
 ];
 
 /// The keys of one section.
-pub fn keys_of(section: &str) -> impl Iterator<Item = &'static Key> {
+pub fn keys_of(section: &str) -> impl Iterator<Item = &'static ConfigKey> {
     KEYS.iter().filter(move |key| key.section == section)
 }
 
 /// The key of this name in this section.
 #[must_use]
-pub fn find(section: &str, name: &str) -> Option<&'static Key> {
+pub fn find(section: &str, name: &str) -> Option<&'static ConfigKey> {
     KEYS.iter().find(|key| key.section == section && key.name == name)
 }
 
@@ -343,7 +343,7 @@ pub fn find_section(name: &str) -> Option<&'static Section> {
     SECTIONS.iter().find(|section| section.name == name)
 }
 
-impl Key {
+impl ConfigKey {
     /// `section.name`.
     #[must_use]
     pub fn path(&self) -> String {

@@ -1,11 +1,11 @@
 //! The rows of the table of keys that concern what may be written to the machine.
 
 use super::keys::Absent::{Default, Optional};
-use super::keys::Kind::{Flag, Number, OneOf, Text};
-use super::keys::{Key, key};
+use super::keys::ValueKind::{Flag, Number, OneOf, Text};
+use super::keys::{ConfigKey, key};
 
 /// Keys of `[gate]` and `[gate.offset]`.
-pub(super) const GATE: &[Key] = &[
+pub(super) const GATE: &[ConfigKey] = &[
     key(
         ("gate", "mode"),
         OneOf(&["off", "shadow", "armed"]),

@@ -1,11 +1,11 @@
 //! The rows of the table of keys that concern what leaves the box.
 
 use super::keys::Absent::{Default, Optional, Required};
-use super::keys::Kind::{Flag, Number, SinkAddress, Text};
-use super::keys::{Key, key};
+use super::keys::ValueKind::{Flag, Number, SinkAddress, Text};
+use super::keys::{ConfigKey, key};
 
 /// Keys of `[[sink]]` and `[outbox]`.
-pub(super) const OUTPUTS: &[Key] = &[
+pub(super) const OUTPUTS: &[ConfigKey] = &[
     key(
         ("sink", "address"),
         SinkAddress,

@@ -1,11 +1,11 @@
 //! The keys of the thermal law that the box runs.
 
 use super::keys::Absent::{Default, Optional};
-use super::keys::Kind::{Flag, Number, OneOf, Path};
-use super::keys::{Key, key};
+use super::keys::ValueKind::{Flag, Number, OneOf, Path};
+use super::keys::{ConfigKey, key};
 
 /// The rows.
-pub(super) const THERMAL: &[Key] = &[
+pub(super) const THERMAL: &[ConfigKey] = &[
     key(
         ("thermal", "model"),
         Path,

@@ -46,38 +46,38 @@ pub const BUILT_IN_TEXT: &str =
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
     /// The box itself.
-    pub gateway: Gateway,
+    pub gateway: GatewayConfig,
     /// At least one source.
-    pub sources: Vec<Source>,
+    pub sources: Vec<SourceConfig>,
     /// One time base for controller and meters.
-    pub alignment: Alignment,
+    pub alignment: AlignmentConfig,
     /// The scripts.
-    pub scripts: Scripts,
+    pub scripts: ScriptsConfig,
     /// How each stretch of an NC program cuts.
-    pub operations: Operations,
+    pub operations: OperationsConfig,
     /// What may be written to the machine.
-    pub gate: Gate,
+    pub gate: GateConfig,
     /// What is remembered.
-    pub history: History,
+    pub history: HistoryConfig,
     /// Where it is sent to.
-    pub sinks: Vec<Sink>,
+    pub sinks: Vec<SinkConfig>,
     /// What the sinks are sent, and how much of it is kept for them.
     pub outbox: OutboxSettings,
     /// The page.
-    pub http: Http,
+    pub http: HttpConfig,
     /// The simulation.
-    pub twin: Twin,
+    pub twin: TwinConfig,
     /// The thermal law.
-    pub thermal: Thermal,
+    pub thermal: ThermalConfig,
     /// The log.
-    pub log: Log,
+    pub log: LogConfig,
     /// Every key with its value and where that was written.
     pub in_force: Vec<InForce>,
 }
 
 /// `[gateway]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gateway {
+pub struct GatewayConfig {
     /// Name of the machine.
     pub name: String,
     /// Ticks per second, 0.1 to 1000.
@@ -90,7 +90,7 @@ pub struct Gateway {
 
 /// One `[[source]]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Source {
+pub struct SourceConfig {
     /// Where it is and how to talk to it.
     pub address: Address,
     /// Short name; the text of the address when none was given.
@@ -126,7 +126,7 @@ impl AlignmentUse {
 
 /// `[alignment]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Alignment {
+pub struct AlignmentConfig {
     /// For the source of `spindle_power_w`.
     pub spindle_power: AlignmentUse,
     /// For the source of `total_power_w`, where that is another one.
@@ -135,7 +135,7 @@ pub struct Alignment {
 
 /// `[scripts]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Scripts {
+pub struct ScriptsConfig {
     /// Directory of the `.rhai` files.
     pub directory: PathBuf,
     /// Look for changes every second.
@@ -144,7 +144,7 @@ pub struct Scripts {
 
 /// `[operations]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Operations {
+pub struct OperationsConfig {
     /// The recipe file.
     pub path: Option<PathBuf>,
 }
@@ -174,7 +174,7 @@ impl GateMode {
 
 /// `[gate]`: the limits that no script can widen.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gate {
+pub struct GateConfig {
     /// How far it goes.
     pub mode: GateMode,
     /// Name of the source that is written to.
@@ -200,10 +200,10 @@ pub struct Gate {
     /// Arming ends by itself after this.
     pub armed_for: Duration,
     /// Thermal offsets.
-    pub offset: Offset,
+    pub offset: OffsetConfig,
 }
 
-impl Gate {
+impl GateConfig {
     /// The furthest that overrides or offsets may go: what arming needs.
     #[must_use]
     pub fn greatest_mode(&self) -> GateMode {
@@ -213,7 +213,7 @@ impl Gate {
 
 /// `[gate.offset]`: the limits of thermal offsets.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Offset {
+pub struct OffsetConfig {
     /// How far it goes.
     pub mode: GateMode,
     /// Name of the source that is written to.
@@ -232,7 +232,7 @@ pub struct Offset {
 
 /// `[history]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct HistoryConfig {
     /// The database.
     pub path: PathBuf,
     /// Age at which raw samples are dropped, days.
@@ -245,7 +245,7 @@ pub struct History {
 
 /// One `[[sink]]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sink {
+pub struct SinkConfig {
     /// Where it is and how to talk to it.
     pub address: SinkAddress,
     /// Short name; the text of the address when none was given.
@@ -256,7 +256,7 @@ pub struct Sink {
 
 /// `[http]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Http {
+pub struct HttpConfig {
     /// `HOST:PORT`.
     pub listen: String,
     /// Serve at all.
@@ -279,14 +279,14 @@ pub struct Http {
 
 /// `[twin]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Twin {
+pub struct TwinConfig {
     /// Model file.
     pub model: Option<PathBuf>,
 }
 
 /// `[thermal]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Thermal {
+pub struct ThermalConfig {
     /// Model file that `identify thermal --model` writes.
     pub model: Option<PathBuf>,
     /// Axis whose error it predicts.
@@ -305,7 +305,7 @@ pub struct Thermal {
 
 /// `[log]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Log {
+pub struct LogConfig {
     /// Least important message.
     pub level: Level,
     /// Text, JSON, or none at all.
@@ -348,7 +348,7 @@ pub fn parse(
     base: &Path,
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Config, Vec<Problem>> {
-    let mut reading = read::Reading::of(file, text);
+    let mut reading = read::ConfigInput::of(file, text);
     let mut variables: Vec<_> =
         environment.into_iter().filter(|(name, _)| name.starts_with(ENVIRONMENT_PREFIX)).collect();
     variables.sort();

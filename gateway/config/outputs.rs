@@ -1,17 +1,17 @@
 //! `[[sink]]` and `[outbox]`: from checked values to the configuration.
 
-use super::Sink;
+use super::SinkConfig;
 use super::build::{as_text, number, origin_of_name, source_name, text};
 use super::check_value::Scalar;
-use super::read::{Origin, Reading, Values};
+use super::read::{ConfigInput, Origin, SectionValues};
 use crate::history::OutboxSettings;
 use crate::sinks::SinkAddress;
 use adapters::channel::{CHANNELS, nearest};
 use std::time::Duration;
 
 /// The sinks; names that are there twice are reported.
-pub(super) fn sinks(reading: &mut Reading<'_>) -> Option<Vec<Sink>> {
-    let sinks: Option<Vec<Sink>> = reading.sinks.iter().map(sink).collect();
+pub(super) fn sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfig>> {
+    let sinks: Option<Vec<SinkConfig>> = reading.sinks.iter().map(sink).collect();
     requests_need_a_way_in(reading);
     let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
@@ -24,18 +24,18 @@ pub(super) fn sinks(reading: &mut Reading<'_>) -> Option<Vec<Sink>> {
     sinks
 }
 
-fn sink(values: &Values) -> Option<Sink> {
+fn sink(values: &SectionValues) -> Option<SinkConfig> {
     let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
-    Some(Sink { name: source_name(values)?, address, allow_requests: allows_requests(values) })
+    Some(SinkConfig { name: source_name(values)?, address, allow_requests: allows_requests(values) })
 }
 
-fn allows_requests(values: &Values) -> bool {
+fn allows_requests(values: &SectionValues) -> bool {
     values.found.get("allow_requests").is_some_and(|found| found.value == Scalar::Flag(true))
 }
 
 /// Only through a broker can the network ask for something.
-fn requests_need_a_way_in(reading: &mut Reading<'_>) {
-    let origin = |values: &Values| {
+fn requests_need_a_way_in(reading: &mut ConfigInput<'_>) {
+    let origin = |values: &SectionValues| {
         let address: SinkAddress = values.found.get("address").and_then(as_text)?.parse().ok()?;
         let deaf = allows_requests(values) && !address.hears();
         values.found.get("allow_requests").filter(|_| deaf).map(|found| (found.origin.clone(), address))
@@ -48,7 +48,7 @@ fn requests_need_a_way_in(reading: &mut Reading<'_>) {
 }
 
 /// What the sinks are sent.
-pub(super) fn outbox(reading: &mut Reading<'_>) -> Option<OutboxSettings> {
+pub(super) fn outbox(reading: &mut ConfigInput<'_>) -> Option<OutboxSettings> {
     let every_nth = number(reading, "outbox", "every_nth")?;
     let origin = reading.get("outbox", "every_nth").map_or(Origin::Default, |found| found.origin.clone());
     if every_nth.fract() != 0.0 {
@@ -67,7 +67,7 @@ pub(super) fn outbox(reading: &mut Reading<'_>) -> Option<OutboxSettings> {
 }
 
 /// `spindle_power_w=5, feed_mm_min=1`; what is wrong is reported.
-fn dead_bands(reading: &mut Reading<'_>) -> Vec<(String, f64)> {
+fn dead_bands(reading: &mut ConfigInput<'_>) -> Vec<(String, f64)> {
     let Some(written) = text(reading, "outbox", "dead_band") else { return Vec::new() };
     let origin = reading.get("outbox", "dead_band").map_or(Origin::Default, |found| found.origin.clone());
     let mut bands = Vec::new();

@@ -2,7 +2,7 @@
 
 use super::channel_keys;
 use super::check_value::{Scalar, check_scalar, check_written};
-use super::keys::{Absent, Key, SECTIONS, Section, find, find_section, keys_of};
+use super::keys::{Absent, ConfigKey, SECTIONS, Section, find, find_section, keys_of};
 use super::problem::Problem;
 use adapters::channel::nearest;
 use std::collections::BTreeMap;
@@ -22,21 +22,21 @@ pub(super) enum Origin {
 
 /// A checked value and where it was written.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct LocatedValue {
     pub(super) value: Scalar,
     pub(super) origin: Origin,
 }
 
 /// One section as found: values by key name, and where it begins.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Values {
-    pub(super) found: BTreeMap<&'static str, Found>,
+pub(super) struct SectionValues {
+    pub(super) found: BTreeMap<&'static str, LocatedValue>,
     /// Sections written several times below this one.
-    pub(super) inner: Vec<Values>,
+    pub(super) inner: Vec<SectionValues>,
     offset: Option<usize>,
 }
 
-impl Values {
+impl SectionValues {
     /// Where a key was written, or where its section begins.
     pub(super) fn origin(&self, key: &str) -> Origin {
         let section = self.offset.map_or(Origin::Default, Origin::File);
@@ -47,16 +47,16 @@ impl Values {
 
 /// Everything found in the file and the environment.
 #[derive(Debug, Default)]
-pub(super) struct Reading<'a> {
+pub(super) struct ConfigInput<'a> {
     file: &'a str,
     text: &'a str,
-    single: BTreeMap<&'static str, Values>,
-    pub(super) sources: Vec<Values>,
-    pub(super) sinks: Vec<Values>,
+    single: BTreeMap<&'static str, SectionValues>,
+    pub(super) sources: Vec<SectionValues>,
+    pub(super) sinks: Vec<SectionValues>,
     pub(super) problems: Vec<Problem>,
 }
 
-impl<'a> Reading<'a> {
+impl<'a> ConfigInput<'a> {
     /// Reads `text`; `file` is its name in messages.
     pub(super) fn of(file: &'a str, text: &'a str) -> Self {
         let mut reading = Self { file, text, ..Self::default() };
@@ -135,7 +135,7 @@ impl<'a> Reading<'a> {
     }
 
     /// A section below another one; those that can stand there several times belong to the one above.
-    fn within(&mut self, section: &'static Section, value: &Spanned<DeValue<'_>>, offset: usize) -> Vec<Values> {
+    fn within(&mut self, section: &'static Section, value: &Spanned<DeValue<'_>>, offset: usize) -> Vec<SectionValues> {
         match (section.repeated, value.get_ref()) {
             (false, DeValue::Table(table)) => {
                 let found = self.values(section, table, offset);
@@ -158,8 +158,8 @@ impl<'a> Reading<'a> {
         }
     }
 
-    fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> Values {
-        let mut values = Values { offset: Some(offset), ..Values::default() };
+    fn values(&mut self, section: &'static Section, table: &DeTable<'_>, offset: usize) -> SectionValues {
+        let mut values = SectionValues { offset: Some(offset), ..SectionValues::default() };
         for (name, value) in table.iter() {
             let within = find_section(&format!("{}.{}", section.name, name.get_ref()));
             if let Some(within) = within {
@@ -178,7 +178,7 @@ impl<'a> Reading<'a> {
             };
             let origin = Origin::File(value.span().start);
             match check_written(key, value.get_ref()) {
-                Ok(value) => drop(values.found.insert(key.name, Found { value, origin })),
+                Ok(value) => drop(values.found.insert(key.name, LocatedValue { value, origin })),
                 Err((what, next)) => self.problem(&origin, what, next),
             }
         }
@@ -209,17 +209,17 @@ impl<'a> Reading<'a> {
             return self.problem(&origin, what, key_hint(known.name, key_name));
         };
         match check_scalar(key, text) {
-            Ok(value) => drop(self.place(known, index).found.insert(key.name, Found { value, origin })),
+            Ok(value) => drop(self.place(known, index).found.insert(key.name, LocatedValue { value, origin })),
             Err((what, next)) => self.problem(&origin, what, next),
         }
     }
 
-    fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut Values {
+    fn place(&mut self, section: &'static Section, index: Option<usize>) -> &mut SectionValues {
         match index {
             Some(index) => {
                 let list = self.list(section);
                 if index >= list.len() {
-                    list.push(Values::default());
+                    list.push(SectionValues::default());
                 }
                 let last = list.len() - 1;
                 &mut list[index.min(last)]
@@ -243,18 +243,18 @@ impl<'a> Reading<'a> {
     }
 
     /// What is collected of a section that may stand there several times.
-    fn list(&mut self, section: &Section) -> &mut Vec<Values> {
+    fn list(&mut self, section: &Section) -> &mut Vec<SectionValues> {
         if section.name == "sink" { &mut self.sinks } else { &mut self.sources }
     }
 
-    fn fill_with_channels(&mut self, section: &Section, values: &mut Values) {
+    fn fill_with_channels(&mut self, section: &Section, values: &mut SectionValues) {
         self.fill(section, values);
         for channel in &mut values.inner {
             find_section(channel_keys::SECTION).into_iter().for_each(|section| self.fill(section, channel));
         }
     }
 
-    fn fill(&mut self, section: &Section, values: &mut Values) {
+    fn fill(&mut self, section: &Section, values: &mut SectionValues) {
         for key in keys_of(section.name) {
             match key.absent {
                 Absent::Default(text) => fill_default(key, text, values),
@@ -264,7 +264,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    fn missing(&mut self, section: &Section, key: &Key, offset: Option<usize>) {
+    fn missing(&mut self, section: &Section, key: &ConfigKey, offset: Option<usize>) {
         let already = offset.map(|offset| Problem::of("", "", "").at(self.text, offset));
         let named = |problem: &Problem| {
             problem.what.contains(key.name) && already.as_ref().is_none_or(|here| problem.line >= here.line)
@@ -276,14 +276,14 @@ impl<'a> Reading<'a> {
     }
 
     /// A value of a section that is written once.
-    pub(super) fn get(&self, section: &str, key: &str) -> Option<&Found> {
+    pub(super) fn get(&self, section: &str, key: &str) -> Option<&LocatedValue> {
         self.single.get(section).and_then(|values| values.found.get(key))
     }
 }
 
-fn fill_default(key: &'static Key, text: &str, values: &mut Values) {
+fn fill_default(key: &'static ConfigKey, text: &str, values: &mut SectionValues) {
     if let Ok(value) = check_scalar(key, text.trim_matches('"')) {
-        values.found.entry(key.name).or_insert(Found { value, origin: Origin::Default });
+        values.found.entry(key.name).or_insert(LocatedValue { value, origin: Origin::Default });
     }
 }
 

@@ -1,9 +1,9 @@
 //! The table of keys as a reader sees it: what `check --keys` and `check --example` print.
 
 use super::keys::Absent::{self, Default, Optional, Required};
-use super::keys::{KEYS, Key, Kind, SECTIONS, find_section, keys_of};
+use super::keys::{ConfigKey, KEYS, SECTIONS, ValueKind, find_section, keys_of};
 
-impl Kind {
+impl ValueKind {
     /// What is accepted, as a reader of the table needs it.
     #[must_use]
     pub fn range(&self) -> String {
@@ -59,11 +59,11 @@ pub fn example() -> String {
 }
 
 /// A key as it is written in the example. A line of a section that need not stand there is a comment.
-fn example_line(key: &Key, commented: bool) -> String {
+fn example_line(key: &ConfigKey, commented: bool) -> String {
     let value = match (key.absent, key.kind) {
         (Default(value), _) => value,
-        (Required, Kind::Address) => "\"simulated://lathe\"",
-        (Required, Kind::SinkAddress) => "\"mqtts://broker:8883/plant\"",
+        (Required, ValueKind::Address) => "\"simulated://lathe\"",
+        (Required, ValueKind::SinkAddress) => "\"mqtts://broker:8883/plant\"",
         (Required | Optional, _) => "...",
     };
     let mark = if commented || key.absent != Required { "# " } else { "" };

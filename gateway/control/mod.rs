@@ -25,7 +25,7 @@ mod server;
 
 pub use client::order;
 pub use network::{NetworkRequest, RequestedChange};
-pub use post::{Inbox, Post, PostedRequest, PostedRow, Wake, queue};
+pub use post::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, queue};
 pub use server::{Listening, listen};
 
 use serde::{Deserialize, Serialize};
@@ -118,7 +118,7 @@ impl Reply {
 
 /// An order on its way to the tick, with the way back.
 #[derive(Debug)]
-pub struct Posted {
+pub struct QueuedOrder {
     /// What is wanted.
     pub order: Order,
     /// Where the answer goes.

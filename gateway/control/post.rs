@@ -3,7 +3,7 @@
 //! Orders, rows and requests of the network go by queues of their own: however many rows a flood of refused requests makes, an
 //! order to disarm finds its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
 
-use super::{ANSWER_WITHIN, NetworkRequest, Order, Posted, Reply, WAITING_MAX};
+use super::{ANSWER_WITHIN, NetworkRequest, Order, QueuedOrder, Reply, WAITING_MAX};
 use crate::history::Audit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -68,8 +68,8 @@ pub struct PostedRequest {
 
 /// The end of those who order.
 #[derive(Debug, Clone)]
-pub struct Post {
-    orders: SyncSender<Posted>,
+pub struct OrderSender {
+    orders: SyncSender<QueuedOrder>,
     rows: SyncSender<PostedRow>,
     requests: SyncSender<PostedRequest>,
     wake: Wake,
@@ -77,9 +77,9 @@ pub struct Post {
 
 /// The end of the tick.
 #[derive(Debug)]
-pub struct Inbox {
+pub struct OrderReceiver {
     /// Orders of persons.
-    pub orders: Receiver<Posted>,
+    pub orders: Receiver<QueuedOrder>,
     /// What is to be accounted for.
     pub rows: Receiver<PostedRow>,
     /// What the network asks for.
@@ -90,20 +90,20 @@ pub struct Inbox {
 
 /// Both ends.
 #[must_use]
-pub fn queue() -> (Post, Inbox) {
+pub fn queue() -> (OrderSender, OrderReceiver) {
     let (orders, to_obey) = sync_channel(WAITING_MAX);
     let (rows, to_keep) = sync_channel(ROWS_MAX);
     let (requests, to_judge) = sync_channel(REQUESTS_MAX);
     let wake = Wake::default();
-    let post = Post { orders, rows, requests, wake: wake.clone() };
-    (post, Inbox { orders: to_obey, rows: to_keep, requests: to_judge, wake })
+    let post = OrderSender { orders, rows, requests, wake: wake.clone() };
+    (post, OrderReceiver { orders: to_obey, rows: to_keep, requests: to_judge, wake })
 }
 
-impl Post {
+impl OrderSender {
     /// Hands an order to the tick and gives what it says.
     pub async fn order(&self, order: Order) -> Reply {
         let (reply, answered) = oneshot::channel();
-        if self.orders.try_send(Posted { order, reply }).is_err() {
+        if self.orders.try_send(QueuedOrder { order, reply }).is_err() {
             return Reply::refused("the box is busy; look at its log and try again");
         }
         self.wake.wake();

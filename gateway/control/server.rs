@@ -1,6 +1,6 @@
 //! Listens for orders and hands each to the tick, on a thread of its own: however busy the page is, an order is heard.
 
-use super::{LINE_MAX, Order, Post, Reply, socket};
+use super::{LINE_MAX, Order, OrderSender, Reply, socket};
 use crate::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
@@ -34,7 +34,7 @@ impl Drop for Listening {
 
 /// Listens in this directory. Without a socket the box goes on; it cannot be armed then, and says so.
 #[must_use]
-pub fn listen(data_dir: &Path, post: Post) -> Option<Listening> {
+pub fn listen(data_dir: &Path, post: OrderSender) -> Option<Listening> {
     let path = socket(data_dir);
     match bind(&path).and_then(|listener| start(listener, post)) {
         Ok(going_on) => Some(Listening { path, _going_on: going_on }),
@@ -48,7 +48,7 @@ pub fn listen(data_dir: &Path, post: Post) -> Option<Listening> {
 }
 
 /// The thread that listens; it ends when what is given is dropped.
-fn start(listener: std::os::unix::net::UnixListener, post: Post) -> io::Result<oneshot::Sender<()>> {
+fn start(listener: std::os::unix::net::UnixListener, post: OrderSender) -> io::Result<oneshot::Sender<()>> {
     let (going_on, over) = oneshot::channel::<()>();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let listen = move || {
@@ -65,7 +65,7 @@ fn start(listener: std::os::unix::net::UnixListener, post: Post) -> io::Result<o
 }
 
 /// Takes one order after another; whoever comes while too many are being talked to waits for his turn.
-async fn take(listener: UnixListener, post: Post) {
+async fn take(listener: UnixListener, post: OrderSender) {
     let room = Arc::new(Semaphore::new(TALKING_MAX));
     loop {
         let Ok(place) = room.clone().acquire_owned().await else { return };
@@ -98,7 +98,7 @@ fn bind(path: &Path) -> io::Result<std::os::unix::net::UnixListener> {
     Ok(listener)
 }
 
-async fn answer(mut stream: UnixStream, post: &Post) {
+async fn answer(mut stream: UnixStream, post: &OrderSender) {
     let user = stream.peer_cred().ok().map(|peer| peer.uid());
     let reply = match tokio::time::timeout(ASK_WITHIN, read(&mut stream)).await {
         Ok(Ok(line)) => obey(&line, user, post).await,
@@ -115,7 +115,7 @@ async fn read(stream: &mut UnixStream) -> io::Result<String> {
     Ok(line)
 }
 
-async fn obey(line: &str, user: Option<u32>, post: &Post) -> Reply {
+async fn obey(line: &str, user: Option<u32>, post: &OrderSender) -> Reply {
     match serde_json::from_str::<Order>(line) {
         Ok(order) => post.order(order.of_user(user)).await,
         Err(error) => Reply::refused(format!("this is no order: {error}")),

@@ -1,7 +1,7 @@
 //! The child process in which a diagnosis is made. It takes minutes and as much memory as the stretch is long, so it can be ended
 //! at any moment, and whatever happens to it, the gateway goes on.
 //!
-//! The gateway writes one line, the [`Job`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
+//! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
 //! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`Said`].
 
 use super::kept::Kept;
@@ -25,7 +25,7 @@ pub const COMMAND: &str = "diagnosis-child";
 
 /// What is to be diagnosed.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Job {
+pub struct DiagnosisJob {
     /// The model, `model/1`.
     pub toml: String,
     /// The history.
@@ -68,7 +68,7 @@ pub enum Said {
 ///
 /// # Errors
 /// No process could be started.
-pub fn start(job: &Job) -> std::io::Result<Child> {
+pub fn start(job: &DiagnosisJob) -> std::io::Result<Child> {
     let program = if cfg!(target_os = "linux") { PathBuf::from("/proc/self/exe") } else { std::env::current_exe()? };
     let mut child = Command::new(program)
         .arg(COMMAND)
@@ -105,7 +105,7 @@ pub fn run() -> std::io::Result<()> {
     let mut line = String::new();
     let mut input = BufReader::new(std::io::stdin().take(LINE_MAX));
     input.read_line(&mut line)?;
-    let job: Job = serde_json::from_str(&line)?;
+    let job: DiagnosisJob = serde_json::from_str(&line)?;
     std::thread::Builder::new().name("parent".to_owned()).spawn(move || {
         let _until_it_is_gone = std::io::copy(&mut input, &mut std::io::sink());
         std::process::exit(2);
@@ -120,7 +120,7 @@ fn say(said: &Said) -> std::io::Result<()> {
     out.flush()
 }
 
-fn diagnose(job: &Job) -> Result<(history::Diagnosis, Vec<String>), String> {
+fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
     let tell = |stage, rows| say(&Said::Stage(stage, rows)).map_err(|error| error.to_string());
     let model = parse_model(&job.toml)
         .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;

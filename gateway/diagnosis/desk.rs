@@ -2,8 +2,8 @@
 //! ended at any moment.
 
 use super::child::Stage;
-use super::kept::{Kept, Part};
-use super::worker::{Loaded, Request};
+use super::kept::{DiagnosisFile, Kept};
+use super::worker::{DiagnosisRequest, LoadedModel};
 use crate::files::{read_text, replace_durably};
 use adapters::clock::TimeNs;
 use rules::twin::parse_model;
@@ -23,7 +23,7 @@ pub enum Run {
     #[default]
     None,
     /// A diagnosis is under way.
-    Running(Running),
+    Running(RunningDiagnosis),
     /// It is in the history, under this key.
     Done {
         /// Who asked for it; `None`: the box itself.
@@ -49,7 +49,7 @@ pub enum Run {
 
 /// A diagnosis under way.
 #[derive(Debug, Clone)]
-pub struct Running {
+pub struct RunningDiagnosis {
     /// Who asked for it; `None`: the box itself.
     pub by: Option<String>,
     /// The stretch.
@@ -68,24 +68,24 @@ pub struct Running {
 
 /// Why nothing was begun, cancelled or accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub struct DiagnosisRefusal {
     /// What is in the way.
     pub what: String,
     /// What to do next.
     pub next: &'static str,
 }
 
-impl Refusal {
+impl DiagnosisRefusal {
     fn new(what: impl Into<String>, next: &'static str) -> Self {
         Self { what: what.into(), next }
     }
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct DeskState {
     run: Run,
     child: Option<Child>,
-    model: Option<Loaded>,
+    model: Option<LoadedModel>,
     /// Seconds per row of the last one: from these follows about how long the next one takes.
     pace_s: Option<f64>,
 }
@@ -93,8 +93,8 @@ struct State {
 /// See the [module](self). Clones are the same desk.
 #[derive(Debug, Clone)]
 pub struct Desk {
-    state: Arc<Mutex<State>>,
-    requests: SyncSender<Request>,
+    state: Arc<Mutex<DeskState>>,
+    requests: SyncSender<DiagnosisRequest>,
     model: PathBuf,
     kept: Kept,
 }
@@ -102,11 +102,11 @@ pub struct Desk {
 impl Desk {
     /// A desk whose requests go there.
     #[must_use]
-    pub fn new(requests: SyncSender<Request>, model: PathBuf, kept: Kept) -> Self {
+    pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, kept: Kept) -> Self {
         Self { state: Arc::default(), requests, model, kept }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, DeskState> {
         // The state is complete whenever the lock is free.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -124,7 +124,7 @@ impl Desk {
     }
 
     /// Another model has come into force.
-    pub fn in_charge(&self, loaded: &Loaded) {
+    pub fn in_charge(&self, loaded: &LoadedModel) {
         self.lock().model = Some(loaded.clone());
     }
 
@@ -142,20 +142,21 @@ impl Desk {
     ///
     /// # Errors
     /// No model is in charge, or one is under way.
-    pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), Refusal> {
+    pub fn ask(&self, by: Option<String>, from_ns: TimeNs, to_ns: TimeNs) -> Result<(), DiagnosisRefusal> {
         let mut state = self.lock();
         if let Run::Running(running) = &state.run {
             let who = running.by.as_deref().unwrap_or("the box itself");
             let what = format!("a diagnosis is under way (asked for by {who})");
-            return Err(Refusal::new(what, "wait for it or end it; there is one at a time"));
+            return Err(DiagnosisRefusal::new(what, "wait for it or end it; there is one at a time"));
         }
-        let none = || Refusal::new("no model is in charge", "name one under [twin] model in the configuration");
+        let none =
+            || DiagnosisRefusal::new("no model is in charge", "name one under [twin] model in the configuration");
         let toml = state.model.as_ref().ok_or_else(none)?.toml.clone();
-        let request = Request { toml, by: by.clone(), from_ns, to_ns };
-        let busy = |_| Refusal::new("the thread of the twin does not answer", "try again in a few seconds");
+        let request = DiagnosisRequest { toml, by: by.clone(), from_ns, to_ns };
+        let busy = |_| DiagnosisRefusal::new("the thread of the twin does not answer", "try again in a few seconds");
         self.requests.try_send(request).map_err(busy)?;
         let (since, stage) = (Instant::now(), Stage::Waiting);
-        state.run = Run::Running(Running { by, from_ns, to_ns, since, stage, rows: 0, cancelled: None });
+        state.run = Run::Running(RunningDiagnosis { by, from_ns, to_ns, since, stage, rows: 0, cancelled: None });
         Ok(())
     }
 
@@ -163,10 +164,13 @@ impl Desk {
     ///
     /// # Errors
     /// There is none.
-    pub fn cancel(&self, by: &str) -> Result<(), Refusal> {
+    pub fn cancel(&self, by: &str) -> Result<(), DiagnosisRefusal> {
         let mut state = self.lock();
         let Run::Running(running) = &mut state.run else {
-            return Err(Refusal::new("no diagnosis is under way", "GET /api/v1/diagnosis tells what was done last"));
+            return Err(DiagnosisRefusal::new(
+                "no diagnosis is under way",
+                "GET /api/v1/diagnosis tells what was done last",
+            ));
         };
         running.cancelled = Some(by.to_owned());
         if let Some(child) = &mut state.child {
@@ -204,7 +208,9 @@ impl Desk {
     /// What came of it.
     pub(super) fn ended(&self, outcome: Result<String, String>) {
         let mut state = self.lock();
-        let Run::Running(Running { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else { return };
+        let Run::Running(RunningDiagnosis { by, since, rows, cancelled, .. }) = std::mem::take(&mut state.run) else {
+            return;
+        };
         let seconds = since.elapsed().as_secs_f64();
         state.run = match (cancelled, outcome) {
             (Some(by), _) => Run::Cancelled { by },
@@ -223,21 +229,26 @@ impl Desk {
     ///
     /// # Errors
     /// The diagnosis has no model, the file has been changed since, or it cannot be written.
-    pub fn accept(&self, key: &str) -> Result<String, Refusal> {
+    pub fn accept(&self, key: &str) -> Result<String, DiagnosisRefusal> {
         let gone = || {
-            Refusal::new("this diagnosis has left no model", "only one that names what is missing does; diagnose again")
+            DiagnosisRefusal::new(
+                "this diagnosis has left no model",
+                "only one that names what is missing does; diagnose again",
+            )
         };
-        let text = self.kept.text(key, Part::Model).ok_or_else(gone)?;
+        let text = self.kept.text(key, DiagnosisFile::Model).ok_or_else(gone)?;
         let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
-        let model = parse_model(&text).map_err(|wrong| Refusal::new(format!("the kept model: {}", wrong[0]), next))?;
+        let model =
+            parse_model(&text).map_err(|wrong| DiagnosisRefusal::new(format!("the kept model: {}", wrong[0]), next))?;
         let before = self.lock().model.clone();
         let now = read_text(&self.model, MODEL_MAX).unwrap_or_default();
         if before.as_ref().is_some_and(|before| before.toml != now) {
             let what = format!("{} has just been changed by somebody else", self.model.display());
-            return Err(Refusal::new(what, "look at what is in charge now, and decide again"));
+            return Err(DiagnosisRefusal::new(what, "look at what is in charge now, and decide again"));
         }
         let permission = "the user of the gateway must be allowed to write the file of [twin] model";
-        let cannot = |error: std::io::Error| Refusal::new(format!("{}: {error}", self.model.display()), permission);
+        let cannot =
+            |error: std::io::Error| DiagnosisRefusal::new(format!("{}: {error}", self.model.display()), permission);
         let kept_before = self.model.with_extension("before.toml");
         replace_durably(&kept_before, &now).map_err(cannot)?;
         replace_durably(&self.model, &text).map_err(cannot)?;

@@ -131,7 +131,7 @@ pub fn execute(
     };
     let machine = Simulated::experiment(name, settings, ORIGIN_NS, &steps.steps);
     let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
-    let mut table = Table::new(name, &steps);
+    let mut table = RecordingBuilder::new(name, &steps);
     let mut instruments = Instruments::new(settings.seed);
     table.fill(Lockstep::new(sources, Delay::SlowestPeriod), rate_hz, |at_ns| {
         instruments.read(&machine.truth(at_ns), at_ns)
@@ -197,7 +197,7 @@ impl Noise {
 }
 
 /// The recording under construction.
-struct Table<'a> {
+struct RecordingBuilder<'a> {
     name: &'static str,
     steps: &'a Steps,
     on_the_way_ns: Option<TimeNs>,
@@ -205,7 +205,7 @@ struct Table<'a> {
     first_ns: Option<TimeNs>,
 }
 
-impl<'a> Table<'a> {
+impl<'a> RecordingBuilder<'a> {
     fn new(name: &'static str, steps: &'a Steps) -> Self {
         Self { name, steps, on_the_way_ns: None, samples: Vec::new(), first_ns: None }
     }

@@ -2,7 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
-use super::steps::{Step, steps};
+use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
 use crate::history;
 use crate::reload::digest;
@@ -26,24 +26,24 @@ pub struct Kept {
 
 /// One file of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum DiagnosisFile {
     /// The report page.
     Page(Language),
     /// The experiment it asks for, as a recording plan.
     Plan(Language),
     /// The model with what was missing.
     Model,
-    /// [`Words`].
+    /// [`DiagnosisTexts`].
     Words,
 }
 
 /// What the page of the box shows of a diagnosis that its JSON does not hold.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Words {
+pub struct DiagnosisTexts {
     /// The first sentence in Chinese; the English one stands in the row.
     pub summary_zh: String,
     /// The experiment it asks for.
-    pub steps: Vec<Step>,
+    pub steps: Vec<DiagnosisStep>,
     /// How long the experiment takes, minutes.
     pub minutes: Option<f64>,
 }
@@ -83,27 +83,27 @@ impl Kept {
 
     /// The path of a file.
     #[must_use]
-    pub fn path(&self, key: &str, part: Part) -> PathBuf {
+    pub fn path(&self, key: &str, part: DiagnosisFile) -> PathBuf {
         let word = |language| if language == Language::Zh { "zh" } else { "en" };
         let end = match part {
-            Part::Page(language) => format!("{}.html", word(language)),
-            Part::Plan(language) => format!("{}.csv", word(language)),
-            Part::Model => "toml".to_owned(),
-            Part::Words => "json".to_owned(),
+            DiagnosisFile::Page(language) => format!("{}.html", word(language)),
+            DiagnosisFile::Plan(language) => format!("{}.csv", word(language)),
+            DiagnosisFile::Model => "toml".to_owned(),
+            DiagnosisFile::Words => "json".to_owned(),
         };
         self.directory.join(format!("{key}.{end}"))
     }
 
     /// The text of a file; `None` where nothing was kept, or no longer.
     #[must_use]
-    pub fn text(&self, key: &str, part: Part) -> Option<String> {
+    pub fn text(&self, key: &str, part: DiagnosisFile) -> Option<String> {
         is_key(key).then(|| read_text(&self.path(key, part), FILE_MAX).ok()).flatten()
     }
 
     /// What is shown of it besides its JSON.
     #[must_use]
-    pub fn words(&self, key: &str) -> Option<Words> {
-        serde_json::from_str(&self.text(key, Part::Words)?).ok()
+    pub fn words(&self, key: &str) -> Option<DiagnosisTexts> {
+        serde_json::from_str(&self.text(key, DiagnosisFile::Words)?).ok()
     }
 
     /// Keeps everything of a diagnosis; older ones beyond the limit go.
@@ -119,19 +119,19 @@ impl Kept {
         let key = key(row);
         let put = |part, text: &str| replace(&self.path(&key, part), text);
         for language in [Language::En, Language::Zh] {
-            put(Part::Page(language), &page(&PageInput { diagnosis: found, recording, language }))?;
+            put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, language }))?;
         }
-        let mut words = Words { summary_zh: summary_zh(found), ..Words::default() };
+        let mut words = DiagnosisTexts { summary_zh: summary_zh(found), ..DiagnosisTexts::default() };
         if let Ok(plan) = plan::plan(found, recording) {
             (words.steps, words.minutes) = (steps(&plan), Some(plan.minutes()));
             for language in [Language::En, Language::Zh] {
-                put(Part::Plan(language), &plan.csv(language))?;
+                put(DiagnosisFile::Plan(language), &plan.csv(language))?;
             }
         }
         if found.verdict != Verdict::CannotTell && !found.missing.is_empty() {
-            put(Part::Model, &twin::write_model(&found.model))?;
+            put(DiagnosisFile::Model, &twin::write_model(&found.model))?;
         }
-        put(Part::Words, &serde_json::to_string(&words)?)?;
+        put(DiagnosisFile::Words, &serde_json::to_string(&words)?)?;
         self.forget_the_oldest()
     }
 
@@ -171,7 +171,7 @@ mod tests {
         assert!(is_key(&key(&row)) && key(&row).starts_with("1700000000123-"));
         for wrong in ["", "-", "1-", "../1-a", "1-a/b", "1-g", "a-1", "1-a.html", "123456789012345678901-a"] {
             assert!(!is_key(wrong), "{wrong}");
-            assert_eq!(Kept::at(PathBuf::from("/")).text(wrong, Part::Words), None);
+            assert_eq!(Kept::at(PathBuf::from("/")).text(wrong, DiagnosisFile::Words), None);
         }
     }
 
@@ -180,7 +180,7 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let kept = Kept::at(directory.path().to_owned());
         for at in 0..KEPT_MAX + 3 {
-            for part in [Part::Words, Part::Model] {
+            for part in [DiagnosisFile::Words, DiagnosisFile::Model] {
                 replace(&kept.path(&format!("{}-00ff", 900 + at), part), "{}").expect("written");
             }
         }
@@ -188,6 +188,9 @@ mod tests {
         kept.forget_the_oldest().expect("swept");
         let left = std::fs::read_dir(directory.path()).expect("there").count();
         assert_eq!(left, 2 * KEPT_MAX + 1);
-        assert!(kept.text("902-00ff", Part::Model).is_none() && kept.text("903-00ff", Part::Model).is_some());
+        assert!(
+            kept.text("902-00ff", DiagnosisFile::Model).is_none()
+                && kept.text("903-00ff", DiagnosisFile::Model).is_some()
+        );
     }
 }

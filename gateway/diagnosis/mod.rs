@@ -20,5 +20,5 @@ pub mod worker;
 
 pub use join::join;
 pub use models::{read_hypotheses, read_model};
-pub use outputs::{Outputs, put};
-pub use recordings::{Given, read_recordings};
+pub use outputs::{DiagnosisOutputs, put};
+pub use recordings::{InputRecordings, read_recordings};

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// What the user wants written. A path of `-` is standard output.
 #[derive(Debug, Clone, Default)]
-pub struct Outputs {
+pub struct DiagnosisOutputs {
     /// The diagnosis as JSON.
     pub json: Option<PathBuf>,
     /// The page.
@@ -25,7 +25,7 @@ pub struct Outputs {
     pub language: Language,
 }
 
-impl Outputs {
+impl DiagnosisOutputs {
     /// Files that cannot be written, before any work is done.
     #[must_use]
     pub fn trouble(&self) -> Vec<String> {

@@ -21,10 +21,10 @@ const PROBLEMS_KEPT: usize = 100;
 /// A column as read.
 struct Read {
     name: String,
-    values: Values,
+    values: ParquetValues,
 }
 
-enum Values {
+enum ParquetValues {
     Numbers(Vec<Option<f64>>),
     /// Nanoseconds since 1970.
     Times(Vec<Option<TimeNs>>),
@@ -59,12 +59,12 @@ fn columns(reader: &SerializedFileReader<File>) -> Result<Vec<Read>, String> {
     Ok(columns)
 }
 
-fn empty(column: &ColumnDescriptor) -> Result<Values, String> {
+fn empty(column: &ColumnDescriptor) -> Result<ParquetValues, String> {
     use ::parquet::basic::Type;
     Ok(match column.physical_type() {
-        Type::BYTE_ARRAY => Values::Texts(Vec::new()),
-        Type::INT64 if nanoseconds_per_unit(column).is_some() => Values::Times(Vec::new()),
-        Type::BOOLEAN | Type::INT32 | Type::INT64 | Type::FLOAT | Type::DOUBLE => Values::Numbers(Vec::new()),
+        Type::BYTE_ARRAY => ParquetValues::Texts(Vec::new()),
+        Type::INT64 if nanoseconds_per_unit(column).is_some() => ParquetValues::Times(Vec::new()),
+        Type::BOOLEAN | Type::INT32 | Type::INT64 | Type::FLOAT | Type::DOUBLE => ParquetValues::Numbers(Vec::new()),
         other => return Err(format!("column {} has the type {other}; use double, integer or text", column.name())),
     })
 }
@@ -80,7 +80,7 @@ fn nanoseconds_per_unit(column: &ColumnDescriptor) -> Option<i64> {
     }
 }
 
-impl Values {
+impl ParquetValues {
     fn append(&mut self, cells: ColumnReader, column: &ColumnDescriptor) -> Result<(), ParquetError> {
         let depth = column.max_def_level();
         match (self, cells) {
@@ -168,22 +168,22 @@ fn assemble(columns: Vec<Read>, file: &str) -> Result<ReadRecording, String> {
 }
 
 /// Seconds per row, or what is wrong; and the time of the first row under `time_utc`.
-fn times(values: &Values, utc: bool) -> (Vec<Result<f64, String>>, Option<TimeNs>) {
+fn times(values: &ParquetValues, utc: bool) -> (Vec<Result<f64, String>>, Option<TimeNs>) {
     if !utc {
         let of = |row: usize| match values {
-            Values::Numbers(numbers) => numbers[row].filter(|time| time.is_finite()).ok_or("no time".to_owned()),
+            ParquetValues::Numbers(numbers) => numbers[row].filter(|time| time.is_finite()).ok_or("no time".to_owned()),
             _ => Err("time_s must hold numbers".to_owned()),
         };
         return ((0..values.len()).map(of).collect(), None);
     }
     let stamp = |row: usize| match values {
-        Values::Times(times) => times[row].ok_or_else(|| "no time".to_owned()),
-        Values::Texts(texts) => {
+        ParquetValues::Times(times) => times[row].ok_or_else(|| "no time".to_owned()),
+        ParquetValues::Texts(texts) => {
             let text = texts[row].as_deref().ok_or("no time")?;
             let stamp = text.parse::<jiff::Timestamp>().map_err(|_| format!("{text:?} is not a time (RFC 3339)"))?;
             i64::try_from(stamp.as_nanosecond()).map_err(|_| format!("{text} is outside the years 1678 to 2261"))
         }
-        Values::Numbers(_) => Err("time_utc must hold timestamps or text (RFC 3339)".to_owned()),
+        ParquetValues::Numbers(_) => Err("time_utc must hold timestamps or text (RFC 3339)".to_owned()),
     };
     let stamps: Vec<Result<TimeNs, String>> = (0..values.len()).map(stamp).collect();
     let start_ns = stamps.iter().flatten().next().copied();
@@ -194,7 +194,7 @@ fn times(values: &Values, utc: bool) -> (Vec<Result<f64, String>>, Option<TimeNs
 fn accepted(
     times: &[Result<f64, String>],
     utc: bool,
-    run: Option<&Values>,
+    run: Option<&ParquetValues>,
     column: &str,
 ) -> (Vec<usize>, Vec<RowProblem>, u64) {
     let (mut kept, mut problems, mut refused) = (Vec::new(), Vec::new(), 0);
@@ -229,10 +229,10 @@ fn cells(column: &Read, kept: &[usize]) -> Result<Cells, String> {
     let is_text = TEXT_COLUMNS.contains(&column.name.as_str()) || column.name.ends_with("_missing");
     let is_channel = ChannelId::of(&column.name).is_some();
     match &column.values {
-        Values::Numbers(numbers) if !is_text => {
+        ParquetValues::Numbers(numbers) if !is_text => {
             Ok(Cells::Numbers(kept.iter().map(|row| numbers[*row]).collect::<Numbers>()))
         }
-        Values::Texts(_) if is_channel && !is_text => {
+        ParquetValues::Texts(_) if is_channel && !is_text => {
             Err(format!("column {} holds text; this channel holds numbers", column.name))
         }
         values => {

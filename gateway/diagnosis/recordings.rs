@@ -12,7 +12,7 @@ const LISTED_MAX: usize = 10;
 
 /// What the user gave, read.
 #[derive(Debug)]
-pub struct Given {
+pub struct InputRecordings {
     /// Every recording, one after the other.
     pub recording: Recording,
     /// Rows that were refused, over all files.
@@ -27,7 +27,7 @@ pub struct Given {
 ///
 /// # Errors
 /// Everything that makes any of them unusable, at once.
-pub fn read_recordings(sources: &[String]) -> Result<Given, Vec<String>> {
+pub fn read_recordings(sources: &[String]) -> Result<InputRecordings, Vec<String>> {
     let mut problems = Vec::new();
     let mut read = Vec::new();
     for source in sources {
@@ -48,7 +48,7 @@ pub fn read_recordings(sources: &[String]) -> Result<Given, Vec<String>> {
     let refused = read.iter().map(|(_, one)| usize::try_from(one.refused).unwrap_or(usize::MAX)).sum();
     let refused_column = read.iter().find_map(|(_, one)| one.problems.first()?.column.clone());
     let recording = join(read.into_iter().map(|(_, one)| one.recording).collect()).map_err(|problem| vec![problem])?;
-    Ok(Given { recording, refused, refused_column, warnings })
+    Ok(InputRecordings { recording, refused, refused_column, warnings })
 }
 
 fn read_one(source: &str) -> Result<ReadRecording, String> {

@@ -12,7 +12,7 @@ const LEVELS_MAX: usize = 8;
 
 /// One step in both languages.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Step {
+pub struct DiagnosisStep {
     /// English.
     pub en: String,
     /// Chinese.
@@ -21,7 +21,7 @@ pub struct Step {
 
 /// The steps of a plan, in the order of time.
 #[must_use]
-pub fn steps(plan: &Plan) -> Vec<Step> {
+pub fn steps(plan: &Plan) -> Vec<DiagnosisStep> {
     let mut groups: Vec<Vec<&Move>> = Vec::new();
     for a in &plan.moves {
         match groups.last_mut() {
@@ -39,7 +39,7 @@ fn alike(a: &Move, b: &Move) -> bool {
         && a.commands.keys().eq(b.commands.keys())
 }
 
-fn step(group: &[&Move], repeated: bool) -> Step {
+fn step(group: &[&Move], repeated: bool) -> DiagnosisStep {
     let first = group[0];
     let (mut en, mut zh) = (String::new(), String::new());
     if repeated {
@@ -81,7 +81,7 @@ fn step(group: &[&Move], repeated: bool) -> Step {
         let _ = write!(en, " ({})", first.instruction.0);
         let _ = write!(zh, "（{}）", first.instruction.1);
     }
-    Step { en, zh }
+    DiagnosisStep { en, zh }
 }
 
 /// The values of one quantity over a group, each once where all are the same.

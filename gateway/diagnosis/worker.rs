@@ -1,9 +1,9 @@
 //! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
 //! a process that has only the processor time that nobody else wants.
 
-use super::child::{self, Job, Said, Stage};
+use super::child::{self, DiagnosisJob, Said, Stage};
 use super::desk::Desk;
-use super::kept::{self, Kept, Part};
+use super::kept::{self, DiagnosisFile, Kept};
 use super::outputs;
 use crate::files::{LOOK_EVERY, Mark, Rest, mark};
 use crate::history::{self, Reader};
@@ -19,7 +19,7 @@ const WAIT_MAX: Duration = Duration::from_secs(10);
 
 /// A model as read from its file.
 #[derive(Debug, Clone)]
-pub struct Loaded {
+pub struct LoadedModel {
     /// The model.
     pub model: Model,
     /// Its text.
@@ -28,7 +28,7 @@ pub struct Loaded {
 
 /// A stretch to be diagnosed.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct DiagnosisRequest {
     /// The model in charge, as text.
     pub toml: String,
     /// The person who asks for it; `None`: the box itself.
@@ -41,9 +41,9 @@ pub struct Request {
 
 /// What the worker has to tell.
 #[derive(Debug)]
-pub enum Report {
+pub enum WorkerReport {
     /// The file holds another model.
-    Model(Box<Loaded>),
+    Model(Box<LoadedModel>),
     /// The file has changed and cannot be used, for these reasons.
     Refused(String),
     /// A diagnosis is finished.
@@ -69,14 +69,14 @@ pub struct Finished {
 #[derive(Debug)]
 pub struct Worker {
     desk: Desk,
-    reports: Receiver<Report>,
+    reports: Receiver<WorkerReport>,
     /// The thread ends when this goes, whoever still holds the desk.
     _going_on: Arc<()>,
 }
 
 /// Where the worker finds and leaves things.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub struct WorkerPaths {
     /// The model file.
     pub model: PathBuf,
     /// The history.
@@ -91,13 +91,13 @@ pub struct Places {
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub fn read(path: &Path) -> Result<Loaded, String> {
+pub fn read(path: &Path) -> Result<LoadedModel, String> {
     let toml = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let problems = |problems: Vec<twin::Problem>| {
         problems.iter().map(|problem| format!("{}, {problem}", path.display())).collect::<Vec<_>>().join("\n")
     };
     let model = parse_model(&toml).map_err(problems)?;
-    Ok(Loaded { model, toml })
+    Ok(LoadedModel { model, toml })
 }
 
 impl Worker {
@@ -105,7 +105,7 @@ impl Worker {
     ///
     /// # Errors
     /// No thread could be started.
-    pub fn start(places: Places, known: String) -> std::io::Result<Self> {
+    pub fn start(places: WorkerPaths, known: String) -> std::io::Result<Self> {
         let (requests, asked) = sync_channel(1);
         let (send, reports) = sync_channel(8);
         let file = FileWatch { path: places.model.clone(), rest: Rest::new(), known };
@@ -124,16 +124,16 @@ impl Worker {
     }
 
     /// What there is to tell since the last call.
-    pub fn take(&self) -> Option<Report> {
+    pub fn take(&self) -> Option<WorkerReport> {
         self.reports.try_recv().ok()
     }
 }
 
 fn work(
     mut file: FileWatch,
-    places: &Places,
-    (asked, desk): (&Receiver<Request>, &Desk),
-    send: &SyncSender<Report>,
+    places: &WorkerPaths,
+    (asked, desk): (&Receiver<DiagnosisRequest>, &Desk),
+    send: &SyncSender<WorkerReport>,
     going_on: &Weak<()>,
 ) {
     while going_on.strong_count() > 0 {
@@ -156,7 +156,7 @@ struct FileWatch {
 }
 
 impl FileWatch {
-    fn look(&mut self) -> Option<Report> {
+    fn look(&mut self) -> Option<WorkerReport> {
         if !self.rest.look(mark(&self.path), false) {
             return None;
         }
@@ -165,26 +165,32 @@ impl FileWatch {
             return None;
         }
         self.known = text;
-        Some(read(&self.path).map_or_else(Report::Refused, |loaded| Report::Model(Box::new(loaded))))
+        Some(read(&self.path).map_or_else(WorkerReport::Refused, |loaded| WorkerReport::Model(Box::new(loaded))))
     }
 }
 
-fn diagnose(request: Request, places: &Places, desk: &Desk) -> Report {
+fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, desk: &Desk) -> WorkerReport {
     wait_for_samples(&places.history, request.to_ns, desk);
-    let Request { toml, by, from_ns, to_ns } = request;
-    let job = Job { toml, history: places.history.clone(), from_ns, to_ns, kept: places.kept.directory().to_owned() };
+    let DiagnosisRequest { toml, by, from_ns, to_ns } = request;
+    let job = DiagnosisJob {
+        toml,
+        history: places.history.clone(),
+        from_ns,
+        to_ns,
+        kept: places.kept.directory().to_owned(),
+    };
     let found = in_child(&job, desk);
     desk.ended(found.as_ref().map(|(record, _)| kept::key(record)).map_err(Clone::clone));
     match found {
-        Ok((record, missing)) => Report::Diagnosed(Box::new(finished(by, places, record, missing))),
-        Err(problem) => Report::NotDiagnosed(problem, by),
+        Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finished(by, places, record, missing))),
+        Err(problem) => WorkerReport::NotDiagnosed(problem, by),
     }
 }
 
 /// Row of the history and what is missing.
-type Found = (history::Diagnosis, Vec<String>);
+type FoundDiagnosis = (history::Diagnosis, Vec<String>);
 
-fn in_child(job: &Job, desk: &Desk) -> Result<Found, String> {
+fn in_child(job: &DiagnosisJob, desk: &Desk) -> Result<FoundDiagnosis, String> {
     let ended_by = |desk: &Desk| desk.cancelled().map(|by| format!("{by} has ended it"));
     if let Some(ended) = ended_by(desk) {
         return Err(ended);
@@ -207,8 +213,8 @@ fn in_child(job: &Job, desk: &Desk) -> Result<Found, String> {
     ended_by(desk).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
-fn finished(by: Option<String>, places: &Places, record: history::Diagnosis, missing: Vec<String>) -> Finished {
-    let model = places.kept.text(&kept::key(&record), Part::Model);
+fn finished(by: Option<String>, places: &WorkerPaths, record: history::Diagnosis, missing: Vec<String>) -> Finished {
+    let model = places.kept.text(&kept::key(&record), DiagnosisFile::Model);
     let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
     Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }
 }

@@ -3,7 +3,7 @@
 //! A machine goes on while it is read. Each value of the library is therefore held against two of ours, one from just
 //! before and one from just after, and a channel differs only if it did so in every one of several rounds.
 
-use super::{Report, Shown, begin};
+use super::{DoctorReport, ValueWithUnit, begin};
 use adapters::address::{FanucBackend, Target};
 use adapters::channel::Kind;
 use adapters::clock::SystemClock;
@@ -16,7 +16,7 @@ const ROUNDS: u32 = 3;
 
 /// A channel on which the two do not agree.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Difference {
+pub struct ChannelDifference {
     /// Which channel.
     pub channel: ChannelId,
     /// What we read by ourselves.
@@ -31,20 +31,20 @@ pub struct Difference {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// What we found by ourselves.
-    pub ours: Report,
+    pub ours: DoctorReport,
     /// What the library found.
-    pub theirs: Report,
+    pub theirs: DoctorReport,
     /// Channels that both have.
     pub compared: usize,
     /// Those on which they differ.
-    pub differences: Vec<Difference>,
+    pub differences: Vec<ChannelDifference>,
     /// Channels that only we can read.
     pub only_native: Vec<ChannelId>,
     /// Channels that only the library can read.
     pub only_vendor: Vec<ChannelId>,
 }
 
-type Values = BTreeMap<usize, Value>;
+type ValuesByIndex = BTreeMap<usize, Value>;
 
 /// Reads a controller in both ways and lists the channels on which they differ.
 ///
@@ -80,7 +80,7 @@ fn through(text: &str, library: &Path) -> String {
 }
 
 /// Everything that has a value now. A source that fails in between is looked at again in the next round.
-fn values(sources: &mut [Box<dyn Source>], clock: &SystemClock) -> Values {
+fn values(sources: &mut [Box<dyn Source>], clock: &SystemClock) -> ValuesByIndex {
     let mut readings = Vec::new();
     for source in sources {
         let _shown_by_the_report = source.read(clock, &mut readings);
@@ -100,12 +100,12 @@ struct Seen {
 #[derive(Default)]
 struct Rounds {
     seen: BTreeMap<usize, Seen>,
-    native: Values,
-    vendor: Values,
+    native: ValuesByIndex,
+    vendor: ValuesByIndex,
 }
 
 impl Rounds {
-    fn add(&mut self, before: &Values, between: &Values, after: &Values) {
+    fn add(&mut self, before: &ValuesByIndex, between: &ValuesByIndex, after: &ValuesByIndex) {
         for (index, vendor) in between {
             let (Some(first), Some(last)) = (before.get(index), after.get(index)) else { continue };
             let Some(channel) = ChannelId::at(*index) else { continue };
@@ -120,8 +120,8 @@ impl Rounds {
         self.vendor.extend(between.clone());
     }
 
-    fn told(self, ours: Report, theirs: Report) -> Comparison {
-        let only = |these: &Values, others: &Values| -> Vec<ChannelId> {
+    fn told(self, ours: DoctorReport, theirs: DoctorReport) -> Comparison {
+        let only = |these: &ValuesByIndex, others: &ValuesByIndex| -> Vec<ChannelId> {
             these.keys().filter(|index| !others.contains_key(index)).filter_map(|index| ChannelId::at(*index)).collect()
         };
         let (only_native, only_vendor) = (only(&self.native, &self.vendor), only(&self.vendor, &self.native));
@@ -130,7 +130,7 @@ impl Rounds {
         let differences = always.filter_map(|(index, seen)| {
             let (channel, (native, vendor)) = (ChannelId::at(index)?, seen.pair?);
             let known = known(channel, &native, &vendor);
-            Some(Difference { channel, native, vendor, known })
+            Some(ChannelDifference { channel, native, vendor, known })
         });
         let differences = differences.collect();
         Comparison { ours, theirs, compared, differences, only_native, only_vendor }
@@ -179,7 +179,7 @@ impl Comparison {
         let mut document = self.ours.json();
         document["vendor"] = self.theirs.json();
         document["compared"] = json!(self.compared);
-        document["differences"] = self.differences.iter().map(Difference::json).collect();
+        document["differences"] = self.differences.iter().map(ChannelDifference::json).collect();
         document["only_native"] = json!(names(&self.only_native));
         document["only_vendor"] = json!(names(&self.only_vendor));
         document
@@ -196,7 +196,7 @@ impl Comparison {
             format!("  read once: native {:.1} ms, library {:.1} ms", self.ours.read_ms, self.theirs.read_ms),
             format!("  {} channels compared in {ROUNDS} rounds, {count} differ", self.compared),
         ];
-        lines.extend(self.differences.iter().map(Difference::line));
+        lines.extend(self.differences.iter().map(ChannelDifference::line));
         for (who, channels) in [("native", &self.only_native), ("the library", &self.only_vendor)] {
             let names: Vec<&str> = channels.iter().map(|channel| channel.name()).collect();
             if !names.is_empty() {
@@ -207,7 +207,7 @@ impl Comparison {
     }
 }
 
-impl Difference {
+impl ChannelDifference {
     /// For `doctor --json`.
     #[must_use]
     pub fn json(&self) -> serde_json::Value {
@@ -220,7 +220,7 @@ impl Difference {
     }
 
     fn line(&self) -> String {
-        let shown = |value: &Value| Shown(self.channel, value.clone()).to_string();
+        let shown = |value: &Value| ValueWithUnit(self.channel, value.clone()).to_string();
         let known = self.known.map_or(String::new(), |known| format!("   ({known})"));
         let (native, vendor) = (shown(&self.native), shown(&self.vendor));
         format!("    {:<26} native {native:<16} library {vendor}{known}", self.channel.name())

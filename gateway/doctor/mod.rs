@@ -3,7 +3,7 @@
 
 mod compare;
 
-pub use compare::{Comparison, Difference, compare};
+pub use compare::{ChannelDifference, Comparison, compare};
 
 use crate::run::open::opened;
 use adapters::clock::{Clock, SystemClock};
@@ -24,9 +24,9 @@ pub struct Trouble {
 
 /// A value with its unit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shown(ChannelId, Value);
+pub struct ValueWithUnit(ChannelId, Value);
 
-impl fmt::Display for Shown {
+impl fmt::Display for ValueWithUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.1 {
             // Seven digits are what a meter's single-precision numbers hold.
@@ -41,7 +41,7 @@ impl fmt::Display for Shown {
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Report {
+pub struct DoctorReport {
     /// As given.
     pub address: String,
     /// Did anything answer?
@@ -49,7 +49,7 @@ pub struct Report {
     /// Who answered.
     pub identity: Vec<Fact>,
     /// What the channels say, in the order of the sources.
-    pub readings: Vec<(ChannelId, Result<Shown, Absence>)>,
+    pub readings: Vec<(ChannelId, Result<ValueWithUnit, Absence>)>,
     /// From nothing to the first values.
     pub open_ms: f64,
     /// Reading everything once on the open connection.
@@ -62,7 +62,7 @@ pub struct Report {
 ///
 /// # Errors
 /// The text is no usable address, in words.
-pub fn examine(text: &str) -> Result<Report, String> {
+pub fn examine(text: &str) -> Result<DoctorReport, String> {
     begin(text, &SystemClock::new()).map(|(report, _)| report)
 }
 
@@ -70,20 +70,20 @@ pub fn examine(text: &str) -> Result<Report, String> {
 ///
 /// # Errors
 /// It cannot be opened, in words.
-pub fn examine_address(address: &Address) -> Result<Report, String> {
+pub fn examine_address(address: &Address) -> Result<DoctorReport, String> {
     begin_at(address, &SystemClock::new()).map(|(report, _)| report)
 }
 
 /// Examines an address and leaves open what works.
-fn begin(text: &str, clock: &SystemClock) -> Result<(Report, Vec<Box<dyn Source>>), String> {
+fn begin(text: &str, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
     let address: Address = text.parse().map_err(|error| format!("{error}"))?;
     begin_at(&address, clock)
 }
 
-fn begin_at(address: &Address, clock: &SystemClock) -> Result<(Report, Vec<Box<dyn Source>>), String> {
+fn begin_at(address: &Address, clock: &SystemClock) -> Result<(DoctorReport, Vec<Box<dyn Source>>), String> {
     let began = Instant::now();
     let opened = opened(address, clock.now_ns()).map_err(|error| error.to_string())?;
-    let mut report = Report {
+    let mut report = DoctorReport {
         address: address.text().to_owned(),
         reachable: false,
         identity: Vec::new(),
@@ -109,7 +109,7 @@ fn milliseconds(since: Instant) -> f64 {
 /// A device that needs so many times the wanted period is told; one late answer of a busy network is not.
 const SLOW: f64 = 2.0;
 
-impl Report {
+impl DoctorReport {
     /// The first look at a source: does it work at all?
     fn first(&mut self, source: &mut dyn Source, clock: &dyn Clock) -> bool {
         let mut readings = Vec::new();
@@ -178,11 +178,11 @@ impl Report {
     pub fn json(&self) -> serde_json::Value {
         let identity: Map<String, serde_json::Value> =
             self.identity.iter().map(|fact| (fact.name.clone(), fact_json(&fact.value))).collect();
-        let reading = |(channel, value): &(ChannelId, Result<Shown, Absence>)| match value {
-            Ok(Shown(_, Value::Number(number))) => {
+        let reading = |(channel, value): &(ChannelId, Result<ValueWithUnit, Absence>)| match value {
+            Ok(ValueWithUnit(_, Value::Number(number))) => {
                 json!({"channel": channel.name(), "value": number, "unit": channel.channel().unit})
             }
-            Ok(Shown(_, Value::Text(text))) => json!({"channel": channel.name(), "value": &**text, "unit": ""}),
+            Ok(ValueWithUnit(_, Value::Text(text))) => json!({"channel": channel.name(), "value": &**text, "unit": ""}),
             Err(absence) => json!({"channel": channel.name(), "missing": absence.word()}),
         };
         json!({
@@ -203,8 +203,8 @@ fn fact_json(value: &FactValue) -> serde_json::Value {
     }
 }
 
-fn shown(reading: Reading) -> (ChannelId, Result<Shown, Absence>) {
-    (reading.channel, reading.value.map(|value| Shown(reading.channel, value)))
+fn shown(reading: Reading) -> (ChannelId, Result<ValueWithUnit, Absence>) {
+    (reading.channel, reading.value.map(|value| ValueWithUnit(reading.channel, value)))
 }
 
 fn next(absence: Absence) -> String {

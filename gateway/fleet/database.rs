@@ -1,7 +1,7 @@
 //! PostgreSQL: the tables, a partition for each day, and a batch in one transaction.
 
 use super::SCHEMA;
-use super::row::Row;
+use super::row::FleetRow;
 use super::secured::{self, Securing};
 use crate::log::{Notice, Severity};
 use crate::nats::NatsError;
@@ -30,7 +30,7 @@ pub struct DatabaseSettings {
 
 /// What a batch did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Written {
+pub(super) struct BatchResult {
     /// Rows that are new.
     pub new: u64,
     /// Rows that were there already.
@@ -173,9 +173,9 @@ impl Database {
     /// What is wrong, in words; nothing is written then.
     pub(super) async fn write(
         &mut self,
-        rows: &[Row],
+        rows: &[FleetRow],
         refused: &[(String, String, String)],
-    ) -> Result<Written, NatsError> {
+    ) -> Result<BatchResult, NatsError> {
         self.prepare_days(rows).await?;
         self.learn(rows).await?;
         let mut lines: Vec<(i32, u64, String)> = Vec::with_capacity(rows.len());
@@ -196,13 +196,13 @@ impl Database {
             transaction.execute(insert, &[subject, reason, payload]).await.map_err(failed)?;
         }
         transaction.commit().await.map_err(failed)?;
-        Ok(Written { new, known: lines.len() as u64 - new })
+        Ok(BatchResult { new, known: lines.len() as u64 - new })
     }
 
     /// A partition for each day of the rows, outside the transaction of the batch: creating one stops every other writer for
     /// a moment.
-    async fn prepare_days(&mut self, rows: &[Row]) -> Result<(), NatsError> {
-        let day = |row: &Row| row.at.to_string().chars().take(10).collect::<String>();
+    async fn prepare_days(&mut self, rows: &[FleetRow]) -> Result<(), NatsError> {
+        let day = |row: &FleetRow| row.at.to_string().chars().take(10).collect::<String>();
         let wanted: BTreeSet<String> = rows.iter().map(day).collect();
         let creating = |error| words("creating the partition of a day", &error);
         for day in wanted.difference(&self.days.clone()) {
@@ -225,7 +225,7 @@ impl Database {
     }
 
     /// The numbers of boxes and series that were not known.
-    async fn learn(&mut self, rows: &[Row]) -> Result<(), NatsError> {
+    async fn learn(&mut self, rows: &[FleetRow]) -> Result<(), NatsError> {
         let failed = |error| words("naming boxes and series", &error);
         for row in rows {
             if !self.boxes.contains_key(&row.box_name) {

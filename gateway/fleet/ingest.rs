@@ -1,7 +1,7 @@
 //! The loop of `fleet ingest`: fetch, write, commit, acknowledge; after any failure again from the beginning.
 
 use super::database::{Database, DatabaseSettings};
-use super::row::{Refused, Row};
+use super::row::{FleetRow, RefusedMessage};
 use crate::log::{Notice, Severity};
 use crate::nats::{Connection, NatsError, NatsTarget, StreamSettings};
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ const REFUSED_KEPT: usize = 4000;
 
 /// From where to where.
 #[derive(Debug, Clone)]
-pub struct Settings {
+pub struct IngestSettings {
     /// The cluster.
     pub servers: NatsTarget,
     /// The stream; it is created if it is missing.
@@ -45,7 +45,7 @@ pub struct Done {
 }
 
 struct Ingest<'a> {
-    settings: &'a Settings,
+    settings: &'a IngestSettings,
     done: Done,
     told: Instant,
     /// The server with which the next connection begins.
@@ -56,7 +56,7 @@ struct Ingest<'a> {
 ///
 /// # Errors
 /// With `once`, the failure that ended it.
-pub async fn run(settings: &Settings) -> Result<Done, NatsError> {
+pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
     let mut ingest = Ingest { settings, done: Done::default(), told: Instant::now(), server: 0 };
     let mut pause = PAUSE_FIRST;
     let mut last = String::new();
@@ -84,7 +84,7 @@ pub async fn run(settings: &Settings) -> Result<Done, NatsError> {
 impl Ingest<'_> {
     /// From connecting to the first failure, or to the end of the work.
     async fn session(&mut self) -> Result<(), NatsError> {
-        let Settings { servers, stream, consumer, database, once } = self.settings;
+        let IngestSettings { servers, stream, consumer, database, once } = self.settings;
         let first = self.server;
         self.server += 1;
         let mut database = Database::open(database).await?;
@@ -105,9 +105,9 @@ impl Ingest<'_> {
             } else {
                 let (mut rows, mut refused) = (Vec::with_capacity(messages.len()), Vec::new());
                 for message in &messages {
-                    match Row::of(&message.subject, &message.payload) {
+                    match FleetRow::of(&message.subject, &message.payload) {
                         Ok(row) => rows.push(row),
-                        Err(Refused(why)) => {
+                        Err(RefusedMessage(why)) => {
                             let payload = String::from_utf8_lossy(&message.payload).replace('\0', "");
                             refused.push((message.subject.clone(), why, payload.chars().take(REFUSED_KEPT).collect()));
                         }

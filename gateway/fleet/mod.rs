@@ -19,7 +19,7 @@ mod row;
 mod secured;
 
 pub use database::{Database, DatabaseSettings};
-pub use row::Refused;
+pub use row::RefusedMessage;
 
 use crate::nats::NatsTarget;
 

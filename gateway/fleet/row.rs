@@ -9,7 +9,7 @@ const YEARS: std::ops::RangeInclusive<i16> = 1990..=2100;
 
 /// One item, ready to be written.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
+pub(super) struct FleetRow {
     pub(super) box_name: String,
     pub(super) machine: String,
     pub(super) sequence: u64,
@@ -25,16 +25,16 @@ pub(super) struct Row {
 
 /// A message that is no item: why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refused(pub String);
+pub struct RefusedMessage(pub String);
 
 #[derive(Deserialize)]
-struct Document {
+struct ItemDocument {
     schema: String,
     sequence: u64,
     at_ns: TimeNs,
     kind: String,
     #[serde(default)]
-    values: Vec<Value>,
+    values: Vec<FieldValue>,
     #[serde(default)]
     record: Option<Json>,
     machine: String,
@@ -44,7 +44,7 @@ struct Document {
 }
 
 #[derive(Deserialize)]
-struct Value {
+struct FieldValue {
     name: String,
     #[serde(default)]
     value: Json,
@@ -54,15 +54,15 @@ struct Value {
     missing: Option<String>,
 }
 
-impl Row {
+impl FleetRow {
     /// Reads a message. Its subject must end in `BOX.KIND` of its own document: then the rights of the servers over subjects
     /// hold for what stands in the table, too.
-    pub(super) fn of(subject: &str, payload: &[u8]) -> Result<Self, Refused> {
-        let refused = |what: &str| Refused(what.to_owned());
-        let document: Document =
-            serde_json::from_slice(payload).map_err(|error| Refused(format!("no document of an item: {error}")))?;
+    pub(super) fn of(subject: &str, payload: &[u8]) -> Result<Self, RefusedMessage> {
+        let refused = |what: &str| RefusedMessage(what.to_owned());
+        let document: ItemDocument = serde_json::from_slice(payload)
+            .map_err(|error| RefusedMessage(format!("no document of an item: {error}")))?;
         if document.schema != "item/1" {
-            return Err(Refused(format!("an item of another version: {}", document.schema)));
+            return Err(RefusedMessage(format!("an item of another version: {}", document.schema)));
         }
         let mut ends = subject.rsplit('.');
         if ends.next() != Some(&document.kind) || ends.next() != Some(&document.box_name) {
@@ -91,7 +91,7 @@ impl Row {
         Ok(row)
     }
 
-    fn add(&mut self, Value { name, value, unit, missing }: Value) {
+    fn add(&mut self, FieldValue { name, value, unit, missing }: FieldValue) {
         match (value.as_f64(), value) {
             (Some(number), _) => self.numbers.push((name, unit, number)),
             (None, Json::String(text)) => drop(self.texts.insert(name, Json::String(text))),
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_sample_becomes_a_line() {
-        let row = Row::of("cnc.Lathe-7-3fa9c1.sample", sample().to_string().as_bytes()).expect("an item");
+        let row = FleetRow::of("cnc.Lathe-7-3fa9c1.sample", sample().to_string().as_bytes()).expect("an item");
         let line = row.line(3, &[12]);
         let expected = "3\t7\t2026-01-31T08:15:00.1Z\tsample\tfalse\t{12}\t{2249.5}\t{\"program\":\"O1\\\\t\\\\\\\\\"}\t{\"coolant_temperature_c\":\"stale\"}\t\\N\n";
         assert_eq!(line, expected);
@@ -164,7 +164,7 @@ mod tests {
         let refused = |subject: &str, change: &dyn Fn(&mut Json)| {
             let mut document = sample();
             change(&mut document);
-            Row::of(subject, document.to_string().as_bytes()).expect_err("refused").0
+            FleetRow::of(subject, document.to_string().as_bytes()).expect_err("refused").0
         };
         assert!(refused("cnc.Mill-1-000000.sample", &|_| {}).contains("another box"));
         assert!(refused("cnc.Lathe-7-3fa9c1.sample", &|d| d["at_ns"] = json!(0)).contains("clock"));
@@ -175,7 +175,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_a_row_or_refused(subject in ".{0,40}", payload in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _either = Row::of(&subject, &payload);
+            let _either = FleetRow::of(&subject, &payload);
         }
 
         #[test]

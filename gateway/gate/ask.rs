@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A request of a script.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Ask {
+pub struct ScriptRequest {
     /// For what.
     pub request: LadderRequest,
     /// Why, in the script's words.
@@ -24,7 +24,7 @@ pub struct Ask {
     pub version: u64,
 }
 
-impl Ask {
+impl ScriptRequest {
     /// What a script asks for, as the ladder knows it: a tool change is a stop after this part.
     #[must_use]
     pub fn of(wanted: &StopRequest) -> Self {
@@ -83,7 +83,12 @@ impl Asks {
         Self { latches: Default::default(), execution: channel("execution"), held: false, stood: false }
     }
 
-    pub(super) fn judge(&mut self, asks: &[Ask], sample: &Sample, armed: bool) -> Vec<(Ask, AskOutcome)> {
+    pub(super) fn judge(
+        &mut self,
+        asks: &[ScriptRequest],
+        sample: &Sample,
+        armed: bool,
+    ) -> Vec<(ScriptRequest, AskOutcome)> {
         self.seen_to(sample);
         let mut judged = Vec::new();
         for (latch, request) in self.latches.iter_mut().zip(LadderRequest::ALL) {
@@ -139,8 +144,13 @@ mod tests {
         sample
     }
 
-    fn hold() -> Vec<Ask> {
-        vec![Ask { request: LadderRequest::FeedHold, reason: "load".into(), script: "a.rhai".into(), version: 1 }]
+    fn hold() -> Vec<ScriptRequest> {
+        vec![ScriptRequest {
+            request: LadderRequest::FeedHold,
+            reason: "load".into(),
+            script: "a.rhai".into(),
+            version: 1,
+        }]
     }
 
     #[test]
@@ -162,10 +172,10 @@ mod tests {
 
     #[test]
     fn a_program_that_stood_or_an_acknowledgement_releases_a_stop() {
-        let stop = vec![Ask { request: LadderRequest::Stop, ..hold().remove(0) }];
+        let stop = vec![ScriptRequest { request: LadderRequest::Stop, ..hold().remove(0) }];
         let mut asks = Asks::new();
         let mut judge = |wanted: bool, word: &str| {
-            let asked: &[Ask] = if wanted { &stop } else { &[] };
+            let asked: &[ScriptRequest] = if wanted { &stop } else { &[] };
             asks.judge(asked, &sample(word), true).first().map(|(_, outcome)| *outcome)
         };
         let active = execution::ACTIVE;

@@ -7,7 +7,7 @@ use std::fmt;
 
 /// What the machine shows where something else was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shown {
+pub struct UnexpectedReading {
     /// The override in force.
     pub found: OverridePct,
     /// The operator's dial, where it is known.
@@ -24,10 +24,10 @@ pub enum Fault {
         /// Written last.
         asked: OverridePct,
         /// Read back.
-        shown: Shown,
+        shown: UnexpectedReading,
     },
     /// The override was withdrawn and the dial is not in force again.
-    StillInForce(Shown),
+    StillInForce(UnexpectedReading),
     /// The machine refuses that the override is withdrawn; it is tried again.
     NotWithdrawn(SourceError),
     /// Writing or reading back failed.
@@ -92,7 +92,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ReadBack { asked, shown } => shown.told(*asked, f),
-            Self::StillInForce(Shown { found, dial, .. }) => {
+            Self::StillInForce(UnexpectedReading { found, dial, .. }) => {
                 let dial = dial.map_or_else(|| "the dial".to_owned(), |dial| format!("the dial at {dial}"));
                 write!(
                     f,
@@ -128,7 +128,7 @@ impl fmt::Display for Fault {
     }
 }
 
-impl Shown {
+impl UnexpectedReading {
     /// The override that was written is in force although the dial stands below it.
     fn replaces_dial(&self, asked: OverridePct) -> bool {
         let expected = self.dial.map(|dial| self.rule.combine(dial, asked));
@@ -169,7 +169,7 @@ mod tests {
     fn what_is_told_of_an_override_does_not_contradict_itself() {
         let pct = |percent| OverridePct::new(percent).expect("not 255");
         let told = |asked, found, dial: Option<u8>, rule| {
-            let shown = Shown { found: pct(found), dial: dial.map(pct), rule };
+            let shown = UnexpectedReading { found: pct(found), dial: dial.map(pct), rule };
             Fault::ReadBack { asked: pct(asked), shown }.to_string()
         };
         let replaced = told(71, 71, Some(70), LadderRule::Least);

@@ -34,13 +34,13 @@ mod verdict;
 mod write;
 
 pub use arming::{ArmError, Armed, Disarmed};
-pub use ask::{Ask, AskOutcome};
-pub use fault::{Fault, Shown};
+pub use ask::{AskOutcome, ScriptRequest};
+pub use fault::{Fault, UnexpectedReading};
 pub use hold::Hold;
 pub use limit::Bound;
 pub use offset::{OffsetVerdict, Offsets};
-pub use verdict::{Outcome, Verdict};
-pub use write::{Occasion, OverrideWriter, Reaction, Written};
+pub use verdict::{GateOutcome, Verdict};
+pub use write::{Occasion, OverrideWriter, Reaction, WriteRecord};
 
 use crate::config::{self, GateMode};
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -58,7 +58,7 @@ use std::time::Duration;
 /// Decides about feed overrides. One per machine; remembers the last decision, for the slew limit, and the arming.
 #[derive(Debug)]
 pub struct Gate {
-    limits: config::Gate,
+    limits: config::GateConfig,
     interlocks: Interlocks,
     dial: Option<ChannelId>,
     aim: Aim,
@@ -75,7 +75,7 @@ pub struct Gate {
 impl Gate {
     /// A gate with these limits. It is disarmed, whatever the configuration says.
     #[must_use]
-    pub fn new(limits: config::Gate) -> Self {
+    pub fn new(limits: config::GateConfig) -> Self {
         let stale_ns = i64::try_from(limits.stale.as_nanos()).unwrap_or(i64::MAX);
         Self {
             interlocks: Interlocks::new(stale_ns),
@@ -93,7 +93,7 @@ impl Gate {
 
     /// The limits in force.
     #[must_use]
-    pub fn limits(&self) -> &config::Gate {
+    pub fn limits(&self) -> &config::GateConfig {
         &self.limits
     }
 
@@ -142,10 +142,10 @@ impl Gate {
         let (target_pct, bound) = limit::below(ceiling_pct, target_pct, bound);
         let dial_pct = self.lesser_dial_pct(sample);
         let outcome = match (hold, bound) {
-            (Some(hold), _) => Outcome::Held(hold),
-            (None, Some(Bound::NotPossible)) => Outcome::Refused,
-            (None, Some(bound)) => Outcome::Limited(bound),
-            (None, None) => Outcome::Permitted,
+            (Some(hold), _) => GateOutcome::Held(hold),
+            (None, Some(Bound::NotPossible)) => GateOutcome::Refused,
+            (None, Some(bound)) => GateOutcome::Limited(bound),
+            (None, None) => GateOutcome::Permitted,
         };
         let (target_pct, permitted, outcome) = if hold.is_some() {
             self.aim.reset();
@@ -156,20 +156,20 @@ impl Gate {
                 Some(dial_pct) => (
                     100.0,
                     self.slew.jump_to_full(at_ns),
-                    Outcome::DialCounts(OverridePct::nearest(dial_pct).unwrap_or(OverridePct::FULL)),
+                    GateOutcome::DialCounts(OverridePct::nearest(dial_pct).unwrap_or(OverridePct::FULL)),
                 ),
                 None => (aim_pct, self.slew.approach(aim_pct, at_ns), outcome),
             }
         };
-        let moves = hold.is_none() && bound.is_none() && !matches!(outcome, Outcome::DialCounts(_));
+        let moves = hold.is_none() && bound.is_none() && !matches!(outcome, GateOutcome::DialCounts(_));
         let slewing = moves && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
-        let outcome = if slewing { Outcome::Limited(Bound::Slew) } else { outcome };
+        let outcome = if slewing { GateOutcome::Limited(Bound::Slew) } else { outcome };
         Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
 
     /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide`]: each request passes once, and then not
     /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
-    pub fn ask(&mut self, asks: &[Ask], sample: &Sample) -> Vec<(Ask, AskOutcome)> {
+    pub fn ask(&mut self, asks: &[ScriptRequest], sample: &Sample) -> Vec<(ScriptRequest, AskOutcome)> {
         let armed = self.wrote && self.writes_override();
         self.asks.judge(asks, sample, armed)
     }

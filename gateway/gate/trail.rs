@@ -3,9 +3,9 @@
 //! and the next row says how many there were.
 
 use super::arming::{Armed, Disarmed};
-use super::ask::{Ask, AskOutcome};
-use super::verdict::{Outcome, Verdict};
-use super::write::{Occasion, Reaction, Written};
+use super::ask::{AskOutcome, ScriptRequest};
+use super::verdict::{GateOutcome, Verdict};
+use super::write::{Occasion, Reaction, WriteRecord};
 use crate::config;
 use crate::history::{Audit, Command, ReactionTime};
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -23,9 +23,9 @@ const FAULT_MAX: usize = 600;
 
 /// What was last recorded of requests.
 #[derive(Debug, Clone, PartialEq)]
-struct Told {
+struct LastRequest {
     asked: Option<i64>,
-    outcome: Outcome,
+    outcome: GateOutcome,
     armed: bool,
     script: Option<u64>,
 }
@@ -50,7 +50,7 @@ const AUTHORS_MAX: usize = 32;
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub struct Trail {
-    told: Option<Told>,
+    told: Option<LastRequest>,
     /// Who has asked since when, the newest at the end.
     authors: VecDeque<(TimeNs, Author)>,
     pace: RowRate,
@@ -101,7 +101,7 @@ impl RowRate {
 impl Trail {
     /// The row of this tick's request, if it or its fate is another than before.
     pub fn request(&mut self, request: Option<&OverrideRequest>, verdict: &Verdict) -> Option<Audit> {
-        let told = Told {
+        let told = LastRequest {
             #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
             asked: request.map(|request| request.pct.round() as i64),
             outcome: verdict.outcome,
@@ -140,7 +140,7 @@ impl Trail {
     }
 
     /// Who asked for what this write came from; nobody when the machine was given back.
-    fn author(&self, written: &Written) -> Author {
+    fn author(&self, written: &WriteRecord) -> Author {
         let before = self.authors.iter().rev().find(|(at_ns, _)| *at_ns <= written.sample_ns);
         let author = before.filter(|_| !matches!(written.occasion, Occasion::Release | Occasion::Leftover));
         author.map_or(Author::default(), |(_, author)| author.clone())
@@ -148,7 +148,7 @@ impl Trail {
 
     /// A write; a sign of life is no news unless it failed.
     #[must_use]
-    pub fn write(&self, written: &Written) -> Option<Audit> {
+    pub fn write(&self, written: &WriteRecord) -> Option<Audit> {
         if written.occasion == Occasion::SignOfLife && written.fault.is_none() {
             return None;
         }
@@ -167,14 +167,14 @@ impl Trail {
 
     /// The same for the table of commands.
     #[must_use]
-    pub fn command(&self, written: &Written, target: &str) -> Option<Command> {
+    pub fn command(&self, written: &WriteRecord, target: &str) -> Option<Command> {
         let outcome = if written.fault.is_some() { "failed" } else { "done" };
         Some(self.write(written)?.as_command("feed_override_pct", target, outcome))
     }
 }
 
 /// Why it was written, and by whose words; or what went wrong.
-fn why(written: &Written, reason: &str) -> String {
+fn why(written: &WriteRecord, reason: &str) -> String {
     match &written.fault {
         Some(fault) => fault.to_string().chars().take(FAULT_MAX).collect(),
         None if reason.is_empty() => written.occasion.words().to_owned(),
@@ -184,11 +184,11 @@ fn why(written: &Written, reason: &str) -> String {
 
 fn outcome(verdict: &Verdict) -> &'static str {
     match verdict.outcome {
-        Outcome::Held(_) => "held",
-        Outcome::Refused => "refused",
-        Outcome::Limited(_) | Outcome::DialCounts(_) => "limited",
-        Outcome::Permitted if verdict.armed => "permitted",
-        Outcome::Permitted => "shadow",
+        GateOutcome::Held(_) => "held",
+        GateOutcome::Refused => "refused",
+        GateOutcome::Limited(_) | GateOutcome::DialCounts(_) => "limited",
+        GateOutcome::Permitted if verdict.armed => "permitted",
+        GateOutcome::Permitted => "shadow",
     }
 }
 
@@ -206,8 +206,9 @@ fn percent(pct: OverridePct) -> f64 {
 
 /// The box has started with these limits.
 #[must_use]
-pub fn started(limits: &config::Gate, at_ns: TimeNs) -> Audit {
-    let config::Gate { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } = limits;
+pub fn started(limits: &config::GateConfig, at_ns: TimeNs) -> Audit {
+    let config::GateConfig { min_pct, max_pct, slew_up_pct_per_s: up, slew_down_pct_per_s: down, above_dial, .. } =
+        limits;
     let target = limits.source.as_deref().unwrap_or("no source");
     let dial = if *above_dial { ", may exceed the dial" } else { "" };
     let offsets = offsets(&limits.offset);
@@ -216,12 +217,12 @@ pub fn started(limits: &config::Gate, at_ns: TimeNs) -> Audit {
 }
 
 /// What may be shifted, if anything.
-fn offsets(limits: &config::Offset) -> String {
+fn offsets(limits: &config::OffsetConfig) -> String {
     if limits.mode == config::GateMode::Off {
         return String::new();
     }
     let axes: Vec<&str> = limits.axes.iter().map(|axis| axis.word()).collect();
-    let config::Offset { step_um, total_um, .. } = limits;
+    let config::OffsetConfig { step_um, total_um, .. } = limits;
     format!("; offsets of {} {}, by {step_um} um up to {total_um} um", axes.join(" "), limits.mode.word())
 }
 
@@ -255,7 +256,7 @@ pub fn times(reaction: &Reaction) -> ReactionTime {
 
 /// A request to the ladder, and what the machine said to it where it was sent.
 #[must_use]
-pub fn asked(ask: &Ask, outcome: AskOutcome, failed: Option<&str>, at_ns: TimeNs) -> Audit {
+pub fn asked(ask: &ScriptRequest, outcome: AskOutcome, failed: Option<&str>, at_ns: TimeNs) -> Audit {
     let more = match (outcome, failed) {
         (_, Some(failed)) => words(failed),
         (AskOutcome::Sent, None) => "handed to the ladder".to_owned(),
@@ -313,7 +314,7 @@ pub fn order(kind: &str, outcome: &str, reason: &str, by: &str, at_ns: TimeNs) -
 mod tests {
     use super::*;
 
-    fn verdict(at_ns: TimeNs, outcome: Outcome) -> Verdict {
+    fn verdict(at_ns: TimeNs, outcome: GateOutcome) -> Verdict {
         Verdict { at_ns, wanted_pct: None, permitted: OverridePct::FULL, outcome, armed: true }
     }
 
@@ -324,14 +325,14 @@ mod tests {
     #[test]
     fn a_request_is_recorded_when_it_or_its_fate_changes() {
         let mut trail = Trail::default();
-        assert_eq!(trail.request(None, &verdict(0, Outcome::Permitted)), None, "nothing has ever been asked for");
-        let first = trail.request(Some(&asking(80.0)), &verdict(1, Outcome::Permitted)).expect("new");
+        assert_eq!(trail.request(None, &verdict(0, GateOutcome::Permitted)), None, "nothing has ever been asked for");
+        let first = trail.request(Some(&asking(80.0)), &verdict(1, GateOutcome::Permitted)).expect("new");
         assert_eq!((first.asked, first.outcome.as_str()), (Some(80.0), "permitted"));
         assert!(first.reason.len() < 300, "a script's words are cut");
-        assert_eq!(trail.request(Some(&asking(80.2)), &verdict(2, Outcome::Permitted)), None);
-        let refused = trail.request(Some(&asking(f64::NAN)), &verdict(3, Outcome::Refused)).expect("new");
+        assert_eq!(trail.request(Some(&asking(80.2)), &verdict(2, GateOutcome::Permitted)), None);
+        let refused = trail.request(Some(&asking(f64::NAN)), &verdict(3, GateOutcome::Refused)).expect("new");
         assert_eq!(refused.outcome, "refused");
-        assert!(trail.request(None, &verdict(4, Outcome::Permitted)).is_some_and(|row| row.asked.is_none()));
+        assert!(trail.request(None, &verdict(4, GateOutcome::Permitted)).is_some_and(|row| row.asked.is_none()));
     }
 
     #[test]
@@ -340,7 +341,9 @@ mod tests {
         let mut rows = Vec::new();
         for tick in 0..100_000 {
             let at_ns = tick * SECOND_NS / 1000;
-            rows.extend(trail.request(Some(&asking(60.0 + (tick % 50) as f64)), &verdict(at_ns, Outcome::Permitted)));
+            rows.extend(
+                trail.request(Some(&asking(60.0 + (tick % 50) as f64)), &verdict(at_ns, GateOutcome::Permitted)),
+            );
         }
         assert!((1000..1300).contains(&rows.len()), "{} rows in 100 s", rows.len());
         assert!(rows.last().is_some_and(|row| row.reason.contains("were left out")));

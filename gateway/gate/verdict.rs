@@ -7,7 +7,7 @@ use adapters::units::OverridePct;
 
 /// What became of the request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum GateOutcome {
     /// As asked for; without a request, the programmed feed.
     Permitted,
     /// Inside the band and the pace instead.
@@ -30,7 +30,7 @@ pub struct Verdict {
     /// What is let through.
     pub permitted: OverridePct,
     /// How the one became the other.
-    pub outcome: Outcome,
+    pub outcome: GateOutcome,
     /// May it be written?
     pub armed: bool,
 }
@@ -46,11 +46,11 @@ impl Verdict {
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self.outcome {
-            Outcome::Held(_) => "held",
-            Outcome::Refused => "refused",
-            Outcome::Limited(_) | Outcome::DialCounts(_) => "limited",
-            Outcome::Permitted if self.armed => "written",
-            Outcome::Permitted => "shadow",
+            GateOutcome::Held(_) => "held",
+            GateOutcome::Refused => "refused",
+            GateOutcome::Limited(_) | GateOutcome::DialCounts(_) => "limited",
+            GateOutcome::Permitted if self.armed => "written",
+            GateOutcome::Permitted => "shadow",
         }
     }
 
@@ -58,29 +58,29 @@ impl Verdict {
     #[must_use]
     pub fn reason(&self) -> String {
         match self.outcome {
-            Outcome::Permitted if self.armed && !self.asks() => {
+            GateOutcome::Permitted if self.armed && !self.asks() => {
                 "nothing is asked of the machine: the dial counts".to_owned()
             }
-            Outcome::Permitted if self.armed => "as asked for".to_owned(),
-            Outcome::DialCounts(dial) => {
+            GateOutcome::Permitted if self.armed => "as asked for".to_owned(),
+            GateOutcome::DialCounts(dial) => {
                 format!(
                     "the operator's dial at {dial} is not above it: nothing is asked of the machine, the dial counts"
                 )
             }
-            Outcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
-            Outcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
-            Outcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
-            Outcome::Limited(Bound::Dial) => {
+            GateOutcome::Permitted => "the gate is not armed: recorded, not written".to_owned(),
+            GateOutcome::Limited(Bound::Least) => format!("the least override is {}", self.permitted),
+            GateOutcome::Limited(Bound::Greatest) => format!("the greatest override is {}", self.permitted),
+            GateOutcome::Limited(Bound::Dial) => {
                 format!(
                     "never above the operator's dial ({} now); `above_dial` under [gate] would allow it",
                     self.permitted
                 )
             }
-            Outcome::Limited(Bound::Slew) => format!("the change is limited; {} now", self.permitted),
-            Outcome::Limited(Bound::NotPossible) | Outcome::Refused => {
+            GateOutcome::Limited(Bound::Slew) => format!("the change is limited; {} now", self.permitted),
+            GateOutcome::Limited(Bound::NotPossible) | GateOutcome::Refused => {
                 "a feed override is a number from 0 to 254 %; back to 100 %".to_owned()
             }
-            Outcome::Held(hold) => format!("no override, the dial counts: {hold}"),
+            GateOutcome::Held(hold) => format!("no override, the dial counts: {hold}"),
         }
     }
 }

@@ -148,14 +148,14 @@ fn entry(row: &Row<'_>) -> Result<AuditEntry, rusqlite::Error> {
 }
 
 /// Follows the chain row by row.
-struct Chain {
+struct AuditChain {
     rows: u64,
     first: i64,
     last: i64,
     head: String,
 }
 
-impl Chain {
+impl AuditChain {
     /// The next row, or why it cannot be the next one.
     fn follow(&mut self, entry: &AuditEntry) -> Result<(), Break> {
         let broken = |what: String| Err(Break { number: entry.number, what });
@@ -233,7 +233,7 @@ impl Reader {
     /// What `SQLite` says; a chain that is broken is no error but the answer.
     pub fn verify_audit(&self) -> Result<AuditCheck, HistoryError> {
         let released = self.released().doing("looking where the audit begins")?;
-        let mut chain = Chain { rows: 0, first: 0, last: released, head: BEGINNING.to_owned() };
+        let mut chain = AuditChain { rows: 0, first: 0, last: released, head: BEGINNING.to_owned() };
         if !self.has_audit()? {
             return Ok(chain.check(None));
         }

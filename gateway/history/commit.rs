@@ -18,7 +18,7 @@ const BLOCKS_MAX: usize = 16;
 
 /// One entry of the crash tail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Entry {
+struct TailEntry {
     slot: i64,
     /// Number of the row after its last.
     end_row: i64,
@@ -32,7 +32,7 @@ const ENTRY_STEP: usize = 256;
 /// Which slots of the crash tail hold what, oldest first.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TailSlots {
-    used: VecDeque<Entry>,
+    used: VecDeque<TailEntry>,
 }
 
 impl TailSlots {
@@ -40,13 +40,13 @@ impl TailSlots {
     pub(crate) fn load(db: &Connection) -> Result<Self, HistoryError> {
         let mut statement =
             db.prepare("SELECT slot, first_row + rows FROM tail ORDER BY first_row").doing("reading the crash tail")?;
-        let used = statement.query_map([], |row| Ok(Entry { slot: row.get(0)?, end_row: row.get(1)? }));
+        let used = statement.query_map([], |row| Ok(TailEntry { slot: row.get(0)?, end_row: row.get(1)? }));
         Ok(Self { used: used.and_then(Iterator::collect).doing("reading the crash tail")? })
     }
 
     /// Takes out the oldest entry if its rows are in blocks and not needed to show the last rows up to `next_row`.
     fn take_spare(&mut self, sealed_row: i64, next_row: i64) -> Option<i64> {
-        let spare = |entry: &mut Entry| entry.end_row <= sealed_row.min(next_row - TAIL_ROWS);
+        let spare = |entry: &mut TailEntry| entry.end_row <= sealed_row.min(next_row - TAIL_ROWS);
         self.used.pop_front_if(spare).map(|entry| entry.slot)
     }
 
@@ -123,7 +123,7 @@ fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots
         let padded = body.len().next_multiple_of(ENTRY_STEP);
         insert_tail(db, minute_buffer, slot, from..from + count, &format!("{body:padded$}"))?;
         from += count;
-        slots.used.push_back(Entry { slot, end_row: minute_buffer.open_row() + from as i64 });
+        slots.used.push_back(TailEntry { slot, end_row: minute_buffer.open_row() + from as i64 });
     }
     while let Some(slot) = slots.take_spare(minute_buffer.open_row(), minute_buffer.next_row) {
         db.prepare_cached("DELETE FROM tail WHERE slot = ?1")

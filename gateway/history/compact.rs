@@ -4,7 +4,7 @@ use super::block::{Block, Cells, Decoder, Directory, Encoder, LEVEL_COMPACT, Num
 use super::commit::put_block;
 use super::error::{Doing, HistoryError};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
-use super::rows::{Column, Rows, Word};
+use super::rows::{Column, SeriesRows, Word};
 use super::schema::known_series;
 use super::series::Series;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -17,7 +17,7 @@ const ROWS_MAX: i64 = 20_000;
 /// At most this many blocks are looked at in one step.
 const LOOK_AHEAD: i64 = 64;
 
-struct Stored {
+struct StoredSegment {
     segment: i64,
     first_row: i64,
     rows: i64,
@@ -33,7 +33,7 @@ pub(crate) fn step(db: &mut Connection) -> Result<bool, HistoryError> {
     let Some(first) = stored.first() else { return Ok(false) };
     let mut end_row = first.first_row;
     let mut rows = 0;
-    let belongs = |block: &&Stored| {
+    let belongs = |block: &&StoredSegment| {
         let follows = block.first_row == end_row && rows + block.rows <= ROWS_MAX.max(block.rows);
         end_row = block.first_row + block.rows;
         rows += block.rows;
@@ -60,7 +60,7 @@ fn cursor(db: &Connection) -> Result<i64, HistoryError> {
     Ok(cursor.unwrap_or(0))
 }
 
-fn load(db: &Connection, cursor: i64) -> Result<Vec<Stored>, HistoryError> {
+fn load(db: &Connection, cursor: i64) -> Result<Vec<StoredSegment>, HistoryError> {
     let mut statement = db
         .prepare_cached(
             "SELECT segment, first_row, rows, start_ns, directory, columns FROM blocks
@@ -68,7 +68,7 @@ fn load(db: &Connection, cursor: i64) -> Result<Vec<Stored>, HistoryError> {
         )
         .doing("reading blocks")?;
     let blocks = statement.query_map([cursor, LOOK_AHEAD], |row| {
-        Ok(Stored {
+        Ok(StoredSegment {
             segment: row.get(0)?,
             first_row: row.get(1)?,
             rows: row.get(2)?,
@@ -80,14 +80,14 @@ fn load(db: &Connection, cursor: i64) -> Result<Vec<Stored>, HistoryError> {
     blocks.and_then(Iterator::collect).doing("reading blocks")
 }
 
-fn merge(db: &Connection, group: &[Stored]) -> Result<Block, HistoryError> {
+fn merge(db: &Connection, group: &[StoredSegment]) -> Result<Block, HistoryError> {
     let mut series = known_series(db)?;
     // What is stored has been rounded already.
     series.iter_mut().for_each(|series| series.decimals = None);
     let zstd = |error| HistoryError::Io { path: "zstd".into(), error };
     let mut decoder = Decoder::new().map_err(zstd)?;
     let mut reasons = Reasons::default();
-    let mut rows = Rows::of(&series);
+    let mut rows = SeriesRows::of(&series);
     for stored in group {
         let damaged = HistoryError::Damaged { first_row: stored.first_row, what: "the block does not decode" };
         let more = rows_of(stored, &series, &mut decoder, &mut reasons).ok_or(damaged)?;
@@ -98,9 +98,14 @@ fn merge(db: &Connection, group: &[Stored]) -> Result<Block, HistoryError> {
     Ok(encoder.encode(&rows, &series, &reasons, group[0].segment, group[0].first_row))
 }
 
-fn rows_of(stored: &Stored, series: &[Series], decoder: &mut Decoder, reasons: &mut Reasons) -> Option<Rows> {
+fn rows_of(
+    stored: &StoredSegment,
+    series: &[Series],
+    decoder: &mut Decoder,
+    reasons: &mut Reasons,
+) -> Option<SeriesRows> {
     let directory = Directory::parse(&stored.directory)?;
-    let mut rows = Rows::of(series);
+    let mut rows = SeriesRows::of(series);
     rows.at_ns = decoder.times(&directory, &stored.columns)?;
     let codes = own_codes(&directory, reasons);
     for (series, column) in series.iter().zip(&mut rows.columns) {
@@ -138,7 +143,12 @@ fn column_of(cells: Cells, codes: &[u8; 256]) -> Column {
     }
 }
 
-fn replace(db: &mut Connection, group: &[Stored], merged: Option<&Block>, next_row: i64) -> Result<(), HistoryError> {
+fn replace(
+    db: &mut Connection,
+    group: &[StoredSegment],
+    merged: Option<&Block>,
+    next_row: i64,
+) -> Result<(), HistoryError> {
     let replacing = db.transaction().doing("beginning to compact")?;
     if let Some(merged) = merged {
         let last_row = group.last().map_or(merged.first_row, |last| last.first_row);

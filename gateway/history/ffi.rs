@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 
 /// Makes `samples` known to statements on `db`.
 pub(super) fn load(db: &Connection, path: &Path) -> Result<(), Error> {
-    const MODULE: Module<'_, Table> = Module::eponymous_only_module();
+    const MODULE: Module<'_, VirtualTable> = Module::eponymous_only_module();
     db.create_module(c"samples", &MODULE, Some(path.to_owned()))
 }
 
 /// The table, as `SQLite` holds it.
 #[repr(C)]
-struct Table {
+struct VirtualTable {
     /// First, as C expects.
     base: sqlite3_vtab,
     samples: Samples,
@@ -33,11 +33,11 @@ struct Scan<'vtab> {
     /// First, as C expects.
     base: sqlite3_vtab_cursor,
     cursor: Cursor,
-    table: PhantomData<&'vtab Table>,
+    table: PhantomData<&'vtab VirtualTable>,
 }
 
 // SAFETY: `Table` is `repr(C)` and its first field is the `sqlite3_vtab` that the trait asks for.
-unsafe impl<'vtab> VTab<'vtab> for Table {
+unsafe impl<'vtab> VTab<'vtab> for VirtualTable {
     type Aux = PathBuf;
     type Cursor = Scan<'vtab>;
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// Which records: those that touch the time from `from_ns` to before `to_ns`, the newest `limit` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Span {
+pub struct RecordSpan {
     /// From this time on.
     pub from_ns: TimeNs,
     /// Before this time.
@@ -18,7 +18,7 @@ pub struct Span {
     pub limit: u32,
 }
 
-impl Span {
+impl RecordSpan {
     /// The newest `limit` records of all time.
     #[must_use]
     pub fn newest(limit: u32) -> Self {
@@ -94,7 +94,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn states(&self, span: Span) -> Result<Vec<StateInterval>, HistoryError> {
+    pub fn states(&self, span: RecordSpan) -> Result<Vec<StateInterval>, HistoryError> {
         let select = "SELECT state, since_ns, until_ns, program, tool, ended_by FROM states
             WHERE since_ns < ?2 AND (until_ns IS NULL OR until_ns > ?1) ORDER BY since_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -113,7 +113,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn state_hours(&self, span: Span) -> Result<Vec<StateHour>, HistoryError> {
+    pub fn state_hours(&self, span: RecordSpan) -> Result<Vec<StateHour>, HistoryError> {
         let select = "SELECT hour * 3600000000000, state, seconds FROM state_hours
             WHERE hour * 3600000000000 < ?2 AND (hour + 1) * 3600000000000 > ?1 ORDER BY hour DESC, state DESC LIMIT ?3";
         self.list(select, span, |row| Ok(StateHour { start_ns: row.get(0)?, state: row.get(1)?, seconds: row.get(2)? }))
@@ -123,7 +123,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn alarms(&self, span: Span) -> Result<Vec<AlarmEntry>, HistoryError> {
+    pub fn alarms(&self, span: RecordSpan) -> Result<Vec<AlarmEntry>, HistoryError> {
         let select = "SELECT code, source, severity, raised_ns, cleared_ns, count, en, zh FROM alarms
             WHERE raised_ns < ?2 AND (cleared_ns IS NULL OR cleared_ns >= ?1) ORDER BY raised_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -144,7 +144,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn events(&self, span: Span) -> Result<Vec<Event>, HistoryError> {
+    pub fn events(&self, span: RecordSpan) -> Result<Vec<Event>, HistoryError> {
         let select = "SELECT at_ns, kind, source, text, detail FROM events
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, event)
@@ -154,7 +154,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn events_of(&self, kind: &str, span: Span) -> Result<Vec<Event>, HistoryError> {
+    pub fn events_of(&self, kind: &str, span: RecordSpan) -> Result<Vec<Event>, HistoryError> {
         let select = "SELECT at_ns, kind, source, text, detail FROM events
             WHERE at_ns >= ?1 AND at_ns < ?2 AND kind = ?4 ORDER BY at_ns DESC, id DESC LIMIT ?3";
         self.list_with(select, params![span.from_ns, span.to_ns, span.limit, kind], event)
@@ -164,7 +164,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn parts(&self, span: Span) -> Result<Vec<Part>, HistoryError> {
+    pub fn parts(&self, span: RecordSpan) -> Result<Vec<Part>, HistoryError> {
         let select = "SELECT began_ns, ended_ns, part, program, count, cutting_s, energy_j, detail FROM parts
             WHERE ended_ns >= ?1 AND ended_ns < ?2 ORDER BY ended_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -185,7 +185,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn decisions(&self, span: Span) -> Result<Vec<Decision>, HistoryError> {
+    pub fn decisions(&self, span: RecordSpan) -> Result<Vec<Decision>, HistoryError> {
         let select = "SELECT at_ns, script, script_version, wanted, value, unit, reason, outcome, outcome_reason
             FROM decisions WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -207,7 +207,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn commands(&self, span: Span) -> Result<Vec<Command>, HistoryError> {
+    pub fn commands(&self, span: RecordSpan) -> Result<Vec<Command>, HistoryError> {
         let select =
             "SELECT at_ns, command, target, before, asked, after, unit, outcome, reason, script, script_version
             FROM commands WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
@@ -232,7 +232,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn models(&self, span: Span) -> Result<Vec<Model>, HistoryError> {
+    pub fn models(&self, span: RecordSpan) -> Result<Vec<Model>, HistoryError> {
         let select = "SELECT at_ns, name, origin, toml FROM models
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -244,7 +244,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn diagnoses(&self, span: Span) -> Result<Vec<Diagnosis>, HistoryError> {
+    pub fn diagnoses(&self, span: RecordSpan) -> Result<Vec<Diagnosis>, HistoryError> {
         let select = "SELECT at_ns, from_ns, to_ns, verdict, summary, json FROM diagnoses
             WHERE at_ns >= ?1 AND at_ns < ?2 ORDER BY at_ns DESC, id DESC LIMIT ?3";
         self.list(select, span, |row| {
@@ -262,7 +262,7 @@ impl Reader {
     fn list<T>(
         &self,
         select: &str,
-        span: Span,
+        span: RecordSpan,
         read: impl FnMut(&Row<'_>) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<T>, HistoryError> {
         self.list_with(select, params![span.from_ns, span.to_ns, span.limit], read)

@@ -3,7 +3,7 @@
 use super::options::{ExtraValue, Options, WhenFull};
 use super::reason::Reasons;
 use super::record::Record;
-use super::rows::Rows;
+use super::rows::SeriesRows;
 use super::series::Series;
 use adapters::Sample;
 use adapters::clock::TimeNs;
@@ -18,7 +18,7 @@ const FREE_MAX: usize = 8;
 
 /// Something the writer is asked to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Job {
+pub(crate) enum WriterJob {
     /// Make everything handed in so far durable.
     Flush,
     /// Compact and retire as of this time.
@@ -27,7 +27,7 @@ pub(crate) enum Job {
 
 /// A record on its way to the disk.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Posted {
+pub(crate) struct QueuedRecord {
     pub(crate) record: Record,
     /// Counts the records that were handed in; zero for one that the writer made itself.
     pub(crate) ticket: u64,
@@ -36,14 +36,14 @@ pub(crate) struct Posted {
 }
 
 #[derive(Debug)]
-struct Post {
-    current: Rows,
-    full: VecDeque<Rows>,
-    free: Vec<Rows>,
+struct MailboxState {
+    current: SeriesRows,
+    full: VecDeque<SeriesRows>,
+    free: Vec<SeriesRows>,
     queued_rows: usize,
     /// Rows taken on since opening.
     taken_rows: u64,
-    records: VecDeque<Posted>,
+    records: VecDeque<QueuedRecord>,
     /// Records handed in so far; the number of the newest is its ticket.
     last_ticket: u64,
     /// Records that the writer holds but has not made durable.
@@ -51,7 +51,7 @@ struct Post {
     reasons: Reasons,
     dropped_samples: u64,
     dropped_records: u64,
-    jobs: VecDeque<(u64, Job)>,
+    jobs: VecDeque<(u64, WriterJob)>,
     last_job: u64,
     finished_job: u64,
     closing: bool,
@@ -60,17 +60,17 @@ struct Post {
 
 /// What the writer takes out in one go.
 pub(crate) struct Delivery {
-    pub(crate) batches: VecDeque<Rows>,
-    pub(crate) records: VecDeque<Posted>,
+    pub(crate) batches: VecDeque<SeriesRows>,
+    pub(crate) records: VecDeque<QueuedRecord>,
     pub(crate) reasons: Reasons,
-    pub(crate) job: Option<(u64, Job)>,
+    pub(crate) job: Option<(u64, WriterJob)>,
     pub(crate) closing: bool,
 }
 
 /// Waiting room of one history.
 #[derive(Debug)]
 pub(crate) struct Mailbox {
-    post: Mutex<Post>,
+    post: Mutex<MailboxState>,
     /// Something has arrived for the writer.
     arrived: Condvar,
     /// The writer has taken something, or has finished a job.
@@ -82,7 +82,7 @@ pub(crate) struct Mailbox {
 
 /// Figures of the waiting room.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Waiting {
+pub(crate) struct QueueFigures {
     pub(crate) rows: usize,
     pub(crate) records: usize,
     pub(crate) dropped_samples: u64,
@@ -91,8 +91,8 @@ pub(crate) struct Waiting {
 
 impl Mailbox {
     pub(crate) fn new(series: &[Series], options: &Options) -> Self {
-        let post = Post {
-            current: Rows::of(series),
+        let post = MailboxState {
+            current: SeriesRows::of(series),
             full: VecDeque::new(),
             free: Vec::new(),
             queued_rows: 0,
@@ -119,12 +119,12 @@ impl Mailbox {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Post> {
+    fn lock(&self) -> MutexGuard<'_, MailboxState> {
         // Nothing in here is left half done by a panic: every push is completed before the lock is released.
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn wait<'a>(&self, post: MutexGuard<'a, Post>) -> MutexGuard<'a, Post> {
+    fn wait<'a>(&self, post: MutexGuard<'a, MailboxState>) -> MutexGuard<'a, MailboxState> {
         self.progressed.wait(post).unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -139,7 +139,7 @@ impl Mailbox {
             post.dropped_samples += 1;
             return post.dropped_samples;
         }
-        let Post { current, reasons, .. } = &mut *post;
+        let MailboxState { current, reasons, .. } = &mut *post;
         current.push(sample, extras, reasons);
         post.queued_rows += 1;
         post.taken_rows += 1;
@@ -163,12 +163,12 @@ impl Mailbox {
         }
         post.last_ticket += 1;
         let (ticket, after_rows) = (post.last_ticket, post.taken_rows);
-        post.records.push_back(Posted { record, ticket, after_rows });
+        post.records.push_back(QueuedRecord { record, ticket, after_rows });
         Some(ticket)
     }
 
     /// Asks for a job and returns its number.
-    pub(crate) fn ask(&self, job: Job) -> u64 {
+    pub(crate) fn ask(&self, job: WriterJob) -> u64 {
         let mut post = self.lock();
         post.last_job += 1;
         let number = post.last_job;
@@ -201,8 +201,9 @@ impl Mailbox {
     /// `rows_too` false leaves the samples where they are.
     pub(crate) fn take(&self, limit: Duration, rows_too: bool, job_too: bool) -> Delivery {
         let mut post = self.lock();
-        let ready =
-            |post: &Post| (rows_too && !post.full.is_empty()) || (job_too && !post.jobs.is_empty()) || post.closing;
+        let ready = |post: &MailboxState| {
+            (rows_too && !post.full.is_empty()) || (job_too && !post.jobs.is_empty()) || post.closing
+        };
         if !ready(&post) && !limit.is_zero() {
             let waited = self.arrived.wait_timeout_while(post, limit, |post| !ready(post));
             post = waited.unwrap_or_else(PoisonError::into_inner).0;
@@ -213,7 +214,7 @@ impl Mailbox {
     }
 
     /// The writer's side: an emptied batch, and how many records it still holds.
-    pub(crate) fn recycle(&self, mut batch: Rows) {
+    pub(crate) fn recycle(&self, mut batch: SeriesRows) {
         batch.clear();
         let mut post = self.lock();
         if post.free.len() < FREE_MAX {
@@ -239,9 +240,9 @@ impl Mailbox {
         self.progressed.notify_all();
     }
 
-    pub(crate) fn waiting(&self) -> Waiting {
+    pub(crate) fn waiting(&self) -> QueueFigures {
         let post = self.lock();
-        Waiting {
+        QueueFigures {
             rows: post.queued_rows,
             records: post.waiting_records(),
             dropped_samples: post.dropped_samples,
@@ -250,7 +251,7 @@ impl Mailbox {
     }
 }
 
-impl Post {
+impl MailboxState {
     fn waiting_records(&self) -> usize {
         self.records.len() + self.held_records
     }

@@ -31,14 +31,14 @@ pub(crate) struct Maintenance {
     /// While the disk is short of room: the size at which that was noticed.
     ceiling: Option<u64>,
     looked: Option<Instant>,
-    task: Option<(TimeNs, Task)>,
+    task: Option<(TimeNs, MaintenanceStage)>,
     /// Raw samples removed since opening.
     pub(crate) retired: u64,
 }
 
 /// The stages of maintenance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Task {
+enum MaintenanceStage {
     Compact,
     Age,
     Shrink,
@@ -117,20 +117,20 @@ impl Maintenance {
 
     /// Begins maintenance as of `now_ns`.
     pub(crate) fn begin(&mut self, now_ns: TimeNs) {
-        self.task = Some((now_ns, Task::Compact));
+        self.task = Some((now_ns, MaintenanceStage::Compact));
     }
 
     /// Does a bounded piece of maintenance; false when there is none left.
     pub(crate) fn step(&mut self, db: &mut Connection) -> Result<bool, HistoryError> {
         let Some((now_ns, task)) = self.task else { return Ok(false) };
         let next = match task {
-            Task::Compact => (!compact::step(db)?).then_some(Task::Age),
-            Task::Age => {
+            MaintenanceStage::Compact => (!compact::step(db)?).then_some(MaintenanceStage::Age),
+            MaintenanceStage::Age => {
                 let removed = remove_aged(db, &self.retention, now_ns)?;
                 self.retired += removed.samples;
-                (!removed.any).then_some(Task::Shrink)
+                (!removed.any).then_some(MaintenanceStage::Shrink)
             }
-            Task::Shrink => {
+            MaintenanceStage::Shrink => {
                 if !shrink(db)? {
                     self.task = None;
                 }

@@ -2,11 +2,11 @@
 
 use super::block::{Block, Encoder, LEVEL_FRESH};
 use super::error::HistoryError;
-use super::mailbox::Posted;
+use super::mailbox::QueuedRecord;
 use super::pyramid::MINUTE_NS;
 use super::reason::Reasons;
 use super::record::{Event, Record};
-use super::rows::Rows;
+use super::rows::SeriesRows;
 use super::series::Series;
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::collections::VecDeque;
@@ -39,12 +39,12 @@ pub(crate) struct MinuteBuffer {
     pub(crate) reasons: Reasons,
     encoder: Encoder,
     /// Rows of the running minute.
-    pub(crate) open: Rows,
+    pub(crate) open: SeriesRows,
     /// How many of them the crash tail already holds.
     pub(crate) in_tail: usize,
     pub(crate) segments: VecDeque<Segment>,
     pub(crate) blocks: VecDeque<Block>,
-    pub(crate) records: VecDeque<Posted>,
+    pub(crate) records: VecDeque<QueuedRecord>,
     /// Ticket of the newest record that is durable.
     pub(crate) durable_ticket: u64,
     pub(crate) segment: i64,
@@ -63,7 +63,7 @@ pub(crate) struct MinuteBuffer {
 impl MinuteBuffer {
     pub(crate) fn new(series: Vec<Series>, end: End) -> Result<Self, HistoryError> {
         let encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
-        let open = Rows::of(&series);
+        let open = SeriesRows::of(&series);
         Ok(Self {
             series,
             reasons: Reasons::default(),
@@ -128,7 +128,7 @@ impl MinuteBuffer {
     }
 
     /// Takes a batch on: rows of the same minute gather, a new minute or a clock that went back seals what is there.
-    pub(crate) fn ingest(&mut self, batch: &Rows) {
+    pub(crate) fn ingest(&mut self, batch: &SeriesRows) {
         let mut from = 0;
         while from < batch.len() {
             self.begin(batch.at_ns[from]);
@@ -183,7 +183,7 @@ impl MinuteBuffer {
         });
         let after_rows = self.rows_through(self.next_row);
         let place = self.records.partition_point(|posted| posted.after_rows <= after_rows);
-        self.records.insert(place, Posted { record, ticket: 0, after_rows });
+        self.records.insert(place, QueuedRecord { record, ticket: 0, after_rows });
     }
 
     /// Turns the open rows into a block.

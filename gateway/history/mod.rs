@@ -81,15 +81,15 @@ mod wear_models;
 mod writer;
 
 pub use audit::{AuditCheck, AuditEntry, Break, audit_document};
-pub use block::{Cells, NumberCells, Summary, WordCells};
+pub use block::{Cells, NumberCells, ValueSummary, WordCells};
 pub use error::HistoryError;
 pub use export::{DayWritten, Format, day_file, day_of};
 pub use info::{Dropped, Info, TableRows};
-pub use list::{AlarmEntry, Span, StateHour, StateInterval};
+pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
 pub use outbox::{
-    Cell, Content, Figures, Head, Item, Outbox, OutboxReader, Position, Reading, SeriesInfo,
-    Settings as OutboxSettings, Standing, Stretch,
+    Cell, Content, DeliveryState, Item, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings, OutboxStretch,
+    Position, Reading, SeriesInfo,
 };
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};
@@ -102,6 +102,6 @@ pub use rounding::rounded;
 pub use rusqlite::types::Value as SqlValue;
 pub use series::{Series, as_stored, decimals_of_unit};
 pub use space::{DiskRoom, disk_room};
-pub use status::Status;
+pub use status::HistoryFigures;
 pub use wear_models::{StoredWearModel, store_wear_model};
 pub use writer::Writer;

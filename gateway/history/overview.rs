@@ -1,6 +1,6 @@
 //! Summaries over time: a year by hour or day from the pyramid, anything finer or conditional from the samples.
 
-use super::block::{Cells, Summary};
+use super::block::{Cells, ValueSummary};
 use super::error::{Doing, HistoryError};
 use super::options::SeriesKind;
 use super::pyramid::Level;
@@ -21,7 +21,7 @@ const BUCKETS_MAX: i64 = 1_000_000;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Buckets {
     /// Count, least, greatest and mean; a count of 0 where there is no value.
-    Numbers(Vec<Summary>),
+    Numbers(Vec<ValueSummary>),
     /// The last word in each bucket.
     Words(Vec<Option<Arc<str>>>),
 }
@@ -41,16 +41,16 @@ pub struct Overview {
 
 /// One bucket under construction: a summary or a word per series.
 #[derive(Debug, Clone, Default)]
-struct Cell {
-    summary: Summary,
+struct BucketCell {
+    summary: ValueSummary,
     word: Option<Arc<str>>,
 }
 
 /// Buckets by number, under construction.
-struct Building {
+struct BucketBuilder {
     width_ns: i64,
     series: Vec<Series>,
-    buckets: BTreeMap<i64, Vec<Cell>>,
+    buckets: BTreeMap<i64, Vec<BucketCell>>,
 }
 
 impl Reader {
@@ -118,8 +118,8 @@ impl Reader {
         width_ns: i64,
         level: &Level,
         known: &Arc<[Series]>,
-    ) -> Result<Building, HistoryError> {
-        let mut building = Building { width_ns, series: wanted, buckets: BTreeMap::new() };
+    ) -> Result<BucketBuilder, HistoryError> {
+        let mut building = BucketBuilder { width_ns, series: wanted, buckets: BTreeMap::new() };
         let range = buckets_of(level, query);
         let (table, key) = (level.table, level.key);
         let places: BTreeMap<i64, usize> = building.series.iter().map(|series| series.id).zip(0..).collect();
@@ -147,7 +147,7 @@ impl Reader {
     }
 
     fn read_samples(&self, query: &Query, width_ns: i64) -> Result<Overview, HistoryError> {
-        let mut building = Building { width_ns, series: Vec::new(), buckets: BTreeMap::new() };
+        let mut building = BucketBuilder { width_ns, series: Vec::new(), buckets: BTreeMap::new() };
         self.samples(query, |chunk| {
             building.add_chunk(chunk);
             ControlFlow::Continue(())
@@ -159,8 +159,13 @@ impl Reader {
     }
 }
 
-fn summary_of(row: &rusqlite::Row<'_>) -> Result<Summary, rusqlite::Error> {
-    Ok(Summary { count: row.get::<_, i64>(2)?.unsigned_abs(), min: row.get(3)?, max: row.get(4)?, mean: row.get(5)? })
+fn summary_of(row: &rusqlite::Row<'_>) -> Result<ValueSummary, rusqlite::Error> {
+    Ok(ValueSummary {
+        count: row.get::<_, i64>(2)?.unsigned_abs(),
+        min: row.get(3)?,
+        max: row.get(4)?,
+        mean: row.get(5)?,
+    })
 }
 
 /// First and last bucket of `level` that the time of `query` touches.
@@ -169,14 +174,15 @@ fn buckets_of(level: &Level, query: &Query) -> Range<i64> {
     level.bucket(range.start)..level.bucket(range.end.saturating_sub(1))
 }
 
-impl Building {
-    fn cell(&mut self, at_ns: TimeNs, column: usize) -> &mut Cell {
+impl BucketBuilder {
+    fn cell(&mut self, at_ns: TimeNs, column: usize) -> &mut BucketCell {
         let count = self.series.len();
-        let cells = self.buckets.entry(at_ns.div_euclid(self.width_ns)).or_insert_with(|| vec![Cell::default(); count]);
+        let cells =
+            self.buckets.entry(at_ns.div_euclid(self.width_ns)).or_insert_with(|| vec![BucketCell::default(); count]);
         &mut cells[column]
     }
 
-    fn add(&mut self, at_ns: TimeNs, column: usize, summary: Summary) {
+    fn add(&mut self, at_ns: TimeNs, column: usize, summary: ValueSummary) {
         let cell = self.cell(at_ns, column);
         cell.summary = cell.summary.and(summary);
     }
@@ -200,7 +206,7 @@ impl Building {
             values.extend((row..end).filter_map(|row| cells.number(row)));
             let word = (row..end).rev().find_map(|row| cells.word(row)).map(Arc::from);
             let cell = self.cell(at_ns[row], column);
-            cell.summary = cell.summary.and(Summary::of(&values));
+            cell.summary = cell.summary.and(ValueSummary::of(&values));
             cell.word = word.or(cell.word.take());
             row = end;
         }

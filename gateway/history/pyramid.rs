@@ -1,7 +1,7 @@
 //! Summaries by minute, hour and day, so that a year is drawn from 365 or 8 760 points per series instead of from 315
 //! million samples. Each level is brought up to date when a block is written, in the same transaction.
 
-use super::block::{Block, Summary};
+use super::block::{Block, ValueSummary};
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};
 
@@ -58,7 +58,7 @@ pub(crate) fn add(db: &Connection, block: &Block) -> Result<(), rusqlite::Error>
     for level in &LEVELS {
         let mut insert = db.prepare_cached(level.insert)?;
         for (series, summary) in &block.summaries {
-            let Summary { count, min, max, mean } = *summary;
+            let ValueSummary { count, min, max, mean } = *summary;
             insert.execute(params![level.bucket(block.start_ns), series, count as i64, min, max, mean])?;
         }
     }

@@ -6,7 +6,7 @@ use super::options::SeriesKind;
 use super::reader::Reader;
 use super::reason::Reasons;
 use super::series::Series;
-use super::walk::{Stretch, Walk};
+use super::walk::{SegmentStretch, Walk};
 use adapters::channel::nearest;
 use adapters::clock::TimeNs;
 use rules::estimators::wear::tool_of;
@@ -163,7 +163,7 @@ fn conditions(query: &Query, known: &[Series]) -> Result<Vec<Condition>, History
 }
 
 /// The rows of `stretch` in the range that meet every condition.
-fn matching(walk: &mut Walk, stretch: &Stretch, conditions: &[Condition]) -> Result<Vec<usize>, HistoryError> {
+fn matching(walk: &mut Walk, stretch: &SegmentStretch, conditions: &[Condition]) -> Result<Vec<usize>, HistoryError> {
     let mut rows: Vec<usize> = walk.rows_of(stretch).collect();
     for (series, word, tool) in conditions {
         let Some(cells) = walk.cells(stretch, *series)? else { return Ok(Vec::new()) };
@@ -178,7 +178,7 @@ static NO_REASONS: Reasons = Reasons::none();
 
 fn chunk<'a>(
     walk: &mut Walk,
-    stretch: &Stretch,
+    stretch: &SegmentStretch,
     rows: &[usize],
     wanted: &'a [Series],
 ) -> Result<Chunk<'a>, HistoryError> {

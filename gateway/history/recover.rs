@@ -7,7 +7,7 @@ use super::minute_buffer::End;
 use super::reason::Reasons;
 use super::record::{Event, Record};
 use super::record_sql::{close_state, store};
-use super::rows::Rows;
+use super::rows::SeriesRows;
 use super::{schema, tail};
 use adapters::clock::TimeNs;
 use rusqlite::{Connection, OptionalExtension};
@@ -85,7 +85,7 @@ fn seal_tail(db: &Connection, mut end: End) -> Result<End, HistoryError> {
     let entries = unsealed(db, end.next_row)?;
     // A commit only ever holds rows of one minute and one segment in the tail, so one block takes them all.
     for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
-        let (mut rows, mut reasons) = (Rows::of(&series), Reasons::default());
+        let (mut rows, mut reasons) = (SeriesRows::of(&series), Reasons::default());
         let whole = group.iter().all(|entry| tail::append(&entry.body, &mut rows, &series, &mut reasons).is_some());
         if !whole {
             note_damage(db, &group[0])?;

@@ -8,7 +8,7 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};
 
 /// A kind of row, in the order in which they go.
-struct Kind {
+struct RowKind {
     name: &'static str,
     table: &'static str,
     /// Column of time, and its unit in nanoseconds.
@@ -25,8 +25,8 @@ struct Kind {
 
 const HOUR_NS: i64 = 3_600 * SECOND_NS;
 
-static KINDS: [Kind; 15] = [
-    Kind {
+static KINDS: [RowKind; 15] = [
+    RowKind {
         name: "raw samples",
         table: "blocks",
         time: "first_row",
@@ -60,8 +60,8 @@ const fn kind(
     unit_ns: i64,
     only: &'static str,
     days: fn(&Retention) -> f64,
-) -> Kind {
-    Kind { name, table, time, unit_ns, rows: "count(*)", only, step: 500, days }
+) -> RowKind {
+    RowKind { name, table, time, unit_ns, rows: "count(*)", only, step: 500, days }
 }
 
 /// What a step removed.
@@ -86,7 +86,7 @@ pub(crate) fn used_bytes(db: &Connection) -> Result<u64, HistoryError> {
 /// Removes the oldest of the first kind that can spare anything; nothing at all when only the newest rows are left.
 pub(crate) fn remove_oldest(db: &mut Connection, because: &str) -> Result<Removed, HistoryError> {
     for kind in &KINDS {
-        let Kind { table, time, only, step, .. } = kind;
+        let RowKind { table, time, only, step, .. } = kind;
         let threshold: Option<i64> = db
             .query_row(
                 &format!(
@@ -108,7 +108,7 @@ pub(crate) fn remove_oldest(db: &mut Connection, because: &str) -> Result<Remove
 pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: TimeNs) -> Result<Removed, HistoryError> {
     for kind in &KINDS {
         let horizon = Retention::horizon_ns((kind.days)(retention), now_ns).div_euclid(kind.unit_ns);
-        let Kind { table, time, only, step, .. } = kind;
+        let RowKind { table, time, only, step, .. } = kind;
         let condition = if *table == "blocks" {
             // Time of a block is not its key; the newest block stays, it says where the history ends.
             format!(
@@ -129,8 +129,8 @@ pub(crate) fn remove_aged(db: &mut Connection, retention: &Retention, now_ns: Ti
     Ok(Removed::default())
 }
 
-fn remove(db: &mut Connection, kind: &Kind, condition: &str, because: &str) -> Result<Removed, HistoryError> {
-    let Kind { name, table, only, rows, time, unit_ns, .. } = kind;
+fn remove(db: &mut Connection, kind: &RowKind, condition: &str, because: &str) -> Result<Removed, HistoryError> {
+    let RowKind { name, table, only, rows, time, unit_ns, .. } = kind;
     let time = if *table == "blocks" { "end_ns" } else { time };
     let condition = &if *table == "audit" { audit::oldest(condition) } else { condition.to_owned() };
     let removing = db.transaction().doing("beginning to remove old rows")?;

@@ -151,14 +151,14 @@ fn append_words(words: &mut Column, have: usize, more: &[(u32, Word)], rows: &Ra
 
 /// Rows of every stored series.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Rows {
+pub(crate) struct SeriesRows {
     pub(crate) at_ns: Vec<TimeNs>,
     pub(crate) columns: Vec<Column>,
     /// How many of the columns, from the first on, are channels.
     channels: usize,
 }
 
-impl Rows {
+impl SeriesRows {
     /// No rows yet of these series.
     pub(crate) fn of(series: &[Series]) -> Self {
         let channels = series.iter().take_while(|series| !series.estimated).count();
@@ -234,8 +234,8 @@ mod tests {
         stored_series(&Options { extras, ..Options::default() }).expect("fine")
     }
 
-    fn rows(count: usize) -> Rows {
-        let mut rows = Rows::of(&series());
+    fn rows(count: usize) -> SeriesRows {
+        let mut rows = SeriesRows::of(&series());
         let mut reasons = Reasons::default();
         let power = ChannelId::of("spindle_power_w").expect("in the table");
         for row in 0..count {
@@ -253,7 +253,7 @@ mod tests {
     fn appending_in_pieces_is_the_same_as_pushing() {
         let whole = rows(40);
         for cut in 0..=40 {
-            let mut pieces = Rows::of(&series());
+            let mut pieces = SeriesRows::of(&series());
             pieces.append(&whole, 0..cut);
             pieces.append(&whole, cut..40);
             assert_eq!(pieces, whole, "cut at {cut}");

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// A moment's figures.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Status {
+pub struct HistoryFigures {
     /// Samples up to and including this time survive a power cut; `None` before the first commit.
     pub acknowledged_through_ns: Option<TimeNs>,
     /// Records up to this ticket survive a power cut.
@@ -42,7 +42,7 @@ pub struct Status {
 
 /// The figures as the writer thread keeps them.
 #[derive(Debug)]
-pub(crate) struct Shared {
+pub(crate) struct SharedStatus {
     pub(crate) acknowledged_ns: AtomicI64,
     pub(crate) acknowledged_record: AtomicU64,
     pub(crate) rows: AtomicU64,
@@ -52,11 +52,11 @@ pub(crate) struct Shared {
     pub(crate) commits: AtomicU64,
     pub(crate) commit_us: AtomicU64,
     pub(crate) short_of_room: AtomicBool,
-    words: Mutex<Words>,
+    words: Mutex<StatusTexts>,
 }
 
 #[derive(Debug, Default)]
-struct Words {
+struct StatusTexts {
     degraded: Option<String>,
     last_error: Option<String>,
 }
@@ -64,7 +64,7 @@ struct Words {
 /// No row is durable yet.
 pub(crate) const NOTHING_NS: i64 = i64::MIN;
 
-impl Default for Shared {
+impl Default for SharedStatus {
     fn default() -> Self {
         Self {
             acknowledged_ns: AtomicI64::new(NOTHING_NS),
@@ -76,12 +76,12 @@ impl Default for Shared {
             commits: AtomicU64::new(0),
             commit_us: AtomicU64::new(0),
             short_of_room: AtomicBool::new(false),
-            words: Mutex::new(Words::default()),
+            words: Mutex::new(StatusTexts::default()),
         }
     }
 }
 
-impl Shared {
+impl SharedStatus {
     pub(crate) fn acknowledged_ns(&self) -> Option<TimeNs> {
         let at_ns = self.acknowledged_ns.load(Ordering::Acquire);
         (at_ns != NOTHING_NS).then_some(at_ns)
@@ -100,9 +100,9 @@ impl Shared {
     }
 
     /// Everything but the queue.
-    pub(crate) fn status(&self) -> Status {
+    pub(crate) fn status(&self) -> HistoryFigures {
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
-        Status {
+        HistoryFigures {
             acknowledged_through_ns: self.acknowledged_ns(),
             acknowledged_record: self.acknowledged_record.load(Ordering::Acquire),
             rows: self.rows.load(Ordering::Relaxed),
@@ -114,7 +114,7 @@ impl Shared {
             short_of_room: self.short_of_room.load(Ordering::Relaxed),
             degraded: words.degraded.clone(),
             last_error: words.last_error.clone(),
-            ..Status::default()
+            ..HistoryFigures::default()
         }
     }
 }

@@ -7,7 +7,7 @@
 use super::options::SeriesKind;
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::rounding::rounded;
-use super::rows::{Column, Rows, Word};
+use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use serde_json::Value as Json;
 use std::fmt::Write;
@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// The text of rows `range`.
-pub(crate) fn to_text(rows: &Rows, range: Range<usize>, series: &[Series], reasons: &Reasons) -> String {
+pub(crate) fn to_text(rows: &SeriesRows, range: Range<usize>, series: &[Series], reasons: &Reasons) -> String {
     let mut out = String::from("{\"t\":[");
     for (index, at_ns) in rows.at_ns[range.clone()].iter().enumerate() {
         comma(&mut out, index);
@@ -92,7 +92,7 @@ fn put_words(out: &mut String, changes: &[(u32, Word)], range: &Range<usize>, re
 }
 
 /// Appends the rows of `text` to `rows`; `None`, and nothing appended, when it is not what [`to_text`] writes.
-pub(crate) fn append(text: &str, rows: &mut Rows, series: &[Series], reasons: &mut Reasons) -> Option<()> {
+pub(crate) fn append(text: &str, rows: &mut SeriesRows, series: &[Series], reasons: &mut Reasons) -> Option<()> {
     let body: Json = serde_json::from_str(text).ok()?;
     let times: Vec<i64> = body.get("t")?.as_array()?.iter().map(Json::as_i64).collect::<Option<_>>()?;
     let cells = body.get("s")?.as_object()?;
@@ -144,7 +144,7 @@ mod tests {
         let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
         (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
         let mut reasons = Reasons::default();
-        let mut rows = Rows::of(&series);
+        let mut rows = SeriesRows::of(&series);
         let channel = |name| ChannelId::of(name).expect("in the table");
         for row in 0..30 {
             let mut sample = Sample::empty(1_700_000_000_000_000_000 + row);
@@ -171,7 +171,7 @@ mod tests {
     fn a_damaged_tail_is_refused() {
         let series = stored_series(&Options::default()).expect("fine");
         for text in ["", "{}", "{\"t\":[1.5],\"s\":{}}", "{\"t\":[1],\"s\":3}"] {
-            let mut rows = Rows::of(&series);
+            let mut rows = SeriesRows::of(&series);
             assert_eq!(append(text, &mut rows, &series, &mut Reasons::default()), None, "{text}");
             assert!(rows.is_empty());
         }

@@ -3,13 +3,13 @@
 
 use super::commit::{TailSlots, commit};
 use super::error::HistoryError;
-use super::mailbox::{Delivery, Job, Mailbox};
+use super::mailbox::{Delivery, Mailbox, WriterJob};
 use super::maintenance::Maintenance;
 use super::minute_buffer::MinuteBuffer;
 use super::options::{Options, WhenFull};
 use super::outbox::Gatherer;
 use super::record_sql::close_state;
-use super::status::Shared;
+use super::status::SharedStatus;
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub(crate) struct Thread {
     pub(crate) slots: TailSlots,
     pub(crate) maintenance: Maintenance,
     pub(crate) mailbox: Arc<Mailbox>,
-    pub(crate) shared: Arc<Shared>,
+    pub(crate) shared: Arc<SharedStatus>,
     pub(crate) options: Options,
     pub(crate) pace: CommitSchedule,
 }
@@ -109,8 +109,8 @@ impl Thread {
             }
         }
         match delivery.job {
-            Some((number, Job::Flush)) => self.pace.flushing = Some(number),
-            Some((number, Job::Maintain(now_ns))) => {
+            Some((number, WriterJob::Flush)) => self.pace.flushing = Some(number),
+            Some((number, WriterJob::Maintain(now_ns))) => {
                 self.pace.maintaining = Some(number);
                 self.maintenance.begin(now_ns);
             }

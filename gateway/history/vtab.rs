@@ -9,7 +9,7 @@ use super::error::HistoryError;
 use super::options::SeriesKind;
 use super::schema;
 use super::series::Series;
-use super::walk::{Stretch, Walk};
+use super::walk::{SegmentStretch, Walk};
 use adapters::clock::{SECOND_NS, TimeNs};
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::vtab::{Context, Filters, IndexConstraintOp, IndexInfo};
@@ -110,7 +110,7 @@ fn letter(column: c_int, operator: IndexConstraintOp) -> Option<char> {
 /// Where a scan is.
 struct Place {
     walk: RefCell<Walk>,
-    stretch: Option<Stretch>,
+    stretch: Option<SegmentStretch>,
     rows: Range<usize>,
     cells: RefCell<BTreeMap<i64, Option<Cells>>>,
 }
@@ -182,7 +182,7 @@ impl Cursor {
         }
     }
 
-    fn cell(&self, place: &Place, stretch: &Stretch, index: usize) -> Result<Value, Error> {
+    fn cell(&self, place: &Place, stretch: &SegmentStretch, index: usize) -> Result<Value, Error> {
         let (series, reason) = match self.series.get(index) {
             Some(series) => (series.id, false),
             None => (self.series[index - self.series.len()].id, true),

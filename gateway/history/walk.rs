@@ -5,7 +5,7 @@ use super::compact::{COMPACT_NS, own_codes};
 use super::error::{Doing, HistoryError};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::recover::unsealed;
-use super::rows::{Column, Rows, Word};
+use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use super::tail;
 use adapters::clock::TimeNs;
@@ -15,23 +15,23 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Consecutive rows of one segment, series decoded when they are asked for.
-pub(crate) struct Stretch {
+pub(crate) struct SegmentStretch {
     pub(crate) segment: i64,
     pub(crate) first_row: i64,
     pub(crate) at_ns: Vec<TimeNs>,
-    form: Form,
+    form: StretchForm,
 }
 
-enum Form {
+enum StretchForm {
     Block { directory: Directory, columns: Vec<u8>, codes: Box<[u8; 256]> },
-    Tail(Rows),
+    Tail(SeriesRows),
 }
 
 /// Where to go on, and what is needed on the way.
 pub(crate) struct Walk {
     blocks: VecDeque<i64>,
     tail_from: Option<i64>,
-    tail: VecDeque<Stretch>,
+    tail: VecDeque<SegmentStretch>,
     range: Range<TimeNs>,
     series: Arc<[Series]>,
     decoder: Decoder,
@@ -72,7 +72,7 @@ impl Walk {
     }
 
     /// The next stretch that has a row in the range.
-    pub(crate) fn next(&mut self, db: &Connection) -> Result<Option<Stretch>, HistoryError> {
+    pub(crate) fn next(&mut self, db: &Connection) -> Result<Option<SegmentStretch>, HistoryError> {
         while let Some(first_row) = self.blocks.pop_front() {
             let stretch = self.load(db, first_row)?;
             if !self.rows_of(&stretch).is_empty() {
@@ -91,16 +91,16 @@ impl Walk {
     }
 
     /// The rows of `stretch` that lie in the range. Time never decreases within a stretch.
-    pub(crate) fn rows_of(&self, stretch: &Stretch) -> Range<usize> {
+    pub(crate) fn rows_of(&self, stretch: &SegmentStretch) -> Range<usize> {
         let from = stretch.at_ns.partition_point(|at_ns| *at_ns < self.range.start);
         let to = stretch.at_ns.partition_point(|at_ns| *at_ns < self.range.end);
         from..to.max(from)
     }
 
     /// The cells of one series in all rows of `stretch`; `None` when nothing delivered it there.
-    pub(crate) fn cells(&mut self, stretch: &Stretch, series: i64) -> Result<Option<Cells>, HistoryError> {
+    pub(crate) fn cells(&mut self, stretch: &SegmentStretch, series: i64) -> Result<Option<Cells>, HistoryError> {
         match &stretch.form {
-            Form::Block { directory, columns, codes } => {
+            StretchForm::Block { directory, columns, codes } => {
                 let Some(entry) = directory.entry(series) else { return Ok(None) };
                 let damaged = damaged(stretch.first_row);
                 let mut cells = self.decoder.cells(directory, entry, columns).ok_or(damaged)?;
@@ -110,7 +110,7 @@ impl Walk {
                 }
                 Ok(Some(cells))
             }
-            Form::Tail(rows) => {
+            StretchForm::Tail(rows) => {
                 let index = self.series.iter().position(|known| known.id == series);
                 let column = index.and_then(|index| rows.columns.get(index));
                 Ok(column.filter(|column| !column.is_unused()).map(|column| cells_of(column, rows.len())))
@@ -118,7 +118,7 @@ impl Walk {
         }
     }
 
-    fn load(&mut self, db: &Connection, first_row: i64) -> Result<Stretch, HistoryError> {
+    fn load(&mut self, db: &Connection, first_row: i64) -> Result<SegmentStretch, HistoryError> {
         let (segment, directory, columns): (i64, Vec<u8>, Vec<u8>) = db
             .prepare_cached("SELECT segment, directory, columns FROM blocks WHERE first_row = ?1")
             .and_then(|mut statement| {
@@ -128,20 +128,25 @@ impl Walk {
         let directory = Directory::parse(&directory).ok_or(damaged(first_row))?;
         let at_ns = self.decoder.times(&directory, &columns).ok_or(damaged(first_row))?;
         let codes = Box::new(own_codes(&directory, &mut self.reasons));
-        Ok(Stretch { segment, first_row, at_ns, form: Form::Block { directory, columns, codes } })
+        Ok(SegmentStretch { segment, first_row, at_ns, form: StretchForm::Block { directory, columns, codes } })
     }
 
-    fn load_tail(&mut self, db: &Connection, from_row: i64) -> Result<VecDeque<Stretch>, HistoryError> {
+    fn load_tail(&mut self, db: &Connection, from_row: i64) -> Result<VecDeque<SegmentStretch>, HistoryError> {
         let mut stretches = VecDeque::new();
         let entries = unsealed(db, from_row)?;
         for group in entries.chunk_by(|a, b| a.segment == b.segment && b.first_row == a.first_row + a.rows) {
-            let mut rows = Rows::of(&self.series);
+            let mut rows = SeriesRows::of(&self.series);
             for entry in group {
                 tail::append(&entry.body, &mut rows, &self.series, &mut self.reasons)
                     .ok_or(damaged(entry.first_row))?;
             }
             let (segment, first_row) = (group[0].segment, group[0].first_row);
-            stretches.push_back(Stretch { segment, first_row, at_ns: rows.at_ns.clone(), form: Form::Tail(rows) });
+            stretches.push_back(SegmentStretch {
+                segment,
+                first_row,
+                at_ns: rows.at_ns.clone(),
+                form: StretchForm::Tail(rows),
+            });
         }
         Ok(stretches)
     }
@@ -151,14 +156,14 @@ fn damaged(first_row: i64) -> HistoryError {
     HistoryError::Damaged { first_row, what: "the block does not decode" }
 }
 
-impl Stretch {
+impl SegmentStretch {
     /// The series delivered here, and whether a value of it is missing anywhere.
     pub(crate) fn delivered(&self, series: &[Series]) -> Vec<(i64, bool)> {
         match &self.form {
-            Form::Block { directory, .. } => {
+            StretchForm::Block { directory, .. } => {
                 directory.entries.iter().map(|entry| (entry.series, entry.any_missing)).collect()
             }
-            Form::Tail(rows) => {
+            StretchForm::Tail(rows) => {
                 let used = series.iter().zip(&rows.columns).filter(|(_, column)| !column.is_unused());
                 used.map(|(series, column)| (series.id, any_missing(column))).collect()
             }

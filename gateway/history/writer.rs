@@ -3,7 +3,7 @@
 use super::commit::TailSlots;
 use super::error::{HistoryError, at};
 use super::lock::Lock;
-use super::mailbox::{Job, Mailbox};
+use super::mailbox::{Mailbox, WriterJob};
 use super::maintenance::Maintenance;
 use super::minute_buffer::MinuteBuffer;
 use super::options::{ExtraValue, Options};
@@ -12,7 +12,7 @@ use super::record::Record;
 use super::recover::recover;
 use super::schema;
 use super::series::stored_series;
-use super::status::{Shared, Status};
+use super::status::{HistoryFigures, SharedStatus};
 use super::thread::{CommitSchedule, Thread};
 use adapters::Sample;
 use adapters::clock::TimeNs;
@@ -30,7 +30,7 @@ const FLUSH_LIMIT: Duration = Duration::from_secs(30);
 pub struct Writer {
     path: PathBuf,
     mailbox: Arc<Mailbox>,
-    shared: Arc<Shared>,
+    shared: Arc<SharedStatus>,
     thread: Option<JoinHandle<()>>,
     _lock: Lock,
 }
@@ -54,7 +54,7 @@ impl Writer {
         let end = recover(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
         let outbox = options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(SharedStatus::default());
         let maintenance = Maintenance::new(path, options.retention, options.reserve_bytes);
         maintenance.bound_log(&db)?;
         let thread = Thread {
@@ -102,12 +102,12 @@ impl Writer {
     /// # Errors
     /// [`HistoryError::NotDurable`] with the reason, after 30 s.
     pub fn flush(&self) -> Result<(), HistoryError> {
-        self.await_job(Job::Flush, FLUSH_LIMIT)
+        self.await_job(WriterJob::Flush, FLUSH_LIMIT)
     }
 
     /// Begins compaction and removal by age as of `now_ns`, piece by piece between commits. Call it once a night.
     pub fn maintain(&self, now_ns: TimeNs) {
-        self.mailbox.ask(Job::Maintain(now_ns));
+        self.mailbox.ask(WriterJob::Maintain(now_ns));
     }
 
     /// As [`Self::maintain`], and waits at most `limit` for the end of it.
@@ -115,10 +115,10 @@ impl Writer {
     /// # Errors
     /// [`HistoryError::NotDurable`] with the reason.
     pub fn maintain_and_wait(&self, now_ns: TimeNs, limit: Duration) -> Result<(), HistoryError> {
-        self.await_job(Job::Maintain(now_ns), limit)
+        self.await_job(WriterJob::Maintain(now_ns), limit)
     }
 
-    fn await_job(&self, job: Job, limit: Duration) -> Result<(), HistoryError> {
+    fn await_job(&self, job: WriterJob, limit: Duration) -> Result<(), HistoryError> {
         let number = self.mailbox.ask(job);
         if self.mailbox.await_job(number, limit) {
             return Ok(());
@@ -132,9 +132,9 @@ impl Writer {
 
     /// How the writer is doing.
     #[must_use]
-    pub fn status(&self) -> Status {
+    pub fn status(&self) -> HistoryFigures {
         let waiting = self.mailbox.waiting();
-        Status {
+        HistoryFigures {
             queued_samples: waiting.rows,
             queued_records: waiting.records,
             dropped_samples: waiting.dropped_samples,
@@ -152,7 +152,7 @@ impl Writer {
     /// Makes everything durable, ends the writer thread and returns the last figures. `degraded` tells when something
     /// could not be made durable.
     #[must_use]
-    pub fn close(mut self) -> Status {
+    pub fn close(mut self) -> HistoryFigures {
         self.join();
         self.status()
     }

@@ -1,6 +1,6 @@
 //! Edited scripts over the history: one run at a time, in the background, with its report kept until the next one.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::told;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -8,7 +8,7 @@ use super::route::Route;
 use super::rules::{named, on_disk, with};
 use crate::access::Role;
 use crate::active_scripts;
-use crate::backtest::{Plan, backtest};
+use crate::backtest::{BacktestPlan, backtest};
 use crate::history::Reader;
 use crate::moment;
 use axum::Json;
@@ -63,7 +63,7 @@ impl Backtests {
 }
 
 /// `GET /api/v1/backtest`
-async fn state(State(shared): State<Shared>) -> Json<Value> {
+async fn state(State(shared): State<ServerState>) -> Json<Value> {
     Json(match &*shared.backtests.locked() {
         Run::None => json!({ "schema": "backtest-run/1", "state": "none" }),
         Run::Running { file, by, since } => {
@@ -77,7 +77,7 @@ async fn state(State(shared): State<Shared>) -> Json<Value> {
 
 /// `POST /api/v1/rules/{file}/backtest`: begins; `GET /api/v1/backtest` tells how it goes.
 async fn begin(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(name): Path<String>,
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<Asked>,
@@ -115,7 +115,7 @@ async fn begin(
     Ok(told(Json(json!({ "schema": "backtest-run/1", "state": "running" })), format!("{name}: a backtest")))
 }
 
-fn plan(shared: &Shared, name: &str, asked: &Asked) -> Result<Plan, ApiProblem> {
+fn plan(shared: &ServerState, name: &str, asked: &Asked) -> Result<BacktestPlan, ApiProblem> {
     let unusable = |found: Vec<Problem>| {
         let all: Vec<String> = found.iter().map(ToString::to_string).collect();
         ApiProblem::request(all.join("\n"), "mend it; `Run trials` marks the line")
@@ -129,7 +129,7 @@ fn plan(shared: &Shared, name: &str, asked: &Asked) -> Result<Plan, ApiProblem> 
     let files = on_disk(shared)?;
     let running = active_scripts::kept(&shared.data_dir).unwrap_or_else(|| files.clone());
     let values = super::rules::values(shared);
-    Ok(Plan {
+    Ok(BacktestPlan {
         history: shared.history.clone(),
         from_ns,
         to_ns: None,

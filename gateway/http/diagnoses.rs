@@ -1,7 +1,7 @@
 //! Diagnoses that a person asks for: begin, watch, end, read the report, take the model over. The work is done in a process of its
 //! own, see `diagnosis::child`; what is found is stored by the tick, as it is for diagnoses that the box begins by itself.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::told;
 use super::headers;
 use super::history::range;
@@ -10,8 +10,8 @@ use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::access::Role;
-use crate::diagnosis::desk::{Desk, Refusal, Run};
-use crate::diagnosis::kept::{Part, is_key};
+use crate::diagnosis::desk::{Desk, DiagnosisRefusal, Run};
+use crate::diagnosis::kept::{DiagnosisFile, is_key};
 use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::extract::{Path, Query as Pairs, State};
@@ -40,7 +40,7 @@ pub(super) const ROUTES: &[Route] = &[
 /// The stretch to be diagnosed, as everywhere in the API: `2026-01-31T08:00:00Z`, or `-2h` before the newest sample.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Stretch {
+struct StretchRequest {
     from: String,
     to: String,
 }
@@ -52,19 +52,19 @@ struct Accepted {
     key: String,
 }
 
-impl Shared {
+impl ServerState {
     fn desk(&self) -> Result<&Desk, ApiProblem> {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "name a model under [twin] model");
         self.desk.as_ref().ok_or_else(none)
     }
 }
 
-fn refused(refusal: Refusal) -> ApiProblem {
+fn refused(refusal: DiagnosisRefusal) -> ApiProblem {
     ApiProblem::conflict(refusal.what, refusal.next)
 }
 
 /// `GET /api/v1/diagnosis`
-async fn state(State(shared): State<Shared>) -> Json<Value> {
+async fn state(State(shared): State<ServerState>) -> Json<Value> {
     let (run, about_s) = shared.desk.as_ref().map(Desk::run).unwrap_or_default();
     let (mut told, by) = match run {
         Run::None => (json!({ "state": "none" }), None),
@@ -91,9 +91,9 @@ async fn state(State(shared): State<Shared>) -> Json<Value> {
 
 /// `POST /api/v1/diagnosis`: begins; `GET` tells how it goes.
 async fn begin(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
-    JsonBody(asked): JsonBody<Stretch>,
+    JsonBody(asked): JsonBody<StretchRequest>,
 ) -> Result<Response, ApiProblem> {
     let newest_ns = shared.status()?.at_ms.saturating_mul(1_000_000);
     let pairs = vec![("from".to_owned(), asked.from.clone()), ("to".to_owned(), asked.to.clone())];
@@ -109,15 +109,15 @@ async fn begin(
 }
 
 /// `DELETE /api/v1/diagnosis`: ends the one under way.
-async fn cancel(State(shared): State<Shared>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
+async fn cancel(State(shared): State<ServerState>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
     shared.desk()?.cancel(&person.name).map_err(refused)?;
     Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
 }
 
-type Given = Pairs<Vec<(String, String)>>;
+type DiagnosisQuery = Pairs<Vec<(String, String)>>;
 
 /// A file that was kept of a diagnosis.
-async fn kept(shared: Shared, key: String, part: Part) -> Result<String, ApiProblem> {
+async fn kept(shared: ServerState, key: String, part: DiagnosisFile) -> Result<String, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("the files of diagnosis {key:?} (the newest 40 are kept)"));
     let desk = shared.desk.clone().filter(|_| is_key(&key)).ok_or_else(gone)?;
     let wanted = key.clone();
@@ -135,27 +135,27 @@ fn language(pairs: Vec<(String, String)>) -> Result<Language, ApiProblem> {
 
 /// `GET /api/v1/diagnoses/{key}/page`: the report.
 async fn page(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(key): Path<String>,
-    Pairs(pairs): Given,
+    Pairs(pairs): DiagnosisQuery,
 ) -> Result<Response, ApiProblem> {
-    let html = kept(shared, key, Part::Page(language(pairs)?)).await?;
+    let html = kept(shared, key, DiagnosisFile::Page(language(pairs)?)).await?;
     Ok(headers::report(&html))
 }
 
 /// `GET /api/v1/diagnoses/{key}/plan`: the experiment as a recording plan.
 async fn plan(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(key): Path<String>,
-    Pairs(pairs): Given,
+    Pairs(pairs): DiagnosisQuery,
 ) -> Result<Response, ApiProblem> {
-    let csv = kept(shared, key, Part::Plan(language(pairs)?)).await?;
+    let csv = kept(shared, key, DiagnosisFile::Plan(language(pairs)?)).await?;
     Ok(download("text/csv; charset=utf-8", "experiment.csv", csv))
 }
 
 /// `GET /api/v1/diagnoses/{key}/model`: the model with what was missing.
-async fn model(State(shared): State<Shared>, Path(key): Path<String>) -> Result<Response, ApiProblem> {
-    let toml = kept(shared, key, Part::Model).await?;
+async fn model(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Response, ApiProblem> {
+    let toml = kept(shared, key, DiagnosisFile::Model).await?;
     Ok(download("application/toml", "model.toml", toml))
 }
 
@@ -167,7 +167,7 @@ pub(super) fn download(kind: &'static str, name: &str, content: impl IntoRespons
 
 /// `POST /api/v1/twin/model`: the model of a diagnosis takes the place of the one in charge.
 async fn accept(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(_): SignedIn,
     JsonBody(Accepted { key }): JsonBody<Accepted>,
 ) -> Result<Response, ApiProblem> {

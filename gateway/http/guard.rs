@@ -1,7 +1,7 @@
 //! What stands before every route, made from its row of the table: the method, who asks, where the request comes from, the
 //! length and the pace of its body, and afterwards the account of it in the audit.
 
-use super::Shared;
+use super::ServerState;
 use super::peer::Peer;
 use super::person::{SignedIn, cookie, name_of_cookie};
 use super::problem::ApiProblem;
@@ -21,19 +21,19 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(60);
 
 /// What a handler says about what it has changed, for the audit.
 #[derive(Debug, Clone)]
-struct Told(String);
+struct AuditNote(String);
 
 /// The answer with what stands in the audit about it: which thing was changed, from what to what. One line.
 pub(super) fn told(answer: impl IntoResponse, words: impl Into<String>) -> Response {
     let mut answer = answer.into_response();
-    answer.extensions_mut().insert(Told(words.into()));
+    answer.extensions_mut().insert(AuditNote(words.into()));
     answer
 }
 
 /// What the guard of one route knows.
 #[derive(Clone)]
 pub(super) struct Guarded {
-    pub(super) shared: Shared,
+    pub(super) shared: ServerState,
     pub(super) route: Route,
 }
 
@@ -95,7 +95,7 @@ async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: O
             status if status.is_client_error() => "refused",
             _ => "failed",
         };
-        let words = answer.extensions().get::<Told>().map_or(String::new(), |told| format!(": {}", told.0));
+        let words = answer.extensions().get::<AuditNote>().map_or(String::new(), |told| format!(": {}", told.0));
         let code = answer.status().as_u16();
         shared.access.changed(outcome, &format!("{} {path} ({code}){words}", route.verb().word()), &person).await;
     }
@@ -103,7 +103,7 @@ async fn answer(Guarded { shared, route }: &Guarded, request: Request, person: O
 }
 
 /// Who asks: by the cookie of a session, or by name and token in the request itself.
-async fn recognise(shared: &Shared, headers: &HeaderMap, peer: &Peer) -> Result<Option<Person>, SignInError> {
+async fn recognise(shared: &ServerState, headers: &HeaderMap, peer: &Peer) -> Result<Option<Person>, SignInError> {
     let given = headers.get(header::AUTHORIZATION).and_then(|value| std::str::from_utf8(value.as_bytes()).ok());
     if let Some(given) = given.and_then(|text| text.strip_prefix("Bearer ")) {
         return shared.access.of_bearer(given.trim(), peer.from).await.map(Some);
@@ -126,7 +126,7 @@ pub(super) fn wrong(error: &SignInError) -> ApiProblem {
     }
 }
 
-fn allowed(shared: &Shared, route: &Route, person: Option<&Person>) -> Result<(), ApiProblem> {
+fn allowed(shared: &ServerState, route: &Route, person: Option<&Person>) -> Result<(), ApiProblem> {
     let needed = match route.needs() {
         Needs::Nothing => return Ok(()),
         Needs::Reading if !shared.access.rules().tokens_always => return Ok(()),
@@ -173,7 +173,7 @@ fn same_origin(headers: &HeaderMap, peer: &Peer) -> Result<(), ApiProblem> {
 }
 
 /// What cannot be accounted for is not changed. What a viewer may do - give the machine back, sign out - always works.
-fn accountable(shared: &Shared, route: &Route) -> Result<(), ApiProblem> {
+fn accountable(shared: &ServerState, route: &Route) -> Result<(), ApiProblem> {
     let more = matches!(route.needs(), Needs::Role(role) if role > Role::Viewer);
     let error = shared.live.borrow().as_ref().and_then(|published| published.status.history.error.clone());
     match error.filter(|_| more) {

@@ -1,6 +1,6 @@
 //! `GET /api/v1/samples`, `states`, `alarms`, ...: the history, read through connections of its own.
 
-use super::Shared;
+use super::ServerState;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
@@ -42,11 +42,11 @@ pub(super) const ROUTES: &[Route] = &[
 ];
 
 pub(super) type Answer = Result<Json<Value>, ApiProblem>;
-pub(super) type Given = Pairs<Vec<(String, String)>>;
+pub(super) type HistoryQuery = Pairs<Vec<(String, String)>>;
 
 /// Runs `read` on a connection of its own, off the threads that serve.
 pub(super) async fn reading(
-    shared: Shared,
+    shared: ServerState,
     read: impl FnOnce(&Reader, TimeNs) -> Result<Value, ApiProblem> + Send + 'static,
 ) -> Answer {
     let newest_ns = shared.status()?.at_ms.saturating_add(1).saturating_mul(1_000_000);
@@ -83,7 +83,7 @@ pub(super) fn range(keys: &QueryKeys, newest_ns: TimeNs) -> Result<(TimeNs, Time
     Ok((from_ns, to_ns))
 }
 
-async fn rows(shared: Shared, kind: RecordKind, pairs: Vec<(String, String)>) -> Answer {
+async fn rows(shared: ServerState, kind: RecordKind, pairs: Vec<(String, String)>) -> Answer {
     let known: &[&str] =
         if kind == RecordKind::States { &["from", "to", "limit", "state"] } else { &["from", "to", "limit"] };
     let keys = QueryKeys::of(pairs, known)?;
@@ -98,33 +98,33 @@ async fn rows(shared: Shared, kind: RecordKind, pairs: Vec<(String, String)>) ->
 }
 
 /// `GET /api/v1/states`
-pub(super) async fn states(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn states(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     rows(shared, RecordKind::States, pairs).await
 }
 
 /// `GET /api/v1/alarms`
-pub(super) async fn alarms(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn alarms(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     rows(shared, RecordKind::Alarms, pairs).await
 }
 
 /// `GET /api/v1/decisions`
-pub(super) async fn decisions(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn decisions(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     rows(shared, RecordKind::Decisions, pairs).await
 }
 
 /// `GET /api/v1/events`
-pub(super) async fn events(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn events(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     rows(shared, RecordKind::Events, pairs).await
 }
 
 /// `GET /api/v1/parts`
-pub(super) async fn parts(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn parts(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     rows(shared, RecordKind::Parts, pairs).await
 }
 
 /// `GET /api/v1/audit`: `history audit --json`, by pages. With `since` the rows after that number, with `from` and `to` those of
 /// the time range, otherwise the newest.
-pub(super) async fn audit(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn audit(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let keys = QueryKeys::of(pairs, &["since", "limit", "from", "to"])?;
     let limit = keys.number("limit", 1, 10_000)?.unwrap_or(1000);
     let since = keys.number("since", 0, i64::MAX)?;
@@ -147,7 +147,7 @@ pub(super) async fn audit(State(shared): State<Shared>, Pairs(pairs): Given) -> 
 }
 
 /// `GET /api/v1/audit/verify`: `history audit --verify`.
-pub(super) async fn verify(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn verify(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
         let check = reader.verify_audit().map_err(|error| trouble(&error))?;
@@ -161,7 +161,7 @@ pub(super) async fn verify(State(shared): State<Shared>, Pairs(pairs): Given) ->
 }
 
 /// `GET /api/v1/samples`
-pub(super) async fn sample_series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn sample_series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let known = ["from", "to", "channels", "resolution_s", "state", "program", "tool"];
     let keys = QueryKeys::of(pairs, &known)?;
     let resolution_s = keys.number("resolution_s", 0.0, 31_622_400.0)?;

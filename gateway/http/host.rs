@@ -1,7 +1,7 @@
 //! Is the request meant for this box? A page of another site can make a browser connect here under that site's own name (DNS
 //! rebinding); the name then stands in the `Host` header, and nothing is answered under a name that is not ours.
 
-use super::Shared;
+use super::ServerState;
 use super::peer::Peer;
 use super::problem::ApiProblem;
 use axum::extract::{Request, State};
@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use std::net::IpAddr;
 
 /// Refuses what is meant for another host.
-pub(super) async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+pub(super) async fn check(State(shared): State<ServerState>, request: Request, next: Next) -> Response {
     let Some(peer) = request.extensions().get::<Peer>().copied() else {
         return ApiProblem::unavailable("the connection has no address", "connect again").into_response();
     };

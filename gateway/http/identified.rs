@@ -3,7 +3,7 @@
 //! The model in the library holds what is needed to use it, not how it was found. Whoever identifies keeps the whole answer with
 //! `cnc-gateway identify thermal ... --json > DATA_DIR/identified/thermal.json`.
 
-use super::Shared;
+use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::aside;
@@ -20,7 +20,7 @@ const BYTES_MAX: usize = 4 << 20;
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/identified/{subject}", || get(identified))];
 
-async fn identified(State(shared): State<Shared>, Path(subject): Path<String>) -> Result<Json<Value>, ApiProblem> {
+async fn identified(State(shared): State<ServerState>, Path(subject): Path<String>) -> Result<Json<Value>, ApiProblem> {
     if !SUBJECTS.contains(&subject.as_str()) {
         return Err(ApiProblem::not_found(&format!("/api/v1/identified/{subject}; known are {}", SUBJECTS.join(", "))));
     }

@@ -1,6 +1,6 @@
 //! `GET /api/v1/live`: the status as server-sent events, a few per second.
 
-use super::Shared;
+use super::ServerState;
 use super::peer::Peer;
 use super::person::{SignedIn, cookie, name_of_cookie};
 use super::route::Route;
@@ -19,7 +19,7 @@ pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/live", || get(live))]
 
 /// `GET /api/v1/live`
 async fn live(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     person: Option<SignedIn>,
     headers: HeaderMap,

@@ -1,7 +1,7 @@
 //! What an integrator needs of the box itself: the configuration in force, a doctor for each source, a backup and its way back, an
 //! archive for whoever helps from afar. None of it holds a token, a key or a password.
 
-use super::Shared;
+use super::ServerState;
 use super::diagnoses::download;
 use super::guard::told;
 use super::history::trouble;
@@ -10,10 +10,10 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::aside;
 use crate::access::Role;
-use crate::archive::{Entry, pack, unpack};
-use crate::backup::{self, Ask, Places, archive_name};
+use crate::archive::{ArchivedFile, pack, unpack};
+use crate::backup::{self, BackupPaths, RestoreRequest, archive_name};
 use crate::config::{Config, GateMode};
-use crate::history::{Reader, Span, audit_document};
+use crate::history::{Reader, RecordSpan, audit_document};
 use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::body::Bytes;
@@ -61,25 +61,28 @@ impl Configured {
         })
     }
 
-    pub(super) fn places(&self) -> Places {
-        Places::of(&self.config, self.file.as_deref())
+    pub(super) fn places(&self) -> BackupPaths {
+        BackupPaths::of(&self.config, self.file.as_deref())
     }
 }
 
 /// `GET /api/v1/configuration`
-async fn configuration(State(shared): State<Shared>) -> Json<Value> {
+async fn configuration(State(shared): State<ServerState>) -> Json<Value> {
     Json(shared.configured.json())
 }
 
 /// Which source is looked at.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Asked {
+struct SourceQuery {
     source: String,
 }
 
 /// `POST /api/v1/doctor`: what `doctor --config FILE NAME` finds, with a second connection beside the one that polls.
-async fn doctor(State(shared): State<Shared>, JsonBody(asked): JsonBody<Asked>) -> Result<Response, ApiProblem> {
+async fn doctor(
+    State(shared): State<ServerState>,
+    JsonBody(asked): JsonBody<SourceQuery>,
+) -> Result<Response, ApiProblem> {
     let found = shared.configured.config.sources.iter().find(|it| it.name == asked.source);
     let names = || shared.configured.config.sources.iter().map(|it| it.name.as_str()).collect::<Vec<_>>().join(", ");
     let none = || {
@@ -103,21 +106,21 @@ async fn doctor(State(shared): State<Shared>, JsonBody(asked): JsonBody<Asked>) 
     Ok(told(Json(document), format!("looked at source {}", asked.source)))
 }
 
-fn now_s(shared: &Shared) -> Result<u64, ApiProblem> {
+fn now_s(shared: &ServerState) -> Result<u64, ApiProblem> {
     Ok(shared.status()?.at_ms.div_euclid(1000).unsigned_abs())
 }
 
-fn packed(files: &[Entry], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
+fn packed(files: &[ArchivedFile], at_s: u64) -> Result<Vec<u8>, ApiProblem> {
     pack(files, at_s)
         .map_err(|error| ApiProblem::unavailable(format!("no archive could be made: {error}"), "look at the disk"))
 }
 
-fn collected(places: &Places) -> Result<Vec<Entry>, ApiProblem> {
+fn collected(places: &BackupPaths) -> Result<Vec<ArchivedFile>, ApiProblem> {
     backup::collect(places).map_err(|error| trouble(&error))
 }
 
 /// `GET /api/v1/backup`
-async fn take(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
+async fn take(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let at_s = now_s(&shared)?;
     let bytes = aside(move || packed(&collected(&shared.configured.places())?, at_s)).await?;
     Ok(download("application/gzip", &archive_name("backup", at_s), bytes))
@@ -125,7 +128,7 @@ async fn take(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
 
 /// `POST /api/v1/restore`: what a backup holds takes the place of what is in force; what was learned, at the next start.
 async fn restore(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
     body: Bytes,
 ) -> Result<Response, ApiProblem> {
@@ -139,7 +142,7 @@ async fn restore(
         let cannot =
             |what: String| ApiProblem::request(what, "nothing was changed; take the backup of a box of this version");
         let at_ns = i64::try_from(at_s).unwrap_or_default().saturating_mul(SECOND_NS);
-        let ask = Ask { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
+        let ask = RestoreRequest { by: &person.name, at_ns, before: (&before, &archive_name("before-restore", at_s)) };
         backup::restore(&places, &files, ask).map_err(cannot)
     });
     let done = done.await?;
@@ -147,11 +150,11 @@ async fn restore(
 }
 
 /// `GET /api/v1/support`
-async fn support(State(shared): State<Shared>) -> Result<Response, ApiProblem> {
+async fn support(State(shared): State<ServerState>) -> Result<Response, ApiProblem> {
     let (at_s, status) = (now_s(&shared)?, shared.status()?);
     let bytes = aside(move || {
         let text = |value: &Value| format!("{value:#}\n").into_bytes();
-        let mut files: Vec<Entry> = vec![("configuration.json".to_owned(), text(&shared.configured.json()))];
+        let mut files: Vec<ArchivedFile> = vec![("configuration.json".to_owned(), text(&shared.configured.json()))];
         let status = serde_json::to_value(&*status).unwrap_or(Value::Null);
         files.push(("status.json".to_owned(), text(&without_secrets(status))));
         let reader = Reader::open(&shared.history).map_err(|error| trouble(&error))?;
@@ -186,12 +189,12 @@ fn history_of(reader: &Reader) -> [(&'static str, Value); 5] {
             |it| serde_json::to_value(it).unwrap_or(Value::Null),
         )
     }
-    let newest = || Span::newest(ROWS);
+    let newest = || RecordSpan::newest(ROWS);
     [
         ("history.json", told(reader.info())),
         ("events.json", told(reader.events(newest()))),
         ("alarms.json", told(reader.alarms(newest()))),
-        ("diagnoses.json", told(reader.diagnoses(Span::newest(5)))),
+        ("diagnoses.json", told(reader.diagnoses(RecordSpan::newest(5)))),
         ("audit.json", told(reader.audit(0, i64::MAX, ROWS).map(|rows| audit_document(&rows)))),
     ]
 }

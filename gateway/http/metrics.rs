@@ -1,12 +1,12 @@
 //! `GET /metrics`: the status for Prometheus. Names end in base units, counters in `_total`; a missing value is no
 //! sample, never a zero.
 
-use super::Shared;
+use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
 use crate::alignment::AlignmentStatus;
 use crate::sinks::SinkStatus;
-use crate::status::{Shown, Status};
+use crate::status::{NumberOrWord, Status};
 use adapters::histogram::Histogram;
 use axum::extract::State;
 use axum::http::header;
@@ -93,7 +93,7 @@ fn label(name: &str, value: &str) -> String {
 
 fn quantities(page: &mut Page, status: &Status) {
     for channel in &status.channels {
-        if let Some(Shown::Number(value)) = channel.value {
+        if let Some(NumberOrWord::Number(value)) = channel.value {
             let (name, factor) = base(channel.name);
             let help = adapters::ChannelId::of(channel.name).map_or("Measured", |id| id.channel().en);
             page.gauge(&name, help, value * factor);
@@ -274,7 +274,7 @@ pub fn render(status: &Status) -> String {
 pub(super) const ROUTES: &[Route] = &[Route::read("/metrics", || get(metrics))];
 
 /// `GET /metrics`
-pub(super) async fn metrics(State(shared): State<Shared>) -> Result<impl IntoResponse, ApiProblem> {
+pub(super) async fn metrics(State(shared): State<ServerState>) -> Result<impl IntoResponse, ApiProblem> {
     let text = render(&*shared.status()?);
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text))
 }

@@ -51,7 +51,7 @@ pub use server::{Server, bind, port_trouble};
 pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
-use crate::control::Post;
+use crate::control::OrderSender;
 use crate::diagnosis::desk::Desk;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
@@ -84,7 +84,7 @@ pub struct Published {
 
 /// What the server is made from.
 #[derive(Debug)]
-pub struct Parts {
+pub struct ServerParts {
     /// What the tick publishes.
     pub live: watch::Receiver<Option<Published>>,
     /// Where the history is.
@@ -98,7 +98,7 @@ pub struct Parts {
     /// Who may do what.
     pub access: Arc<Access>,
     /// The way of orders to the tick.
-    pub post: Post,
+    pub post: OrderSender,
     /// Names by which browsers reach the box, besides its own addresses, in lower case.
     pub hosts: Vec<String>,
     /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
@@ -109,7 +109,7 @@ pub struct Parts {
 
 /// What every request can see.
 #[derive(Clone)]
-pub struct Shared {
+pub struct ServerState {
     live: watch::Receiver<Option<Published>>,
     streams: Streams,
     readers: Arc<Semaphore>,
@@ -119,18 +119,18 @@ pub struct Shared {
     backtests: Backtests,
     language: Option<Language>,
     access: Arc<Access>,
-    post: Post,
+    post: OrderSender,
     hosts: Arc<[String]>,
     desk: Option<Desk>,
     configured: Configured,
     doctor: Arc<Semaphore>,
 }
 
-impl Shared {
+impl ServerState {
     /// From these parts.
     #[must_use]
-    pub fn new(parts: Parts) -> Self {
-        let Parts { live, history, scripts, data_dir, language, access, post, hosts, desk, configured } = parts;
+    pub fn new(parts: ServerParts) -> Self {
+        let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, desk, configured } = parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
@@ -195,7 +195,7 @@ pub fn routes() -> impl Iterator<Item = &'static Route> {
 }
 
 /// All routes with what they see, each behind its guard.
-pub fn router(shared: Shared) -> Router {
+pub fn router(shared: ServerState) -> Router {
     let routes = routes().fold(Router::new(), |router, route| {
         let guarded = Guarded { shared: shared.clone(), route: *route };
         router.route(route.path(), route.method_router().route_layer(from_fn_with_state(guarded, guard)))
@@ -230,7 +230,7 @@ async fn in_our_words(request: axum::extract::Request, next: axum::middleware::N
     }
 }
 
-async fn status(axum::extract::State(shared): axum::extract::State<Shared>) -> Response {
+async fn status(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
     shared.status().map(|status| axum::Json(&*status).into_response()).into_response()
 }
 
@@ -239,7 +239,7 @@ async fn openapi() -> Response {
 }
 
 /// `GET /healthz`: 200 while the tick goes on, 503 with the reason otherwise.
-async fn healthz(axum::extract::State(shared): axum::extract::State<Shared>) -> Response {
+async fn healthz(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
     let Some(age) = shared.live.borrow().as_ref().map(|published| published.at.elapsed()) else {
         return ApiProblem::unavailable("the box is starting", "ask again in a second").into_response();
     };

@@ -1,7 +1,7 @@
 //! The operations recipe as a table to be edited: read with what tells it from another text, and put back whole when all of it is
 //! right. The tick takes a changed file by itself.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::told;
 use super::person::JsonBody;
 use super::problem::ApiProblem;
@@ -27,12 +27,12 @@ pub(super) const ROUTES: &[Route] = &[
 /// Another text, and the digest of the one that was edited.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Edited {
+struct EditedRecipe {
     text: String,
     digest: String,
 }
 
-fn path(shared: &Shared) -> Result<PathBuf, ApiProblem> {
+fn path(shared: &ServerState) -> Result<PathBuf, ApiProblem> {
     let none = || ApiProblem::conflict("no recipe is configured", "name a file under [operations] path");
     shared.configured.config.operations.path.clone().ok_or_else(none)
 }
@@ -47,7 +47,7 @@ fn on_disk(path: &std::path::Path) -> Result<String, ApiProblem> {
 }
 
 /// `GET /api/v1/operations`
-async fn recipe(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+async fn recipe(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     aside(move || {
         let path = path(&shared)?;
         let text = on_disk(&path)?;
@@ -75,7 +75,10 @@ fn row(it: &Operation) -> Value {
 }
 
 /// `PUT /api/v1/operations`: another text, if all of it is right and nobody has changed the file meanwhile.
-async fn replace(State(shared): State<Shared>, JsonBody(edited): JsonBody<Edited>) -> Result<Response, ApiProblem> {
+async fn replace(
+    State(shared): State<ServerState>,
+    JsonBody(edited): JsonBody<EditedRecipe>,
+) -> Result<Response, ApiProblem> {
     let done = aside(move || {
         let path = path(&shared)?;
         let now = on_disk(&path)?;

@@ -1,7 +1,7 @@
 //! Orders of a person on the page: arm the gate, give the machine back to its dial, acknowledge. They go the way of the orders
 //! at the box, see `control`; what the tick makes of them stands in the audit with the name of the person.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::{told, wrong};
 use super::peer::Peer;
 use super::person::{JsonBody, SignedIn};
@@ -36,7 +36,7 @@ struct Arm {
 
 /// `POST /api/v1/arm`: only where the configuration allows it, and only with the token once more.
 async fn arm(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
     JsonBody(wish): JsonBody<Arm>,
@@ -53,7 +53,7 @@ async fn arm(
 
 /// `POST /api/v1/disarm`: back to the dial.
 async fn disarm(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
     headers: HeaderMap,
@@ -74,7 +74,7 @@ struct Acknowledge {
 
 /// `POST /api/v1/alarms/acknowledge`
 async fn acknowledge(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
     JsonBody(wish): JsonBody<Acknowledge>,

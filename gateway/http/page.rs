@@ -3,7 +3,7 @@
 use super::files::{FILES, INDEX};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::{Shared, headers};
+use super::{ServerState, headers};
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -24,7 +24,7 @@ pub(super) const ROUTES: &[Route] = &[
 ];
 
 /// `GET /` and the address of every view.
-async fn page(State(shared): State<Shared>) -> Response {
+async fn page(State(shared): State<ServerState>) -> Response {
     let chosen = match shared.language {
         None => return headers::page(INDEX),
         Some(Language::En) => "<html lang=\"en\" data-opens=\"en\">",

@@ -1,6 +1,6 @@
 //! For a browser without JavaScript: the state of the machine as a page of plain HTML, and the form to sign in by.
 
-use super::Shared;
+use super::ServerState;
 use super::headers;
 use super::peer::Peer;
 use super::person::SignedIn;
@@ -8,7 +8,7 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::vocabulary;
 use crate::moment;
-use crate::status::{ChannelStatus, GateStatus, Shown, Status};
+use crate::status::{ChannelStatus, GateStatus, NumberOrWord, Status};
 use adapters::ChannelId;
 use axum::extract::{Extension, Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -47,7 +47,7 @@ const SHOWN: [&str; 10] = [
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct Asked {
+struct LanguageQuery {
     lang: String,
     next: String,
 }
@@ -65,7 +65,7 @@ pub(super) fn wants_page(headers: &HeaderMap) -> bool {
 }
 
 /// The language asked for, or that of the configuration, or that of the browser.
-fn zh(shared: &Shared, asked: &str, headers: &HeaderMap) -> bool {
+fn zh(shared: &ServerState, asked: &str, headers: &HeaderMap) -> bool {
     let of_browser = || {
         let accepted = headers.get(header::ACCEPT_LANGUAGE).and_then(|value| value.to_str().ok());
         accepted.is_some_and(|languages| languages.trim_start().to_ascii_lowercase().starts_with("zh"))
@@ -83,12 +83,16 @@ async fn style() -> Response {
 }
 
 /// `GET /sign-in`
-async fn sign_in(State(shared): State<Shared>, Query(asked): Query<Asked>, headers: HeaderMap) -> Response {
+async fn sign_in(
+    State(shared): State<ServerState>,
+    Query(asked): Query<LanguageQuery>,
+    headers: HeaderMap,
+) -> Response {
     form(zh(&shared, &asked.lang, &headers), &asked.next, "")
 }
 
 /// The form once more, with what was wrong.
-pub(super) fn sign_in_again(shared: &Shared, headers: &HeaderMap, next: &str, problem: &ApiProblem) -> Response {
+pub(super) fn sign_in_again(shared: &ServerState, headers: &HeaderMap, next: &str, problem: &ApiProblem) -> Response {
     let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::UNAUTHORIZED);
     let trouble = format!("{}. {}", problem.title, problem.hint);
     let mut answer = form(zh(shared, "", headers), next, &trouble);
@@ -119,9 +123,9 @@ fn form(zh: bool, next: &str, trouble: &str) -> Response {
 
 /// `GET /plain`
 async fn plain(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
-    Query(asked): Query<Asked>,
+    Query(asked): Query<LanguageQuery>,
     person: Option<SignedIn>,
     headers: HeaderMap,
 ) -> Response {
@@ -174,12 +178,12 @@ fn machine(zh: bool, status: &Status) -> String {
 
 fn value(zh: bool, channel: &ChannelStatus) -> String {
     match (&channel.value, channel.missing) {
-        (Some(Shown::Number(number)), _) => {
+        (Some(NumberOrWord::Number(number)), _) => {
             let digits = usize::from(number.abs() < 100.0 && number.fract() != 0.0);
             let unit = if channel.unit == "1" { "" } else { channel.unit };
             escape(&format!("{number:.digits$} {unit}"))
         }
-        (Some(Shown::Text(text)), _) => escape(text),
+        (Some(NumberOrWord::Text(text)), _) => escape(text),
         (None, missing) => {
             format!("<em>{}</em>", escape(vocabulary::absence_text(missing.unwrap_or_default(), zh)))
         }

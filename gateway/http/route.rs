@@ -5,7 +5,7 @@
 //! [`Route::put`] and [`Route::delete`] ask for one, and the guard answers a row of [`Route::read`] to `GET` and `HEAD`
 //! alone, whatever handler it was given.
 
-use super::Shared;
+use super::ServerState;
 use crate::access::Role;
 use axum::http::Method;
 use axum::routing::MethodRouter;
@@ -54,7 +54,7 @@ pub enum Needs {
 }
 
 /// What answers at a path.
-type Answers = fn() -> MethodRouter<Shared>;
+type Answers = fn() -> MethodRouter<ServerState>;
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
@@ -138,7 +138,7 @@ impl Route {
         !matches!(self.verb, Verb::Get)
     }
 
-    pub(super) fn method_router(&self) -> MethodRouter<Shared> {
+    pub(super) fn method_router(&self) -> MethodRouter<ServerState> {
         (self.answers)()
     }
 }

@@ -1,7 +1,7 @@
 //! The scripts over the API: as they are on disk, as drafts, their trials, edited ones over the history, put in charge, earlier
 //! versions.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::told;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -37,7 +37,7 @@ pub(super) const ROUTES: &[Route] = &[
 /// A text that somebody has typed, and the digest of the text that he began from.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Edited {
+pub(super) struct EditedScript {
     pub(super) text: String,
     #[serde(default)]
     pub(super) digest: String,
@@ -59,13 +59,13 @@ pub(super) fn named(name: &str) -> Result<(), ApiProblem> {
     if is_name(name) { Ok(()) } else { Err(bad()) }
 }
 
-pub(super) fn on_disk(shared: &Shared) -> Result<Vec<ScriptFile>, ApiProblem> {
+pub(super) fn on_disk(shared: &ServerState) -> Result<Vec<ScriptFile>, ApiProblem> {
     let problems = |found: Vec<Problem>| broken(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
     read_directory(&shared.scripts).map_err(problems)
 }
 
 /// The values of the settings in force; the defaults where the file cannot be used, which the status says.
-pub(super) fn values(shared: &Shared) -> SettingValues {
+pub(super) fn values(shared: &ServerState) -> SettingValues {
     settings::read(&settings::path(&shared.data_dir)).unwrap_or_default()
 }
 
@@ -78,7 +78,7 @@ pub(super) fn with(files: Vec<ScriptFile>, name: &str, text: &str) -> Vec<Script
 }
 
 /// `GET /api/v1/rules`
-async fn rules(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+async fn rules(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     aside(move || {
         let drafts = Drafts::of(&shared.data_dir);
         let rows: Vec<Value> = on_disk(&shared)?.iter().map(|file| row(&drafts, file)).collect();
@@ -107,7 +107,7 @@ async fn words() -> Json<Value> {
 
 /// `GET /api/v1/rules/{file}/versions/{digest}`
 async fn version(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path((name, digest)): Path<(String, String)>,
 ) -> Result<Json<Value>, ApiProblem> {
     named(&name)?;
@@ -123,9 +123,9 @@ async fn version(
 
 /// `POST /api/v1/rules/{file}/check`: does it compile, beside the others?
 async fn check(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(name): Path<String>,
-    JsonBody(edited): JsonBody<Edited>,
+    JsonBody(edited): JsonBody<EditedScript>,
 ) -> Result<Json<Value>, ApiProblem> {
     named(&name)?;
     aside(move || {
@@ -138,16 +138,16 @@ async fn check(
 
 /// `POST /api/v1/rules/{file}/trials`
 async fn trials(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(name): Path<String>,
-    JsonBody(edited): JsonBody<Edited>,
+    JsonBody(edited): JsonBody<EditedScript>,
 ) -> Result<Json<Value>, ApiProblem> {
     named(&name)?;
     aside(move || Ok(Json(tried(&shared, &name, &edited.text)))).await
 }
 
 /// The trials of one text, as `rules test --json` tells them.
-fn tried(shared: &Shared, name: &str, text: &str) -> Value {
+fn tried(shared: &ServerState, name: &str, text: &str) -> Value {
     let file = ScriptFile { name: name.to_owned(), text: text.to_owned() };
     let files = with(on_disk(shared).unwrap_or_default(), name, text);
     let (results, found) = match script::compile_one(&file, &files, &values(shared)) {
@@ -196,16 +196,16 @@ fn still_newest(drafts: &Drafts, files: &[ScriptFile], name: &str, began_from: &
     Err(ApiProblem::conflict(format!("{name} was changed meanwhile {who}"), hint))
 }
 
-fn now_ms(shared: &Shared) -> i64 {
+fn now_ms(shared: &ServerState) -> i64 {
     shared.status().map(|status| status.at_ms).unwrap_or_default()
 }
 
 /// `PUT /api/v1/rules/{file}/draft`
 async fn save(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(name): Path<String>,
     SignedIn(person): SignedIn,
-    JsonBody(edited): JsonBody<Edited>,
+    JsonBody(edited): JsonBody<EditedScript>,
 ) -> Result<Response, ApiProblem> {
     named(&name)?;
     let (words, answer) = aside(move || {
@@ -225,7 +225,7 @@ async fn save(
 }
 
 /// `DELETE /api/v1/rules/{file}/draft`
-async fn discard(State(shared): State<Shared>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
+async fn discard(State(shared): State<ServerState>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
     named(&name)?;
     let words = format!("{name}: its draft is discarded");
     aside(move || Drafts::of(&shared.data_dir).discard(&name).map_err(broken)).await?;
@@ -235,10 +235,10 @@ async fn discard(State(shared): State<Shared>, Path(name): Path<String>) -> Resu
 /// `POST /api/v1/rules/{file}/activate`: comes into charge when every script compiles and every trial passes; otherwise it stays
 /// a draft, and the answer (422) says why.
 async fn activate(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Path(name): Path<String>,
     SignedIn(person): SignedIn,
-    JsonBody(edited): JsonBody<Edited>,
+    JsonBody(edited): JsonBody<EditedScript>,
 ) -> Result<Response, ApiProblem> {
     named(&name)?;
     aside(move || {
@@ -264,7 +264,7 @@ async fn activate(
     .await
 }
 
-fn refused(shared: &Shared, name: &str, text: &str, found: &[Problem]) -> Response {
+fn refused(shared: &ServerState, name: &str, text: &str, found: &[Problem]) -> Response {
     let mut document = tried(shared, name, text);
     document["status"] = json!(422);
     document["title"] = json!("it does not come into charge: not every trial passes");

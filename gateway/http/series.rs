@@ -1,7 +1,7 @@
 //! `GET /api/v1/series`: what this history holds, and from when to when.
 
-use super::Shared;
-use super::history::{Answer, Given, reading, trouble};
+use super::ServerState;
+use super::history::{Answer, HistoryQuery, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::SeriesKind;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/series", || get(series))];
 
 /// `GET /api/v1/series`
-async fn series(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn series(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
         let span = reader.span().map_err(|error| trouble(&error))?;

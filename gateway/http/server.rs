@@ -1,6 +1,6 @@
 //! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
 
-use super::{Certificate, Shared, connection, router};
+use super::{Certificate, ServerState, connection, router};
 use crate::log::{Notice, Severity};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -44,7 +44,7 @@ impl Server {
     pub fn start(
         (listen, listener): (SocketAddr, Option<TcpListener>),
         certificate: Option<Certificate>,
-        shared: Shared,
+        shared: ServerState,
         report: watch::Sender<Option<String>>,
     ) -> Self {
         let (stop, stopped) = watch::channel(false);
@@ -62,7 +62,7 @@ impl Server {
 async fn serve(
     (listen, listener): (SocketAddr, Option<TcpListener>),
     certificate: Option<Certificate>,
-    shared: Shared,
+    shared: ServerState,
     mut stopped: watch::Receiver<bool>,
     report: watch::Sender<Option<String>>,
 ) {

@@ -1,6 +1,6 @@
 //! The settings of the scripts over the API: every one that is declared, with what is in force; one changed by a setter.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::told;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -24,7 +24,7 @@ pub(super) const ROUTES: &[Route] = &[
 /// A number, a text, or nothing: as elsewhere again.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
-enum Given {
+enum RequestedValue {
     Number(f64),
     Text(String),
 }
@@ -32,17 +32,17 @@ enum Given {
 /// One setting that is to have another value.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Asked {
+struct SettingRequest {
     script: String,
     name: String,
-    value: Option<Given>,
+    value: Option<RequestedValue>,
     #[serde(default)]
     tool: Option<String>,
     #[serde(default)]
     operation: Option<String>,
 }
 
-impl Asked {
+impl SettingRequest {
     fn wish(self) -> Result<Wish, ApiProblem> {
         let place = match (self.tool, self.operation) {
             (None, None) => Place::Machine,
@@ -53,8 +53,8 @@ impl Asked {
             }
         };
         let value = self.value.map(|value| match value {
-            Given::Number(number) => SettingValue::Number(number),
-            Given::Text(text) => SettingValue::Text(text),
+            RequestedValue::Number(number) => SettingValue::Number(number),
+            RequestedValue::Text(text) => SettingValue::Text(text),
         });
         let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
         Ok(Wish { script, name: self.name, place, value })
@@ -68,7 +68,7 @@ fn refused(problems: &[Problem]) -> ApiProblem {
 }
 
 /// `GET /api/v1/settings`
-async fn list(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     aside(move || {
         let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
         Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared))))
@@ -78,9 +78,9 @@ async fn list(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
 
 /// `PUT /api/v1/settings`: tried with every script first; in force within a second.
 async fn change(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(person): SignedIn,
-    JsonBody(asked): JsonBody<Asked>,
+    JsonBody(asked): JsonBody<SettingRequest>,
 ) -> Result<Response, ApiProblem> {
     let wish = asked.wish()?;
     aside(move || {

@@ -1,15 +1,15 @@
 //! Signing in and out, and who may: `/api/v1/login`, `logout`, `session`, `persons`.
 
-use super::Shared;
+use super::ServerState;
 use super::guard::{told, wrong};
-use super::history::{Answer, Given};
+use super::history::{Answer, HistoryQuery};
 use super::peer::Peer;
 use super::person::{JsonBody, SignedIn, cookie, name_of_cookie, set_cookie};
 use super::plain;
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::access::{Begun, Person, PersonsError, Role, Token};
+use crate::access::{NewSession, Person, PersonsError, Role, Token};
 use axum::Json;
 use axum::extract::{Extension, Form, FromRequest, Path, Query as Pairs, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -46,7 +46,7 @@ struct Login {
 }
 
 /// `POST /api/v1/login`, as JSON or from the form of `/sign-in`.
-async fn login(State(shared): State<Shared>, Extension(peer): Extension<Peer>, request: Request) -> Response {
+async fn login(State(shared): State<ServerState>, Extension(peer): Extension<Peer>, request: Request) -> Response {
     let kind = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let headers = request.headers().clone();
     if kind.starts_with("application/x-www-form-urlencoded") {
@@ -66,7 +66,7 @@ async fn login(State(shared): State<Shared>, Extension(peer): Extension<Peer>, r
     }
 }
 
-async fn login_by_form(shared: &Shared, peer: &Peer, headers: &HeaderMap, login: Login) -> Response {
+async fn login_by_form(shared: &ServerState, peer: &Peer, headers: &HeaderMap, login: Login) -> Response {
     match begin(shared, peer, &login).await {
         Ok((_, set)) => {
             let next = if plain::local(&login.next) { login.next.as_str() } else { "/" };
@@ -76,7 +76,7 @@ async fn login_by_form(shared: &Shared, peer: &Peer, headers: &HeaderMap, login:
     }
 }
 
-async fn begin(shared: &Shared, peer: &Peer, login: &Login) -> Result<(Begun, String), ApiProblem> {
+async fn begin(shared: &ServerState, peer: &Peer, login: &Login) -> Result<(NewSession, String), ApiProblem> {
     let begun = shared.access.sign_in(&login.name, &Token::typed(&login.token), peer.from).await;
     let begun = begun.map_err(|error| wrong(&error))?;
     let set = set_cookie(peer, &begun.cookie, shared.access.rules().session.as_secs());
@@ -84,7 +84,7 @@ async fn begin(shared: &Shared, peer: &Peer, login: &Login) -> Result<(Begun, St
 }
 
 /// `POST /api/v1/logout`
-async fn logout(State(shared): State<Shared>, Extension(peer): Extension<Peer>, headers: HeaderMap) -> Response {
+async fn logout(State(shared): State<ServerState>, Extension(peer): Extension<Peer>, headers: HeaderMap) -> Response {
     if let Some(cookie) = cookie(&headers, name_of_cookie(&peer)) {
         shared.access.sign_out(cookie, peer.from).await;
     }
@@ -97,11 +97,11 @@ async fn logout(State(shared): State<Shared>, Extension(peer): Extension<Peer>, 
 
 /// `GET /api/v1/session`
 async fn session(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     person: Option<SignedIn>,
     headers: HeaderMap,
-    Pairs(pairs): Given,
+    Pairs(pairs): HistoryQuery,
 ) -> Answer {
     QueryKeys::of(pairs, &[])?;
     let until = cookie(&headers, name_of_cookie(&peer)).and_then(|cookie| shared.access.of_cookie(cookie));
@@ -110,7 +110,7 @@ async fn session(
 
 /// `session/1`: who is signed in, for how long, and what the box lets such a person do. Times are lengths: the clock of a
 /// browser may be wrong.
-fn about(shared: &Shared, person: Option<(Person, Option<Instant>)>) -> Value {
+fn about(shared: &ServerState, person: Option<(Person, Option<Instant>)>) -> Value {
     let rules = shared.access.rules();
     let until = person.as_ref().and_then(|(_, until)| *until);
     let left_s = match (&person, until) {
@@ -137,7 +137,7 @@ fn about(shared: &Shared, person: Option<(Person, Option<Instant>)>) -> Value {
 }
 
 /// `GET /api/v1/persons`
-async fn persons(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn persons(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::of(pairs, &[])?;
     let persons = shared.access.persons();
     let rows: Vec<Value> =
@@ -154,7 +154,7 @@ struct NewPerson {
 
 /// `POST /api/v1/persons`: the token is in the answer, once.
 async fn add(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
     JsonBody(wish): JsonBody<NewPerson>,
 ) -> Result<Response, ApiProblem> {
@@ -171,7 +171,7 @@ struct NewRole {
 
 /// `PUT /api/v1/persons/{name}`
 async fn give_role(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
     Path(name): Path<String>,
     JsonBody(wish): JsonBody<NewRole>,
@@ -183,7 +183,7 @@ async fn give_role(
 
 /// `POST /api/v1/persons/{name}/token`: the token is in the answer, once; sessions with the one before end.
 async fn give_token(
-    State(shared): State<Shared>,
+    State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
     Path(name): Path<String>,
 ) -> Result<Response, ApiProblem> {
@@ -194,7 +194,7 @@ async fn give_token(
 }
 
 /// `DELETE /api/v1/persons/{name}`
-async fn remove(State(shared): State<Shared>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
+async fn remove(State(shared): State<ServerState>, Path(name): Path<String>) -> Result<Response, ApiProblem> {
     shared.access.change(|persons| persons.remove(&name)).await.map_err(trouble)?;
     Ok(told(Json(json!({ "schema": "person/1", "name": name, "role": null })), format!("{name} was removed")))
 }

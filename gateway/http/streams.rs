@@ -16,7 +16,7 @@ pub(super) struct Streams(Arc<Mutex<HashMap<IpAddr, usize>>>);
 
 /// One of them; it is given back when this goes.
 #[derive(Debug)]
-pub(super) struct Stream {
+pub(super) struct OpenStream {
     streams: Streams,
     from: IpAddr,
 }
@@ -26,7 +26,7 @@ impl Streams {
     ///
     /// # Errors
     /// There are too many.
-    pub(super) fn take(&self, from: IpAddr) -> Result<Stream, ApiProblem> {
+    pub(super) fn take(&self, from: IpAddr) -> Result<OpenStream, ApiProblem> {
         let mut counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let own = counts.get(&from).copied().unwrap_or(0);
         let refuse =
@@ -38,11 +38,11 @@ impl Streams {
             return refuse(format!("{STREAMS_MAX} clients listen already"));
         }
         counts.insert(from, own + 1);
-        Ok(Stream { streams: self.clone(), from })
+        Ok(OpenStream { streams: self.clone(), from })
     }
 }
 
-impl Drop for Stream {
+impl Drop for OpenStream {
     fn drop(&mut self) {
         let mut counts = self.streams.0.lock().unwrap_or_else(PoisonError::into_inner);
         match counts.get_mut(&self.from) {

@@ -1,11 +1,11 @@
 //! `GET /api/v1/twin`: the simulation beside the machine, and the diagnoses of the history.
 
-use super::Shared;
-use super::history::{Answer, Given, reading, trouble};
+use super::ServerState;
+use super::history::{Answer, HistoryQuery, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::diagnosis::kept::{self, Kept, Part};
-use crate::history::{Diagnosis, Span};
+use crate::diagnosis::kept::{self, DiagnosisFile, Kept};
+use crate::history::{Diagnosis, RecordSpan};
 use adapters::clock::TimeNs;
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
@@ -17,13 +17,13 @@ const DIAGNOSES_DEFAULT: u32 = 5;
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/twin", || get(twin))];
 
 /// `GET /api/v1/twin`
-pub(super) async fn twin(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+pub(super) async fn twin(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let keys = QueryKeys::of(pairs, &["limit"])?;
     let limit = keys.number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
     let status = shared.status()?;
     let kept = shared.desk.as_ref().map(|desk| desk.kept().clone());
     reading(shared, move |reader, _| {
-        let found = reader.diagnoses(Span::newest(limit)).map_err(|error| trouble(&error))?;
+        let found = reader.diagnoses(RecordSpan::newest(limit)).map_err(|error| trouble(&error))?;
         let diagnoses: Vec<Value> = found.iter().rev().map(|row| diagnosis(row, kept.as_ref())).collect();
         Ok(json!({ "schema": "twin/1", "at_ms": status.at_ms, "twin": status.twin, "diagnoses": diagnoses }))
     })
@@ -36,7 +36,7 @@ fn diagnosis(found: &Diagnosis, kept: Option<&Kept>) -> Value {
     let ms = |at_ns: TimeNs| at_ns.div_euclid(1_000_000);
     let key = kept::key(found);
     let words = kept.and_then(|kept| kept.words(&key));
-    let model = kept.is_some_and(|kept| kept.path(&key, Part::Model).exists());
+    let model = kept.is_some_and(|kept| kept.path(&key, DiagnosisFile::Model).exists());
     json!({
         "at_ms": ms(found.at_ns),
         "from_ms": ms(found.from_ns),

@@ -1,11 +1,11 @@
 //! `GET /api/v1/utilisation`: seconds in each machine state, by hour, shift, day or week of the reader's own clock.
 
-use super::Shared;
-use super::history::{Answer, Given, range, reading, trouble};
+use super::ServerState;
+use super::history::{Answer, HistoryQuery, range, reading, trouble};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::history::{Reader, Span, StateHour};
+use crate::history::{Reader, RecordSpan, StateHour};
 use crate::moment::time_of_day;
 use adapters::clock::{SECOND_NS, TimeNs};
 use axum::extract::{Query as Pairs, State};
@@ -23,7 +23,7 @@ const SHIFTS_MAX: usize = 12;
 
 /// How the time is cut.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum By {
+enum GroupBy {
     Hour,
     Day,
     Week,
@@ -31,7 +31,7 @@ enum By {
     Shift(Vec<i64>),
 }
 
-impl By {
+impl GroupBy {
     /// Beginning of the stretch that holds this minute of the reader's clock (minutes since 1970, local).
     fn begin(&self, minute: i64) -> i64 {
         let day = minute.div_euclid(DAY_MINUTES);
@@ -70,12 +70,12 @@ fn shifts(keys: &QueryKeys, usual: &[i64]) -> Result<Vec<i64>, ApiProblem> {
     Ok(starts)
 }
 
-fn cut(keys: &QueryKeys, usual: &[i64]) -> Result<By, ApiProblem> {
+fn cut(keys: &QueryKeys, usual: &[i64]) -> Result<GroupBy, ApiProblem> {
     match keys.text("by") {
-        None | Some("day") => Ok(By::Day),
-        Some("hour") => Ok(By::Hour),
-        Some("week") => Ok(By::Week),
-        Some("shift") => shifts(keys, usual).map(By::Shift),
+        None | Some("day") => Ok(GroupBy::Day),
+        Some("hour") => Ok(GroupBy::Hour),
+        Some("week") => Ok(GroupBy::Week),
+        Some("shift") => shifts(keys, usual).map(GroupBy::Shift),
         Some(other) => {
             Err(ApiProblem::request(format!("by={other} is not known"), "write by=hour, shift, day or week"))
         }
@@ -85,7 +85,7 @@ fn cut(keys: &QueryKeys, usual: &[i64]) -> Result<By, ApiProblem> {
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/utilisation", || get(utilisation))];
 
 /// `GET /api/v1/utilisation`
-async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn utilisation(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     let keys = QueryKeys::of(pairs, &["from", "to", "by", "shifts", "offset_min"])?;
     let usual = shared.configured.config.http.shifts.clone();
     let by = cut(&keys, &usual)?;
@@ -107,9 +107,9 @@ async fn utilisation(State(shared): State<Shared>, Pairs(pairs): Given) -> Answe
 
 /// The stored hours, and those of the state that lasts.
 fn hours(reader: &Reader, from_ns: TimeNs, to_ns: TimeNs, newest_ns: TimeNs) -> Result<Vec<StateHour>, ApiProblem> {
-    let span = Span::between(from_ns, to_ns, HOURS_MAX);
+    let span = RecordSpan::between(from_ns, to_ns, HOURS_MAX);
     let mut hours = reader.state_hours(span).map_err(|error| trouble(&error))?;
-    let newest = reader.states(Span::between(from_ns, to_ns, 1)).map_err(|error| trouble(&error))?;
+    let newest = reader.states(RecordSpan::between(from_ns, to_ns, 1)).map_err(|error| trouble(&error))?;
     let open = newest.into_iter().find(|interval| interval.until_ns.is_none());
     let Some(open) = open else { return Ok(hours) };
     let (mut at_ns, end_ns) = (open.since_ns.max(from_ns), newest_ns.min(to_ns));
@@ -128,7 +128,7 @@ fn seconds(ns: i64) -> f64 {
 }
 
 /// Seconds per state, by beginning.
-fn gathered(hours: &[StateHour], by: &By, offset_min: i64) -> Vec<Value> {
+fn gathered(hours: &[StateHour], by: &GroupBy, offset_min: i64) -> Vec<Value> {
     let mut rows: BTreeMap<i64, BTreeMap<&str, f64>> = BTreeMap::new();
     for hour in hours {
         let local = hour.start_ns.div_euclid(MINUTE_NS) + offset_min;
@@ -151,18 +151,18 @@ mod tests {
     fn days_weeks_and_shifts_begin_where_the_readers_clock_says() {
         // 1970-01-07 was a Wednesday; its week began on Monday the 5th, day number 4.
         let wednesday_5_00 = 6 * DAY_MINUTES + 5 * 60;
-        assert_eq!(By::Day.begin(wednesday_5_00), 6 * DAY_MINUTES);
-        assert_eq!(By::Week.begin(wednesday_5_00), 4 * DAY_MINUTES);
-        let shift = By::Shift(vec![360, 840, 1320]);
+        assert_eq!(GroupBy::Day.begin(wednesday_5_00), 6 * DAY_MINUTES);
+        assert_eq!(GroupBy::Week.begin(wednesday_5_00), 4 * DAY_MINUTES);
+        let shift = GroupBy::Shift(vec![360, 840, 1320]);
         assert_eq!(shift.begin(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
         assert_eq!(shift.begin(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
-        assert_eq!(By::Week.begin(-1), -3 * DAY_MINUTES);
+        assert_eq!(GroupBy::Week.begin(-1), -3 * DAY_MINUTES);
     }
 
     #[test]
     fn hours_are_added_up_by_local_day() {
         let hour = |at: i64, seconds| StateHour { start_ns: at * HOUR_NS, state: "idle".to_owned(), seconds };
-        let rows = gathered(&[hour(15, 100.0), hour(16, 200.0), hour(40, 50.0)], &By::Day, 8 * 60);
+        let rows = gathered(&[hour(15, 100.0), hour(16, 200.0), hour(40, 50.0)], &GroupBy::Day, 8 * 60);
         let told: Vec<_> = rows.iter().map(|row| (row["from_ms"].as_i64(), row["total_s"].as_f64())).collect();
         let day_ms = 86_400_000;
         let eight_h_ms = 8 * 3_600_000;

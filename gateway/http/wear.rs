@@ -1,7 +1,7 @@
 //! `GET /api/v1/wear`: the library of wear models, each with what it is for and how well it fits.
 
-use super::Shared;
-use super::history::{Answer, Given, reading, trouble};
+use super::ServerState;
+use super::history::{Answer, HistoryQuery, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::history::StoredWearModel;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(wear))];
 
 /// `GET /api/v1/wear`
-async fn wear(State(shared): State<Shared>, Pairs(pairs): Given) -> Answer {
+async fn wear(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     QueryKeys::of(pairs, &[])?;
     reading(shared, |reader, _| {
         let models = reader.wear_models().map_err(|error| trouble(&error))?;

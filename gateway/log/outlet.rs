@@ -15,10 +15,10 @@ const WAITING_MAX: usize = 1024;
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
 /// Where the lines go.
-type Stream = Box<dyn Write + Send>;
+type LogStream = Box<dyn Write + Send>;
 
 #[derive(Debug, Default)]
-struct Counts {
+struct LineCounts {
     /// Lines handed in, those left out included.
     handed: AtomicU64,
     /// Lines written or left out.
@@ -31,14 +31,14 @@ struct Counts {
 #[derive(Debug)]
 pub(super) struct Outlet {
     lines: Option<SyncSender<Vec<u8>>>,
-    counts: Arc<Counts>,
+    counts: Arc<LineCounts>,
 }
 
 impl Outlet {
     /// Starts the thread of this name. Without one, nothing is written.
-    pub(super) fn start(name: &str, stream: Stream) -> Self {
+    pub(super) fn start(name: &str, stream: LogStream) -> Self {
         let (lines, waiting) = sync_channel(WAITING_MAX);
-        let counts = Arc::new(Counts::default());
+        let counts = Arc::new(LineCounts::default());
         let of_thread = counts.clone();
         let thread =
             std::thread::Builder::new().name(name.to_owned()).spawn(move || work(&waiting, stream, &of_thread));
@@ -68,7 +68,7 @@ impl Outlet {
     }
 }
 
-fn work(waiting: &Receiver<Vec<u8>>, mut stream: Stream, counts: &Counts) {
+fn work(waiting: &Receiver<Vec<u8>>, mut stream: LogStream, counts: &LineCounts) {
     let mut told = 0;
     for line in waiting {
         // Whoever closed the terminal is no reason to stop the box.

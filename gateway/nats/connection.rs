@@ -1,6 +1,6 @@
 //! One connection to one server. Every wait of [`Connection::next`] may be dropped and begun again.
 
-use super::wire::{Inbox, Operation, ServerInfo};
+use super::wire::{ReceivedBytes, ServerInfo, ServerOperation};
 use super::{NatsError, NatsTarget, words};
 use adapters::address::Endpoint;
 use serde_json::json;
@@ -29,7 +29,7 @@ impl<T: AsyncRead + AsyncWrite + Send + Unpin> Duplex for T {}
 pub struct Connection {
     stream: Box<dyn Duplex>,
     at: Endpoint,
-    inbox: Inbox,
+    inbox: ReceivedBytes,
     waiting_out: Vec<u8>,
     info: ServerInfo,
     answers: String,
@@ -74,7 +74,7 @@ impl Connection {
         let mut connection = Self {
             stream: Box::new(stream),
             at: at.clone(),
-            inbox: Inbox::default(),
+            inbox: ReceivedBytes::default(),
             waiting_out: Vec::new(),
             info: ServerInfo::default(),
             answers: format!("_INBOX.{}", adapters::mqtt::unique()),
@@ -82,7 +82,7 @@ impl Connection {
             next_subscription: ANSWERS + 1,
         };
         connection.info = match connection.take().await? {
-            Operation::Info(info) => info,
+            ServerOperation::Info(info) => info,
             other => return Err(words::no_nats(at, &format!("{other:?}"))),
         };
         let offers = connection.info.tls_required || connection.info.tls_available;
@@ -115,8 +115,8 @@ impl Connection {
         self.waiting_out.extend(text.as_bytes());
         loop {
             match self.take().await? {
-                Operation::Pong => return Ok(()),
-                Operation::Error(said) => return Err(words::of_server(&self.at, &said)),
+                ServerOperation::Pong => return Ok(()),
+                ServerOperation::Error(said) => return Err(words::of_server(&self.at, &said)),
                 _ => {}
             }
         }
@@ -193,22 +193,22 @@ impl Connection {
     pub async fn next(&mut self) -> Result<Message, NatsError> {
         loop {
             match self.take().await? {
-                Operation::Message(message) => return Ok(message),
-                Operation::Error(said) => return Err(words::of_server(&self.at, &said)),
-                Operation::Info(info) if info.ldm => {
+                ServerOperation::Message(message) => return Ok(message),
+                ServerOperation::Error(said) => return Err(words::of_server(&self.at, &said)),
+                ServerOperation::Info(info) if info.ldm => {
                     let what = format!("{}:{} is about to stop", self.at.host, self.at.port);
                     return Err(NatsError::new(what, "the next server is used, where the address names one"));
                 }
-                Operation::Info(info) => self.info = info,
+                ServerOperation::Info(info) => self.info = info,
                 _ => {}
             }
         }
     }
 
-    async fn take(&mut self) -> Result<Operation, NatsError> {
+    async fn take(&mut self) -> Result<ServerOperation, NatsError> {
         loop {
             match self.inbox.take().map_err(|came| words::no_nats(&self.at, &came))? {
-                Some(Operation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
+                Some(ServerOperation::Ping) => self.waiting_out.extend(b"PONG\r\n"),
                 Some(operation) => return Ok(operation),
                 None => {
                     self.flush().await?;

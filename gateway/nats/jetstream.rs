@@ -32,7 +32,7 @@ pub struct Outgoing {
 
 /// Why a message was not stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Failure {
+pub enum JetStreamFailure {
     /// The connection, or the cluster for the time being.
     Line(NatsError),
     /// This message will never be stored.
@@ -81,7 +81,7 @@ impl Connection {
     ///
     /// # Errors
     /// The index of the first that is not stored, and why.
-    pub async fn publish_all(&mut self, messages: &[Outgoing]) -> Result<u64, (usize, Failure)> {
+    pub async fn publish_all(&mut self, messages: &[Outgoing]) -> Result<u64, (usize, JetStreamFailure)> {
         let oversize = |message: &Outgoing| message.payload.len() + message.id.len() + 40 > self.max_payload();
         let sendable = messages.iter().position(oversize).unwrap_or(messages.len());
         let mut first_token = None;
@@ -93,11 +93,11 @@ impl Connection {
         let first_token = first_token.unwrap_or(0);
         let mut open: Vec<bool> = vec![true; sendable];
         let (mut left, mut duplicates) = (sendable, 0);
-        let mut failed: Option<(usize, Failure)> = None;
+        let mut failed: Option<(usize, JetStreamFailure)> = None;
         let until = Instant::now() + DEADLINE;
         while left > 0 {
             let first_open = open.iter().position(|open| *open).unwrap_or(0);
-            let line = |error| (first_open, Failure::Line(error));
+            let line = |error| (first_open, JetStreamFailure::Line(error));
             let waited = timeout_at(until, self.next()).await;
             let late = |_| line(words::silent(self.at(), "a message is not acknowledged"));
             let came = waited.map_err(late)?.map_err(line)?;
@@ -119,7 +119,7 @@ impl Connection {
             None if sendable < messages.len() => {
                 let (length, most) = (messages[sendable].payload.len(), self.max_payload());
                 let what = format!("its {length} bytes are more than the {most} that the server takes");
-                Err((sendable, Failure::Message(NatsError::new(what, "raise max_payload of the server"))))
+                Err((sendable, JetStreamFailure::Message(NatsError::new(what, "raise max_payload of the server"))))
             }
             None => Ok(duplicates),
         }
@@ -259,17 +259,17 @@ impl Connection {
 }
 
 /// Was the message there already?
-fn acknowledgement(came: &Message, subject: &str) -> Result<bool, Failure> {
+fn acknowledgement(came: &Message, subject: &str) -> Result<bool, JetStreamFailure> {
     if came.status.as_ref().is_some_and(|(code, _)| *code == NO_RESPONDERS) {
-        return Err(Failure::Line(words::no_stream(subject)));
+        return Err(JetStreamFailure::Line(words::no_stream(subject)));
     }
     let answer: Json = serde_json::from_slice(&came.payload).unwrap_or(Json::Null);
     match refusal(&answer) {
-        Some((code, said)) if TOO_LARGE.contains(&code) => Err(Failure::Message(NatsError::new(
+        Some((code, said)) if TOO_LARGE.contains(&code) => Err(JetStreamFailure::Message(NatsError::new(
             format!("JetStream says {said:?}"),
             "raise max_msg_size of the stream",
         ))),
-        Some((code, said)) => Err(Failure::Line(words::of_jetstream(code, &said))),
+        Some((code, said)) => Err(JetStreamFailure::Line(words::of_jetstream(code, &said))),
         None => Ok(answer["duplicate"].as_bool().unwrap_or(false)),
     }
 }

@@ -40,7 +40,7 @@ pub struct Message {
 
 /// What a server says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Operation {
+pub(super) enum ServerOperation {
     Info(ServerInfo),
     Message(Message),
     Ping,
@@ -51,17 +51,17 @@ pub(super) enum Operation {
 
 /// Bytes that have come and are not taken yet.
 #[derive(Debug, Default)]
-pub(super) struct Inbox {
+pub(super) struct ReceivedBytes {
     pub(super) bytes: Vec<u8>,
     start: usize,
 }
 
-impl Inbox {
+impl ReceivedBytes {
     /// The next operation, `None` until enough has come.
     ///
     /// # Errors
     /// What came is no NATS, in words.
-    pub(super) fn take(&mut self) -> Result<Option<Operation>, String> {
+    pub(super) fn take(&mut self) -> Result<Option<ServerOperation>, String> {
         let waiting = &self.bytes[self.start..];
         let found = parse(waiting)?;
         let taken = found.map(|(operation, length)| {
@@ -77,7 +77,7 @@ impl Inbox {
 }
 
 /// The first operation and its length.
-fn parse(bytes: &[u8]) -> Result<Option<(Operation, usize)>, String> {
+fn parse(bytes: &[u8]) -> Result<Option<(ServerOperation, usize)>, String> {
     let Some(end) = bytes.windows(2).take(LINE_MAX).position(|pair| pair == b"\r\n") else {
         let endless = bytes.len() > LINE_MAX;
         return if endless { Err("a line without an end".to_owned()) } else { Ok(None) };
@@ -88,18 +88,20 @@ fn parse(bytes: &[u8]) -> Result<Option<(Operation, usize)>, String> {
     let operation = match verb.to_ascii_uppercase().as_str() {
         "MSG" => return message(&bytes[after..], rest, false).map(|found| found.map(|(m, n)| (m, after + n))),
         "HMSG" => return message(&bytes[after..], rest, true).map(|found| found.map(|(m, n)| (m, after + n))),
-        "PING" => Operation::Ping,
-        "PONG" => Operation::Pong,
-        "+OK" => Operation::Fine,
-        "-ERR" => Operation::Error(rest.trim().trim_matches('\'').to_owned()),
-        "INFO" => Operation::Info(serde_json::from_str(rest).map_err(|error| format!("an unreadable INFO: {error}"))?),
+        "PING" => ServerOperation::Ping,
+        "PONG" => ServerOperation::Pong,
+        "+OK" => ServerOperation::Fine,
+        "-ERR" => ServerOperation::Error(rest.trim().trim_matches('\'').to_owned()),
+        "INFO" => {
+            ServerOperation::Info(serde_json::from_str(rest).map_err(|error| format!("an unreadable INFO: {error}"))?)
+        }
         _ => return Err(format!("{:?}", line.chars().take(40).collect::<String>())),
     };
     Ok(Some((operation, after)))
 }
 
 /// `subject sid [reply] [header bytes] bytes`, then the content.
-fn message(content: &[u8], line: &str, headed: bool) -> Result<Option<(Operation, usize)>, String> {
+fn message(content: &[u8], line: &str, headed: bool) -> Result<Option<(ServerOperation, usize)>, String> {
     let unreadable = || format!("an unreadable message line {line:?}");
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let lengths = if headed { 2 } else { 1 };
@@ -121,7 +123,7 @@ fn message(content: &[u8], line: &str, headed: bool) -> Result<Option<(Operation
     let status = status(&content[..header]);
     let payload = content[header..total].to_vec();
     let message = Message { subject: subject.to_owned(), subscription, reply, status, payload };
-    Ok(Some((Operation::Message(message), total + 2)))
+    Ok(Some((ServerOperation::Message(message), total + 2)))
 }
 
 /// `NATS/1.0 503 No Responders`: code and words, where the first line of the header has them.
@@ -137,8 +139,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn inbox(bytes: &[u8]) -> Inbox {
-        Inbox { bytes: bytes.to_vec(), start: 0 }
+    fn inbox(bytes: &[u8]) -> ReceivedBytes {
+        ReceivedBytes { bytes: bytes.to_vec(), start: 0 }
     }
 
     #[test]
@@ -146,14 +148,14 @@ mod tests {
         let mut inbox = inbox(
             b"MSG a.b 1 5\r\nhello\r\nHMSG _INBOX.x.7 2 $JS.ACK.1 16 18\r\nNATS/1.0 503\r\n\r\nok\r\nPING\r\n+OK\r\n-ERR 'Authorization Violation'\r\n",
         );
-        let Ok(Some(Operation::Message(first))) = inbox.take() else { panic!("a message") };
+        let Ok(Some(ServerOperation::Message(first))) = inbox.take() else { panic!("a message") };
         assert_eq!((first.subject.as_str(), first.subscription, first.payload.as_slice()), ("a.b", 1, &b"hello"[..]));
-        let Ok(Some(Operation::Message(second))) = inbox.take() else { panic!("a message") };
+        let Ok(Some(ServerOperation::Message(second))) = inbox.take() else { panic!("a message") };
         assert_eq!(second.status, Some((503, String::new())));
         assert_eq!((second.reply.as_deref(), second.payload.as_slice()), (Some("$JS.ACK.1"), &b"ok"[..]));
-        assert_eq!(inbox.take(), Ok(Some(Operation::Ping)));
-        assert_eq!(inbox.take(), Ok(Some(Operation::Fine)));
-        assert_eq!(inbox.take(), Ok(Some(Operation::Error("Authorization Violation".to_owned()))));
+        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Ping)));
+        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Fine)));
+        assert_eq!(inbox.take(), Ok(Some(ServerOperation::Error("Authorization Violation".to_owned()))));
         assert_eq!(inbox.take(), Ok(None));
         assert!(inbox.bytes.is_empty());
     }
@@ -185,7 +187,7 @@ mod tests {
             prop_assert_eq!(early.is_some(), cut == whole.len());
             if early.is_none() {
                 inbox.bytes.extend(&whole[cut..]);
-                let Ok(Some(Operation::Message(message))) = inbox.take() else { panic!("whole") };
+                let Ok(Some(ServerOperation::Message(message))) = inbox.take() else { panic!("whole") };
                 prop_assert_eq!(message.payload, payload);
             }
         }

@@ -12,7 +12,7 @@ use adapters::Sample;
 use rules::operations::{Completion, Lookup, Recipe};
 use rules::script::Problem;
 use std::path::{Path, PathBuf};
-use watch::Found;
+use watch::RecipeResult;
 
 pub use watch::read;
 
@@ -21,7 +21,7 @@ pub const SOURCE: &str = "operations";
 
 /// A recipe and the text it was read from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Loaded {
+pub struct LoadedRecipe {
     /// The table.
     pub recipe: Recipe,
     /// The file.
@@ -33,9 +33,9 @@ pub struct Loaded {
 pub struct Operations {
     path: PathBuf,
     completion: Completion,
-    active: Option<Loaded>,
+    active: Option<LoadedRecipe>,
     refused: Vec<Problem>,
-    watcher: Option<Lookout<Found>>,
+    watcher: Option<Lookout<RecipeResult>>,
     told: Vec<Notice>,
     /// Name of the operation in force, or why there is none.
     in_force: Option<Result<String, &'static str>>,
@@ -66,7 +66,7 @@ impl Operations {
         operations
     }
 
-    fn take(&mut self, found: Found) {
+    fn take(&mut self, found: RecipeResult) {
         match found {
             Ok(loaded) => {
                 let (count, version) = (loaded.recipe.operations().len(), loaded.recipe.version());
@@ -127,12 +127,12 @@ impl Operations {
 
     /// What does not work, for the list of problems.
     #[must_use]
-    pub fn problem(&self) -> Option<status::Problem> {
+    pub fn problem(&self) -> Option<status::StatusProblem> {
         let first = self.refused.first()?;
         let more = self.refused.len() - 1;
         let others = if more > 0 { format!(" (and {more} more)") } else { String::new() };
         let what = format!("the operations recipe is refused, {}: {first}{others}", self.consequence());
-        Some(status::Problem { what, next: "correct the file; it is taken within two seconds".to_owned() })
+        Some(status::StatusProblem { what, next: "correct the file; it is taken within two seconds".to_owned() })
     }
 }
 

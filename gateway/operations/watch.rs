@@ -1,6 +1,6 @@
 //! The recipe on disk, read and checked beside the tick.
 
-use super::Loaded;
+use super::LoadedRecipe;
 use crate::files::{Lookout, Rest, advice, mark, read_text};
 use rules::operations::{TEXT_MAX, parse};
 use rules::script::Problem;
@@ -10,10 +10,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// The file cannot be read, or everything that is wrong in it.
-pub fn read(path: &Path) -> Result<Loaded, Vec<Problem>> {
+pub fn read(path: &Path) -> Result<LoadedRecipe, Vec<Problem>> {
     let name = path.display().to_string();
     let text = read_text(path, TEXT_MAX).map_err(|error| vec![unreadable(&name, &error)])?;
-    Ok(Loaded { recipe: parse(&name, &text)?, text })
+    Ok(LoadedRecipe { recipe: parse(&name, &text)?, text })
 }
 
 fn unreadable(name: &str, error: &std::io::Error) -> Problem {
@@ -26,13 +26,13 @@ fn unreadable(name: &str, error: &std::io::Error) -> Problem {
 }
 
 /// The recipe, or what is wrong with it.
-pub(super) type Found = Result<Loaded, Vec<Problem>>;
+pub(super) type RecipeResult = Result<LoadedRecipe, Vec<Problem>>;
 
 /// Watches one file; what is there now is known already. Asked, it takes a change without waiting for it to stand still.
 ///
 /// # Errors
 /// No thread could be started.
-pub(super) fn watch(path: &Path) -> std::io::Result<Lookout<Found>> {
+pub(super) fn watch(path: &Path) -> std::io::Result<Lookout<RecipeResult>> {
     let mut rest = Rest::known(mark(path));
     let path = path.to_owned();
     Lookout::start("operations", true, move |asked| rest.look(mark(&path), asked).then(|| read(&path)))

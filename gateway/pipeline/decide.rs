@@ -12,14 +12,14 @@ const RECENT: usize = 6;
 
 /// What was asked for, in whole percent: finer changes are not recorded one by one.
 #[derive(Debug, Clone, PartialEq)]
-struct Asked {
+struct RoundedRequest {
     pct: i64,
     reason: Arc<str>,
     script: Arc<str>,
     outcome: &'static str,
 }
 
-impl Asked {
+impl RoundedRequest {
     fn of(request: &OverrideRequest, verdict: &Verdict) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
         let pct = request.pct.round() as i64;
@@ -29,7 +29,7 @@ impl Asked {
 
 /// A change worth showing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct ShownChange {
     /// When.
     pub at_ns: TimeNs,
     /// In plain words.
@@ -39,16 +39,16 @@ pub struct Change {
 /// Remembers what was last recorded.
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
-    asked: Option<Asked>,
+    asked: Option<RoundedRequest>,
     stops: Vec<(Stop, Arc<str>)>,
     /// Whole micrometres: finer changes are not recorded one by one.
     offsets: Vec<(Axis, i64)>,
-    recent: VecDeque<Change>,
+    recent: VecDeque<ShownChange>,
 }
 
 impl Decisions {
     /// The latest changes, newest first.
-    pub fn recent(&self) -> impl Iterator<Item = &Change> {
+    pub fn recent(&self) -> impl Iterator<Item = &ShownChange> {
         self.recent.iter()
     }
 
@@ -65,7 +65,7 @@ impl Decisions {
         }
         self.stops(decision, &mut keep);
         self.offsets(decision, &mut keep);
-        let asked = decision.request.as_ref().map(|request| Asked::of(request, verdict));
+        let asked = decision.request.as_ref().map(|request| RoundedRequest::of(request, verdict));
         if asked != self.asked {
             keep(self.change(decision, verdict, asked).into());
         }
@@ -77,7 +77,7 @@ impl Decisions {
             if !self.stops.iter().any(|(stop, script)| *stop == request.stop && *script == request.script) {
                 keep(stop_row(request, decision.at_ns).into());
                 let text = format!("{} asked for ({})", request.stop.word(), request.reason);
-                self.recent.push_front(Change { at_ns: decision.at_ns, text });
+                self.recent.push_front(ShownChange { at_ns: decision.at_ns, text });
                 self.recent.truncate(RECENT);
             }
         }
@@ -100,7 +100,7 @@ impl Decisions {
         self.offsets.retain(|(axis, _)| decision.offsets.iter().any(|proposal| proposal.axis == *axis));
     }
 
-    fn change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<Asked>) -> DecisionRow {
+    fn change(&mut self, decision: &Decision, verdict: &Verdict, asked: Option<RoundedRequest>) -> DecisionRow {
         let at_ns = decision.at_ns;
         let before = std::mem::replace(&mut self.asked, asked);
         let (text, row) = match &decision.request {
@@ -115,7 +115,7 @@ impl Decisions {
                 ("the programmed feed, 100 %".to_owned(), row)
             }
         };
-        self.recent.push_front(Change { at_ns, text });
+        self.recent.push_front(ShownChange { at_ns, text });
         self.recent.truncate(RECENT);
         DecisionRow { outcome: verdict.word().to_owned(), outcome_reason: verdict.reason(), ..row }
     }
@@ -191,7 +191,7 @@ mod tests {
 
     fn verdict(at_ns: TimeNs) -> Verdict {
         let permitted = adapters::units::OverridePct::FULL;
-        Verdict { at_ns, wanted_pct: None, permitted, outcome: crate::gate::Outcome::Permitted, armed: false }
+        Verdict { at_ns, wanted_pct: None, permitted, outcome: crate::gate::GateOutcome::Permitted, armed: false }
     }
 
     #[test]

@@ -12,12 +12,12 @@ mod parts;
 mod tally;
 
 pub use channels::Channels;
-pub use decide::{Change, Decisions};
+pub use decide::{Decisions, ShownChange};
 use extras::{own, own_value};
 pub use extras::{series as stored_series, values as stored_values};
 pub use journal::Journal;
 pub use part_detail::{OperationUse, PartDetail, ToolUse};
-pub use parts::Parts;
+pub use parts::CycleFollower;
 pub use tally::Tally;
 
 use crate::gate::{Gate, OffsetVerdict, Verdict, offset};
@@ -61,7 +61,7 @@ pub struct Pipeline {
     verdict: Option<Verdict>,
     decisions: Decisions,
     journal: Journal,
-    parts: Parts,
+    parts: CycleFollower,
     tally: Tally,
     /// What the box itself proposes at this tick.
     proposal: Option<OffsetProposal>,
@@ -87,7 +87,7 @@ impl Pipeline {
             verdict: None,
             decisions: Decisions::default(),
             journal: Journal::default(),
-            parts: Parts::default(),
+            parts: CycleFollower::default(),
             tally: Tally::default(),
             proposal: None,
             request: None,
@@ -244,7 +244,7 @@ impl Pipeline {
 
     /// Finished parts.
     #[must_use]
-    pub fn parts(&self) -> &Parts {
+    pub fn parts(&self) -> &CycleFollower {
         &self.parts
     }
 

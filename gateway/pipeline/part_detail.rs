@@ -40,7 +40,7 @@ pub struct OperationUse {
 
 /// An operation in progress.
 #[derive(Debug, Clone, Default)]
-struct Operation {
+struct OpenOperation {
     name: String,
     seconds: f64,
     cutting_s: f64,
@@ -103,7 +103,7 @@ pub(super) struct Gathering {
     seconds: [f64; State::ALL.len()],
     peak_power_w: Option<f64>,
     tools: Vec<Tool>,
-    operations: Vec<Operation>,
+    operations: Vec<OpenOperation>,
 }
 
 impl Gathering {
@@ -130,7 +130,7 @@ impl Gathering {
     fn operate(&mut self, estimates: &Estimates, name: &str, power_w: Option<f64>, step_s: f64) {
         let index = self.operations.iter().position(|operation| operation.name == name).or_else(|| {
             (self.operations.len() < TOOLS_MAX).then(|| {
-                self.operations.push(Operation { name: name.to_owned(), ..Operation::default() });
+                self.operations.push(OpenOperation { name: name.to_owned(), ..OpenOperation::default() });
                 self.operations.len() - 1
             })
         });
@@ -198,7 +198,7 @@ impl ToolUse {
 }
 
 impl OperationUse {
-    fn of(operation: Operation) -> Self {
+    fn of(operation: OpenOperation) -> Self {
         let known = operation.power.seconds > 0.0;
         Self {
             operation: operation.name,

@@ -16,7 +16,7 @@ const BRIDGED_MAX_S: f64 = 10.0;
 
 /// Follows the cycle in progress.
 #[derive(Debug, Clone, Default)]
-pub struct Parts {
+pub struct CycleFollower {
     count: Option<f64>,
     part: Option<Arc<str>>,
     began_ns: Option<TimeNs>,
@@ -33,7 +33,7 @@ pub struct Parts {
     finished: u64,
 }
 
-impl Parts {
+impl CycleFollower {
     /// Parts finished since the start.
     #[must_use]
     pub fn finished(&self) -> u64 {
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn the_counter_finishes_parts_and_a_reset_does_not() {
-        let (channels, mut parts) = (Channels::new(), Parts::default());
+        let (channels, mut parts) = (Channels::new(), CycleFollower::default());
         let mut step = |at_s, count| parts.step(&channels, &sample(at_s, Ok(count), "A"), &in_state(State::Cutting));
         assert_eq!(step(0, 7.0), None);
         assert_eq!(step(1, 7.0), None);
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn without_a_counter_the_name_tells() {
-        let (channels, mut parts) = (Channels::new(), Parts::default());
+        let (channels, mut parts) = (Channels::new(), CycleFollower::default());
         let mut step =
             |at_s, part| parts.step(&channels, &sample(at_s, Err(Absence::NotProvided), part), &in_state(State::Idle));
         assert_eq!(step(0, "A"), None);

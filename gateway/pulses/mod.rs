@@ -16,7 +16,7 @@ const TAIL_SPACINGS: u64 = 4096;
 
 /// One row that goes in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Row {
+pub struct PulseRow {
     /// When, ns.
     pub at_ns: u64,
     /// The levels from then on.
@@ -98,7 +98,7 @@ impl Heads {
         Ok(Self { time: need("time_ns")?, a: need("a")?, b: need("b")?, request: at("request"), bypass: at("bypass") })
     }
 
-    fn row(&self, line: &str, number: usize) -> Result<Row, String> {
+    fn row(&self, line: &str, number: usize) -> Result<PulseRow, String> {
         let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let cell = |at: usize| cells.get(at).copied().unwrap_or("");
         let level = |at: usize, name: &str| match cell(at) {
@@ -119,12 +119,12 @@ impl Heads {
             "1" => Some(true),
             other => return Err(format!("line {number}: bypass is {other:?}; write 0 or 1")),
         };
-        Ok(Row { at_ns, lines: Lines { a: level(self.a, "a")?, b: level(self.b, "b")? }, request, bypass })
+        Ok(PulseRow { at_ns, lines: Lines { a: level(self.a, "a")?, b: level(self.b, "b")? }, request, bypass })
     }
 }
 
 /// A device with the decoder behind it.
-struct Bench {
+struct DecodedDevice {
     device: PulseInserter,
     decoder: Decoder,
     encoder: Decoder,
@@ -133,8 +133,8 @@ struct Bench {
     proof: Proof,
 }
 
-impl Bench {
-    fn new(first: &Row, spacing_ns: u64) -> Self {
+impl DecodedDevice {
+    fn new(first: &PulseRow, spacing_ns: u64) -> Self {
         let device = PulseInserter::new(first.lines, first.at_ns, spacing_ns);
         let decoder = Decoder::new(device.lines(), 0);
         Self {
@@ -147,7 +147,7 @@ impl Bench {
         }
     }
 
-    fn take(&mut self, row: &Row, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
+    fn take(&mut self, row: &PulseRow, out: &mut Vec<(u64, Lines)>) -> Result<(), String> {
         if let Some(bypass) = row.bypass {
             self.device.set_bypass(bypass);
         }
@@ -193,8 +193,8 @@ pub fn stream(
     first_request: i64,
 ) -> Result<Proof, String> {
     let mut heads = None;
-    let mut bench: Option<Bench> = None;
-    let mut last: Option<Row> = None;
+    let mut bench: Option<DecodedDevice> = None;
+    let mut last: Option<PulseRow> = None;
     let mut out = Vec::new();
     let io = |error: std::io::Error| error.to_string();
     writeln!(output, "time_ns,a,b").map_err(io)?;
@@ -210,7 +210,7 @@ pub fn stream(
         let mut row = heads.row(&line, index + 1)?;
         let bench = bench.get_or_insert_with(|| {
             row.request += first_request;
-            Bench::new(&row, spacing_ns)
+            DecodedDevice::new(&row, spacing_ns)
         });
         bench.take(&row, &mut out).map_err(|what| format!("line {}: {what}", index + 1))?;
         last = Some(row);

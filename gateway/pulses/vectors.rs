@@ -26,11 +26,11 @@ pub struct Vector {
 /// # Errors
 /// A vector that the device refuses: never, a test holds it.
 pub fn vectors() -> Result<Vec<Vector>, String> {
-    VECTORS.iter().map(Source::vector).collect()
+    VECTORS.iter().map(VectorSource::vector).collect()
 }
 
 /// How a vector is made: encoder edges at a pace, and requests.
-struct Source {
+struct VectorSource {
     name: &'static str,
     shows: &'static str,
     spacing_ns: u64,
@@ -40,71 +40,71 @@ struct Source {
     requests: &'static [(usize, i64, Option<bool>)],
 }
 
-const VECTORS: &[Source] = &[
-    Source {
+const VECTORS: &[VectorSource] = &[
+    VectorSource {
         name: "rest_up",
         shows: "three pulses up at rest, both lines low",
         spacing_ns: 250,
         motion: &[(0, 1000)],
         requests: &[(0, 3, None)],
     },
-    Source {
+    VectorSource {
         name: "rest_down",
         shows: "three pulses down at rest",
         spacing_ns: 250,
         motion: &[(0, 1000)],
         requests: &[(0, -3, None)],
     },
-    Source {
+    VectorSource {
         name: "forward",
         shows: "pulses up while the axis moves up: each waits for both lines low",
         spacing_ns: 250,
         motion: &[(40, 5000)],
         requests: &[(0, 4, None)],
     },
-    Source {
+    VectorSource {
         name: "forward_down",
         shows: "pulses down while the axis moves up",
         spacing_ns: 250,
         motion: &[(40, 5000)],
         requests: &[(0, -4, None)],
     },
-    Source {
+    VectorSource {
         name: "backward",
         shows: "pulses up while the axis moves down",
         spacing_ns: 250,
         motion: &[(-40, 5000)],
         requests: &[(0, 4, None)],
     },
-    Source {
+    VectorSource {
         name: "reversal",
         shows: "the axis reverses within a period while pulses wait",
         spacing_ns: 250,
         motion: &[(13, 4000), (-17, 4000), (9, 4000)],
         requests: &[(0, 2, None), (1, -3, None), (2, 2, None)],
     },
-    Source {
+    VectorSource {
         name: "not_low",
         shows: "the axis stands with a line high: nothing is inserted until it moves on",
         spacing_ns: 250,
         motion: &[(2, 4000), (0, 1000), (6, 4000)],
         requests: &[(1, 1, None)],
     },
-    Source {
+    VectorSource {
         name: "bypass",
         shows: "bypass holds pulses back, and lets them go",
         spacing_ns: 250,
         motion: &[(16, 4000), (16, 4000)],
         requests: &[(0, 2, Some(true)), (1, 0, Some(false))],
     },
-    Source {
+    VectorSource {
         name: "burst",
         shows: "a slow device: encoder edges wait their turn in order, none is lost",
         spacing_ns: 3000,
         motion: &[(8, 4000), (12, 1500), (8, 20000)],
         requests: &[(0, 1, None)],
     },
-    Source {
+    VectorSource {
         name: "there_and_back",
         shows: "what is inserted up and taken back adds up to nothing",
         spacing_ns: 250,
@@ -113,7 +113,7 @@ const VECTORS: &[Source] = &[
     },
 ];
 
-impl Source {
+impl VectorSource {
     fn vector(&self) -> Result<Vector, String> {
         let input = self.input();
         let mut expected = Vec::new();

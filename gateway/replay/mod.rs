@@ -8,7 +8,7 @@ mod resume;
 mod summary;
 
 pub use motion::Motion;
-pub use summary::{FileSummary, StoredRows, Summary};
+pub use summary::{FileSummary, ReplaySummary, StoredRows};
 
 use crate::cannot_run::CannotRun;
 use crate::config;
@@ -28,14 +28,14 @@ use rules::script::Host;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use summary::Counts;
+use summary::ReplayCounts;
 
 /// The progress is shown anew after so many rows.
 const PROGRESS_ROWS: u64 = 2048;
 
 /// What to replay, and where to.
 #[derive(Debug)]
-pub struct Plan {
+pub struct ReplayPlan {
     /// Recordings, in order.
     pub files: Vec<PathBuf>,
     /// What the recordings do not say of the cut; fills in channels that they lack.
@@ -51,13 +51,13 @@ pub struct Plan {
 }
 
 /// Stores what is not stored yet, and counts everything.
-struct Sink {
+struct ReplaySink {
     writer: Option<Writer>,
     before: Before,
-    counts: Counts,
+    counts: ReplayCounts,
 }
 
-impl Store for Sink {
+impl Store for ReplaySink {
     fn sample(&mut self, sample: &Sample, extras: &[ExtraValue<'_>]) {
         self.counts.rows += 1;
         if !self.before.has_row(self.counts.rows)
@@ -82,13 +82,13 @@ impl Store for Sink {
 ///
 /// # Errors
 /// A file that cannot be read, or a history that cannot be written.
-pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary, CannotRun> {
+pub fn replay(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) -> Result<ReplaySummary, CannotRun> {
     let began = Instant::now();
     let fresh = estimators::Inference::new(estimators::Settings::default());
     let mut pipeline = Pipeline::new(fresh, scripts, Gate::new(gate));
     library(plan, &mut pipeline)?;
     let mut files = Vec::new();
-    let mut counts = Counts::default();
+    let mut counts = ReplayCounts::default();
     let mut visibility = VisibilityTally::default();
     let mut motion = Motion::default();
     let mut next_ns = 0;
@@ -107,7 +107,7 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
         next_ns = last_ns + (UNKNOWN_PAUSE_S * 1e9) as i64;
     }
     let kept = plan.history.as_ref().map(|path| StoredRows::of(path, &counts));
-    Ok(Summary {
+    Ok(ReplaySummary {
         files,
         counts,
         kept,
@@ -121,7 +121,7 @@ pub fn replay(plan: &Plan, scripts: Host, gate: config::Gate) -> Result<Summary,
 
 /// Gives the pipeline the wear models of the history. A recording does not name its machine: a library of several machines is
 /// used for what names none.
-fn library(plan: &Plan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
+fn library(plan: &ReplayPlan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
     let Some(path) = plan.models.as_ref().or(plan.history.as_ref()).filter(|path| path.exists()) else { return Ok(()) };
     let cannot = |error: crate::history::HistoryError| CannotRun::new(error.to_string(), "");
     let stored = Reader::open(path).and_then(|reader| reader.wear_models()).map_err(cannot)?;
@@ -138,7 +138,7 @@ fn library(plan: &Plan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
 
 /// One recording on its way through the pipeline.
 struct OneFile<'a> {
-    plan: &'a Plan,
+    plan: &'a ReplayPlan,
     pipeline: &'a mut Pipeline,
     visibility: &'a mut VisibilityTally,
     motion: &'a mut Motion,
@@ -147,7 +147,7 @@ struct OneFile<'a> {
 
 impl OneFile<'_> {
     /// Replays the file, which begins at `next_ns` when it has no dates; what happened, and the time of the last row.
-    fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(Counts, TimeNs), CannotRun> {
+    fn run(&mut self, file: &Path, read: &ReadRecording, next_ns: TimeNs) -> Result<(ReplayCounts, TimeNs), CannotRun> {
         let origin = origin_of(file).map_err(|error| CannotRun::new(format!("{}: {error}", file.display()), ""))?;
         let before = self.before(&origin)?;
         let writer = self
@@ -163,7 +163,7 @@ impl OneFile<'_> {
             eprintln!("{}: storing in {} from row {} on", file.display(), path.display(), before.rows() + 1);
         }
         let bar = self.bar(rows, file);
-        let mut sink = Sink { writer, before, counts: Counts::default() };
+        let mut sink = ReplaySink { writer, before, counts: ReplayCounts::default() };
         let last_ns = self.through(source, &mut sink, &bar);
         bar.finish_and_clear();
         close(sink.writer.take())?;
@@ -176,7 +176,7 @@ impl OneFile<'_> {
         found.transpose().map(Option::unwrap_or_default).map_err(|error| CannotRun::new(error.to_string(), ""))
     }
 
-    fn through(&mut self, source: Replay, sink: &mut Sink, bar: &ProgressBar) -> TimeNs {
+    fn through(&mut self, source: Replay, sink: &mut ReplaySink, bar: &ProgressBar) -> TimeNs {
         let mut sources = Lockstep::new(vec![Box::new(source) as Box<dyn Pull>], Delay::Fixed(Duration::ZERO));
         let mut sample = Sample::empty(0);
         while let Some(now_ns) = sources.next_ns() {

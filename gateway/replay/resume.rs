@@ -1,6 +1,6 @@
 //! What a history already holds of a recording, so that a replay that was broken off stores nothing twice.
 
-use crate::history::{HistoryError, Reader, Record, Span, SqlValue, StateChange};
+use crate::history::{HistoryError, Reader, Record, RecordSpan, SqlValue, StateChange};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::estimators::Estimates;
@@ -59,7 +59,7 @@ impl Before {
         if rows == 0 {
             return Ok(Self { free_ns, ..Self::default() });
         }
-        let records = records(&reader, Span::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
+        let records = records(&reader, RecordSpan::between(last_ns - LOOK_BACK_NS, TimeNs::MAX, RECORDS_MAX))?;
         Ok(Self { origin_ns: Some(first_ns), free_ns, rows, records, state_ended: !state_open(&reader)? })
     }
 
@@ -124,7 +124,7 @@ fn state_open(reader: &Reader) -> Result<bool, HistoryError> {
 }
 
 /// Everything recorded in this time, as it was handed in.
-fn records(reader: &Reader, span: Span) -> Result<Vec<Record>, HistoryError> {
+fn records(reader: &Reader, span: RecordSpan) -> Result<Vec<Record>, HistoryError> {
     let mut records: Vec<Record> = Vec::new();
     records.extend(reader.events(span)?.into_iter().map(Record::from));
     records.extend(reader.parts(span)?.into_iter().map(Record::from));

@@ -14,7 +14,7 @@ const PROBLEMS_SHOWN: usize = 10;
 
 /// Sums of one or several files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
+pub struct ReplayCounts {
     /// Rows that went through the pipeline.
     pub rows: u64,
     /// Rows that were stored now.
@@ -27,7 +27,7 @@ pub struct Counts {
     pub state_changes: u64,
 }
 
-impl Counts {
+impl ReplayCounts {
     /// Counts a record.
     pub(super) fn record(&mut self, record: &Record) {
         match record {
@@ -90,18 +90,18 @@ pub struct StoredRows {
 }
 
 impl StoredRows {
-    pub(super) fn of(path: &Path, counts: &Counts) -> Self {
+    pub(super) fn of(path: &Path, counts: &ReplayCounts) -> Self {
         Self { path: path.to_owned(), stored: counts.stored, already: counts.rows - counts.stored }
     }
 }
 
 /// What a replay ends with: rows, seconds per state, parts, alarms, refused rows, visibility of the cut.
 #[derive(Debug)]
-pub struct Summary {
+pub struct ReplaySummary {
     /// The recordings.
     pub files: Vec<FileSummary>,
     /// Sums over all of them.
-    pub counts: Counts,
+    pub counts: ReplayCounts,
     /// Where the rows went.
     pub kept: Option<StoredRows>,
     /// Machine time in each state, s.
@@ -116,7 +116,7 @@ pub struct Summary {
     pub took: Duration,
 }
 
-impl Summary {
+impl ReplaySummary {
     fn refused(&self) -> u64 {
         self.files.iter().map(|file| file.refused).sum()
     }
@@ -157,7 +157,7 @@ impl Summary {
     }
 }
 
-impl fmt::Display for Summary {
+impl fmt::Display for ReplaySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (rows, took, rate) = (self.counts.rows, self.took.as_secs_f64(), self.rows_per_s());
         writeln!(f, "{rows} rows in {took:.2} s ({rate:.0} rows/s), {} refused", self.refused())?;

@@ -21,7 +21,7 @@ const DERIVED: [&str; 4] =
 const MEASURED: [&str; 8] = ["power", "current", "force", "torque", "load", "error", "_missing", "residual"];
 
 /// Where a column's values come from.
-enum Values<'a> {
+enum ColumnSource<'a> {
     Numbers(Cow<'a, Numbers>),
     Words(&'a Words),
     /// Seconds since the run began.
@@ -41,7 +41,7 @@ enum Cut {
 /// A column with its bins.
 pub(super) struct Binned<'a> {
     pub(super) name: String,
-    values: Values<'a>,
+    values: ColumnSource<'a>,
     cut: Cut,
 }
 
@@ -63,9 +63,9 @@ impl Binned<'_> {
     /// The value in a row of a quantity.
     pub(super) fn value(&self, data: &Data<'_>, row: usize) -> Option<f64> {
         match &self.values {
-            Values::Numbers(numbers) => numbers.get(row),
-            Values::Words(words) => words.code(row).map(f64::from),
-            Values::InRun => {
+            ColumnSource::Numbers(numbers) => numbers.get(row),
+            ColumnSource::Words(words) => words.code(row).map(f64::from),
+            ColumnSource::InRun => {
                 let run = data.runs.get(data.run_of(row))?;
                 Some(data.time_s(row) - data.time_s(run.rows.start))
             }
@@ -74,7 +74,7 @@ impl Binned<'_> {
 
     /// The bin of a row.
     pub(super) fn bin(&self, data: &Data<'_>, row: usize) -> Option<usize> {
-        if let (Values::Words(words), Cut::Words(_)) = (&self.values, &self.cut) {
+        if let (ColumnSource::Words(words), Cut::Words(_)) = (&self.values, &self.cut) {
             return words.code(row).and_then(|code| usize::try_from(code).ok());
         }
         let x = self.value(data, row)?;
@@ -118,22 +118,24 @@ pub(super) fn sample(data: &Data<'_>) -> Vec<usize> {
 /// Every column that may be an axis, cut into about `bins` bins.
 pub(super) fn candidates<'a>(data: &Data<'a>, rows: &[usize], bins: usize) -> Vec<Binned<'a>> {
     let recording = data.input.recording;
-    let mut sources: Vec<(String, Values<'a>)> = Vec::new();
+    let mut sources: Vec<(String, ColumnSource<'a>)> = Vec::new();
     for column in recording.columns().iter().filter(|column| may_be_axis(data, &column.name)) {
         match &column.cells {
-            Cells::Numbers(numbers) => sources.push((column.name.clone(), Values::Numbers(Cow::Borrowed(numbers)))),
+            Cells::Numbers(numbers) => {
+                sources.push((column.name.clone(), ColumnSource::Numbers(Cow::Borrowed(numbers))))
+            }
             Cells::Words(words) if GROUPS.contains(&column.name.as_str()) => {
-                sources.push((column.name.clone(), Values::Words(words)));
+                sources.push((column.name.clone(), ColumnSource::Words(words)));
             }
             Cells::Words(_) => {}
         }
     }
     for name in DERIVED.into_iter().filter(|name| recording.numbers(name).is_none()) {
         if let Some(numbers) = derived(recording, name) {
-            sources.push((name.to_owned(), Values::Numbers(Cow::Owned(numbers))));
+            sources.push((name.to_owned(), ColumnSource::Numbers(Cow::Owned(numbers))));
         }
     }
-    sources.push(("time_in_run_s".to_owned(), Values::InRun));
+    sources.push(("time_in_run_s".to_owned(), ColumnSource::InRun));
     sources.into_iter().filter_map(|(name, values)| binned(data, rows, bins, name, values)).collect()
 }
 
@@ -151,8 +153,14 @@ pub(super) fn describes(data: &Data<'_>, name: &str) -> bool {
     data.diagnosis.mismatch.iter().any(|region| region.conditions.iter().any(by))
 }
 
-fn binned<'a>(data: &Data<'a>, rows: &[usize], bins: usize, name: String, values: Values<'a>) -> Option<Binned<'a>> {
-    if let Values::Words(words) = &values {
+fn binned<'a>(
+    data: &Data<'a>,
+    rows: &[usize],
+    bins: usize,
+    name: String,
+    values: ColumnSource<'a>,
+) -> Option<Binned<'a>> {
+    if let ColumnSource::Words(words) = &values {
         let words = words.words().to_vec();
         let fits = (2..=WORDS_MAX).contains(&words.len());
         return fits.then_some(Binned { name, values, cut: Cut::Words(words) });
@@ -179,13 +187,13 @@ fn binned<'a>(data: &Data<'a>, rows: &[usize], bins: usize, name: String, values
 
 /// Mean and count per cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Cell {
+pub(super) struct BinCell {
     pub(super) sum: f64,
     pub(super) squares: f64,
     pub(super) rows: u32,
 }
 
-impl Cell {
+impl BinCell {
     pub(super) fn add(&mut self, x: f64) {
         self.sum += x;
         self.squares += x * x;
@@ -205,7 +213,7 @@ impl Cell {
 }
 
 /// Share of the variance that lies between the cells, less what chance alone would put there.
-pub(super) fn told(cells: &[Cell]) -> f64 {
+pub(super) fn told(cells: &[BinCell]) -> f64 {
     let rows: f64 = cells.iter().map(|cell| f64::from(cell.rows)).sum();
     let sum: f64 = cells.iter().map(|cell| cell.sum).sum();
     let squares: f64 = cells.iter().map(|cell| cell.squares).sum();
@@ -224,8 +232,8 @@ pub(super) fn told(cells: &[Cell]) -> f64 {
 mod tests {
     use super::*;
 
-    fn cell(values: &[f64]) -> Cell {
-        let mut cell = Cell::default();
+    fn cell(values: &[f64]) -> BinCell {
+        let mut cell = BinCell::default();
         values.iter().for_each(|x| cell.add(*x));
         cell
     }

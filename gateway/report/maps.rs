@@ -1,6 +1,6 @@
 //! Residual maps: the mean of recorded minus simulated over the two inputs that tell most, before and after.
 
-use super::bins::{Binned, Cell, candidates, sample, told};
+use super::bins::{BinCell, Binned, candidates, sample, told};
 use super::data::{Data, Fit};
 use super::text::{fixed, number, signed, with_unit};
 use rules::physics::explain::Language;
@@ -96,8 +96,8 @@ fn setting(data: &Data<'_>, column: &Binned<'_>) -> f64 {
     }
 }
 
-fn tally(data: &Data<'_>, rows: &[usize], count: usize, bin: impl Fn(usize) -> Option<usize>) -> Vec<Cell> {
-    let mut cells = vec![Cell::default(); count];
+fn tally(data: &Data<'_>, rows: &[usize], count: usize, bin: impl Fn(usize) -> Option<usize>) -> Vec<BinCell> {
+    let mut cells = vec![BinCell::default(); count];
     for row in rows {
         if let Some((bin, residual)) = bin(*row).zip(data.residual(*row, Fit::Before)) {
             cells[bin].add(residual);
@@ -107,13 +107,13 @@ fn tally(data: &Data<'_>, rows: &[usize], count: usize, bin: impl Fn(usize) -> O
 }
 
 /// A map of two columns that say the same is a diagonal: little of it is filled, and it tells no more than one column.
-fn filled(cells: &[Cell]) -> f64 {
+fn filled(cells: &[BinCell]) -> f64 {
     let used = cells.iter().filter(|cell| cell.rows >= ROWS_MIN).count();
     (used as f64 / cells.len().max(1) as f64).powf(0.25)
 }
 
-fn cells(data: &Data<'_>, across: &Binned<'_>, up: &Binned<'_>, fit: Fit) -> Vec<Cell> {
-    let mut cells = vec![Cell::default(); across.len() * up.len()];
+fn cells(data: &Data<'_>, across: &Binned<'_>, up: &Binned<'_>, fit: Fit) -> Vec<BinCell> {
+    let mut cells = vec![BinCell::default(); across.len() * up.len()];
     for row in 0..data.rows() {
         if let (Some(x), Some(y), Some(residual)) = (across.bin(data, row), up.bin(data, row), data.residual(row, fit))
         {
@@ -126,7 +126,7 @@ fn cells(data: &Data<'_>, across: &Binned<'_>, up: &Binned<'_>, fit: Fit) -> Vec
 fn map(
     data: &Data<'_>,
     (across, up): (&Binned<'_>, &Binned<'_>),
-    cells: &[Cell],
+    cells: &[BinCell],
     top: f64,
     fit: Option<Fit>,
 ) -> String {
@@ -159,7 +159,7 @@ fn cell(
     data: &Data<'_>,
     (across, up): (&Binned<'_>, &Binned<'_>),
     (x, y): (usize, usize),
-    cell: &Cell,
+    cell: &BinCell,
     top: f64,
 ) -> String {
     if cell.rows < ROWS_MIN {

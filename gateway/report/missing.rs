@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::place::capital;
-use super::table::{Head, table};
+use super::table::{ColumnHead, table};
 use super::text::{escape, exponent, fixed, law, number, unit_text, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Estimate, Missing};
@@ -60,10 +60,10 @@ fn parameters(data: &Data<'_>, missing: &Missing) -> String {
     }
     let rows: String = missing.parameters.iter().map(|e| parameter(data, &missing.effect, e)).collect();
     let heads = [
-        Head::Words(data.say("parameter", "参数")),
-        Head::Number(data.say("value", "值")),
-        Head::Number(data.say("95\u{202f}% interval", "95\u{202f}%区间")),
-        Head::Words(data.say("unit", "单位")),
+        ColumnHead::Words(data.say("parameter", "参数")),
+        ColumnHead::Number(data.say("value", "值")),
+        ColumnHead::Number(data.say("95\u{202f}% interval", "95\u{202f}%区间")),
+        ColumnHead::Words(data.say("unit", "单位")),
     ];
     table(&heads, &rows)
 }

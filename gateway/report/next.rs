@@ -1,7 +1,7 @@
 //! What else it could be, what to record next, bent parameters, data quality, and how to read the page.
 
 use super::data::Data;
-use super::table::{Head, listed};
+use super::table::{ColumnHead, listed};
 use super::text::{escape, fixed, number, signed, unit_text, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Alternative, Shift};
@@ -20,10 +20,10 @@ pub(super) fn alternatives(data: &Data<'_>) -> String {
         "此记录对下列解释的支持几乎相同。领先越小越难区分；不足6个单位不能作为证据。",
     );
     let heads = [
-        Head::Words(data.say("could also be", "也可能是")),
-        Head::Words(data.say("instead of", "而不是")),
-        Head::Number(data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）")),
-        Head::Words(data.say("what tells them apart", "区分方法")),
+        ColumnHead::Words(data.say("could also be", "也可能是")),
+        ColumnHead::Words(data.say("instead of", "而不是")),
+        ColumnHead::Number(data.say("lead of the best (units of information)", "最佳解释的领先（信息单位）")),
+        ColumnHead::Words(data.say("what tells them apart", "区分方法")),
     ];
     listed(data.say("What else it could be", "还可能是什么"), note, &heads, &rows)
 }
@@ -73,11 +73,11 @@ pub(super) fn shifts(data: &Data<'_>) -> String {
         "在缺少该效应时，拟合曾扭曲仿真的这些参数来模仿它。",
     );
     let heads = [
-        Head::Words(data.say("parameter", "参数")),
-        Head::Number(data.say("before", "之前")),
-        Head::Number(data.say("after", "之后")),
-        Head::Number(data.say("change", "变化")),
-        Head::Words(data.say("unit", "单位")),
+        ColumnHead::Words(data.say("parameter", "参数")),
+        ColumnHead::Number(data.say("before", "之前")),
+        ColumnHead::Number(data.say("after", "之后")),
+        ColumnHead::Number(data.say("change", "变化")),
+        ColumnHead::Words(data.say("unit", "单位")),
     ];
     listed(data.say("Parameters that had been bent", "曾被扭曲的参数"), note, &heads, &rows)
 }
@@ -128,9 +128,9 @@ pub(super) fn quality(data: &Data<'_>) -> String {
         "这些不会使比较产生偏差。没有可信数值的行未参与比较。",
     );
     let heads = [
-        Head::Words(data.say("what", "问题")),
-        Head::Words(data.say("column", "列")),
-        Head::Number(data.say("rows", "行数")),
+        ColumnHead::Words(data.say("what", "问题")),
+        ColumnHead::Words(data.say("column", "列")),
+        ColumnHead::Number(data.say("rows", "行数")),
     ];
     listed(title, note, &heads, &rows)
 }

@@ -1,7 +1,7 @@
 //! An effect over the input that governs it: the fitted law as a line, what the recording shows as points.
 
 use super::axis::Axis;
-use super::bins::{Binned, Cell, candidates, sample, told};
+use super::bins::{BinCell, Binned, candidates, sample, told};
 use super::data::{Data, Fit};
 use super::plot::{Curve, Plot};
 
@@ -30,8 +30,8 @@ pub(super) fn chart(data: &Data<'_>, effect: &str) -> String {
     if governed < GOVERNED_MIN { String::new() } else { drawn(data, &rows, &column, values) }
 }
 
-fn law(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -> Vec<Cell> {
-    let mut cells = vec![Cell::default(); column.len()];
+fn law(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -> Vec<BinCell> {
+    let mut cells = vec![BinCell::default(); column.len()];
     for row in rows {
         if let (Some(bin), Some(x)) = (column.bin(data, *row), values.get(*row)) {
             cells[bin].add(*x);
@@ -42,7 +42,7 @@ fn law(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -> 
 
 /// Mean input, law and law plus what remains, per bin.
 fn drawn(data: &Data<'_>, rows: &[usize], column: &Binned<'_>, values: &[f64]) -> String {
-    let mut cells = vec![(Cell::default(), Cell::default(), Cell::default()); column.len()];
+    let mut cells = vec![(BinCell::default(), BinCell::default(), BinCell::default()); column.len()];
     for row in rows {
         let here = column.bin(data, *row).zip(column.value(data, *row)).zip(values.get(*row));
         if let (Some(((bin, x), effect)), Some(rest)) = (here, data.residual(*row, Fit::After)) {

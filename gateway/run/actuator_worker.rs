@@ -8,8 +8,8 @@
 use super::priority::{self, Granted};
 use super::verdict_mailbox::VerdictMailbox;
 use crate::config;
-use crate::gate::offset::{Account, Moved, OffsetOrder};
-use crate::gate::{Ask, Fault, OverrideWriter, Reaction, Verdict, Written};
+use crate::gate::offset::{Moved, OffsetAccount, OffsetOrder};
+use crate::gate::{Fault, OverrideWriter, Reaction, ScriptRequest, Verdict, WriteRecord};
 use adapters::Actuator;
 use adapters::clock::{Clock, ManualClock, TimeNs};
 use std::sync::Arc;
@@ -37,13 +37,13 @@ const NOT_PASSED_ON: &str = "not handed over: the gate was disarmed before the c
 #[derive(Debug)]
 pub enum ActuatorReport {
     /// It wrote.
-    Written(Written),
+    Written(WriteRecord),
     /// A change was seen in force.
     Seen(Reaction),
     /// What was written is not in force, or the machine cannot be reached.
     Fault(Fault),
     /// A request went to the ladder, or could not be handed over.
-    Asked(Ask, Option<String>),
+    Asked(ScriptRequest, Option<String>),
     /// An order to shift an axis was carried out, or could not be.
     Moved(Box<Moved>),
     /// An order that was not carried out: the arming ended before its turn came, or it waited too long.
@@ -56,17 +56,17 @@ pub struct Tools {
     /// The way to the feed override.
     pub actuator: Option<Box<dyn Actuator>>,
     /// The way to the offsets.
-    pub offsets: Option<Account>,
+    pub offsets: Option<OffsetAccount>,
 }
 
 /// The same with the account of what was written.
 pub struct Writers {
     writer: Option<AnyWriter>,
-    offsets: Option<Account>,
+    offsets: Option<OffsetAccount>,
 }
 
 impl Writers {
-    fn of(tools: Tools, limits: &config::Gate) -> Self {
+    fn of(tools: Tools, limits: &config::GateConfig) -> Self {
         Self { writer: tools.actuator.map(|actuator| OverrideWriter::new(actuator, limits)), offsets: tools.offsets }
     }
 
@@ -74,7 +74,7 @@ impl Writers {
         self.writer.as_ref().is_some_and(OverrideWriter::is_waiting)
     }
 
-    fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
+    fn release(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
         self.writer.as_mut()?.release(clock)
     }
 
@@ -102,7 +102,7 @@ impl ActuatorWorker {
     /// There is no thread to be had.
     pub fn start(
         tools: Tools,
-        limits: &config::Gate,
+        limits: &config::GateConfig,
         clock: Arc<dyn Clock>,
         period: Duration,
     ) -> std::io::Result<Self> {
@@ -118,12 +118,18 @@ impl ActuatorWorker {
 
     /// At the tick, for accelerated time.
     #[must_use]
-    pub fn inline(tools: Tools, limits: &config::Gate) -> Self {
+    pub fn inline(tools: Tools, limits: &config::GateConfig) -> Self {
         Self::Inline(Box::new(Writers::of(tools, limits)), ManualClock::default())
     }
 
     /// Hands over what was decided at `now_ns`. What is told about it comes with [`ActuatorWorker::listen`].
-    pub fn step(&mut self, verdict: &Verdict, asks: &[Ask], now_ns: TimeNs, mut tell: impl FnMut(ActuatorReport)) {
+    pub fn step(
+        &mut self,
+        verdict: &Verdict,
+        asks: &[ScriptRequest],
+        now_ns: TimeNs,
+        mut tell: impl FnMut(ActuatorReport),
+    ) {
         match self {
             Self::None => {}
             Self::Inline(writers, clock) => {
@@ -238,7 +244,7 @@ fn work(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: 
     }
 }
 
-fn ask(writers: &mut Writers, ask: &Ask, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
+fn ask(writers: &mut Writers, ask: &ScriptRequest, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(writer) = &mut writers.writer else { return };
     let failed = writer.ask(ask.request, clock).err().map(|error| error.to_string());
     tell(ActuatorReport::Asked(ask.clone(), failed));

@@ -8,13 +8,15 @@ use super::network_requests::{self, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
 use super::report::milliseconds;
 use crate::config::{self, GateMode};
-use crate::control::{self, Inbox, NetworkRequest, Posted, PostedRequest, PostedRow, Reply, RequestedChange};
+use crate::control::{
+    self, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
+};
 use crate::gate::offset::{Moved, OffsetOrder};
-use crate::gate::{ArmError, Armed, Ask, AskOutcome, Disarmed, Fault, Gate, Occasion, Verdict, trail};
+use crate::gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, trail};
 use crate::history::{Alarm, AlarmClear, Audit, ReactionTime};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
-use crate::status::{Acknowledged, AlarmStatus, Problem};
+use crate::status::{Acknowledged, AlarmStatus, StatusProblem};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use rules::estimators::StateBasis;
@@ -33,7 +35,7 @@ pub struct Commands {
     shifting: OffsetCommands,
     /// Name of the source that is written to.
     target: String,
-    inbox: Inbox,
+    inbox: OrderReceiver,
     seen: AcknowledgedAlarms,
     network: NetworkRequests,
     trail: trail::Trail,
@@ -50,7 +52,12 @@ pub struct Commands {
 impl Commands {
     /// Commands that this worker writes to the source of this name.
     #[must_use]
-    pub fn new(actuator_worker: ActuatorWorker, shifting: OffsetCommands, target: String, inbox: Inbox) -> Self {
+    pub fn new(
+        actuator_worker: ActuatorWorker,
+        shifting: OffsetCommands,
+        target: String,
+        inbox: OrderReceiver,
+    ) -> Self {
         Self {
             actuator_worker,
             shifting,
@@ -94,7 +101,7 @@ impl Commands {
         if !std::mem::replace(&mut self.begun, true) {
             self.keep(trail::started(gate.limits(), sample.at_ns), gate, health);
         }
-        while let Ok(Posted { order, reply }) = self.inbox.orders.try_recv() {
+        while let Ok(QueuedOrder { order, reply }) = self.inbox.orders.try_recv() {
             let answer = self.order(&order, gate, sample, health);
             // Whoever has gone meanwhile finds it in the audit.
             let _gone = reply.send(answer);
@@ -208,7 +215,7 @@ impl Commands {
     pub fn step(
         &mut self,
         pipeline: &mut Pipeline,
-        asks: &[Ask],
+        asks: &[ScriptRequest],
         sample: &Sample,
         now_ns: TimeNs,
         health: &mut Health,
@@ -358,14 +365,14 @@ impl Commands {
     }
 
     /// What is wrong with the way to the machine.
-    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
+    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
         let next = "find the reason, then arm again with `cnc-gateway arm`".to_owned();
-        let alarm = self.alarm.as_ref().map(|(_, text, _)| Problem { what: text.clone(), next });
+        let alarm = self.alarm.as_ref().map(|(_, text, _)| StatusProblem { what: text.clone(), next });
         alarm.into_iter().chain(self.shifting.problems(gate))
     }
 }
 
-fn told(armed: &Armed, target: &str, limits: &config::Gate) -> String {
+fn told(armed: &Armed, target: &str, limits: &config::GateConfig) -> String {
     let what = match (limits.mode, limits.offset.mode) {
         (GateMode::Armed, GateMode::Armed) => "overrides and offsets are",
         (_, GateMode::Armed) => "offsets are",

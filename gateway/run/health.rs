@@ -9,7 +9,7 @@ use crate::alignment::{self, Alignment};
 use crate::history::{Audit, Event, ExtraValue, Record};
 use crate::log::{Notice, Severity};
 use crate::pipeline::{Pipeline, Store};
-use crate::status::{HistoryStatus, Problem};
+use crate::status::{HistoryStatus, StatusProblem};
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
 use std::path::{Path, PathBuf};
@@ -230,9 +230,9 @@ impl Health {
 
     /// What does not work, of the store too.
     #[must_use]
-    pub fn problems(&self, history: &HistoryStatus) -> Vec<Problem> {
+    pub fn problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
         let mut problems = Vec::new();
-        let mut add = |what: String, next: &str| problems.push(Problem { what, next: next.to_owned() });
+        let mut add = |what: String, next: &str| problems.push(StatusProblem { what, next: next.to_owned() });
         if let Some(what) = self.port.borrow().clone() {
             add(what, "stop the other program, or choose another port with --listen");
         }

@@ -3,8 +3,8 @@
 use super::recent::{self, Recent};
 use crate::config;
 use crate::history::{
-    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record, Retention, Span,
-    Writer, disk_room,
+    self, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record, RecordSpan,
+    Retention, Writer, disk_room,
 };
 use crate::log::{Notice, Severity};
 use crate::pipeline::Store;
@@ -53,7 +53,7 @@ impl HistoryStore {
     /// # Errors
     /// A history that belongs to somebody else: another gateway, a newer version, another program.
     pub fn open(
-        config: &config::History,
+        config: &config::HistoryConfig,
         beside: Vec<ExtraSeries>,
         outbox: Option<Outbox>,
     ) -> Result<Self, HistoryError> {
@@ -216,7 +216,7 @@ impl Store for HistoryStore {
 }
 
 /// What the writer has to tell: nothing becomes durable, or only at the cost of what is old.
-fn trouble(status: &history::Status) -> Option<String> {
+fn trouble(status: &history::HistoryFigures) -> Option<String> {
     let short = || status.short_of_room.then(|| SHORT.to_owned());
     status.degraded.clone().or_else(short)
 }
@@ -225,7 +225,7 @@ fn trouble(status: &history::Status) -> Option<String> {
 fn end_alarms(path: &Path, writer: &Writer) {
     let Ok(reader) = Reader::open(path) else { return };
     let Ok(Some((_, newest_ns))) = reader.span() else { return };
-    for alarm in reader.alarms(Span::newest(ALARMS_MAX)).unwrap_or_default() {
+    for alarm in reader.alarms(RecordSpan::newest(ALARMS_MAX)).unwrap_or_default() {
         if alarm.cleared_ns.is_none() {
             writer.record(AlarmClear { at_ns: newest_ns, code: alarm.code, source: alarm.source });
         }
@@ -237,7 +237,7 @@ fn foreign(error: &HistoryError) -> bool {
     matches!(error, HistoryError::InUse { .. } | HistoryError::NewerSchema { .. } | HistoryError::NotAHistory { .. })
 }
 
-fn options(config: &config::History, beside: Vec<ExtraSeries>, outbox: Option<Outbox>) -> Options {
+fn options(config: &config::HistoryConfig, beside: Vec<ExtraSeries>, outbox: Option<Outbox>) -> Options {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

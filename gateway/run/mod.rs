@@ -30,14 +30,14 @@ use crate::alignment;
 use crate::backup::take_restored;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
-use crate::control::{self, Inbox};
+use crate::control::{self, OrderReceiver};
 use crate::diagnosis::desk::Desk;
 use crate::gate::Gate;
-use crate::http::{Certificate, Configured, Parts, Published, Server, Shared, bind, port_trouble};
+use crate::http::{Certificate, Configured, Published, Server, ServerParts, ServerState, bind, port_trouble};
 use crate::log::{self, Notice, Severity};
 use crate::operations::Operations;
 use crate::pipeline::Pipeline;
-use crate::signals::{Request, Signals};
+use crate::signals::{SignalRequest, Signals};
 use actuator_worker::{ActuatorWorker, Tools};
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::{Actuator, OffsetSink};
@@ -49,7 +49,7 @@ use history_store::HistoryStore;
 use live_twin::Twin;
 use offset_commands::OffsetCommands;
 use open::{MachineSpeed, Sources, Way};
-use outputs::Outputs;
+use outputs::ConfiguredSinks;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,7 +68,7 @@ const FOLLOW_EVERY: Duration = Duration::from_secs(1);
 
 /// What the box shall do.
 #[derive(Debug)]
-pub struct Plan {
+pub struct RunPlan {
     /// The configuration.
     pub config: Config,
     /// Its file; `None`: the built-in one.
@@ -83,7 +83,7 @@ pub struct Plan {
 }
 
 /// The tick, ready to go, and what it publishes.
-type Begun = (Ticker, watch::Receiver<Option<Published>>);
+type StartedTicker = (Ticker, watch::Receiver<Option<Published>>);
 
 /// The ways to the feed override and to the offsets, where they may be written.
 type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
@@ -92,11 +92,11 @@ type Ends = (Option<Box<dyn Actuator>>, Option<Box<dyn OffsetSink>>);
 ///
 /// # Errors
 /// Everything that makes it impossible to begin.
-pub fn run(plan: Plan) -> Result<(), CannotRun> {
-    let outputs = Outputs::of(&plan.config);
+pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
+    let outputs = ConfiguredSinks::of(&plan.config);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
-        .max_blocking_threads(BLOCKING_MAX + outputs.as_ref().map_or(0, Outputs::threads))
+        .max_blocking_threads(BLOCKING_MAX + outputs.as_ref().map_or(0, ConfiguredSinks::threads))
         .thread_name("serve")
         .on_thread_start(priority::give_way)
         .enable_all()
@@ -119,7 +119,7 @@ pub fn run(plan: Plan) -> Result<(), CannotRun> {
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
 }
 
-fn address(plan: &Plan) -> Result<Option<SocketAddr>, CannotRun> {
+fn address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun> {
     let http = &plan.config.http;
     if !http.enabled {
         return Ok(None);
@@ -129,7 +129,7 @@ fn address(plan: &Plan) -> Result<Option<SocketAddr>, CannotRun> {
 }
 
 /// What is shown to whoever connects, where the page is served over TLS.
-fn certificate(plan: &Plan) -> Result<Option<Certificate>, CannotRun> {
+fn certificate(plan: &RunPlan) -> Result<Option<Certificate>, CannotRun> {
     let http = &plan.config.http;
     let Some(listen) = address(plan)?.filter(|_| http.tls) else { return Ok(None) };
     let directory = plan.config.gateway.data_dir.join("tls");
@@ -141,14 +141,14 @@ fn certificate(plan: &Plan) -> Result<Option<Certificate>, CannotRun> {
 }
 
 /// A port that the user named is opened before anything else starts.
-async fn listen(plan: &Plan) -> Result<Option<TcpListener>, CannotRun> {
+async fn listen(plan: &RunPlan) -> Result<Option<TcpListener>, CannotRun> {
     let Some(address) = address(plan)?.filter(|_| plan.port_named) else { return Ok(None) };
     let next = "stop the other program, or choose another port with --listen 127.0.0.1:8081";
     bind(address).await.map(Some).map_err(|error| CannotRun::new(port_trouble(address, &error), next))
 }
 
 /// The estimators and edges as they were remembered, the scripts in charge and the gate.
-fn pipeline(plan: &Plan, memory: &Path) -> (Pipeline, rules::Watched) {
+fn pipeline(plan: &RunPlan, memory: &Path) -> (Pipeline, rules::ScriptWatch) {
     let (mut scripts, watched) = rules::load(&plan.config);
     if plan.speed == MachineSpeed::Real {
         scripts.watch(Arc::new(RunLimit::new(RUN_MAX)));
@@ -159,12 +159,12 @@ fn pipeline(plan: &Plan, memory: &Path) -> (Pipeline, rules::Watched) {
 }
 
 fn ticker(
-    plan: &Plan,
+    plan: &RunPlan,
     run_flags: &Arc<RunFlags>,
     port: watch::Receiver<Option<String>>,
-    inbox: Inbox,
-    outputs: Option<&Outputs>,
-) -> Result<Begun, CannotRun> {
+    inbox: OrderReceiver,
+    outputs: Option<&ConfiguredSinks>,
+) -> Result<StartedTicker, CannotRun> {
     let config = &plan.config;
     let data_dir = &config.gateway.data_dir;
     // Before anything is read that a restore has laid ready.
@@ -238,13 +238,13 @@ fn ticker(
 /// The way to the machine. Unless the configuration allows arming there is no actuator in the process at all, and no sink
 /// of offsets.
 fn commands(
-    plan: &Plan,
+    plan: &RunPlan,
     mut ways: Vec<Way>,
-    inbox: Inbox,
+    inbox: OrderReceiver,
     clock: &Arc<dyn Clock>,
     gate: &mut Gate,
 ) -> Result<Commands, CannotRun> {
-    let limits: &config::Gate = &plan.config.gate;
+    let limits: &config::GateConfig = &plan.config.gate;
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();
     if limits.greatest_mode() != GateMode::Armed {
@@ -267,7 +267,7 @@ fn commands(
 }
 
 /// What may be written, and nothing else.
-fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Ends, CannotRun> {
+fn tools(limits: &config::GateConfig, ways: &mut [Way]) -> Result<Ends, CannotRun> {
     let (mut actuator, mut sink) = (None, None);
     if limits.mode == GateMode::Armed {
         let target = limits.source.as_deref().unwrap_or_default();
@@ -287,7 +287,7 @@ fn tools(limits: &config::Gate, ways: &mut [Way]) -> Result<Ends, CannotRun> {
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.
-fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs {
+fn start_ns(plan: &RunPlan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs {
     let Some(newest_ns) = history_store.newest_ns().filter(|newest_ns| *newest_ns >= now_ns) else { return now_ns };
     if plan.speed == MachineSpeed::Real {
         let text = "the history holds samples from the future (an accelerated run, or a clock that was wrong); \
@@ -300,12 +300,12 @@ fn start_ns(plan: &Plan, history_store: &HistoryStore, now_ns: TimeNs) -> TimeNs
 
 /// Serves until a signal says stop, or the tick has ended by itself.
 async fn serve(
-    plan: &Plan,
+    plan: &RunPlan,
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
     run_flags: &Arc<RunFlags>,
-    (report, post, desk): (watch::Sender<Option<String>>, control::Post, Option<Desk>),
-    outputs: Option<&Outputs>,
+    (report, post, desk): (watch::Sender<Option<String>>, control::OrderSender, Option<Desk>),
+    outputs: Option<&ConfiguredSinks>,
 ) {
     let sinks = outputs.map(|outputs| outputs.start(&post));
     let _listening = control::listen(&plan.config.gateway.data_dir, post.clone());
@@ -318,7 +318,7 @@ async fn serve(
             let (scripts, data_dir) = (plan.config.scripts.directory.clone(), plan.config.gateway.data_dir.clone());
             let live = live.clone();
             let configured = Configured { config: Arc::new(plan.config.clone()), file: plan.config_file.clone() };
-            let shared = Shared::new(Parts {
+            let shared = ServerState::new(ServerParts {
                 live,
                 history,
                 scripts,
@@ -349,7 +349,7 @@ async fn serve(
 }
 
 /// Who may do what on the page. The first start makes an administrator, whose token is shown this once.
-fn open_access(config: &Config, post: control::Post) -> Access {
+fn open_access(config: &Config, post: control::OrderSender) -> Access {
     let rules = access::Rules {
         tokens_always: config.http.tokens_always,
         session: config.http.session,
@@ -388,8 +388,8 @@ async fn obey(run_flags: &RunFlags) {
     };
     loop {
         match signals.next().await {
-            Request::Stop => return,
-            Request::Reload => run_flags.reload.store(true, Ordering::SeqCst),
+            SignalRequest::Stop => return,
+            SignalRequest::Reload => run_flags.reload.store(true, Ordering::SeqCst),
         }
     }
 }

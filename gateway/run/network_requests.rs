@@ -13,7 +13,7 @@ const STANDS_S: i64 = 60;
 
 /// One sink's feed override.
 #[derive(Debug, Clone)]
-struct Standing {
+struct ActiveRequest {
     request: OverrideRequest,
     until_ns: TimeNs,
 }
@@ -21,7 +21,7 @@ struct Standing {
 /// See the [module](self). At most one request per sink.
 #[derive(Debug, Default)]
 pub struct NetworkRequests {
-    standing: Vec<Standing>,
+    standing: Vec<ActiveRequest>,
 }
 
 impl NetworkRequests {
@@ -34,14 +34,14 @@ impl NetworkRequests {
         };
         let reason = if reason.is_empty() { "asked over the network" } else { reason };
         let request = OverrideRequest { pct: *pct, reason: reason.into(), script: author.into(), version: 0 };
-        self.standing.push(Standing { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
+        self.standing.push(ActiveRequest { request, until_ns: at_ns.saturating_add(STANDS_S * SECOND_NS) });
         Reply::done(format!("the gate is asked for {pct} % for {STANDS_S} s; it decides at every tick"))
     }
 
     /// The least of what stands at this tick; what is over goes.
     pub fn at(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
         // A clock that went back ends it too: it would stand for longer than it may.
-        let stands = |standing: &Standing| {
+        let stands = |standing: &ActiveRequest| {
             at_ns < standing.until_ns && standing.until_ns.saturating_sub(at_ns) <= STANDS_S * SECOND_NS
         };
         self.standing.retain(stands);

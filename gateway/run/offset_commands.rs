@@ -2,11 +2,11 @@
 
 use super::health::Health;
 use crate::cannot_run::CannotRun;
-use crate::gate::offset::{Account, Book, Moved, OffsetOrder, OffsetTrail};
+use crate::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder, OffsetTrail};
 use crate::gate::{Gate, OffsetVerdict};
 use crate::history::{Audit, Command};
 use crate::log::{Notice, Severity};
-use crate::status::Problem;
+use crate::status::StatusProblem;
 use adapters::SourceError;
 use adapters::offset::{Axis, Left, OffsetSink};
 use rules::script::OffsetProposal;
@@ -32,15 +32,17 @@ impl OffsetCommands {
     ///
     /// # Errors
     /// The book of what is left cannot be read, nor put aside.
-    pub fn resume(data_dir: &Path, sink: Box<dyn OffsetSink>, gate: &mut Gate) -> Result<(Self, Account), CannotRun> {
+    pub fn resume(
+        data_dir: &Path,
+        sink: Box<dyn OffsetSink>,
+        gate: &mut Gate,
+    ) -> Result<(Self, OffsetAccount), CannotRun> {
         let target = sink.name().to_owned();
-        let (book, unreadable) = match Book::open(data_dir, &target) {
+        let (book, unreadable) = match OffsetJournal::open(data_dir, &target) {
             Ok(book) => (book, None),
-            Err(_) => {
-                Book::begin_anew(data_dir, &target).map(|(book, aside)| (book, Some(aside))).map_err(|error| {
-                    CannotRun::new(format!("{}: {error}", data_dir.display()), "look at the permissions")
-                })?
-            }
+            Err(_) => OffsetJournal::begin_anew(data_dir, &target).map(|(book, aside)| (book, Some(aside))).map_err(
+                |error| CannotRun::new(format!("{}: {error}", data_dir.display()), "look at the permissions"),
+            )?,
         };
         for axis in Axis::ALL {
             if let Some(left) = book.left(axis) {
@@ -49,13 +51,13 @@ impl OffsetCommands {
             }
         }
         let shifting = Self { target: Some(target), left: left(&book), unreadable, ..Self::default() };
-        Ok((shifting, Account::new(sink, book)))
+        Ok((shifting, OffsetAccount::new(sink, book)))
     }
 
     /// Nothing can be written; but an earlier run may have left something, which a person has to see to.
     #[must_use]
     pub fn idle(data_dir: &Path) -> Self {
-        Self { left: Book::open(data_dir, "").map(|book| left(&book)).unwrap_or_default(), ..Self::default() }
+        Self { left: OffsetJournal::open(data_dir, "").map(|book| left(&book)).unwrap_or_default(), ..Self::default() }
     }
 
     /// The rows of this tick's verdicts that say something new.
@@ -103,17 +105,18 @@ impl OffsetCommands {
     }
 
     /// Shifts that stay in a control although nobody follows them up.
-    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = Problem> {
-        let unreadable = self.unreadable.as_ref().map(|path| Problem {
+    pub fn problems(&self, gate: &Gate) -> impl Iterator<Item = StatusProblem> {
+        let unreadable = self.unreadable.as_ref().map(|path| StatusProblem {
             what: format!("{}: what an earlier run has left in the control cannot be read", path.display()),
             next: "look at the external offsets at the control, set them right there, and delete the file".to_owned(),
         });
-        let own =
-            self.abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| Problem {
+        let own = self.abandoned(|target, axis| self.is_own(target) && !self.follows(axis, gate)).map(|shifts| {
+            StatusProblem {
                 what: format!("the external offset in the control is still shifted: {shifts}"),
                 next: "arm the gate again, or set the offset back at the control".to_owned(),
-            });
-        let others = self.abandoned(|target, _| !self.is_own(target)).map(|shifts| Problem {
+            }
+        });
+        let others = self.abandoned(|target, _| !self.is_own(target)).map(|shifts| StatusProblem {
             what: format!("the external offset is still shifted in a control that is no longer written to: {shifts}"),
             next: "name that control again as `source` under [gate.offset], or set the offset back there".to_owned(),
         });
@@ -141,7 +144,7 @@ impl OffsetCommands {
     }
 }
 
-fn left(book: &Book) -> Vec<(String, Axis, Left)> {
+fn left(book: &OffsetJournal) -> Vec<(String, Axis, Left)> {
     book.all().map(|(target, axis, left)| (target.to_owned(), axis, left)).collect()
 }
 

@@ -122,7 +122,7 @@ pub(crate) fn opened(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenEr
 fn threads(
     sources: Vec<(Box<dyn Source>, WorkerSettings)>,
     clock: &Arc<dyn Clock>,
-    alignment: &config::Alignment,
+    alignment: &config::AlignmentConfig,
 ) -> std::io::Result<SampleFeed> {
     let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
         let plan = SourcePlan::of(source.as_ref());

@@ -1,23 +1,23 @@
 //! The sinks of a running box: what they need to begin, and where they tell how they are.
 
 use crate::config::{self, Config};
-use crate::control::Post;
+use crate::control::OrderSender;
 use crate::history::Outbox;
 use crate::sinks::{self, Board, Sinks};
 use std::path::PathBuf;
 
 /// Sinks that are configured.
 #[derive(Debug)]
-pub struct Outputs {
+pub struct ConfiguredSinks {
     /// What waits for them.
     pub outbox: Outbox,
     /// How they are.
     pub board: Board,
-    sinks: Vec<config::Sink>,
+    sinks: Vec<config::SinkConfig>,
     history: PathBuf,
 }
 
-impl Outputs {
+impl ConfiguredSinks {
     /// `None` where no sink is configured.
     #[must_use]
     pub fn of(config: &Config) -> Option<Self> {
@@ -34,7 +34,7 @@ impl Outputs {
 
     /// Starts their tasks on the runtime that is running; what the network asks for goes by this post.
     #[must_use]
-    pub fn start(&self, post: &Post) -> Sinks {
+    pub fn start(&self, post: &OrderSender) -> Sinks {
         sinks::start(&self.sinks, post, (&self.outbox, &self.board), &self.history)
     }
 

@@ -1,11 +1,11 @@
 //! From the pipeline's figures to the status document.
 
 use crate::config::GateMode;
-use crate::gate::{Gate, Outcome, Verdict};
+use crate::gate::{Gate, GateOutcome, Verdict};
 use crate::pipeline::Pipeline;
 use crate::status::{
-    AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, OffsetStatus, ScriptStatus,
-    Shown, StateStatus,
+    AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, NumberOrWord, OffsetStatus,
+    ScriptStatus, StateStatus,
 };
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Axis, Sample, Slot, Value};
@@ -33,8 +33,8 @@ pub fn channels(sample: &Sample) -> Vec<ChannelStatus> {
 
 fn channel(name: &'static str, unit: &'static str, slot: &Slot) -> ChannelStatus {
     let (value, missing) = match &slot.value {
-        Ok(Value::Number(number)) => (Some(Shown::Number(*number)), None),
-        Ok(Value::Text(text)) => (Some(Shown::Text(text.to_string())), None),
+        Ok(Value::Number(number)) => (Some(NumberOrWord::Number(*number)), None),
+        Ok(Value::Text(text)) => (Some(NumberOrWord::Text(text.to_string())), None),
         Err(absence) => (None, Some(absence.word())),
     };
     let age_s = value.is_some().then(|| seconds(slot.age_ns));
@@ -101,7 +101,7 @@ pub fn alarms(pipeline: &Pipeline) -> Vec<AlarmStatus> {
 pub fn gate(pipeline: &Pipeline, written_pct: Option<f64>) -> GateStatus {
     let request = pipeline.scripts().decision().request.as_ref();
     let verdict = pipeline.verdict();
-    let changed = verdict.filter(|verdict| verdict.outcome != Outcome::Permitted);
+    let changed = verdict.filter(|verdict| verdict.outcome != GateOutcome::Permitted);
     let recent = pipeline.decisions().recent();
     let armed = pipeline.gate().armed();
     GateStatus {

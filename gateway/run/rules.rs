@@ -17,7 +17,7 @@ use std::sync::atomic::Ordering;
 /// Writes the shipped scripts where there are none, loads what is there, and watches it. Whatever is wrong is told, and
 /// the box goes on: with the shipped scripts from memory when the directory cannot be read at all.
 #[must_use]
-pub fn load(config: &Config) -> (Host, Watched) {
+pub fn load(config: &Config) -> (Host, ScriptWatch) {
     let directory = &config.scripts.directory;
     let values = settings::path(&config.gateway.data_dir);
     let mut told = Vec::new();
@@ -53,7 +53,7 @@ pub fn load(config: &Config) -> (Host, Watched) {
         told.push(Notice::new(Severity::Warning, "scripts_not_watched", text));
     }
     let (reloader, data_dir) = (reloader.ok(), config.gateway.data_dir.clone());
-    let watched = Watched { reloader, data_dir, told, told_of: None, failed: BTreeMap::new() };
+    let watched = ScriptWatch { reloader, data_dir, told, told_of: None, failed: BTreeMap::new() };
     watched.keep(&host);
     (host, watched)
 }
@@ -71,7 +71,7 @@ fn refused(problems: &[Problem], consequence: &str) -> Notice {
 }
 
 /// Keeps the scripts of the pipeline as they are on disk.
-pub struct Watched {
+pub struct ScriptWatch {
     reloader: Option<Reloader>,
     data_dir: PathBuf,
     told: Vec<Notice>,
@@ -81,7 +81,7 @@ pub struct Watched {
     failed: BTreeMap<String, String>,
 }
 
-impl Watched {
+impl ScriptWatch {
     /// Remembers the texts in charge, for a start at which the directory holds something broken and for backtests.
     fn keep(&self, host: &Host) {
         if let Err(error) = active_scripts::keep(&self.data_dir, host.files()) {

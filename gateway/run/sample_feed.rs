@@ -1,7 +1,7 @@
 //! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
 
 use crate::alignment::Alignment;
-use crate::status::{FactStatus, Shown, SourceStatus};
+use crate::status::{FactStatus, NumberOrWord, SourceStatus};
 use adapters::clock::TimeNs;
 use adapters::histogram::Histogram;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
@@ -149,8 +149,8 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
 
 fn shown(fact: &Fact) -> FactStatus {
     let value = match &fact.value {
-        FactValue::Number(number) => Shown::Number(*number),
-        FactValue::Text(text) => Shown::Text(text.clone()),
+        FactValue::Number(number) => NumberOrWord::Number(*number),
+        FactValue::Text(text) => NumberOrWord::Text(text.clone()),
     };
     FactStatus { name: fact.name.clone(), value }
 }

@@ -32,7 +32,7 @@ const COUNT: usize = 6;
 
 /// See the [module](self).
 pub struct Thermal {
-    settings: config::Thermal,
+    settings: config::ThermalConfig,
     follower: Follower,
     compensator: Compensator,
     sensors: Vec<ChannelId>,

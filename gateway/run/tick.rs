@@ -6,19 +6,19 @@ use super::live_twin::Twin;
 use super::pace::TickSchedule;
 use super::priority::{self, Granted};
 use super::report;
-use super::rules::Watched;
+use super::rules::ScriptWatch;
 use super::sample_feed::SampleFeed;
 use super::thermal::Thermal;
 use super::wear::{self, Wear};
 use crate::config::GateMode;
 use crate::control::Wake;
-use crate::gate::Ask;
+use crate::gate::ScriptRequest;
 use crate::http::Published;
 use crate::log::{Notice, Severity};
 use crate::operations::{Operations, SOURCE};
 use crate::pipeline::Pipeline;
 use crate::sinks::Board;
-use crate::status::{AlarmStatus, HistoryStatus, Problem, Status, TickStatus};
+use crate::status::{AlarmStatus, HistoryStatus, Status, StatusProblem, TickStatus};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use adapters::simulated::Simulated;
@@ -80,7 +80,7 @@ pub struct Ticker {
     /// How the sinks are.
     pub sinks: Board,
     /// Keeps the scripts as they are on disk.
-    pub scripts: Watched,
+    pub scripts: ScriptWatch,
     /// Store, sources, clock: what may fail while the box goes on.
     pub health: Health,
     /// What the rest of the process wants.
@@ -126,7 +126,8 @@ impl Ticker {
             }
             self.pipeline.request(self.commands.requested(sample.at_ns));
             self.pipeline.decide(&sample);
-            let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
+            let asks: Vec<ScriptRequest> =
+                self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::of).collect();
             self.commands.step(&mut self.pipeline, &asks, &sample, now_ns, &mut self.health);
             // What can wait comes after what is written to the machine.
             self.pipeline.record(&sample, &mut self.health);
@@ -236,7 +237,7 @@ impl Ticker {
         report::alarms(&self.pipeline).into_iter().chain(of_twin).chain(self.commands.alarm()).collect()
     }
 
-    fn problems(&self, history: &HistoryStatus) -> Vec<Problem> {
+    fn problems(&self, history: &HistoryStatus) -> Vec<StatusProblem> {
         let recipe = self.operations.as_ref().and_then(Operations::problem);
         self.health
             .problems(history)

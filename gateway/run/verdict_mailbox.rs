@@ -7,7 +7,7 @@
 
 use super::pace::{LEAD, LEAD_PERIOD_MIN};
 use crate::gate::offset::OffsetOrder;
-use crate::gate::{Ask, Verdict};
+use crate::gate::{ScriptRequest, Verdict};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -27,20 +27,20 @@ const ORDER_LASTS: Duration = Duration::from_secs(2);
 const SPIN_AFTER_DUE: Duration = Duration::from_micros(900);
 
 #[derive(Debug, Default)]
-struct Pending {
+struct PendingVerdict {
     verdict: Option<(Instant, Verdict)>,
-    asks: Waiting<Ask>,
-    orders: Waiting<OffsetOrder>,
+    asks: TimedQueue<ScriptRequest>,
+    orders: TimedQueue<OffsetOrder>,
     closing: bool,
     /// When the last verdict came, if it was armed: the next is due a period later.
     armed_at: Option<Instant>,
 }
 
 /// What waits, and since when.
-type Waiting<T> = VecDeque<(Instant, T)>;
+type TimedQueue<T> = VecDeque<(Instant, T)>;
 
 /// Queues these from now on; gives those for which there is no room.
-fn queue<T: Clone>(waiting: &mut Waiting<T>, most: usize, new: &[T]) -> Vec<T> {
+fn queue<T: Clone>(waiting: &mut TimedQueue<T>, most: usize, new: &[T]) -> Vec<T> {
     let (taken, left) = new.split_at(most.saturating_sub(waiting.len()).min(new.len()));
     waiting.extend(taken.iter().map(|it| (Instant::now(), it.clone())));
     left.to_vec()
@@ -49,7 +49,7 @@ fn queue<T: Clone>(waiting: &mut Waiting<T>, most: usize, new: &[T]) -> Vec<T> {
 /// See the [module](self).
 #[derive(Debug, Default)]
 pub(super) struct VerdictMailbox {
-    pending: Mutex<Pending>,
+    pending: Mutex<PendingVerdict>,
     arrived: Condvar,
     /// Grows with everything that is laid down.
     laid: AtomicU64,
@@ -68,14 +68,14 @@ impl VerdictMailbox {
         self.arrived.notify_one();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Pending> {
+    fn lock(&self) -> MutexGuard<'_, PendingVerdict> {
         // It is complete whenever the lock is free.
         self.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The newest verdict, and requests to the ladder. Gives those that will not be handed over: there is no room, or the
     /// arming has ended.
-    pub(super) fn post_verdict(&self, verdict: &Verdict, asks: &[Ask]) -> Vec<Ask> {
+    pub(super) fn post_verdict(&self, verdict: &Verdict, asks: &[ScriptRequest]) -> Vec<ScriptRequest> {
         let mut pending = self.lock();
         let now = Instant::now();
         pending.verdict = Some((now, *verdict));
@@ -116,7 +116,8 @@ impl VerdictMailbox {
     /// Waits at most so long for something to do. Gives the newest verdict, and whether the end has come.
     /// `awake`, it waits awake for the next verdict that is due.
     pub(super) fn take(&self, limit: Duration, awake: bool) -> (Option<Verdict>, bool) {
-        let empty = |pending: &mut Pending| pending.verdict.is_none() && pending.orders.is_empty() && !pending.closing;
+        let empty =
+            |pending: &mut PendingVerdict| pending.verdict.is_none() && pending.orders.is_empty() && !pending.closing;
         let pending = self.lock();
         let due = self.period.filter(|_| awake).zip(pending.armed_at).map(|(period, at)| at + period);
         let laid = self.laid.load(Ordering::Acquire);
@@ -143,7 +144,7 @@ impl VerdictMailbox {
     }
 
     /// The next request to the ladder, and whether it comes in time.
-    pub(super) fn next_ask(&self) -> Option<(Ask, bool)> {
+    pub(super) fn next_ask(&self) -> Option<(ScriptRequest, bool)> {
         let (laid, ask) = self.lock().asks.pop_front()?;
         Some((ask, laid.elapsed() <= ASK_LASTS))
     }

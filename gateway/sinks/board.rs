@@ -3,7 +3,7 @@
 use super::SinkError;
 use super::status::SinkStatus;
 use crate::history::Outbox;
-use crate::status::Problem;
+use crate::status::StatusProblem;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::histogram::Histogram;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,7 +24,7 @@ pub(super) struct Progress {
 }
 
 #[derive(Debug)]
-struct Entry {
+struct BoardEntry {
     name: String,
     address: String,
     progress: Progress,
@@ -33,7 +33,7 @@ struct Entry {
 /// What is known of every sink, for status and page. Clones are the same board.
 #[derive(Debug, Clone, Default)]
 pub struct Board {
-    entries: Arc<Mutex<Vec<Entry>>>,
+    entries: Arc<Mutex<Vec<BoardEntry>>>,
     outbox: Option<Outbox>,
 }
 
@@ -41,11 +41,11 @@ impl Board {
     /// A board for these sinks, each with name and address.
     #[must_use]
     pub fn new(outbox: Outbox, sinks: impl IntoIterator<Item = (String, String)>) -> Self {
-        let entry = |(name, address)| Entry { name, address, progress: Progress::default() };
+        let entry = |(name, address)| BoardEntry { name, address, progress: Progress::default() };
         Self { entries: Arc::new(Mutex::new(sinks.into_iter().map(entry).collect())), outbox: Some(outbox) }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Entry>> {
+    fn lock(&self) -> MutexGuard<'_, Vec<BoardEntry>> {
         // An entry is complete whenever the lock is free.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -71,11 +71,11 @@ impl Board {
 
     /// The sinks that fail at the moment.
     #[must_use]
-    pub fn problems(&self) -> Vec<Problem> {
-        let problem = |entry: &Entry| {
+    pub fn problems(&self) -> Vec<StatusProblem> {
+        let problem = |entry: &BoardEntry| {
             let next = "it is tried again by itself; what waits is kept (see `sinks` in the status)".to_owned();
             let error = entry.progress.error.as_ref().filter(|_| entry.progress.failing)?;
-            Some(Problem { what: format!("sink {}: {error}", entry.name), next })
+            Some(StatusProblem { what: format!("sink {}: {error}", entry.name), next })
         };
         self.lock().iter().filter_map(problem).collect()
     }
@@ -86,8 +86,8 @@ impl Board {
         let Some(outbox) = &self.outbox else { return Vec::new() };
         let (head, figures) = (*outbox.head().borrow(), outbox.figures());
         let fits = figures.outage_fits_h(outbox.settings());
-        let status = |entry: &Entry| {
-            let Entry { name, address, progress } = entry;
+        let status = |entry: &BoardEntry| {
+            let BoardEntry { name, address, progress } = entry;
             let standing = outbox.standing(name);
             let behind_items = standing.as_ref().map_or(0, |standing| standing.position.waiting(head.next_sequence));
             let age = head.newest_ns.zip(progress.reached_ns).map(|(newest, reached)| seconds(newest - reached));

@@ -137,14 +137,14 @@ impl Link {
         messages: Vec<Outgoing>,
         qos: Qos,
         broker: &BrokerTarget,
-    ) -> Result<(), (usize, Failure)> {
+    ) -> Result<(), (usize, BrokerFailure)> {
         let place = place(broker);
-        let failed = |error| (0, Failure::Line(error));
+        let failed = |error| (0, BrokerFailure::Line(error));
         let client = self.client.clone().ok_or_else(|| failed(not_connected(&place)))?;
         let sent = blocking(move || client.publish_all(&messages, qos)).await.map_err(failed)?;
         sent.map_err(|(index, error)| match error {
-            MqttError::Unsendable(what) => (index, Failure::Message(what)),
-            other => (index, Failure::Line(line(&place, other))),
+            MqttError::Unsendable(what) => (index, BrokerFailure::Message(what)),
+            other => (index, BrokerFailure::Line(line(&place, other))),
         })
     }
 
@@ -174,14 +174,14 @@ impl Link {
 
 /// Why a message did not arrive.
 #[derive(Debug)]
-pub(super) enum Failure {
+pub(super) enum BrokerFailure {
     /// The connection is of no use any more, or nothing goes through it now.
     Line(SinkError),
     /// This message will never be taken.
     Message(String),
 }
 
-impl Failure {
+impl BrokerFailure {
     /// The same for an item.
     pub(super) fn of_item(self, sequence: u64) -> SinkError {
         match self {

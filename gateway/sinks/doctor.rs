@@ -11,7 +11,7 @@ const DEADLINE: Duration = Duration::from_secs(20);
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct SinkFinding {
     /// From nothing to ready to send, ms.
     pub connected_ms: f64,
     /// What is wrong.
@@ -19,7 +19,7 @@ pub struct Found {
 }
 
 /// Connects to the receiver once.
-pub async fn examine(address: &SinkAddress) -> Found {
+pub async fn examine(address: &SinkAddress) -> SinkFinding {
     let outbox = Outbox::new("doctor", OutboxSettings::default(), []);
     let mut sink = open(address, ("doctor", Requests::none()), &outbox, Path::new(""));
     let began = Instant::now();
@@ -30,10 +30,10 @@ pub async fn examine(address: &SinkAddress) -> Found {
         Err(SinkError::line(what, "look whether the receiver is overloaded or a firewall swallows the packets"))
     };
     let error = connected.unwrap_or_else(|_| late()).err();
-    Found { connected_ms, error }
+    SinkFinding { connected_ms, error }
 }
 
-impl Found {
+impl SinkFinding {
     /// As a document.
     #[must_use]
     pub fn json(&self, address: &SinkAddress) -> serde_json::Value {

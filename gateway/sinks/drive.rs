@@ -3,8 +3,8 @@
 use super::board::{Board, seconds};
 use super::{Batch, Requests, Sink, SinkError, open};
 use crate::config;
-use crate::control::Post;
-use crate::history::{Head, Outbox, OutboxReader, Stretch};
+use crate::control::OrderSender;
+use crate::history::{Outbox, OutboxHead, OutboxReader, OutboxStretch};
 use crate::log::{Notice, Severity};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -34,8 +34,13 @@ pub struct Sinks {
 /// Starts a task for each of these sinks, which must be known to outbox and board in this order. The history at `path` may be
 /// opened later. What the network asks for goes by `post`. Call it within a runtime.
 #[must_use]
-pub fn start(sinks: &[config::Sink], post: &Post, (outbox, board): (&Outbox, &Board), path: &Path) -> Sinks {
-    let opened = sinks.iter().map(|config::Sink { name, address, allow_requests }| {
+pub fn start(
+    sinks: &[config::SinkConfig],
+    post: &OrderSender,
+    (outbox, board): (&Outbox, &Board),
+    path: &Path,
+) -> Sinks {
+    let opened = sinks.iter().map(|config::SinkConfig { name, address, allow_requests }| {
         let requests = Requests::new(name, *allow_requests, Some(post.clone()));
         (name.clone(), open(address, (name, requests), outbox, path))
     });
@@ -47,7 +52,7 @@ pub fn start(sinks: &[config::Sink], post: &Post, (outbox, board): (&Outbox, &Bo
 pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &Board, path: &Path) -> Sinks {
     let (stop, stopping) = watch::channel(false);
     let task = |(index, (name, sink)): (usize, (String, Box<dyn Sink>))| {
-        let task = Task {
+        let task = SinkTask {
             index,
             name,
             outbox: outbox.clone(),
@@ -74,7 +79,7 @@ impl Sinks {
     }
 }
 
-struct Task {
+struct SinkTask {
     index: usize,
     name: String,
     outbox: Outbox,
@@ -96,7 +101,7 @@ impl From<SinkError> for Left {
     }
 }
 
-impl Task {
+impl SinkTask {
     async fn run(mut self, mut sink: Box<dyn Sink>) {
         let mut stopping = self.stopping.clone();
         let mut head = self.outbox.head();
@@ -127,7 +132,12 @@ impl Task {
     }
 
     /// From connecting to the end of the connection.
-    async fn connection(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<Head>, tries: &mut u32) -> Left {
+    async fn connection(
+        &mut self,
+        sink: &mut dyn Sink,
+        head: &mut watch::Receiver<OutboxHead>,
+        tries: &mut u32,
+    ) -> Left {
         self.board.change(self.index, |progress| progress.state = Some("connecting"));
         let mut stopping = self.stopping.clone();
         let connected = tokio::select! {
@@ -158,7 +168,7 @@ impl Task {
     }
 
     /// Live data begins now.
-    fn begin(&self, sink: &dyn Sink, head: &watch::Receiver<Head>) {
+    fn begin(&self, sink: &dyn Sink, head: &watch::Receiver<OutboxHead>) {
         let next = head.borrow().next_sequence;
         let Some(standing) = self.outbox.standing(&self.name) else { return };
         let waiting = standing.position.waiting(next);
@@ -171,7 +181,7 @@ impl Task {
     }
 
     /// One batch of live data, or else one of old data, or else waits for something to happen.
-    async fn step(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<Head>) -> Result<(), Left> {
+    async fn step(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<OutboxHead>) -> Result<(), Left> {
         let newest = *head.borrow_and_update();
         let Some(standing) = self.outbox.standing(&self.name) else { return Err(Left::Stop) };
         let next = standing.position.next();
@@ -212,7 +222,7 @@ impl Task {
         }
     }
 
-    async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<Stretch, Left> {
+    async fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, Left> {
         let (feed, path) = (self.feed.take(), self.path.clone());
         let reading = tokio::task::spawn_blocking(move || {
             let mut feed = feed.map_or_else(|| OutboxReader::open(&path), Ok)?;
@@ -225,7 +235,7 @@ impl Task {
         Ok(stretch)
     }
 
-    fn delivered(&self, stretch: &Stretch, from: u64, historical: bool) {
+    fn delivered(&self, stretch: &OutboxStretch, from: u64, historical: bool) {
         self.outbox.delivered(&self.name, from, stretch.to);
         let reached_ns = stretch.items.last().map(|item| item.at_ns);
         let gap = self.outbox.standing(&self.name).is_some_and(|standing| standing.position.oldest_gap().is_some());

@@ -60,7 +60,7 @@ impl MqttSink {
     async fn answer(&mut self, message: MqttMessage) -> Result<(), SinkError> {
         let document = if message.retained { Err(RETAINED.to_owned()) } else { document_of(&message.payload) };
         let id = document.as_ref().map_or(Json::Null, |document| document.id.clone().map_or(Json::Null, Json::from));
-        let change = document.and_then(Document::change);
+        let change = document.and_then(RequestDocument::change);
         let Some(Reply { done, text }) = self.requests.ask(change).await else { return Ok(()) };
         let says = json!({"done": done, "text": text, "id": id});
         let topic = self.topic("request/answer");
@@ -98,7 +98,7 @@ const ID_MAX: usize = 64;
 /// `{"request":"feed_override","pct":80,"reason":"...","id":"..."}`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Document {
+struct RequestDocument {
     request: String,
     pct: Option<f64>,
     reason: Option<String>,
@@ -106,11 +106,11 @@ struct Document {
     id: Option<String>,
 }
 
-fn document_of(payload: &[u8]) -> Result<Document, String> {
+fn document_of(payload: &[u8]) -> Result<RequestDocument, String> {
     if payload.len() > REQUEST_BYTES_MAX {
         return Err(format!("a message of {} bytes is no request: at most {REQUEST_BYTES_MAX}", payload.len()));
     }
-    let mut document: Document =
+    let mut document: RequestDocument =
         serde_json::from_slice(payload).map_err(|error| format!("this is no request: {error}; {FORMS}"))?;
     document.id = document.id.map(|id| id.chars().take(ID_MAX).collect());
     Ok(document)
@@ -119,7 +119,7 @@ fn document_of(payload: &[u8]) -> Result<Document, String> {
 const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"request\":\"withdraw\"} or \
                      {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
 
-impl Document {
+impl RequestDocument {
     fn change(self) -> Result<RequestedChange, String> {
         match (self.request.as_str(), self.pct, self.code) {
             ("feed_override", Some(pct), None) => RequestedChange::feed_override(pct, &self.reason.unwrap_or_default()),

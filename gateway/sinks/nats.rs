@@ -7,7 +7,7 @@
 use super::mqtt::document;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::{Item, Outbox};
-use crate::nats::{Connection, Failure, NatsError, NatsTarget, Outgoing};
+use crate::nats::{Connection, JetStreamFailure, NatsError, NatsTarget, Outgoing};
 use adapters::address::Keys;
 
 /// Where to, and under which subjects.
@@ -96,8 +96,8 @@ impl Sink for NatsSink {
             let connection = self.connection.as_mut().ok_or_else(not_connected)?;
             match connection.publish_all(&messages).await {
                 Ok(_duplicates) => Ok(()),
-                Err((_, Failure::Line(error))) => Err(error.into()),
-                Err((index, Failure::Message(NatsError { what, next }))) => {
+                Err((_, JetStreamFailure::Line(error))) => Err(error.into()),
+                Err((index, JetStreamFailure::Message(NatsError { what, next }))) => {
                     let sequence = batch.items.get(index).map_or(0, |item| item.sequence);
                     Err(SinkError::Item { sequence, what, next })
                 }

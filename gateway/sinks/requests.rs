@@ -3,7 +3,7 @@
 //! A sink hands every message that looks like a request to [`Requests::ask`], whether it is allowed or not: the tick writes
 //! all of them into the audit, carries out what is allowed, and says what became of it.
 
-use crate::control::{NetworkRequest, Post, Reply, RequestedChange};
+use crate::control::{NetworkRequest, OrderSender, Reply, RequestedChange};
 use crate::gate::trail::RowRate;
 use adapters::clock::{Clock, SystemClock};
 
@@ -18,14 +18,14 @@ const AT_ONCE: f64 = 10.0;
 pub struct Requests {
     sink: String,
     allowed: bool,
-    post: Option<Post>,
+    post: Option<OrderSender>,
     rate: RowRate,
 }
 
 impl Requests {
     /// Of the sink of this name; `allowed` is what its configuration says.
     #[must_use]
-    pub fn new(sink: &str, allowed: bool, post: Option<Post>) -> Self {
+    pub fn new(sink: &str, allowed: bool, post: Option<OrderSender>) -> Self {
         Self { sink: sink.to_owned(), allowed, post, rate: RowRate::new(PER_S, AT_ONCE) }
     }
 

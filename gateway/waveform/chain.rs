@@ -22,7 +22,7 @@ enum Phases {
 }
 
 /// See the [module](self).
-pub(super) struct Chain {
+pub(super) struct WaveformChain {
     header: WaveformHeader,
     phases: Phases,
     delay_s: f64,
@@ -46,7 +46,7 @@ pub(super) struct Sums {
     raw_ns: (TimeNs, TimeNs),
 }
 
-impl Chain {
+impl WaveformChain {
     pub(super) fn new(header: &WaveformHeader) -> Result<Self, String> {
         let rate_hz = header.rate_hz;
         let least_a = LEAST_SHARE * f64::from(header.full_scale) * header.scale[0].abs();
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_sine_gives_its_root_mean_square_in_the_middle() {
         let header = WaveformHeader::currents(1000.0, &["u", "v", "w"], 0.01, 32767);
-        let mut chain = Chain::new(&header).expect("three phases");
+        let mut chain = WaveformChain::new(&header).expect("three phases");
         let mut sums = Sums::default();
         chain.push(&block(&header), &mut sums);
         let (stamp, value_a) = sums.reading().expect("many periods");
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn an_amplitude_is_its_own_root_mean_square() {
-        let mut chain = Chain::new(&WaveformHeader::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
+        let mut chain = WaveformChain::new(&WaveformHeader::amplitude(1000.0, 0.01, 32767)).expect("an amplitude");
         let mut sums = Sums::default();
         chain.push(&Block { first_ns: 0, gap: 0, clipped: 0, raw: vec![-1234; 1000] }, &mut sums);
         let (stamp, value_a) = sums.reading().expect("a second");
@@ -180,8 +180,8 @@ mod tests {
         let header = WaveformHeader::currents(1000.0, &["u"], 0.01, 32767);
         let mut sums = Sums::default();
         let still = Block { first_ns: 10, gap: 0, clipped: 0, raw: vec![1; 100] };
-        Chain::new(&header).expect("one phase").push(&still, &mut sums);
+        WaveformChain::new(&header).expect("one phase").push(&still, &mut sums);
         assert!(sums.reading().is_some_and(|(_, value_a)| value_a < 0.02));
-        assert!(Chain::new(&WaveformHeader::currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
+        assert!(WaveformChain::new(&WaveformHeader::currents(1000.0, &["u", "v"], 0.01, 32767)).is_err());
     }
 }

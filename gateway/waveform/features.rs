@@ -1,6 +1,6 @@
 //! What every stream of spindle current gives, whoever sends it: filter, feature, raw samples around what is remarkable.
 
-use super::chain::{Chain, Sums};
+use super::chain::{Sums, WaveformChain};
 use super::excerpt_writer::ExcerptWriter;
 use adapters::address::WaveformKeep;
 use adapters::driver::Fact;
@@ -9,7 +9,7 @@ use adapters::{Absence, ChannelId, Reading, SourceError};
 
 /// Blocks in, one reading of `spindle_current_a` out whenever it is asked for.
 pub(super) struct Features {
-    chain: Option<Chain>,
+    chain: Option<WaveformChain>,
     excerpt_writer: Option<ExcerptWriter>,
     channels: Vec<ChannelId>,
     sums: Sums,
@@ -48,7 +48,7 @@ impl Features {
                 request: "the header of the stream".to_owned(),
                 what,
             };
-            self.chain = Some(Chain::new(header).map_err(unsuitable)?);
+            self.chain = Some(WaveformChain::new(header).map_err(unsuitable)?);
         }
         let Some(chain) = &mut self.chain else { return Ok(()) };
         self.clipped |= block.clipped > 0;
@@ -90,7 +90,7 @@ impl Features {
         ];
         facts.extend(intake.header().map(|header| Fact::number("waveform_rate_hz", header.rate_hz)));
         facts.extend(intake.drift_ppm().map(|ppm| Fact::number("waveform_clock_drift_ppm", ppm)));
-        if let Some(unbalance) = self.chain.as_ref().and_then(Chain::unbalance) {
+        if let Some(unbalance) = self.chain.as_ref().and_then(WaveformChain::unbalance) {
             facts.push(Fact::number("phase_unbalance_pct", 100.0 * unbalance));
         }
         facts.extend(

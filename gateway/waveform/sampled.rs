@@ -26,7 +26,7 @@ const SILENT: Duration = Duration::from_secs(3);
 /// The spindle among the axes of an HNC-8, where the address does not say.
 const SPINDLE_AXIS: u32 = 5;
 
-type Waiting = Arc<Mutex<VecDeque<(SampleBlock, Instant)>>>;
+type SampleQueue = Arc<Mutex<VecDeque<(SampleBlock, Instant)>>>;
 
 /// A controller whose sampling is wanted, opened with it; `None` for every other address.
 pub(super) fn opened(address: &Address) -> Option<Result<Opened, OpenError>> {
@@ -58,8 +58,8 @@ fn joined(samples: ControllerSamples, mut opened: Opened) -> Opened {
     opened
 }
 
-fn queue() -> (Waiting, BlockSink) {
-    let waiting = Waiting::default();
+fn queue() -> (SampleQueue, BlockSink) {
+    let waiting = SampleQueue::default();
     let filled = waiting.clone();
     let sink = move |block: &SampleBlock, arrived: Instant| {
         let mut waiting = filled.lock().unwrap_or_else(PoisonError::into_inner);
@@ -75,13 +75,13 @@ fn queue() -> (Waiting, BlockSink) {
 pub struct ControllerSamples {
     name: String,
     current: SampledCurrent,
-    waiting: Waiting,
+    waiting: SampleQueue,
     features: Features,
     heard: Option<Instant>,
 }
 
 impl ControllerSamples {
-    fn new(address: &str, current: SampledCurrent, waiting: Waiting, keep: Option<&WaveformKeep>) -> Self {
+    fn new(address: &str, current: SampledCurrent, waiting: SampleQueue, keep: Option<&WaveformKeep>) -> Self {
         Self { name: format!("{address}#samples"), current, waiting, features: Features::new(keep), heard: None }
     }
 

@@ -2,7 +2,7 @@
 //! did after a restore.
 
 use super::process::{Gateway, run, stderr, stdout, text};
-use gateway::backup::Places;
+use gateway::backup::BackupPaths;
 use gateway::backup::list::fate;
 use gateway::history::Reader;
 use std::fs;
@@ -38,8 +38,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|entry| if entry.path().is_dir() { files(&entry.path()) } else { vec![entry.path()] }).collect()
 }
 
-fn places(place: &Path) -> Places {
-    Places {
+fn places(place: &Path) -> BackupPaths {
+    BackupPaths {
         machine: "Seven".to_owned(),
         data_dir: place.join("data"),
         scripts: place.join("data/scripts"),

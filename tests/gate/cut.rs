@@ -37,9 +37,9 @@ pub(crate) fn cutting(at_ns: i64) -> (Sample, Estimates) {
     (sample, estimates)
 }
 
-pub(crate) fn limits(mode: GateMode) -> config::Gate {
+pub(crate) fn limits(mode: GateMode) -> config::GateConfig {
     let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
-    config::Gate { mode, source: Some("test".to_owned()), ..config.gate }
+    config::GateConfig { mode, source: Some("test".to_owned()), ..config.gate }
 }
 
 pub(crate) fn asking(pct: f64) -> OverrideRequest {

@@ -6,7 +6,9 @@ use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
 use adapters::{Absence, Actuator, LadderRule, Sample, Slot, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::{ArmError, Bound, Disarmed, Fault, Gate, Hold, Outcome, OverrideWriter, Shown, Verdict};
+use gateway::gate::{
+    ArmError, Bound, Disarmed, Fault, Gate, GateOutcome, Hold, OverrideWriter, UnexpectedReading, Verdict,
+};
 use rules::script::{Host, ScriptFile, shipped};
 use std::path::Path;
 use std::time::Duration;
@@ -108,11 +110,11 @@ fn every_hold_gives_the_programmed_feed_at_once_and_says_why() {
         }
         let (mut sample, mut estimates) = cutting(100 * TICK_NS);
         let before = gate.decide(Some(&asking(60.0)), &sample, &estimates);
-        assert_eq!((before.permitted.percent(), before.outcome), (60, Outcome::Permitted), "{what}");
+        assert_eq!((before.permitted.percent(), before.outcome), (60, GateOutcome::Permitted), "{what}");
         sample.at_ns += TICK_NS;
         change(&mut sample, &mut estimates);
         let verdict = gate.decide(Some(&asking(60.0)), &sample, &estimates);
-        assert_eq!((verdict.permitted.percent(), verdict.outcome), (100, Outcome::Held(hold)), "{what}");
+        assert_eq!((verdict.permitted.percent(), verdict.outcome), (100, GateOutcome::Held(hold)), "{what}");
         assert!(verdict.reason().starts_with("no override, the dial counts: ") && !hold.zh().is_empty());
         assert_eq!(verdict.word(), "held");
     }
@@ -137,7 +139,8 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
         let mut gate = armed_gate();
         let (mut sample, estimates) = cutting(0);
         set_text(&mut sample, "block", block);
-        let mut decide = |sample: &Sample| matches!(gate.decide(None, sample, &estimates).outcome, Outcome::Held(_));
+        let mut decide =
+            |sample: &Sample| matches!(gate.decide(None, sample, &estimates).outcome, GateOutcome::Held(_));
         assert_eq!(decide(&sample), held, "{block}");
         set_text(&mut sample, "block", "X5");
         assert_eq!(decide(&sample), held, "{block}, next line");
@@ -150,7 +153,7 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
 fn off_is_off() {
     let mut gate = Gate::new(limits(GateMode::Off));
     let (sample, estimates) = cutting(0);
-    assert_eq!(gate.decide(Some(&asking(80.0)), &sample, &estimates).outcome, Outcome::Held(Hold::Off));
+    assert_eq!(gate.decide(Some(&asking(80.0)), &sample, &estimates).outcome, GateOutcome::Held(Hold::Off));
 }
 
 #[test]
@@ -185,7 +188,7 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
         let now = f64::from(verdict.permitted.percent());
         assert!(now >= limits.min_pct && now <= limits.max_pct, "{verdict:?}");
         let step_s = step_ns as f64 / SECOND_NS as f64;
-        if matches!(verdict.outcome, Outcome::Held(_)) {
+        if matches!(verdict.outcome, GateOutcome::Held(_)) {
             held += 1;
             assert_eq!(now, 100.0, "{verdict:?}");
         } else {
@@ -193,7 +196,7 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
             assert!(now - before <= limits.slew_up_pct_per_s * step_s + 1.0, "{before} -> {verdict:?}");
             assert!(before - now <= limits.slew_down_pct_per_s * step_s + 1.0, "{before} -> {verdict:?}");
         }
-        if matches!(verdict.outcome, Outcome::Refused) {
+        if matches!(verdict.outcome, GateOutcome::Refused) {
             assert!((now - 100.0).abs() <= (before - 100.0).abs(), "a mistake never moves it away from 100 %");
         }
         before = now;
@@ -205,23 +208,23 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
 
 #[test]
 fn the_pace_and_the_band_are_told() {
-    let mut gate = Gate::new(config::Gate { above_dial: true, ..limits(GateMode::Armed) });
+    let mut gate = Gate::new(config::GateConfig { above_dial: true, ..limits(GateMode::Armed) });
     let mut outcome_at = |tick: i64, pct: f64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
         gate.decide(Some(&asking(pct)), &sample, &estimates)
     };
     let first = outcome_at(0, 55.0);
-    assert_eq!((first.outcome, first.permitted.percent()), (Outcome::Limited(Bound::Slew), 100));
+    assert_eq!((first.outcome, first.permitted.percent()), (GateOutcome::Limited(Bound::Slew), 100));
     assert_eq!(outcome_at(1, 55.0).permitted.percent(), 95);
-    assert_eq!(outcome_at(2, 10.0).outcome, Outcome::Limited(Bound::Least));
-    assert_eq!(outcome_at(3, 200.0).outcome, Outcome::Limited(Bound::Greatest));
-    assert_eq!(outcome_at(4, 300.0).outcome, Outcome::Refused);
+    assert_eq!(outcome_at(2, 10.0).outcome, GateOutcome::Limited(Bound::Least));
+    assert_eq!(outcome_at(3, 200.0).outcome, GateOutcome::Limited(Bound::Greatest));
+    assert_eq!(outcome_at(4, 300.0).outcome, GateOutcome::Refused);
 }
 
 #[test]
 fn never_above_the_operators_dial_unless_configured() {
     let decided = |above_dial: bool, dial: Option<f64>| {
-        let mut gate = Gate::new(config::Gate { above_dial, ..limits(GateMode::Armed) });
+        let mut gate = Gate::new(config::GateConfig { above_dial, ..limits(GateMode::Armed) });
         let mut last = None;
         for tick in 0..60 {
             let (mut sample, estimates) = cutting(tick * TICK_NS);
@@ -230,9 +233,9 @@ fn never_above_the_operators_dial_unless_configured() {
         }
         last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
-    assert_eq!(decided(false, None), (100, Outcome::Limited(Bound::Dial)), "nobody knows the dial");
-    assert_eq!(decided(false, Some(110.0)), (110, Outcome::Limited(Bound::Dial)));
-    assert_eq!(decided(false, Some(60.0)), (100, Outcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
+    assert_eq!(decided(false, None), (100, GateOutcome::Limited(Bound::Dial)), "nobody knows the dial");
+    assert_eq!(decided(false, Some(110.0)), (110, GateOutcome::Limited(Bound::Dial)));
+    assert_eq!(decided(false, Some(60.0)), (100, GateOutcome::Limited(Bound::Dial)), "the ladder takes the lesser one");
     let asked_60 = |dial: f64| {
         let mut gate = Gate::new(limits(GateMode::Armed));
         let decide = |tick: i64| {
@@ -244,12 +247,12 @@ fn never_above_the_operators_dial_unless_configured() {
     };
     assert_eq!(
         asked_60(60.0),
-        (100, Outcome::DialCounts(OverridePct::new(60).expect("not 255"))),
+        (100, GateOutcome::DialCounts(OverridePct::new(60).expect("not 255"))),
         "nothing is asked that the dial does already"
     );
-    assert_eq!(asked_60(61.0), (60, Outcome::Permitted));
-    assert_eq!(decided(false, Some(120.0)), (115, Outcome::Permitted));
-    assert_eq!(decided(true, Some(60.0)), (115, Outcome::Permitted), "the ladder multiplies: 69 %");
+    assert_eq!(asked_60(61.0), (60, GateOutcome::Permitted));
+    assert_eq!(decided(false, Some(120.0)), (115, GateOutcome::Permitted));
+    assert_eq!(decided(true, Some(60.0)), (115, GateOutcome::Permitted), "the ladder multiplies: 69 %");
 }
 
 #[test]
@@ -306,7 +309,11 @@ fn a_machine_that_does_not_take_the_override_disarms_the_gate_once() {
     let told: Vec<_> = run(&mut gate, &mut dial, 0..60, 80.0).into_iter().flatten().collect();
     let mismatch = |found| Fault::ReadBack {
         asked: OverridePct::new(80).expect("not 255"),
-        shown: Shown { found: OverridePct::new(found).expect("not 255"), dial: None, rule: LadderRule::Least },
+        shown: UnexpectedReading {
+            found: OverridePct::new(found).expect("not 255"),
+            dial: None,
+            rule: LadderRule::Least,
+        },
     };
     assert_eq!(told, [mismatch(37)], "once");
     assert_eq!(gate.armed().err(), Some(Disarmed::ReadBack));

@@ -39,7 +39,7 @@ impl Stand {
         let machine = Simulated::new("simulated://lathe", settings, -7200 * SECOND_NS);
         let above_dial = rule == LadderRule::Product;
         let armed_for = Duration::from_secs(86_400);
-        let mut gate = Gate::new(config::Gate { above_dial, armed_for, ..limits(GateMode::Armed) });
+        let mut gate = Gate::new(config::GateConfig { above_dial, armed_for, ..limits(GateMode::Armed) });
         gate.arm("fitter", None, 0).expect("allowed");
         let writer = OverrideWriter::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, gate.limits());
         Self { machine, gate, writer, clock: ManualClock::at(0), tick: 0 }
@@ -110,7 +110,7 @@ fn on_a_ladder_that_replaces_the_dial_nothing_above_it_is_ever_in_force() {
 #[test]
 fn a_ladder_that_replaces_the_dial_where_a_product_is_configured_is_found_out() {
     let mut stand = Stand::new(LadderRule::Replace);
-    stand.gate = Gate::new(config::Gate { above_dial: true, ..limits(GateMode::Armed) });
+    stand.gate = Gate::new(config::GateConfig { above_dial: true, ..limits(GateMode::Armed) });
     stand.gate.arm("fitter", None, 0).expect("allowed");
     stand.writer =
         OverrideWriter::new(Box::new(stand.machine.feed_override()) as Box<dyn Actuator>, stand.gate.limits());

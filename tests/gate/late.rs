@@ -6,8 +6,8 @@ use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::units::OverridePct;
 use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
 use gateway::config::GateMode;
-use gateway::gate::offset::{Account, Book, OffsetOrder};
-use gateway::gate::{Ask, Disarmed, Fault, Gate, Outcome, OverrideWriter, Verdict, trail};
+use gateway::gate::offset::{OffsetAccount, OffsetJournal, OffsetOrder};
+use gateway::gate::{Disarmed, Fault, Gate, GateOutcome, OverrideWriter, ScriptRequest, Verdict, trail};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
@@ -95,13 +95,13 @@ impl OffsetSink for Controller {
 
 fn verdict(pct: u8, armed: bool) -> Verdict {
     let permitted = OverridePct::new(pct).expect("not 255");
-    Verdict { at_ns: 0, wanted_pct: None, permitted, outcome: Outcome::Permitted, armed }
+    Verdict { at_ns: 0, wanted_pct: None, permitted, outcome: GateOutcome::Permitted, armed }
 }
 
 /// A hand of its own thread, holding this controller.
 fn actuator_worker(controller: &Controller, directory: &tempfile::TempDir) -> ActuatorWorker {
-    let book = Book::open(directory.path(), "test").expect("readable");
-    let offsets = Some(Account::new(Box::new(controller.clone()), book));
+    let book = OffsetJournal::open(directory.path(), "test").expect("readable");
+    let offsets = Some(OffsetAccount::new(Box::new(controller.clone()), book));
     let tools = Tools { actuator: Some(Box::new(controller.clone())), offsets };
     ActuatorWorker::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
         .expect("a thread")
@@ -131,7 +131,7 @@ fn told<T>(actuator_worker: &mut ActuatorWorker, mut of: impl FnMut(ActuatorRepo
     }
 }
 
-fn lay(actuator_worker: &mut ActuatorWorker, verdict: &Verdict, asks: &[Ask]) -> Vec<ActuatorReport> {
+fn lay(actuator_worker: &mut ActuatorWorker, verdict: &Verdict, asks: &[ScriptRequest]) -> Vec<ActuatorReport> {
     let mut said = Vec::new();
     actuator_worker.step(verdict, asks, 0, |it| said.push(it));
     said
@@ -195,7 +195,8 @@ fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
 fn what_waits_for_a_slow_controller_goes_nowhere_once_the_gate_is_disarmed() {
     let directory = tempfile::tempdir().expect("a directory");
     let (controller, mut actuator_worker) = stuck(&directory);
-    let stop = Ask { request: LadderRequest::Stop, reason: "worn".into(), script: "a.rhai".into(), version: 1 };
+    let stop =
+        ScriptRequest { request: LadderRequest::Stop, reason: "worn".into(), script: "a.rhai".into(), version: 1 };
     lay(&mut actuator_worker, &verdict(80, true), &[stop]);
     actuator_worker.shift(&[SHIFT], true, 0, |_| {});
     // Disarmed, by a person or because the time is over, while all that waits.

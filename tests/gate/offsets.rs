@@ -7,7 +7,7 @@ use adapters::simulated::{Simulated, SimulatedOffsets, SimulatedSettings};
 use adapters::words::execution;
 use adapters::{Sample, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Account, Book, Moved, OffsetBound, OffsetOrder, OffsetOutcome, Shifted};
+use gateway::gate::offset::{Moved, OffsetAccount, OffsetBound, OffsetJournal, OffsetOrder, OffsetOutcome, Shifted};
 use gateway::gate::{Disarmed, Gate, Hold, OffsetVerdict};
 use rules::estimators::{Estimates, State};
 use rules::script::OffsetProposal;
@@ -16,9 +16,9 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 /// Z may be shifted by 5 um at a time and 12 um in all, once a minute.
-fn offset_limits(mode: GateMode) -> config::Gate {
+fn offset_limits(mode: GateMode) -> config::GateConfig {
     let before = limits(GateMode::Shadow);
-    let offset = config::Offset {
+    let offset = config::OffsetConfig {
         mode,
         source: Some("test".to_owned()),
         axes: vec![Axis::Z],
@@ -27,7 +27,7 @@ fn offset_limits(mode: GateMode) -> config::Gate {
         min_interval: Duration::from_secs(60),
         restore: true,
     };
-    config::Gate { offset, ..before }
+    config::GateConfig { offset, ..before }
 }
 
 fn proposal(axis: Axis, offset_um: f64) -> OffsetProposal {
@@ -148,8 +148,8 @@ fn without_a_proposal_the_shift_goes_back_by_steps_and_after_disarming_at_once()
     let verdict = judged(&mut gate, 400 * SECOND_NS, Some(9.0)).expect("decided");
     assert_eq!(verdict.order, Some(OffsetOrder::Restore(Axis::Z)));
     let mut keeping = Gate::new(offset_limits(GateMode::Armed));
-    keeping = Gate::new(config::Gate {
-        offset: config::Offset { restore: false, ..keeping.limits().offset.clone() },
+    keeping = Gate::new(config::GateConfig {
+        offset: config::OffsetConfig { restore: false, ..keeping.limits().offset.clone() },
         ..keeping.limits().clone()
     });
     keeping.offsets_mut().resume(Axis::Z, 9.0);
@@ -181,12 +181,12 @@ impl Bench {
     }
 
     /// As after a start of the gateway.
-    fn account(&self, sink: Box<dyn OffsetSink>) -> Account {
-        let book = Book::open(self.directory.path(), "simulated://lathe").expect("readable");
-        Account::new(sink, book)
+    fn account(&self, sink: Box<dyn OffsetSink>) -> OffsetAccount {
+        let book = OffsetJournal::open(self.directory.path(), "simulated://lathe").expect("readable");
+        OffsetAccount::new(sink, book)
     }
 
-    fn started(&self) -> Account {
+    fn started(&self) -> OffsetAccount {
         self.account(Box::new(self.machine.offsets()))
     }
 }
@@ -195,7 +195,7 @@ fn shift(from_um: f64, wanted_um: f64) -> OffsetOrder {
     OffsetOrder::Shift { axis: Axis::Z, from_um, wanted_um }
 }
 
-fn done(account: &mut Account, clock: &ManualClock, order: OffsetOrder) -> Shifted {
+fn done(account: &mut OffsetAccount, clock: &ManualClock, order: OffsetOrder) -> Shifted {
     account.carry_out(order, clock).result.expect("at rest").expect("something to do")
 }
 

@@ -5,7 +5,7 @@ use adapters::clock::{Clock, ManualClock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, SourceError};
 use gateway::config::GateMode;
-use gateway::gate::{Gate, Outcome, OverrideWriter};
+use gateway::gate::{Gate, GateOutcome, OverrideWriter};
 use rules::script::{Host, ScriptFile};
 
 /// Asks for what the channel `temperature_1_c` says: numbers of every kind, and everything that is no number.
@@ -76,7 +76,7 @@ fn renewed(host: Host) -> Host {
 
 fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
     let mut random = Random(20_261_122);
-    let mut gate = Gate::new(gateway::config::Gate {
+    let mut gate = Gate::new(gateway::config::GateConfig {
         above_dial: true,
         armed_for: std::time::Duration::MAX,
         ..limits(GateMode::Armed)
@@ -97,8 +97,8 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
         }
         let verdict = gate.decide(host.tick(&sample, &estimates).request.as_ref(), &sample, &estimates);
         match verdict.outcome {
-            Outcome::Held(_) => told[0] += 1,
-            Outcome::Refused => told[1] += 1,
+            GateOutcome::Held(_) => told[0] += 1,
+            GateOutcome::Refused => told[1] += 1,
             _ => told[2] += 1,
         }
         writer.step(&verdict, &clock);

@@ -5,7 +5,9 @@
 use crate::machine::Machine;
 use crate::round_trip::{options, write};
 use adapters::clock::SECOND_NS;
-use gateway::history::{Alarm, DAY_NS, Event, Options, Query, Reader, Retention, Span, Status, WhenFull, Writer};
+use gateway::history::{
+    Alarm, DAY_NS, Event, HistoryFigures, Options, Query, Reader, RecordSpan, Retention, WhenFull, Writer,
+};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -56,7 +58,7 @@ fn alarm(number: i64) -> Alarm {
 }
 
 /// The status once nothing retires any more: what is written about the retired rows may itself retire some.
-fn at_rest(writer: &Writer) -> Status {
+fn at_rest(writer: &Writer) -> HistoryFigures {
     let began = Instant::now();
     let mut before = writer.status();
     loop {
@@ -123,7 +125,7 @@ fn full_disk() {
 /// All alarms are there, and the newest rows without a hole up to `end`.
 fn check_full_disk(path: &Path, end: i64) {
     let reader = Reader::open(path).expect("opens");
-    assert_eq!(reader.alarms(Span::newest(1_000)).expect("reads").len(), 200);
+    assert_eq!(reader.alarms(RecordSpan::newest(1_000)).expect("reads").len(), 200);
     let mut rows = Vec::new();
     reader
         .samples(&Query::default().of(["total_power_w"]), |chunk| {
@@ -194,7 +196,7 @@ fn the_size_limit_takes_the_oldest_raw_first() {
     let reader = Reader::open(&path).expect("opens");
     let (first_ns, last_ns) = reader.span().expect("reads").expect("rows");
     assert!(first_ns > Machine::at_ns(0) && last_ns == Machine::at_ns(6 * 36_000 - 1));
-    assert_eq!(reader.alarms(Span::newest(100)).expect("reads").len(), 6);
+    assert_eq!(reader.alarms(RecordSpan::newest(100)).expect("reads").len(), 6);
     let overview = reader.overview(&Query::default().of(["total_power_w"]), 60 * SECOND_NS).expect("answers");
     assert_eq!(overview.start_ns.len(), 360, "every minute is still in the overview");
 }
@@ -224,8 +226,8 @@ fn ages_take_each_kind_at_its_time() {
     let (first_ns, _) = reader.span().expect("reads").expect("rows");
     assert!((Machine::at_ns(3 * 36_000 - 6_000)..=Machine::at_ns(3 * 36_000)).contains(&first_ns));
     assert!((119..=121).contains(&minutes("total_power_w")), "{}", minutes("total_power_w"));
-    assert_eq!(reader.events(Span::newest(100)).expect("reads").len(), 3);
-    assert_eq!(reader.alarms(Span::newest(100)).expect("reads").len(), 4);
+    assert_eq!(reader.events(RecordSpan::newest(100)).expect("reads").len(), 3);
+    assert_eq!(reader.alarms(RecordSpan::newest(100)).expect("reads").len(), 4);
     assert!(reader.info().expect("reads").dropped.len() >= 3);
     assert_eq!(DAY_NS, 86_400 * SECOND_NS);
 }

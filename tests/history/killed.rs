@@ -3,7 +3,7 @@
 use crate::machine::{Machine, START_NS, TICK_NS, extra_values, uniform};
 use crate::round_trip::{options, verify, write};
 use adapters::Sample;
-use gateway::history::{Event, Options, Query, Reader, Span, WhenFull, Writer};
+use gateway::history::{Event, Options, Query, Reader, RecordSpan, WhenFull, Writer};
 use std::io::{BufRead, BufReader};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -97,7 +97,7 @@ fn twenty_kills_lose_nothing_acknowledged() {
         assert!(rows > acknowledged, "round {round}: {rows} rows, row {acknowledged} was acknowledged");
         let reader = Reader::open(&path).expect("opens");
         assert_eq!(reader.check().expect("checks"), Vec::<String>::new(), "round {round}");
-        let marks = reader.events(Span::between(Machine::at_ns(first), i64::MAX, u32::MAX)).expect("reads");
+        let marks = reader.events(RecordSpan::between(Machine::at_ns(first), i64::MAX, u32::MAX)).expect("reads");
         let marks = marks.iter().filter(|event| event.kind == "mark").count() as i64;
         assert!(marks >= events, "round {round}: {marks} events, {events} were acknowledged");
     }
@@ -203,7 +203,7 @@ fn a_clock_that_goes_back_begins_a_segment() {
     let expected: Vec<(i64, i64)> =
         (5_000..5_700).map(|row| (1, row)).chain((4_000..6_000).map(|row| (2, row))).collect();
     assert!(order == expected);
-    let events = reader.events(Span::newest(10)).expect("reads");
+    let events = reader.events(RecordSpan::newest(10)).expect("reads");
     assert_eq!(events.len(), 1);
     assert!(events[0].kind == "clock_went_back" && events[0].text.contains("169.9"), "{events:?}");
 

@@ -4,7 +4,7 @@ use crate::machine::{Machine, START_NS, extra_values};
 use crate::round_trip::{options, write};
 use adapters::clock::SECOND_NS;
 use gateway::history::{
-    Alarm, AlarmClear, Buckets, Command, Decision, Diagnosis, Event, Model, Part, Query, Reader, Span, SqlValue,
+    Alarm, AlarmClear, Buckets, Command, Decision, Diagnosis, Event, Model, Part, Query, Reader, RecordSpan, SqlValue,
     StateChange, Writer,
 };
 use std::ops::ControlFlow;
@@ -181,7 +181,7 @@ fn records_come_back() {
     assert_eq!((ticket, writer.acknowledged_record()), (12, 12));
 
     let reader = Reader::open(&path).expect("opens");
-    let all = Span::newest(100);
+    let all = RecordSpan::newest(100);
     let states = reader.states(all).expect("reads");
     let words: Vec<&str> = states.iter().map(|state| state.state.as_str()).collect();
     assert_eq!(words, ["standby", "cutting", "idle"]);
@@ -198,7 +198,7 @@ fn records_come_back() {
     assert_eq!(reader.parts(all).expect("reads"), [part]);
     assert_eq!(reader.models(all).expect("reads"), [model]);
     assert_eq!(reader.diagnoses(all).expect("reads"), [diagnosis]);
-    assert_eq!(reader.events(Span::between(0, START_NS, 9)).expect("reads"), []);
+    assert_eq!(reader.events(RecordSpan::between(0, START_NS, 9)).expect("reads"), []);
 }
 
 #[test]

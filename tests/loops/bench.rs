@@ -5,8 +5,8 @@ use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
 use adapters::{Actuator, LadderRule, Pull, Sample};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
-use gateway::gate::offset::{Account, Book, Moved, OffsetOrder};
-use gateway::gate::{Ask, AskOutcome, Gate, Reaction};
+use gateway::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder};
+use gateway::gate::{AskOutcome, Gate, Reaction, ScriptRequest};
 use gateway::history::{ExtraValue, Part, Record};
 use gateway::pipeline::{Pipeline, Store};
 use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
@@ -20,10 +20,10 @@ pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
 const LOOK_NS: i64 = SECOND_NS / 50;
 
 /// The gate of a shop whose ladder multiplies dial and override, and which lets the feed rise as quickly as it falls.
-pub(crate) fn limits(min_pct: f64, max_pct: f64) -> config::Gate {
+pub(crate) fn limits(min_pct: f64, max_pct: f64) -> config::GateConfig {
     let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
     let source = Some("lathe".to_owned());
-    config::Gate {
+    config::GateConfig {
         mode: GateMode::Armed,
         source,
         min_pct,
@@ -80,25 +80,25 @@ impl Bench {
         mut settings: SimulatedSettings,
         steps: &[ExperimentStep],
         scripts: &[ScriptFile],
-        limits: &config::Gate,
+        limits: &config::GateConfig,
     ) -> Self {
         settings.ladder.rule = LadderRule::Product;
         Self::of(Simulated::experiment("simulated://lathe", settings, 0, steps), scripts, limits)
     }
 
     /// The day's work.
-    pub(crate) fn at_work(settings: SimulatedSettings, scripts: &[ScriptFile], limits: &config::Gate) -> Self {
+    pub(crate) fn at_work(settings: SimulatedSettings, scripts: &[ScriptFile], limits: &config::GateConfig) -> Self {
         Self::of(Simulated::new("simulated://lathe", settings, 0), scripts, limits)
     }
 
-    fn of(machine: Simulated, scripts: &[ScriptFile], limits: &config::Gate) -> Self {
+    fn of(machine: Simulated, scripts: &[ScriptFile], limits: &config::GateConfig) -> Self {
         let sources: Vec<Box<dyn Pull>> = vec![Box::new(machine.controller()), Box::new(machine.meter())];
         let mut host = Host::new();
         host.load(scripts).expect("the scripts are accepted");
         let actuator: Box<dyn Actuator> = Box::new(machine.feed_override());
         let directory = tempfile::tempdir().expect("a directory");
-        let book = Book::open(directory.path(), "simulated://lathe").expect("none yet");
-        let offsets = Account::new(Box::new(machine.offsets()), book);
+        let book = OffsetJournal::open(directory.path(), "simulated://lathe").expect("none yet");
+        let offsets = OffsetAccount::new(Box::new(machine.offsets()), book);
         let estimators = estimators::Inference::new(estimators::Settings::default());
         Self {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
@@ -129,10 +129,11 @@ impl Bench {
         self.pipeline.step(&self.sample, &mut finished);
         self.parts.append(&mut finished.0);
         let verdict = *self.pipeline.verdict().expect("decided");
-        let asks: Vec<Ask> = self.pipeline.scripts().decision().stops.iter().map(Ask::of).collect();
+        let asks: Vec<ScriptRequest> = self.pipeline.scripts().decision().stops.iter().map(ScriptRequest::of).collect();
         let gate = self.pipeline.gate_mut();
         let judged = gate.ask(&asks, &self.sample).into_iter();
-        let sent: Vec<Ask> = judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
+        let sent: Vec<ScriptRequest> =
+            judged.filter(|(_, outcome)| *outcome == AskOutcome::Sent).map(|(ask, _)| ask).collect();
         let mut said = Vec::new();
         self.actuator_worker.step(&verdict, &sent, self.now_ns, |it| said.push(it));
         let orders: Vec<OffsetOrder> =

@@ -122,9 +122,9 @@ fn shipped(law: &ThermalLaw) -> ScriptFile {
 }
 
 /// Offsets alone: ten micrometres at a time, once a minute.
-fn offset_limits() -> config::Gate {
+fn offset_limits() -> config::GateConfig {
     let before = limits(50.0, 120.0);
-    let offset = config::Offset {
+    let offset = config::OffsetConfig {
         mode: GateMode::Armed,
         axes: vec![MachineAxis::Z],
         step_um: 10.0,
@@ -132,7 +132,7 @@ fn offset_limits() -> config::Gate {
         min_interval: Duration::from_secs(60),
         ..before.offset.clone()
     };
-    config::Gate { mode: GateMode::Shadow, armed_for: Duration::from_secs(86_400), offset, ..before }
+    config::GateConfig { mode: GateMode::Shadow, armed_for: Duration::from_secs(86_400), offset, ..before }
 }
 
 /// The whole loop: sensors, merge, shipped script, gate, control. What is true is asked of the machine while it cuts.

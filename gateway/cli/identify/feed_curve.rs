@@ -1,6 +1,6 @@
 //! `identify feed-curve`: the curve of the spindle current over feed, by speed and depth of cut.
 
-use super::{Learned, Reading};
+use super::{IdentifyFiles, IdentifyOutput};
 use crate::cli::CommandResult;
 use ::rules::estimators::spindle_current::identify_feed_curve;
 use clap::Args;
@@ -9,7 +9,7 @@ use serde_json::json;
 #[derive(Debug, Args)]
 pub(super) struct FeedCurveArguments {
     #[command(flatten)]
-    reading: Reading,
+    reading: IdentifyFiles,
     /// Column of the feature: a current, a load, a power.
     #[arg(long, value_name = "COLUMN", default_value = "spindle_current_a")]
     feature: String,
@@ -20,7 +20,7 @@ pub(super) struct FeedCurveArguments {
 
 pub(super) fn run(arguments: &FeedCurveArguments) -> CommandResult {
     let recording = adapters::recording::with_derived(arguments.reading.read()?);
-    let learned = identify_feed_curve(&recording, &arguments.feed, &arguments.feature).map(|learned| Learned {
+    let learned = identify_feed_curve(&recording, &arguments.feed, &arguments.feature).map(|learned| IdentifyOutput {
         text: learned.to_string(),
         json: json!(learned),
         file: learned.script(),

@@ -1,6 +1,6 @@
 //! `identify load-loss`: the loss that comes with the cut, per gear stage.
 
-use super::{Learned, Reading};
+use super::{IdentifyFiles, IdentifyOutput};
 use crate::cli::CommandResult;
 use ::rules::estimators::power_separation::{ReferenceChoice, identify_load_loss};
 use clap::Args;
@@ -9,7 +9,7 @@ use serde_json::json;
 #[derive(Debug, Args)]
 pub(super) struct LoadLossArguments {
     #[command(flatten)]
-    reading: Reading,
+    reading: IdentifyFiles,
     /// Column of the cutting torque at the spindle, N·m; without it cutting_force_n with diameter_mm serves.
     #[arg(long, value_name = "COLUMN", default_value = "torque_nm")]
     torque: String,
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &LoadLossArguments) -> CommandResult {
         torque_column: arguments.torque.clone(),
         specific_energy_j_mm3: arguments.specific_energy.zip(arguments.specific_energy_sd),
     };
-    let learned = identify_load_loss(&recording, &choice).map(|learned| Learned {
+    let learned = identify_load_loss(&recording, &choice).map(|learned| IdentifyOutput {
         text: learned.to_string(),
         json: json!(learned),
         file: Some(learned.script()),

@@ -10,7 +10,7 @@ mod thermal;
 mod tool_wear;
 
 use super::diagnose::cannot_use;
-use super::{CannotRun, CommandResult, Outcome, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::diagnosis::{put, read_recordings};
 use adapters::Recording;
 use clap::{Args, Subcommand};
@@ -22,11 +22,11 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArguments {
     #[command(subcommand)]
-    what: What,
+    what: IdentifyCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum IdentifyCommand {
     /// No-load power per gear stage and speed, from the idle stretches of recordings.
     NoLoad(no_load::NoLoadArguments),
     /// Load loss per gear stage, from cuts whose power at the edge is known besides.
@@ -41,7 +41,7 @@ enum What {
 
 /// What every subcommand reads and writes.
 #[derive(Debug, Args)]
-struct Reading {
+struct IdentifyFiles {
     /// Recordings (recording/1): .csv, .csv.gz, .parquet, or history:DB?from=..&to=..; several are put together.
     #[arg(long, value_name = "R.csv", num_args = 1.., required = true)]
     recording: Vec<String>,
@@ -54,7 +54,7 @@ struct Reading {
 }
 
 /// What a subcommand learned.
-struct Learned {
+struct IdentifyOutput {
     /// For the reader.
     text: String,
     /// For programs.
@@ -63,7 +63,7 @@ struct Learned {
     file: Option<String>,
 }
 
-impl Reading {
+impl IdentifyFiles {
     /// The recordings, put together; rows that were refused are told on standard error.
     fn read(&self) -> Result<Recording, CannotRun> {
         let given = read_recordings(&self.recording).map_err(|problems| cannot_use(&problems))?;
@@ -72,7 +72,7 @@ impl Reading {
     }
 
     /// Prints the result or the refusal, and writes the file.
-    fn finish(&self, what: &str, learned: Result<Learned, Refusal>) -> CommandResult {
+    fn finish(&self, what: &str, learned: Result<IdentifyOutput, Refusal>) -> CommandResult {
         match learned {
             Ok(learned) => {
                 match (&self.out, &learned.file) {
@@ -90,7 +90,7 @@ impl Reading {
                 } else {
                     print(&learned.text)
                 }
-                Ok(Outcome::Fine)
+                Ok(CommandOutcome::Fine)
             }
             Err(refusal) => {
                 let document = json!({ "schema": "identify/1", "what": what, "refused": refusal, "learned": null });
@@ -99,7 +99,7 @@ impl Reading {
                 } else {
                     print(&format!("cannot tell: {refusal}\n"))
                 }
-                Ok(Outcome::No)
+                Ok(CommandOutcome::No)
             }
         }
     }
@@ -108,10 +108,10 @@ impl Reading {
 /// Learns, prints, writes.
 pub(super) fn identify(arguments: &IdentifyArguments) -> CommandResult {
     match &arguments.what {
-        What::NoLoad(arguments) => no_load::run(arguments),
-        What::LoadLoss(arguments) => load_loss::run(arguments),
-        What::FeedCurve(arguments) => feed_curve::run(arguments),
-        What::Thermal(arguments) => thermal::run(arguments),
-        What::ToolWear(arguments) => tool_wear::run(arguments),
+        IdentifyCommand::NoLoad(arguments) => no_load::run(arguments),
+        IdentifyCommand::LoadLoss(arguments) => load_loss::run(arguments),
+        IdentifyCommand::FeedCurve(arguments) => feed_curve::run(arguments),
+        IdentifyCommand::Thermal(arguments) => thermal::run(arguments),
+        IdentifyCommand::ToolWear(arguments) => tool_wear::run(arguments),
     }
 }

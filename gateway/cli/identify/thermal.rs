@@ -1,6 +1,6 @@
 //! `identify thermal`: thermal error from temperatures, which sensors and which law.
 
-use super::{Learned, Reading};
+use super::{IdentifyFiles, IdentifyOutput};
 use crate::cli::{CannotRun, CommandResult};
 use crate::diagnosis::put;
 use adapters::Recording;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct ThermalArguments {
     #[command(flatten)]
-    reading: Reading,
+    reading: IdentifyFiles,
     /// Use these sensors instead of choosing, e.g. bearing_temperature_c,temperature_3_c.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     sensors: Option<Vec<String>>,
@@ -49,14 +49,14 @@ pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
     arguments.reading.finish("thermal", learned)
 }
 
-fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(Learned, ThermalModel), Refusal> {
+fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(IdentifyOutput, ThermalModel), Refusal> {
     let settings = settings(arguments)?;
     let collected = collect(recording)?;
     let learned = learn(&collected.course, settings, arguments.sensors.as_deref())?;
     let text = format!("{}{learned}", left_out(&collected.left_out));
     let model = ThermalModel::new(arguments.machine.clone(), learned.best().fit.law.clone());
     let json = document(&learned, &collected.left_out);
-    Ok((Learned { text, json, file: Some(learned.script()) }, model))
+    Ok((IdentifyOutput { text, json, file: Some(learned.script()) }, model))
 }
 
 fn settings(arguments: &ThermalArguments) -> Result<SelectionSettings, Refusal> {

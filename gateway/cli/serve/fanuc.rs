@@ -1,6 +1,6 @@
 //! `cnc-gateway serve fanuc`: the simulated machine behind a control that answers FOCAS2/Ethernet.
 
-use super::{Common, Running, until_stopped};
+use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
 use adapters::LadderRule;
 use adapters::clock::Clock;
@@ -89,7 +89,7 @@ pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
     let at = arguments.common.listen(8193);
     let next = "stop the other program, or choose another port with --listen";
     let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
-    let Running { machine, clock } = arguments.common.machine()?;
+    let RunningMachine { machine, clock } = arguments.common.machine()?;
     let control = control(arguments, machine, clock);
     let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
     let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");

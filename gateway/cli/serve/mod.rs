@@ -6,8 +6,8 @@ mod modbus;
 mod nclink;
 mod waveform;
 
-use super::{CannotRun, CommandResult, Outcome};
-use crate::signals::{Request, Signals};
+use super::{CannotRun, CommandOutcome, CommandResult};
+use crate::signals::{SignalRequest, Signals};
 use adapters::Address;
 use adapters::address::{SimulatedTarget, Speed, Target};
 use adapters::clock::{Clock, ScaledClock};
@@ -46,7 +46,7 @@ struct Common {
 }
 
 /// A running machine and the clock that it lives by.
-struct Running {
+struct RunningMachine {
     machine: Simulated,
     clock: Arc<dyn Clock>,
 }
@@ -58,7 +58,7 @@ impl Common {
     }
 
     /// Starts the machine.
-    fn machine(&self) -> Result<Running, CannotRun> {
+    fn machine(&self) -> Result<RunningMachine, CannotRun> {
         let whole = self.machine.contains(':');
         let text = if whole { self.machine.clone() } else { format!("simulated://{}", self.machine) };
         let address: Address = text.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
@@ -73,7 +73,7 @@ impl Common {
         let target = SimulatedTarget { begun_s: target.begun_s.max(STARTED_S), ..*target };
         let begun_ns = adapters::open::begun(&target, clock.now_ns());
         let machine = Simulated::new(address.text(), SimulatedSettings::of(&target), begun_ns);
-        Ok(Running { machine, clock })
+        Ok(RunningMachine { machine, clock })
     }
 }
 
@@ -108,7 +108,7 @@ fn until_stopped() -> CommandResult {
     runtime.block_on(async {
         let mut signals =
             Signals::listen().map_err(|error| CannotRun::new(format!("no signals can be heard: {error}"), ""))?;
-        while signals.next().await != Request::Stop {}
-        Ok(Outcome::Fine)
+        while signals.next().await != SignalRequest::Stop {}
+        Ok(CommandOutcome::Fine)
     })
 }

@@ -1,6 +1,6 @@
 //! `cnc-gateway serve nclink`: the simulated machine as an NC-Link device. A device does not listen; it dials a broker.
 
-use super::{Common, Running, until_stopped};
+use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print};
 use adapters::mqtt::Options;
 use adapters::nclink::device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
@@ -37,7 +37,7 @@ pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
         ));
     }
     let options = broker(&arguments.broker)?;
-    let Running { machine, clock } = arguments.common.machine()?;
+    let RunningMachine { machine, clock } = arguments.common.machine()?;
     let mut device = NcLinkDevice::new(&arguments.serial, &machine, clock);
     let stop = Arc::new(AtomicBool::new(false));
     let (stopping, name) = (stop.clone(), format!("nclink://{}/{}", arguments.broker, arguments.serial));

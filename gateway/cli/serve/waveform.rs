@@ -1,7 +1,7 @@
 //! `cnc-gateway serve waveform`: a sampler's stream: the simulated spindle current, a file, or a Linux IIO device.
 
 use super::{CannotRun, CommandResult, Common};
-use crate::cli::{Outcome, print};
+use crate::cli::{CommandOutcome, print};
 use adapters::clock::{Clock, SystemClock};
 use adapters::waveform::{Iio, Producer, Recorded, Sampler, SimulatedCurrent};
 use clap::Args;
@@ -77,5 +77,8 @@ pub(super) fn serve(arguments: &WaveformArguments) -> CommandResult {
     while !producer.is_finished() && !stopping() {
         std::thread::sleep(Duration::from_millis(100));
     }
-    producer.end().map(|()| Outcome::Fine).map_err(|error| CannotRun::new(format!("the sampler failed: {error}"), ""))
+    producer
+        .end()
+        .map(|()| CommandOutcome::Fine)
+        .map_err(|error| CannotRun::new(format!("the sampler failed: {error}"), ""))
 }

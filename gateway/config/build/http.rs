@@ -1,16 +1,16 @@
 //! `[http]`: what is served, and what a page that other computers reach must have.
 
 use super::{flag, seconds, text};
-use crate::config::Http;
-use crate::config::read::{Origin, Reading};
+use crate::config::HttpConfig;
+use crate::config::read::{ConfigInput, Origin};
 use std::net::SocketAddr;
 use std::path::Path;
 
 const SECTION: &str = "http";
 
-pub(super) fn http(reading: &Reading<'_>, base: &Path) -> Option<Http> {
+pub(super) fn http(reading: &ConfigInput<'_>, base: &Path) -> Option<HttpConfig> {
     let file = |key| text(reading, SECTION, key).map(|path| base.join(path));
-    Some(Http {
+    Some(HttpConfig {
         listen: text(reading, SECTION, "listen")?,
         enabled: flag(reading, SECTION, "enabled")?,
         tls: flag(reading, SECTION, "tls")?,
@@ -41,7 +41,7 @@ fn shifts(text: &str) -> Option<Vec<i64>> {
     (1..=SHIFTS_MAX).contains(&starts.len()).then_some(starts)
 }
 
-fn check_shifts(reading: &mut Reading<'_>) {
+fn check_shifts(reading: &mut ConfigInput<'_>) {
     let Some(written) = text(reading, SECTION, "shifts").filter(|written| shifts(written).is_none()) else { return };
     let at = origin(reading, "shifts");
     reading.problem(
@@ -60,19 +60,19 @@ pub(super) fn own(listen: &str) -> bool {
     }
 }
 
-pub(super) fn check(reading: &mut Reading<'_>) {
+pub(super) fn check(reading: &mut ConfigInput<'_>) {
     check_files(reading);
     check_hosts(reading);
     check_shifts(reading);
     check_reach(reading);
 }
 
-fn origin(reading: &Reading<'_>, key: &str) -> Origin {
+fn origin(reading: &ConfigInput<'_>, key: &str) -> Origin {
     reading.get(SECTION, key).map_or(Origin::Default, |found| found.origin.clone())
 }
 
 /// Certificate and key belong together.
-fn check_files(reading: &mut Reading<'_>) {
+fn check_files(reading: &mut ConfigInput<'_>) {
     let tls = flag(reading, SECTION, "tls").unwrap_or(false);
     for (one, other) in [("certificate", "key"), ("key", "certificate")] {
         if text(reading, SECTION, one).is_none() {
@@ -88,7 +88,7 @@ fn check_files(reading: &mut Reading<'_>) {
     }
 }
 
-fn check_hosts(reading: &mut Reading<'_>) {
+fn check_hosts(reading: &mut ConfigInput<'_>) {
     let named = |host: &String| {
         !host.is_empty()
             && host.len() <= 253
@@ -103,7 +103,7 @@ fn check_hosts(reading: &mut Reading<'_>) {
 }
 
 /// What other computers reach is encrypted and asks who is there.
-fn check_reach(reading: &mut Reading<'_>) {
+fn check_reach(reading: &mut ConfigInput<'_>) {
     let Some(listen) = text(reading, SECTION, "listen") else { return };
     let enabled = flag(reading, SECTION, "enabled").unwrap_or(true);
     let safe =

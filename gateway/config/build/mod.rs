@@ -5,10 +5,10 @@ mod thermal;
 
 use super::check_value::Scalar;
 use super::outputs;
-use super::read::{Found, Origin, Reading, Values};
+use super::read::{ConfigInput, LocatedValue, Origin, SectionValues};
 use super::{
-    Alignment, AlignmentUse, Config, Gate, GateMode, Gateway, History, Log, Offset, Operations, Scripts, Source, Twin,
-    channels,
+    AlignmentConfig, AlignmentUse, Config, GateConfig, GateMode, GatewayConfig, HistoryConfig, LogConfig, OffsetConfig,
+    OperationsConfig, ScriptsConfig, SourceConfig, TwinConfig, channels,
 };
 use crate::log::LogFormat;
 use adapters::Axis;
@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The configuration, or `None` where a value is missing; the problem has been reported then.
-pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
-    let sources: Option<Vec<Source>> = reading.sources.iter().map(source).collect();
+pub(super) fn build(reading: &mut ConfigInput<'_>, base: &Path) -> Option<Config> {
+    let sources: Option<Vec<SourceConfig>> = reading.sources.iter().map(source).collect();
     check_names(reading);
     check_gate(reading);
     http::check(reading);
@@ -35,18 +35,18 @@ pub(super) fn build(reading: &mut Reading<'_>, base: &Path) -> Option<Config> {
     let in_force = super::in_force::in_force(reading);
     Some(Config {
         in_force,
-        alignment: Alignment {
+        alignment: AlignmentConfig {
             spindle_power: alignment_use(&text(reading, "alignment", "spindle_power")?),
             total_power: alignment_use(&text(reading, "alignment", "total_power")?),
         },
         scripts: scripts(reading, &gateway.data_dir)?,
-        operations: Operations { path: text(reading, "operations", "path").map(|path| base.join(path)) },
+        operations: OperationsConfig { path: text(reading, "operations", "path").map(|path| base.join(path)) },
         gate: gate(reading)?,
         history: history(reading, &gateway.data_dir)?,
         sinks: sinks?,
         outbox: outbox?,
         http: http::http(reading, base)?,
-        twin: Twin { model: text(reading, "twin", "model").map(|path| base.join(path)) },
+        twin: TwinConfig { model: text(reading, "twin", "model").map(|path| base.join(path)) },
         thermal: thermal::thermal(reading, base)?,
         log: log(reading)?,
         gateway,
@@ -62,18 +62,18 @@ fn alignment_use(word: &str) -> AlignmentUse {
     }
 }
 
-fn log(reading: &Reading<'_>) -> Option<Log> {
+fn log(reading: &ConfigInput<'_>) -> Option<LogConfig> {
     let format = match text(reading, "log", "format")?.as_str() {
         "text" => LogFormat::Text,
         "json" => LogFormat::Json,
         _ => LogFormat::Off,
     };
     // The words of the key are those of the levels.
-    Some(Log { level: text(reading, "log", "level")?.parse().ok()?, format })
+    Some(LogConfig { level: text(reading, "log", "level")?.parse().ok()?, format })
 }
 
-fn gateway(reading: &Reading<'_>, base: &Path) -> Option<Gateway> {
-    Some(Gateway {
+fn gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
+    Some(GatewayConfig {
         name: text(reading, "gateway", "name")?,
         tick_hz: number(reading, "gateway", "tick_hz")?,
         language: match text(reading, "gateway", "language")?.as_str() {
@@ -85,15 +85,15 @@ fn gateway(reading: &Reading<'_>, base: &Path) -> Option<Gateway> {
     })
 }
 
-fn scripts(reading: &Reading<'_>, data_dir: &Path) -> Option<Scripts> {
-    Some(Scripts {
+fn scripts(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<ScriptsConfig> {
+    Some(ScriptsConfig {
         directory: data_dir.join(text(reading, "scripts", "directory")?),
         reload: flag(reading, "scripts", "reload")?,
     })
 }
 
-fn gate(reading: &Reading<'_>) -> Option<Gate> {
-    Some(Gate {
+fn gate(reading: &ConfigInput<'_>) -> Option<GateConfig> {
+    Some(GateConfig {
         mode: mode(&text(reading, "gate", "mode")?),
         source: text(reading, "gate", "source"),
         min_pct: number(reading, "gate", "min_pct")?,
@@ -110,9 +110,9 @@ fn gate(reading: &Reading<'_>) -> Option<Gate> {
     })
 }
 
-fn offset(reading: &Reading<'_>) -> Option<Offset> {
+fn offset(reading: &ConfigInput<'_>) -> Option<OffsetConfig> {
     const SECTION: &str = "gate.offset";
-    Some(Offset {
+    Some(OffsetConfig {
         mode: mode(&text(reading, SECTION, "mode")?),
         source: text(reading, SECTION, "source").or_else(|| text(reading, "gate", "source")),
         axes: axes(&text(reading, SECTION, "axes").unwrap_or_default()).unwrap_or_default(),
@@ -140,8 +140,8 @@ fn mode(word: &str) -> GateMode {
     }
 }
 
-fn history(reading: &Reading<'_>, data_dir: &Path) -> Option<History> {
-    Some(History {
+fn history(reading: &ConfigInput<'_>, data_dir: &Path) -> Option<HistoryConfig> {
+    Some(HistoryConfig {
         path: data_dir.join(PathBuf::from(text(reading, "history", "path")?)),
         retention_days: number(reading, "history", "retention_days")?,
         max_gb: number(reading, "history", "max_gb")?,
@@ -149,10 +149,10 @@ fn history(reading: &Reading<'_>, data_dir: &Path) -> Option<History> {
     })
 }
 
-fn source(values: &Values) -> Option<Source> {
+fn source(values: &SectionValues) -> Option<SourceConfig> {
     let number = |key| values.found.get(key).and_then(as_number);
     let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
-    Some(Source {
+    Some(SourceConfig {
         name: source_name(values)?,
         address,
         period: number("period_s").map(Duration::from_secs_f64),
@@ -160,13 +160,13 @@ fn source(values: &Values) -> Option<Source> {
     })
 }
 
-pub(super) fn source_name(values: &Values) -> Option<String> {
+pub(super) fn source_name(values: &SectionValues) -> Option<String> {
     let named = |key| values.found.get(key).and_then(as_text).map(str::to_owned);
     named("name").or_else(|| named("address"))
 }
 
 /// Sources exist and have different names.
-fn check_names(reading: &mut Reading<'_>) {
+fn check_names(reading: &mut ConfigInput<'_>) {
     if reading.sources.is_empty() {
         let next = "write [[source]] with address = \"simulated://lathe\" to begin with";
         return reading.problem(&Origin::Default, "there is no source to read", next);
@@ -181,13 +181,13 @@ fn check_names(reading: &mut Reading<'_>) {
     }
 }
 
-pub(super) fn origin_of_name(values: &Values) -> Origin {
+pub(super) fn origin_of_name(values: &SectionValues) -> Origin {
     let found = values.found.get("name").or_else(|| values.found.get("address"));
     found.map_or(Origin::Default, |found| found.origin.clone())
 }
 
 /// What is armed has somewhere to write to.
-fn check_gate(reading: &mut Reading<'_>) {
+fn check_gate(reading: &mut ConfigInput<'_>) {
     check_offsets(reading);
     let armed = text(reading, "gate", "mode").as_deref() == Some("armed");
     let origin = |key: &str| reading.get("gate", key).map_or(Origin::Default, |found| found.origin.clone());
@@ -209,7 +209,7 @@ fn check_gate(reading: &mut Reading<'_>) {
 
 /// A machine whose feed override may be written tells where its operator's dial stands: only then can nothing above it be
 /// asked for, and a ladder that replaces the dial be found out.
-fn check_dial(reading: &mut Reading<'_>, name: &str) {
+fn check_dial(reading: &mut ConfigInput<'_>, name: &str) {
     let target = reading.sources.iter().find(|values| source_name(values).as_deref() == Some(name));
     let Some(found) = target.and_then(|values| values.found.get("address")) else { return };
     let address = as_text(found).and_then(|text| text.parse::<adapters::Address>().ok());
@@ -228,7 +228,7 @@ fn lacks_dial(target: &Target) -> bool {
 }
 
 /// There is a source of this name.
-fn check_source(reading: &mut Reading<'_>, names: &[String], name: &str, at: &Origin) {
+fn check_source(reading: &mut ConfigInput<'_>, names: &[String], name: &str, at: &Origin) {
     if names.iter().any(|known| known == name) || names.is_empty() {
         return;
     }
@@ -240,9 +240,9 @@ fn check_source(reading: &mut Reading<'_>, names: &[String], name: &str, at: &Or
 }
 
 /// What may shift an axis says which one, and where.
-fn check_offsets(reading: &mut Reading<'_>) {
+fn check_offsets(reading: &mut ConfigInput<'_>) {
     const SECTION: &str = "gate.offset";
-    let origin = |reading: &Reading<'_>, key: &str| {
+    let origin = |reading: &ConfigInput<'_>, key: &str| {
         reading.get(SECTION, key).map_or(Origin::Default, |found| found.origin.clone())
     };
     let on = text(reading, SECTION, "mode").is_some_and(|mode| mode != "off");
@@ -272,33 +272,33 @@ fn quoted(names: &[String]) -> String {
     names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
 }
 
-pub(super) fn as_text(found: &Found) -> Option<&str> {
+pub(super) fn as_text(found: &LocatedValue) -> Option<&str> {
     match &found.value {
         Scalar::Text(text) => Some(text),
         _ => None,
     }
 }
 
-fn as_number(found: &Found) -> Option<f64> {
+fn as_number(found: &LocatedValue) -> Option<f64> {
     match found.value {
         Scalar::Number(number) => Some(number),
         _ => None,
     }
 }
 
-pub(super) fn text(reading: &Reading<'_>, section: &str, key: &str) -> Option<String> {
+pub(super) fn text(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<String> {
     reading.get(section, key).and_then(as_text).map(str::to_owned)
 }
 
-pub(super) fn number(reading: &Reading<'_>, section: &str, key: &str) -> Option<f64> {
+pub(super) fn number(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<f64> {
     reading.get(section, key).and_then(as_number)
 }
 
-pub(super) fn seconds(reading: &Reading<'_>, section: &str, key: &str) -> Option<Duration> {
+pub(super) fn seconds(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<Duration> {
     number(reading, section, key).map(Duration::from_secs_f64)
 }
 
-pub(super) fn flag(reading: &Reading<'_>, section: &str, key: &str) -> Option<bool> {
+pub(super) fn flag(reading: &ConfigInput<'_>, section: &str, key: &str) -> Option<bool> {
     match reading.get(section, key).map(|found| &found.value) {
         Some(Scalar::Flag(flag)) => Some(*flag),
         _ => None,

@@ -1,16 +1,16 @@
 //! `[thermal]`.
 
 use super::{flag, number, text};
-use crate::config::Thermal;
-use crate::config::read::Reading;
+use crate::config::ThermalConfig;
+use crate::config::read::ConfigInput;
 use adapters::Axis;
 use rules::estimators::thermal::CompensationSettings;
 use std::path::Path;
 
-pub(super) fn thermal(reading: &Reading<'_>, base: &Path) -> Option<Thermal> {
+pub(super) fn thermal(reading: &ConfigInput<'_>, base: &Path) -> Option<ThermalConfig> {
     const SECTION: &str = "thermal";
     let number = |key| number(reading, SECTION, key);
-    Some(Thermal {
+    Some(ThermalConfig {
         model: text(reading, SECTION, "model").map(|path| base.join(path)),
         axis: Axis::of(&text(reading, SECTION, "axis")?)?,
         propose: flag(reading, SECTION, "propose")?,

@@ -5,7 +5,7 @@
 //! changed the offset, or the gate has counted on another shift than there is, nothing is written either; the gate decides
 //! anew from what was found.
 
-use super::book::Book;
+use super::book::OffsetJournal;
 use super::order::{Moved, OffsetOrder, Shifted};
 use adapters::SourceError;
 use adapters::clock::Clock;
@@ -15,16 +15,16 @@ use adapters::offset::{Axis, LastWrite, Left, OffsetShares, OffsetSink, same};
 const MOST_UM: f64 = 1000.0;
 
 /// Holds the only sink of offsets there is. Blocks as long as the control takes to answer.
-pub struct Account {
+pub struct OffsetAccount {
     sink: Box<dyn OffsetSink>,
     ledgers: [OffsetShares; Axis::ALL.len()],
-    book: Book,
+    book: OffsetJournal,
 }
 
-impl Account {
+impl OffsetAccount {
     /// With what the book knows of this control.
     #[must_use]
-    pub fn new(sink: Box<dyn OffsetSink>, book: Book) -> Self {
+    pub fn new(sink: Box<dyn OffsetSink>, book: OffsetJournal) -> Self {
         let ledgers = Axis::ALL.map(|axis| OffsetShares::with(book.left(axis)));
         Self { sink, ledgers, book }
     }

@@ -20,7 +20,7 @@ const SCHEMA: &str = "offsets/2";
 type Axes = BTreeMap<String, Left>;
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Content {
+struct JournalContent {
     schema: String,
     /// By the address of the control.
     controls: BTreeMap<String, Axes>,
@@ -35,13 +35,13 @@ struct OneControl {
 
 /// What was written to which control and not given back; survives a power cut.
 #[derive(Debug, Clone)]
-pub struct Book {
+pub struct OffsetJournal {
     path: PathBuf,
     target: String,
-    content: Content,
+    content: JournalContent,
 }
 
-impl Book {
+impl OffsetJournal {
     /// The book in this directory, for this control; empty where there is none.
     ///
     /// # Errors
@@ -50,10 +50,10 @@ impl Book {
         let path = data_dir.join(FILE);
         let content = match std::fs::read_to_string(&path) {
             Ok(text) => parse(&text)?,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Content::default(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => JournalContent::default(),
             Err(error) => return Err(error),
         };
-        Ok(Self { path, target: target.to_owned(), content: Content { schema: SCHEMA.to_owned(), ..content } })
+        Ok(Self { path, target: target.to_owned(), content: JournalContent { schema: SCHEMA.to_owned(), ..content } })
     }
 
     /// Puts a book that cannot be read aside, and begins an empty one.
@@ -105,10 +105,12 @@ impl Book {
     }
 }
 
-fn parse(text: &str) -> io::Result<Content> {
-    let of_one =
-        |OneControl { target, axes }| Content { controls: BTreeMap::from([(target, axes)]), ..Content::default() };
-    let parsed = serde_json::from_str::<Content>(text);
+fn parse(text: &str) -> io::Result<JournalContent> {
+    let of_one = |OneControl { target, axes }| JournalContent {
+        controls: BTreeMap::from([(target, axes)]),
+        ..JournalContent::default()
+    };
+    let parsed = serde_json::from_str::<JournalContent>(text);
     parsed.or_else(|error| serde_json::from_str(text).map(of_one).map_err(|_| error.into()))
 }
 
@@ -121,13 +123,13 @@ mod tests {
     #[test]
     fn what_is_left_in_another_control_stays_in_the_book() {
         let directory = tempfile::tempdir().expect("a directory");
-        let mut book = Book::open(directory.path(), "fanuc://a").expect("none yet");
+        let mut book = OffsetJournal::open(directory.path(), "fanuc://a").expect("none yet");
         book.keep(Axis::Z, Some(LEFT)).expect("written");
-        let mut other = Book::open(directory.path(), "fanuc://b").expect("readable");
+        let mut other = OffsetJournal::open(directory.path(), "fanuc://b").expect("readable");
         assert_eq!(other.left(Axis::Z), None);
         other.keep(Axis::X, Some(LEFT)).expect("written");
         other.keep(Axis::X, None).expect("written");
-        let book = Book::open(directory.path(), "fanuc://a").expect("readable");
+        let book = OffsetJournal::open(directory.path(), "fanuc://a").expect("readable");
         assert_eq!(book.all().collect::<Vec<_>>(), [("fanuc://a", Axis::Z, LEFT)]);
     }
 
@@ -137,11 +139,11 @@ mod tests {
         let path = directory.path().join(FILE);
         let first = r#"{"schema":"offsets/1","target":"fanuc://a","axes":{"z":{"base_um":40.0,"written_um":45.0}}}"#;
         std::fs::write(&path, first).expect("written");
-        let book = Book::open(directory.path(), "fanuc://a").expect("readable");
+        let book = OffsetJournal::open(directory.path(), "fanuc://a").expect("readable");
         assert_eq!(book.left(Axis::Z), Some(Left { intended_um: None, ..LEFT }));
         std::fs::write(&path, &first[..30]).expect("written");
-        assert!(Book::open(directory.path(), "fanuc://a").is_err());
-        let (book, aside) = Book::begin_anew(directory.path(), "fanuc://a").expect("put aside");
+        assert!(OffsetJournal::open(directory.path(), "fanuc://a").is_err());
+        let (book, aside) = OffsetJournal::begin_anew(directory.path(), "fanuc://a").expect("put aside");
         assert!(aside.is_file() && book.all().next().is_none());
     }
 }

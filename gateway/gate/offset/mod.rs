@@ -12,7 +12,7 @@
 //! nothing. A control that shows something else than was written ends the arming and raises an alarm.
 //!
 //! A work offset has no sign of life: nothing takes it back when the gateway dies. Therefore what is to be written is kept in
-//! a file beside the history before it is written ([`Book`]); after a failed line and after a start the control is looked at
+//! a file beside the history before it is written ([`OffsetJournal`]); after a failed line and after a start the control is looked at
 //! before anything else is written to it; and `on_disarm = "restore"`, which is the default, gives it back in one step as soon
 //! as no program runs: after disarming, at the end of the gateway, and after a start that finds something left. One large
 //! step between two programs is better than an offset that nobody follows up while the machine cools. `"keep"` is for shops
@@ -23,8 +23,8 @@ mod book;
 mod order;
 mod trail;
 
-pub use account::Account;
-pub use book::Book;
+pub use account::OffsetAccount;
+pub use book::OffsetJournal;
 pub use order::{Moved, OffsetOrder, Shifted};
 pub use trail::OffsetTrail;
 
@@ -112,14 +112,14 @@ pub(super) struct Circumstances {
 /// Decides about offsets. One per machine.
 #[derive(Debug)]
 pub struct Offsets {
-    limits: config::Offset,
+    limits: config::OffsetConfig,
     slides: Vec<Slide>,
     ordered_ns: Option<TimeNs>,
 }
 
 impl Offsets {
     /// Nothing is shifted, as far as is known.
-    pub(super) fn new(limits: config::Offset) -> Self {
+    pub(super) fn new(limits: config::OffsetConfig) -> Self {
         let slides = limits.axes.iter().map(|axis| Slide::new(*axis)).collect();
         Self { limits, slides, ordered_ns: None }
     }
@@ -270,7 +270,7 @@ impl Slide {
         self.shift_um == 0.0 || (0..MISSING_NS).contains(&since_ns)
     }
 
-    fn judge(&self, wanted_um: Option<f64>, limits: &config::Offset, now: Circumstances) -> OffsetVerdict {
+    fn judge(&self, wanted_um: Option<f64>, limits: &config::OffsetConfig, now: Circumstances) -> OffsetVerdict {
         let finite = wanted_um.is_none_or(f64::is_finite);
         // Controls count in whole micrometres.
         let target_um =
@@ -290,7 +290,7 @@ impl Slide {
     }
 
     /// What is to be written: a step while armed; afterwards everything back, where that is configured.
-    fn order(&self, verdict: &OffsetVerdict, limits: &config::Offset) -> Option<OffsetOrder> {
+    fn order(&self, verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> Option<OffsetOrder> {
         if verdict.armed && !self.retired {
             let (axis, from_um, wanted_um) = (self.axis, self.shift_um, verdict.permitted_um);
             let step = OffsetOrder::Shift { axis, from_um, wanted_um };

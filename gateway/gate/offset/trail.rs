@@ -10,7 +10,7 @@ use rules::script::OffsetProposal;
 
 /// What was last recorded of the proposals for an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Known {
+struct LastProposal {
     asked_um: Option<i64>,
     outcome: OffsetOutcome,
     armed: bool,
@@ -20,7 +20,7 @@ struct Known {
 /// Remembers what was last recorded.
 #[derive(Debug, Default)]
 pub struct OffsetTrail {
-    known: [Option<Known>; Axis::ALL.len()],
+    known: [Option<LastProposal>; Axis::ALL.len()],
     /// Who proposed what was ordered last.
     authors: [Author; Axis::ALL.len()],
     pace: RowRate,
@@ -32,13 +32,13 @@ impl OffsetTrail {
         &mut self,
         proposal: Option<&OffsetProposal>,
         verdict: &OffsetVerdict,
-        limits: &config::Offset,
+        limits: &config::OffsetConfig,
     ) -> Option<Audit> {
         if verdict.order.is_some() {
             self.authors[verdict.axis.index()] =
                 proposal.map_or(Author::default(), |it| Author::new(&it.script, it.version, &it.reason));
         }
-        let known = Known {
+        let known = LastProposal {
             #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN becomes 0; only compared")]
             asked_um: verdict.wanted_um.map(|um| um.round() as i64),
             outcome: verdict.outcome,
@@ -149,7 +149,7 @@ fn outcome(verdict: &OffsetVerdict) -> &'static str {
 }
 
 /// Why, for the operator.
-fn reason(verdict: &OffsetVerdict, limits: &config::Offset) -> String {
+fn reason(verdict: &OffsetVerdict, limits: &config::OffsetConfig) -> String {
     match verdict.outcome {
         OffsetOutcome::Permitted if verdict.armed => "as proposed".to_owned(),
         OffsetOutcome::Permitted => "the gate is not armed for offsets: recorded, not written".to_owned(),

@@ -12,8 +12,8 @@
 
 mod withdraw;
 
-use super::fault::{Fault, Shown};
-use super::verdict::{Outcome, Verdict};
+use super::fault::{Fault, UnexpectedReading};
+use super::verdict::{GateOutcome, Verdict};
 use crate::config;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
@@ -49,7 +49,7 @@ impl Occasion {
 
 /// One write, for the history.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Written {
+pub struct WriteRecord {
     /// When it was issued.
     pub at_ns: TimeNs,
     /// The sample that led to it.
@@ -94,7 +94,7 @@ struct WriteSchedule {
 
 /// A change that has not been seen in force yet.
 #[derive(Debug, Clone, Copy)]
-struct Pending {
+struct PendingWrite {
     /// `None`: the dial has to be in force again.
     asked: Option<OverridePct>,
     sample_ns: TimeNs,
@@ -119,12 +119,12 @@ pub struct OverrideWriter<A> {
     /// When the machine was last looked at before anything was enabled.
     looked_ns: Option<TimeNs>,
     changed_ns: Option<TimeNs>,
-    pending: Option<Pending>,
+    pending: Option<PendingWrite>,
 }
 
 impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
-    pub fn new(actuator: A, limits: &config::Gate) -> Self {
+    pub fn new(actuator: A, limits: &config::GateConfig) -> Self {
         let ns = |duration: std::time::Duration| i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX);
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
@@ -152,7 +152,7 @@ impl<A: Actuator> OverrideWriter<A> {
     /// Writes what an armed verdict asks for, when it has changed or the sign of life is due. The first verdict that is not
     /// armed any more, or asks for nothing, gives the machine back to its dial. Anything else writes nothing; neither does an
     /// armed verdict after a fault, until one that is not armed has been seen.
-    pub fn step(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<Written> {
+    pub fn step(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<WriteRecord> {
         if !verdict.armed {
             self.failed = false;
             return self.release(clock);
@@ -171,7 +171,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let occasion = self.due(verdict, at_ns)?;
         let failed = |fault| {
             let (asked, sample_ns) = (verdict.permitted, verdict.at_ns);
-            Written { at_ns, sample_ns, occasion, before: None, asked, after: None, fault: Some(fault) }
+            WriteRecord { at_ns, sample_ns, occasion, before: None, asked, after: None, fault: Some(fault) }
         };
         let begins = if self.holding { Ok(true) } else { self.may_begin(verdict.permitted, clock) };
         match (begins, self.interrupted(at_ns, clock)) {
@@ -182,7 +182,7 @@ impl<A: Actuator> OverrideWriter<A> {
     }
 
     /// Nothing more is written after a fault.
-    fn noted(&mut self, act: impl FnOnce(&mut Self) -> Option<Written>) -> Option<Written> {
+    fn noted(&mut self, act: impl FnOnce(&mut Self) -> Option<WriteRecord>) -> Option<WriteRecord> {
         let written = act(self)?;
         self.failed = written.fault.is_some();
         Some(written)
@@ -281,7 +281,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let makes = |dial| pending.asked.map_or(dial, |asked| self.pace.rule.combine(dial, asked));
         if self.dials.iter().any(|(_, dial)| makes(*dial) == found) {
             self.pending = None;
-            let Pending { asked, sample_ns, issued_ns } = pending;
+            let PendingWrite { asked, sample_ns, issued_ns } = pending;
             let seen = |asked| Ok(Reaction { asked, found, sample_ns, issued_ns, seen_ns: now_ns });
             return asked.map(seen);
         }
@@ -303,7 +303,7 @@ impl<A: Actuator> OverrideWriter<A> {
     /// Going back to 100 % does not wait for the least interval between two changes.
     fn due(&self, verdict: &Verdict, now_ns: TimeNs) -> Option<Occasion> {
         let Some((at_ns, pct)) = self.recent.back().filter(|_| self.holding) else { return Some(Occasion::Change) };
-        let back = matches!(verdict.outcome, Outcome::Held(_) | Outcome::Refused);
+        let back = matches!(verdict.outcome, GateOutcome::Held(_) | GateOutcome::Refused);
         let rested = self.changed_ns.is_none_or(|changed_ns| now_ns - changed_ns >= self.pace.interval_ns);
         if *pct != verdict.permitted && (rested || back) {
             return Some(Occasion::Change);
@@ -318,7 +318,7 @@ impl<A: Actuator> OverrideWriter<A> {
         wanted: OverridePct,
         sample_ns: TimeNs,
         clock: &dyn Clock,
-    ) -> Option<Written> {
+    ) -> Option<WriteRecord> {
         let at_ns = clock.now_ns();
         let first = !std::mem::replace(&mut self.holding, true);
         let before = match (first, self.dials.back()) {
@@ -334,7 +334,7 @@ impl<A: Actuator> OverrideWriter<A> {
         let sent = self.actuator.write_feed_override(clock, asked);
         if occasion == Occasion::Change {
             self.changed_ns = Some(at_ns);
-            self.pending = Some(Pending { asked: Some(asked), sample_ns, issued_ns: at_ns });
+            self.pending = Some(PendingWrite { asked: Some(asked), sample_ns, issued_ns: at_ns });
         }
         let late = self.late(at_ns, clock.now_ns());
         let (after, fault) = match sent.and_then(|()| self.read(clock)) {
@@ -346,7 +346,7 @@ impl<A: Actuator> OverrideWriter<A> {
             }
             Err(error) => (None, Some(Fault::Line(error))),
         };
-        Some(Written { at_ns, sample_ns, occasion, before, asked, after, fault })
+        Some(WriteRecord { at_ns, sample_ns, occasion, before, asked, after, fault })
     }
 
     /// The override in force; notes the dial beside it.
@@ -392,8 +392,8 @@ impl<A: Actuator> OverrideWriter<A> {
         Fault::ReadBack { asked, shown: self.shown(found) }
     }
 
-    fn shown(&self, found: OverridePct) -> Shown {
+    fn shown(&self, found: OverridePct) -> UnexpectedReading {
         let dial = self.dials.back().map(|(_, dial)| *dial).filter(|_| self.dial_is_known);
-        Shown { found, dial, rule: self.pace.rule }
+        UnexpectedReading { found, dial, rule: self.pace.rule }
     }
 }

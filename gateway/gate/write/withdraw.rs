@@ -1,7 +1,7 @@
 //! The enable is withdrawn: when nothing is asked for any more, at the end, and once after every start in case an earlier run
 //! could not. A withdrawal that the machine refuses is repeated until it is taken.
 
-use super::{Occasion, OverrideWriter, Pending, Written};
+use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
 use crate::gate::fault::Fault;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
@@ -42,7 +42,7 @@ impl Owed {
 
 impl<A: Actuator> OverrideWriter<A> {
     /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
-    pub fn release(&mut self, clock: &dyn Clock) -> Option<Written> {
+    pub fn release(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {
         if std::mem::take(&mut self.holding) {
             self.owed = Some(Owed::at_once());
         }
@@ -56,7 +56,7 @@ impl<A: Actuator> OverrideWriter<A> {
         self.holding || self.owed.is_some_and(|owed| !owed.leftover)
     }
 
-    fn withdraw(&mut self, owed: Owed, clock: &dyn Clock) -> Option<Written> {
+    fn withdraw(&mut self, owed: Owed, clock: &dyn Clock) -> Option<WriteRecord> {
         let at_ns = clock.now_ns();
         let before = self.recent.back().map(|(_, pct)| *pct);
         let occasion = if owed.leftover { Occasion::Leftover } else { Occasion::Release };
@@ -66,7 +66,7 @@ impl<A: Actuator> OverrideWriter<A> {
         };
         let written = |after, fault| {
             let asked = OverridePct::FULL;
-            Some(Written { at_ns, sample_ns: at_ns, occasion, before, asked, after, fault })
+            Some(WriteRecord { at_ns, sample_ns: at_ns, occasion, before, asked, after, fault })
         };
         match sent {
             Ok(false) => {
@@ -107,7 +107,7 @@ impl<A: Actuator> OverrideWriter<A> {
         self.begin_anew();
         if self.dial_is_known && told.1.is_none() {
             self.dials.extend(dial);
-            self.pending = Some(Pending { asked: None, sample_ns: at_ns, issued_ns: at_ns });
+            self.pending = Some(PendingWrite { asked: None, sample_ns: at_ns, issued_ns: at_ns });
         }
         told
     }

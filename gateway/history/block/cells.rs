@@ -24,7 +24,7 @@ pub(crate) enum Encoding {
 
 /// Count, least, greatest and mean of the values that are there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Summary {
+pub struct ValueSummary {
     /// How many values.
     pub count: u64,
     /// The least, in the unit of the series; 0 when there is none.
@@ -35,7 +35,7 @@ pub struct Summary {
     pub mean: f64,
 }
 
-impl Summary {
+impl ValueSummary {
     pub(crate) fn of(values: &[f64]) -> Self {
         if values.is_empty() {
             return Self::default();
@@ -59,9 +59,9 @@ impl Summary {
 }
 
 /// What was written for one series.
-pub(crate) struct Written {
+pub(crate) struct SeriesWritten {
     pub(crate) encoding: Encoding,
-    pub(crate) summary: Summary,
+    pub(crate) summary: ValueSummary,
     pub(crate) any_missing: bool,
 }
 
@@ -79,7 +79,7 @@ pub(crate) fn encode(
     decimals: Option<u8>,
     scratch: &mut Scratch,
     out: &mut Vec<u8>,
-) -> Written {
+) -> SeriesWritten {
     match column {
         Column::Numbers { values, missing } => encode_numbers(values, missing, decimals, scratch, out),
         Column::Words(changes) => encode_words(changes, rows, out),
@@ -92,7 +92,7 @@ fn encode_numbers(
     decimals: Option<u8>,
     scratch: &mut Scratch,
     out: &mut Vec<u8>,
-) -> Written {
+) -> SeriesWritten {
     let any_missing = missing.iter().any(|code| *code != PRESENT);
     let present = &mut scratch.present;
     present.clear();
@@ -118,7 +118,7 @@ fn encode_numbers(
             Encoding::Planes
         }
     };
-    Written { encoding, summary: Summary::of(present), any_missing }
+    SeriesWritten { encoding, summary: ValueSummary::of(present), any_missing }
 }
 
 fn put_runs(codes: &[u8], out: &mut Vec<u8>) {
@@ -136,7 +136,7 @@ fn put_planes(values: &[f64], out: &mut Vec<u8>) {
     }
 }
 
-fn encode_words(changes: &[(u32, Word)], rows: usize, out: &mut Vec<u8>) -> Written {
+fn encode_words(changes: &[(u32, Word)], rows: usize, out: &mut Vec<u8>) -> SeriesWritten {
     let mut words: Vec<&str> = Vec::new();
     let mut runs: Vec<u8> = Vec::new();
     let mut count = 0u64;
@@ -156,7 +156,7 @@ fn encode_words(changes: &[(u32, Word)], rows: usize, out: &mut Vec<u8>) -> Writ
     put(out, changes.len() as u64);
     out.extend_from_slice(&runs);
     let any_missing = count < rows as u64;
-    Written { encoding: Encoding::Words, summary: Summary { count, ..Summary::default() }, any_missing }
+    SeriesWritten { encoding: Encoding::Words, summary: ValueSummary { count, ..ValueSummary::default() }, any_missing }
 }
 
 fn position<'a>(words: &mut Vec<&'a str>, text: &'a str) -> usize {

@@ -3,7 +3,7 @@
 
 use super::super::reason::Reasons;
 use super::super::rounding::{TEN, nearest};
-use super::cells::{Encoding, Summary};
+use super::cells::{Encoding, ValueSummary};
 use super::varint::{Bytes, put, put_text, unzigzag, zigzag};
 
 /// Version of the block format, the first byte.
@@ -16,7 +16,7 @@ const MISSING: u8 = 0x80;
 
 /// Where the bytes of a series lie and how they are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Span {
+pub(crate) struct ByteSpan {
     pub(crate) offset: usize,
     pub(crate) stored: usize,
     /// Length after decompression; equal to `stored` when the bytes are not compressed.
@@ -25,26 +25,26 @@ pub(crate) struct Span {
 
 /// One series of a block.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub(crate) struct SeriesEntry {
     pub(crate) series: i64,
     pub(crate) encoding: Encoding,
     pub(crate) any_missing: bool,
-    pub(crate) summary: Summary,
-    pub(crate) span: Span,
+    pub(crate) summary: ValueSummary,
+    pub(crate) span: ByteSpan,
 }
 
 /// What a block holds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Directory {
     pub(crate) rows: usize,
-    pub(crate) times: Span,
-    pub(crate) entries: Vec<Entry>,
+    pub(crate) times: ByteSpan,
+    pub(crate) entries: Vec<SeriesEntry>,
     /// Estimators' own reasons used in this block: code and word.
     pub(crate) words: Vec<(u8, String)>,
 }
 
 impl Directory {
-    pub(crate) fn entry(&self, series: i64) -> Option<&Entry> {
+    pub(crate) fn entry(&self, series: i64) -> Option<&SeriesEntry> {
         self.entries.iter().find(|entry| entry.series == series)
     }
 
@@ -90,18 +90,18 @@ impl Directory {
     }
 }
 
-fn put_span(out: &mut Vec<u8>, span: Span) {
+fn put_span(out: &mut Vec<u8>, span: ByteSpan) {
     put(out, span.stored as u64);
     put(out, span.unpacked as u64);
 }
 
-fn take_span(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<Span> {
-    let span = Span { offset: *offset, stored: bytes.count()?, unpacked: bytes.count()? };
+fn take_span(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<ByteSpan> {
+    let span = ByteSpan { offset: *offset, stored: bytes.count()?, unpacked: bytes.count()? };
     *offset = offset.checked_add(span.stored)?;
     Some(span)
 }
 
-fn put_entry(out: &mut Vec<u8>, entry: &Entry) {
+fn put_entry(out: &mut Vec<u8>, entry: &SeriesEntry) {
     put(out, zigzag(entry.series));
     let encoding = match entry.encoding {
         Encoding::Scaled(places) => places,
@@ -116,8 +116,8 @@ fn put_entry(out: &mut Vec<u8>, entry: &Entry) {
     put_span(out, entry.span);
 }
 
-fn put_summary(out: &mut Vec<u8>, entry: &Entry) {
-    let Summary { min, max, mean, .. } = entry.summary;
+fn put_summary(out: &mut Vec<u8>, entry: &SeriesEntry) {
+    let ValueSummary { min, max, mean, .. } = entry.summary;
     match entry.encoding {
         Encoding::Words => {}
         Encoding::Scaled(places) => {
@@ -129,7 +129,7 @@ fn put_summary(out: &mut Vec<u8>, entry: &Entry) {
     }
 }
 
-fn take_entry(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<Entry> {
+fn take_entry(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<SeriesEntry> {
     let series = unzigzag(bytes.varint()?);
     let byte = bytes.byte()?;
     let encoding = match byte & !MISSING {
@@ -138,15 +138,15 @@ fn take_entry(bytes: &mut Bytes<'_>, offset: &mut usize) -> Option<Entry> {
         places if usize::from(places) < TEN.len() => Encoding::Scaled(places),
         _ => return None,
     };
-    let mut summary = Summary { count: bytes.varint()?, ..Summary::default() };
+    let mut summary = ValueSummary { count: bytes.varint()?, ..ValueSummary::default() };
     if summary.count > 0 {
         take_summary(bytes, encoding, &mut summary)?;
     }
     let span = take_span(bytes, offset)?;
-    Some(Entry { series, encoding, any_missing: byte & MISSING != 0, summary, span })
+    Some(SeriesEntry { series, encoding, any_missing: byte & MISSING != 0, summary, span })
 }
 
-fn take_summary(bytes: &mut Bytes<'_>, encoding: Encoding, summary: &mut Summary) -> Option<()> {
+fn take_summary(bytes: &mut Bytes<'_>, encoding: Encoding, summary: &mut ValueSummary) -> Option<()> {
     match encoding {
         Encoding::Words => return Some(()),
         Encoding::Scaled(places) => {

@@ -12,11 +12,11 @@ mod integers;
 mod varint;
 
 pub(crate) use cells::Encoding;
-pub use cells::{Cells, NumberCells, Summary, WordCells};
-pub(crate) use directory::{Directory, Entry, Span};
+pub use cells::{Cells, NumberCells, ValueSummary, WordCells};
+pub(crate) use directory::{ByteSpan, Directory, SeriesEntry};
 
 use super::reason::{PRESENT, Reasons};
-use super::rows::{Column, Rows, Word};
+use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
 use adapters::clock::TimeNs;
 use cells::Scratch;
@@ -43,7 +43,7 @@ pub(crate) struct Block {
     pub(crate) directory: Vec<u8>,
     pub(crate) columns: Vec<u8>,
     /// Series number and summary of every quantity that has a value.
-    pub(crate) summaries: Vec<(i64, Summary)>,
+    pub(crate) summaries: Vec<(i64, ValueSummary)>,
 }
 
 impl Block {
@@ -71,7 +71,7 @@ impl Encoder {
     /// The block of `rows`, which must not be empty. Series without a single value or reason take no room.
     pub(crate) fn encode(
         &mut self,
-        rows: &Rows,
+        rows: &SeriesRows,
         series: &[Series],
         reasons: &Reasons,
         segment: i64,
@@ -92,8 +92,8 @@ impl Encoder {
             if written.encoding != Encoding::Words && written.summary.count > 0 {
                 summaries.push((series.id, written.summary));
             }
-            let cells::Written { encoding, summary, any_missing } = written;
-            directory.entries.push(Entry { series: series.id, encoding, any_missing, summary, span });
+            let cells::SeriesWritten { encoding, summary, any_missing } = written;
+            directory.entries.push(SeriesEntry { series: series.id, encoding, any_missing, summary, span });
         }
         directory.note_words(&codes_in(rows), reasons);
         Block {
@@ -109,18 +109,18 @@ impl Encoder {
     }
 
     /// Appends `plain` to `columns`, compressed when that is shorter.
-    fn pack(&mut self, columns: &mut Vec<u8>) -> Span {
+    fn pack(&mut self, columns: &mut Vec<u8>) -> ByteSpan {
         let (offset, unpacked) = (columns.len(), self.plain.len());
         let packed = (unpacked >= PACK_FROM).then(|| self.zstd.compress(&self.plain).ok()).flatten();
         match packed.filter(|packed| packed.len() < unpacked) {
             Some(packed) => columns.extend_from_slice(&packed),
             None => columns.extend_from_slice(&self.plain),
         }
-        Span { offset, stored: columns.len() - offset, unpacked }
+        ByteSpan { offset, stored: columns.len() - offset, unpacked }
     }
 }
 
-fn codes_in(rows: &Rows) -> [bool; 256] {
+fn codes_in(rows: &SeriesRows) -> [bool; 256] {
     let mut codes = [false; 256];
     for column in &rows.columns {
         match column {
@@ -151,13 +151,13 @@ impl Decoder {
     }
 
     /// The cells of one series; `None` when the block is damaged.
-    pub(crate) fn cells(&mut self, directory: &Directory, entry: &Entry, columns: &[u8]) -> Option<Cells> {
+    pub(crate) fn cells(&mut self, directory: &Directory, entry: &SeriesEntry, columns: &[u8]) -> Option<Cells> {
         let plain = self.unpack(entry.span, columns)?;
         let present = usize::try_from(entry.summary.count).ok().filter(|count| *count <= directory.rows)?;
         cells::decode(&plain, directory.rows, entry.encoding, entry.any_missing, present)
     }
 
-    fn unpack<'a>(&mut self, span: Span, columns: &'a [u8]) -> Option<std::borrow::Cow<'a, [u8]>> {
+    fn unpack<'a>(&mut self, span: ByteSpan, columns: &'a [u8]) -> Option<std::borrow::Cow<'a, [u8]>> {
         let stored = columns.get(span.offset..span.offset.checked_add(span.stored)?)?;
         if span.stored == span.unpacked {
             return Some(stored.into());

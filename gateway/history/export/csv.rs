@@ -4,7 +4,7 @@ use super::super::error::{HistoryError, at};
 use super::super::info::utc;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
-use super::{Plan, RUN, run_text};
+use super::{ColumnPlan, RUN, run_text};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
@@ -15,7 +15,7 @@ use std::path::Path;
 pub(super) fn write_gzip(
     reader: &Reader,
     query: &Query,
-    plan: &Plan,
+    plan: &ColumnPlan,
     out: impl Write,
     path: &Path,
 ) -> Result<u64, HistoryError> {
@@ -29,7 +29,7 @@ pub(super) fn write_gzip(
 pub(super) fn write(
     reader: &Reader,
     query: &Query,
-    plan: &Plan,
+    plan: &ColumnPlan,
     out: impl Write,
     path: &Path,
 ) -> Result<u64, HistoryError> {
@@ -53,7 +53,7 @@ pub(super) fn write(
     }
 }
 
-fn header(plan: &Plan) -> Vec<String> {
+fn header(plan: &ColumnPlan) -> Vec<String> {
     let mut names = vec![if plan.monotone { "time_utc" } else { "time_s" }.to_owned()];
     if !plan.monotone && !plan.has_run() {
         names.push(RUN.to_owned());
@@ -67,7 +67,7 @@ fn header(plan: &Plan) -> Vec<String> {
     names
 }
 
-fn cells(plan: &Plan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
+fn cells(plan: &ColumnPlan, chunk: &Chunk<'_>, row: usize) -> Vec<String> {
     let at_ns = chunk.at_ns[row];
     let mut cells = vec![if plan.monotone { utc(at_ns) } else { plan.seconds(at_ns).to_string() }];
     if !plan.monotone && !plan.has_run() {

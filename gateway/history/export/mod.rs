@@ -55,7 +55,7 @@ impl Format {
 }
 
 /// What the columns of a recording will be.
-struct Plan {
+struct ColumnPlan {
     /// The series, and whether a column of reasons goes with it.
     series: Vec<(Series, bool)>,
     first_ns: TimeNs,
@@ -63,7 +63,7 @@ struct Plan {
     monotone: bool,
 }
 
-impl Plan {
+impl ColumnPlan {
     fn has_run(&self) -> bool {
         self.series.iter().any(|(series, _)| &*series.name == RUN)
     }
@@ -110,7 +110,7 @@ impl Reader {
         csv::write(self, query, &plan, out, name)
     }
 
-    fn plan(&self, query: &Query) -> Result<Plan, HistoryError> {
+    fn plan(&self, query: &Query) -> Result<ColumnPlan, HistoryError> {
         let known: Arc<[Series]> = self.series()?.into();
         let mut series = self.delivered(query, &known)?;
         if !query.series.is_empty() {
@@ -130,7 +130,7 @@ impl Reader {
                     .to_owned(),
             ));
         };
-        Ok(Plan { series, first_ns, monotone: self.is_monotone(query)? })
+        Ok(ColumnPlan { series, first_ns, monotone: self.is_monotone(query)? })
     }
 
     /// Does time never decrease in the range, over all its blocks and the tail?

@@ -5,7 +5,7 @@ use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
 use super::super::record::Diagnosis;
-use super::{Plan, RUN, run_text};
+use super::{ColumnPlan, RUN, run_text};
 use ::parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use ::parquet::errors::ParquetError;
@@ -22,7 +22,7 @@ use std::sync::Arc;
 const GROUP_ROWS: usize = 65_536;
 
 /// Values of one column of the running row group.
-enum Values {
+enum ColumnValues {
     Times(Vec<i64>),
     Numbers(Vec<f64>, Vec<i16>),
     Texts(Vec<ByteArray>, Vec<i16>),
@@ -32,7 +32,7 @@ enum Values {
 pub(super) fn write(
     reader: &Reader,
     query: &Query,
-    plan: &Plan,
+    plan: &ColumnPlan,
     about: &[(String, String)],
     out: impl Write + Send,
     path: &Path,
@@ -116,7 +116,7 @@ fn utc_field(name: &str) -> Result<TypePtr, ParquetError> {
     field.with_repetition(Repetition::REQUIRED).build().map(Arc::new)
 }
 
-fn schema(plan: &Plan) -> Result<TypePtr, ParquetError> {
+fn schema(plan: &ColumnPlan) -> Result<TypePtr, ParquetError> {
     let mut fields = vec![time_field(plan)?];
     if !plan.monotone && !plan.has_run() {
         fields.push(text_field(RUN)?);
@@ -133,7 +133,7 @@ fn schema(plan: &Plan) -> Result<TypePtr, ParquetError> {
     Type::group_type_builder("recording").with_fields(fields).build().map(Arc::new)
 }
 
-fn time_field(plan: &Plan) -> Result<TypePtr, ParquetError> {
+fn time_field(plan: &ColumnPlan) -> Result<TypePtr, ParquetError> {
     let field = if plan.monotone {
         let utc = LogicalType::timestamp(true, TimeUnit::NANOS);
         Type::primitive_type_builder("time_utc", Physical::INT64).with_logical_type(Some(utc))
@@ -157,13 +157,13 @@ fn text_field(name: &str) -> Result<TypePtr, ParquetError> {
 
 /// The running row group.
 struct Group<'a> {
-    plan: &'a Plan,
-    columns: Vec<Values>,
+    plan: &'a ColumnPlan,
+    columns: Vec<ColumnValues>,
     rows: usize,
 }
 
 impl<'a> Group<'a> {
-    fn new(plan: &'a Plan) -> Self {
+    fn new(plan: &'a ColumnPlan) -> Self {
         Self { plan, columns: empty(plan), rows: 0 }
     }
 
@@ -171,32 +171,32 @@ impl<'a> Group<'a> {
         self.rows += chunk.at_ns.len();
         let mut columns = self.columns.iter_mut();
         // The columns stand in the order of the schema, so each series finds its own next.
-        let mut fill = |cell: &dyn Fn(usize) -> Cell| {
+        let mut fill = |cell: &dyn Fn(usize) -> ParquetCell| {
             if let Some(values) = columns.next() {
                 (0..chunk.at_ns.len()).for_each(|row| values.push(cell(row)));
             }
         };
         let plan = self.plan;
         if plan.monotone {
-            fill(&|row| Cell::Time(chunk.at_ns[row]));
+            fill(&|row| ParquetCell::Time(chunk.at_ns[row]));
         } else {
-            fill(&|row| Cell::Number(Some(plan.seconds(chunk.at_ns[row]))));
+            fill(&|row| ParquetCell::Number(Some(plan.seconds(chunk.at_ns[row]))));
         }
         if !plan.monotone && !plan.has_run() {
-            fill(&|_| Cell::Text(Some(run_text(chunk.segment, None))));
+            fill(&|_| ParquetCell::Text(Some(run_text(chunk.segment, None))));
         }
         for (index, (series, missing)) in plan.series.iter().enumerate() {
             let column = &chunk.columns[index];
             match series.kind {
-                SeriesKind::Number => fill(&|row| Cell::Number(column.number(row))),
+                SeriesKind::Number => fill(&|row| ParquetCell::Number(column.number(row))),
                 SeriesKind::Text if !plan.monotone && &*series.name == RUN => {
-                    fill(&|row| Cell::Text(Some(run_text(chunk.segment, column.word(row)))));
+                    fill(&|row| ParquetCell::Text(Some(run_text(chunk.segment, column.word(row)))));
                 }
-                SeriesKind::Text => fill(&|row| Cell::Text(column.word(row).map(str::to_owned))),
+                SeriesKind::Text => fill(&|row| ParquetCell::Text(column.word(row).map(str::to_owned))),
             }
             if *missing {
                 let reason = |row| chunk.missing(index, row).filter(|word| *word != "not_provided");
-                fill(&|row| Cell::Text(reason(row).map(str::to_owned)));
+                fill(&|row| ParquetCell::Text(reason(row).map(str::to_owned)));
             }
         }
     }
@@ -206,9 +206,9 @@ impl<'a> Group<'a> {
         for values in &self.columns {
             let Some(column) = group.next_column()? else { break };
             match values {
-                Values::Times(times) => put::<Int64Type>(column, times, None)?,
-                Values::Numbers(numbers, levels) => put::<DoubleType>(column, numbers, self.levels(levels))?,
-                Values::Texts(texts, levels) => put::<ByteArrayType>(column, texts, self.levels(levels))?,
+                ColumnValues::Times(times) => put::<Int64Type>(column, times, None)?,
+                ColumnValues::Numbers(numbers, levels) => put::<DoubleType>(column, numbers, self.levels(levels))?,
+                ColumnValues::Texts(texts, levels) => put::<ByteArrayType>(column, texts, self.levels(levels))?,
             }
         }
         group.close()?;
@@ -222,21 +222,21 @@ impl<'a> Group<'a> {
     }
 }
 
-enum Cell {
+enum ParquetCell {
     Time(i64),
     Number(Option<f64>),
     Text(Option<String>),
 }
 
-impl Values {
-    fn push(&mut self, cell: Cell) {
+impl ColumnValues {
+    fn push(&mut self, cell: ParquetCell) {
         match (self, cell) {
-            (Self::Times(times), Cell::Time(at_ns)) => times.push(at_ns),
-            (Self::Numbers(numbers, levels), Cell::Number(number)) => {
+            (Self::Times(times), ParquetCell::Time(at_ns)) => times.push(at_ns),
+            (Self::Numbers(numbers, levels), ParquetCell::Number(number)) => {
                 levels.push(i16::from(number.is_some()));
                 numbers.extend(number);
             }
-            (Self::Texts(texts, levels), Cell::Text(text)) => {
+            (Self::Texts(texts, levels), ParquetCell::Text(text)) => {
                 levels.push(i16::from(text.is_some()));
                 texts.extend(text.as_deref().map(ByteArray::from));
             }
@@ -245,10 +245,10 @@ impl Values {
     }
 }
 
-fn empty(plan: &Plan) -> Vec<Values> {
-    let texts = || Values::Texts(Vec::new(), Vec::new());
-    let numbers = || Values::Numbers(Vec::new(), Vec::new());
-    let mut columns = vec![if plan.monotone { Values::Times(Vec::new()) } else { numbers() }];
+fn empty(plan: &ColumnPlan) -> Vec<ColumnValues> {
+    let texts = || ColumnValues::Texts(Vec::new(), Vec::new());
+    let numbers = || ColumnValues::Numbers(Vec::new(), Vec::new());
+    let mut columns = vec![if plan.monotone { ColumnValues::Times(Vec::new()) } else { numbers() }];
     if !plan.monotone && !plan.has_run() {
         columns.push(texts());
     }

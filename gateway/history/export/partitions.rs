@@ -6,7 +6,7 @@
 //! in the metadata of the file as `unit.<column>` and `machine`.
 
 use super::super::error::{HistoryError, at};
-use super::super::list::Span;
+use super::super::list::RecordSpan;
 use super::super::options::DAY_NS;
 use super::super::query::Query;
 use super::super::reader::Reader;
@@ -63,7 +63,7 @@ impl Reader {
                 parquet::write(self, &query, &plan, &about, out, path)
             })?;
         }
-        let diagnoses = self.diagnoses(Span { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
+        let diagnoses = self.diagnoses(RecordSpan { from_ns: day_ns, to_ns: day_ns + DAY_NS, limit: u32::MAX })?;
         if !diagnoses.is_empty() {
             written.diagnoses = whole(&day_file(root, "diagnoses", machine, day_ns), |out, path| {
                 parquet::write_diagnoses(&diagnoses, machine, out, path)

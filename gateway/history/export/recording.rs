@@ -4,14 +4,14 @@ use super::super::error::HistoryError;
 use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
-use super::{Plan, RUN, run_text};
+use super::{ColumnPlan, RUN, run_text};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers, Words};
 use std::ops::ControlFlow;
 
 /// Columns under construction.
-struct Building<'a> {
-    plan: &'a Plan,
+struct ColumnBuilder<'a> {
+    plan: &'a ColumnPlan,
     time_s: Vec<f64>,
     columns: Vec<Cells>,
     /// Reasons of absence, where a series has any.
@@ -26,7 +26,7 @@ impl Reader {
     /// [`HistoryError::Question`] when there are no rows, and what [`Reader::samples`] says.
     pub fn recording(&self, query: &Query) -> Result<Recording, HistoryError> {
         let plan = self.plan(query)?;
-        let mut building = Building::new(&plan);
+        let mut building = ColumnBuilder::new(&plan);
         self.samples(&Query { series: plan.names(), ..query.clone() }, |chunk| {
             building.add(chunk);
             ControlFlow::Continue(())
@@ -35,8 +35,8 @@ impl Reader {
     }
 }
 
-impl<'a> Building<'a> {
-    fn new(plan: &'a Plan) -> Self {
+impl<'a> ColumnBuilder<'a> {
+    fn new(plan: &'a ColumnPlan) -> Self {
         let empty = |kind| match kind {
             SeriesKind::Number => Cells::Numbers(Numbers::default()),
             SeriesKind::Text => Cells::Words(Words::default()),

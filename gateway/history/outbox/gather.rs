@@ -3,13 +3,13 @@
 
 use super::item::{SeriesInfo, leaves};
 use super::line;
-use super::report::Report;
-use super::shared::{Head, Outbox};
-use super::store::{self, Put, Stored};
+use super::report::OutboxReport;
+use super::shared::{Outbox, OutboxHead};
+use super::store::{self, OutboxContents, Put};
 use crate::history::HistoryError;
-use crate::history::mailbox::Posted;
+use crate::history::mailbox::QueuedRecord;
 use crate::history::reason::Reasons;
-use crate::history::rows::Rows;
+use crate::history::rows::SeriesRows;
 use crate::history::series::Series;
 use adapters::clock::TimeNs;
 use rusqlite::Connection;
@@ -27,7 +27,7 @@ const TIDY_EVERY: Duration = Duration::from_secs(5);
 
 /// The line of one tick.
 #[derive(Debug)]
-struct Waiting {
+struct PendingLine {
     row: i64,
     at_ns: TimeNs,
     text: String,
@@ -37,18 +37,18 @@ struct Waiting {
 #[derive(Debug)]
 pub(crate) struct Gatherer {
     outbox: Outbox,
-    report: Report,
+    report: OutboxReport,
     known: Vec<Arc<SeriesInfo>>,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<PendingLine>,
     bytes: usize,
     /// Lines dropped because the disk took nothing for too long; they never got a number.
     lost: u64,
-    stored: Stored,
+    stored: OutboxContents,
     tidied: Instant,
 }
 
 /// What a transaction has taken, to be forgotten when it is durable.
-pub(crate) struct Taken {
+pub(crate) struct TransactionWork {
     ticks: usize,
     put: Put,
     tidy: bool,
@@ -59,7 +59,7 @@ impl Gatherer {
     pub(crate) fn open(db: &mut Connection, outbox: Outbox, series: &[Series]) -> Result<Self, HistoryError> {
         let stored = store::open(db, &outbox)?;
         let gatherer = Self {
-            report: Report::new(outbox.settings(), series),
+            report: OutboxReport::new(outbox.settings(), series),
             known: series.iter().map(|series| Arc::new(SeriesInfo::from(series))).collect(),
             waiting: VecDeque::new(),
             bytes: 0,
@@ -73,11 +73,11 @@ impl Gatherer {
     }
 
     /// Takes on a batch of ticks whose first has the number `first_row`.
-    pub(crate) fn gather(&mut self, rows: &Rows, first_row: i64, series: &[Series], reasons: &Reasons) {
+    pub(crate) fn gather(&mut self, rows: &SeriesRows, first_row: i64, series: &[Series], reasons: &Reasons) {
         let Self { report, waiting, bytes, .. } = self;
         report.lines(rows, series, reasons, |index, text| {
             *bytes += text.len();
-            waiting.push_back(Waiting { row: first_row + index as i64, at_ns: rows.at_ns[index], text });
+            waiting.push_back(PendingLine { row: first_row + index as i64, at_ns: rows.at_ns[index], text });
         });
         while self.bytes > WAITING_BYTES_MAX {
             let Some(oldest) = self.waiting.pop_front() else { break };
@@ -102,10 +102,10 @@ impl Gatherer {
     pub(crate) fn put<'a>(
         &self,
         db: &Connection,
-        records: impl Iterator<Item = &'a Posted>,
+        records: impl Iterator<Item = &'a QueuedRecord>,
         opened_row: i64,
         end_row: i64,
-    ) -> Result<Taken, HistoryError> {
+    ) -> Result<TransactionWork, HistoryError> {
         let mut lines: Vec<(TimeNs, std::borrow::Cow<'_, str>)> = Vec::new();
         let mut ticks = self.waiting.iter().take_while(|line| line.row < end_row).peekable();
         for posted in records.filter(|posted| leaves(&posted.record)) {
@@ -119,11 +119,11 @@ impl Gatherer {
         let ticks = self.waiting.iter().take_while(|line| line.row < end_row).count();
         let tidy = self.tidied.elapsed() >= TIDY_EVERY;
         let put = store::put(db, &self.outbox, &self.stored, &lines, tidy)?;
-        Ok(Taken { ticks, put, tidy })
+        Ok(TransactionWork { ticks, put, tidy })
     }
 
     /// What was put is durable.
-    pub(crate) fn committed(&mut self, taken: Taken, reasons: &Reasons) {
+    pub(crate) fn committed(&mut self, taken: TransactionWork, reasons: &Reasons) {
         for line in self.waiting.drain(..taken.ticks) {
             self.bytes -= line.text.len();
         }
@@ -136,9 +136,9 @@ impl Gatherer {
     }
 
     fn tell(&self, reasons: &Reasons) {
-        let Stored { next_sequence, newest_ns, .. } = self.stored;
+        let OutboxContents { next_sequence, newest_ns, .. } = self.stored;
         self.outbox.publish(
-            Head { next_sequence, newest_ns, ready: true },
+            OutboxHead { next_sequence, newest_ns, ready: true },
             self.stored.figures(self.lost),
             self.report.latest(&self.known, reasons),
         );

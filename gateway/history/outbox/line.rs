@@ -15,7 +15,7 @@ use std::sync::Arc;
 const DIAGNOSIS_BYTES_MAX: usize = 200_000;
 
 #[derive(Debug, Deserialize)]
-struct Line {
+struct OutboxLine {
     t: TimeNs,
     #[serde(default)]
     s: Option<Map<String, Json>>,
@@ -36,27 +36,27 @@ pub(super) fn of_record(record: &Record) -> String {
 }
 
 /// Series by their numbers.
-pub(super) type Known = HashMap<i64, Arc<SeriesInfo>>;
+pub(super) type SeriesByNumber = HashMap<i64, Arc<SeriesInfo>>;
 
 /// A line, parsed.
 #[derive(Debug)]
-pub(super) struct Parsed(Line);
+pub(super) struct Parsed(OutboxLine);
 
 /// Reads a line; `None` for one that this version cannot read.
 pub(super) fn parse(text: &str) -> Option<Parsed> {
-    serde_json::from_str(text).ok().filter(|line: &Line| line.s.is_some() || line.r.is_some()).map(Parsed)
+    serde_json::from_str(text).ok().filter(|line: &OutboxLine| line.s.is_some() || line.r.is_some()).map(Parsed)
 }
 
 impl Parsed {
     /// Does it name a series that is not among these?
-    pub(super) fn names_unknown(&self, known: &Known) -> bool {
+    pub(super) fn names_unknown(&self, known: &SeriesByNumber) -> bool {
         let is_unknown = |id: &String| id.parse().map_or(true, |id: i64| !known.contains_key(&id));
         self.0.s.as_ref().is_some_and(|cells| cells.keys().any(is_unknown))
     }
 
     /// The item; values of unknown series are left out.
-    pub(super) fn item(self, sequence: u64, known: &Known) -> Item {
-        let Line { t, s, r } = self.0;
+    pub(super) fn item(self, sequence: u64, known: &SeriesByNumber) -> Item {
+        let OutboxLine { t, s, r } = self.0;
         let readings =
             |cells: Map<String, Json>| cells.iter().filter_map(|(id, cell)| reading(id, cell, known)).collect();
         let content = match r {
@@ -67,7 +67,7 @@ impl Parsed {
     }
 }
 
-fn reading(id: &str, cell: &Json, known: &Known) -> Option<Reading> {
+fn reading(id: &str, cell: &Json, known: &SeriesByNumber) -> Option<Reading> {
     let series = known.get(&id.parse().ok()?)?.clone();
     let value = match cell {
         Json::Number(number) => Cell::Number(number.as_f64()?),

@@ -6,14 +6,14 @@
 //! therefore neither sent something it does not remember, nor remembers something that is never sent.
 //!
 //! # Data
-//! An [`Item`] is the values of one tick that changed ([`Settings`] says what counts as a change), or one record: a state,
+//! An [`Item`] is the values of one tick that changed ([`OutboxSettings`] says what counts as a change), or one record: a state,
 //! part, alarm, decision, diagnosis or event. Items are numbered from 1 without holes over the life of the database; the
 //! number together with [`Outbox::box_id`] names an item everywhere. The items of one commit lie in one compressed row of
 //! the table `outbox`; the table `outbox_sinks` holds what each sink still has to deliver.
 //!
 //! # Bounds
-//! The outbox holds at most [`Settings::max_bytes`] and nothing older than [`Settings::max_age`]. What is dropped by
-//! that is counted for each sink that had not delivered it ([`Standing::dropped`]). While no sink is configured nothing
+//! The outbox holds at most [`OutboxSettings::max_bytes`] and nothing older than [`OutboxSettings::max_age`]. What is dropped by
+//! that is counted for each sink that had not delivered it ([`DeliveryState::dropped`]). While no sink is configured nothing
 //! is gathered and the tables do not exist.
 //!
 //! # Who does what
@@ -33,6 +33,6 @@ mod store;
 pub(crate) use gather::Gatherer;
 pub use item::{Cell, Content, Item, Reading, SeriesInfo};
 pub use position::Position;
-pub use reader::{OutboxReader, Stretch};
-pub use report::Settings;
-pub use shared::{Figures, Head, Outbox, Standing};
+pub use reader::{OutboxReader, OutboxStretch};
+pub use report::OutboxSettings;
+pub use shared::{DeliveryState, Outbox, OutboxFigures, OutboxHead};

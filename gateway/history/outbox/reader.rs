@@ -1,7 +1,7 @@
 //! How a sink reads the outbox: on a connection of its own that only reads, a bounded piece at a time.
 
 use super::item::{Item, SeriesInfo};
-use super::line::{self, Known};
+use super::line::{self, SeriesByNumber};
 use crate::history::HistoryError;
 use crate::history::error::Doing;
 use crate::history::schema::{known_series, open_for_reading};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A piece of the outbox.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Stretch {
+pub struct OutboxStretch {
     /// What is there, in the order of the numbers. Numbers may be missing where items were dropped.
     pub items: Vec<Item>,
     /// The number after the last one that was looked at: acknowledge up to here.
@@ -22,7 +22,7 @@ pub struct Stretch {
 #[derive(Debug)]
 pub struct OutboxReader {
     db: Connection,
-    known: Known,
+    known: SeriesByNumber,
 }
 
 /// A body that claims to be larger is damaged: a commit holds a minute at most.
@@ -34,7 +34,7 @@ impl OutboxReader {
     /// # Errors
     /// As [`Reader::open`](crate::history::Reader::open).
     pub fn open(path: &Path) -> Result<Self, HistoryError> {
-        let mut feed = Self { db: open_for_reading(path)?, known: Known::new() };
+        let mut feed = Self { db: open_for_reading(path)?, known: SeriesByNumber::new() };
         feed.learn()?;
         Ok(feed)
     }
@@ -49,8 +49,8 @@ impl OutboxReader {
     ///
     /// # Errors
     /// What `SQLite` says.
-    pub fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<Stretch, HistoryError> {
-        let mut stretch = Stretch { items: Vec::new(), to: from };
+    pub fn read(&mut self, from: u64, to: u64, items_max: usize) -> Result<OutboxStretch, HistoryError> {
+        let mut stretch = OutboxStretch { items: Vec::new(), to: from };
         while stretch.to < to && stretch.items.len() < items_max {
             match self.row_at(stretch.to, to)? {
                 Some(row) => self.take(&mut stretch, &row, to, items_max)?,
@@ -60,7 +60,13 @@ impl OutboxReader {
         Ok(stretch)
     }
 
-    fn take(&mut self, stretch: &mut Stretch, row: &Row, to: u64, items_max: usize) -> Result<(), HistoryError> {
+    fn take(
+        &mut self,
+        stretch: &mut OutboxStretch,
+        row: &OutboxRow,
+        to: u64,
+        items_max: usize,
+    ) -> Result<(), HistoryError> {
         // A body that cannot be read is passed over: its items are lost, those after it are not.
         let text = unpacked(&row.body).unwrap_or_default();
         stretch.to = stretch.to.max(row.first);
@@ -83,7 +89,7 @@ impl OutboxReader {
     }
 
     /// The row that holds item `from`, or the next one below `to`.
-    fn row_at(&self, from: u64, to: u64) -> Result<Option<Row>, HistoryError> {
+    fn row_at(&self, from: u64, to: u64) -> Result<Option<OutboxRow>, HistoryError> {
         let [from, to] = [from, to].map(|number| i64::try_from(number).unwrap_or(i64::MAX));
         let mut select = self
             .db
@@ -96,14 +102,14 @@ impl OutboxReader {
             .doing("reading the outbox")?;
         let unsigned = |number: i64| u64::try_from(number).unwrap_or(0);
         let row = select.query_map([from, to], |row| {
-            Ok(Row { first: unsigned(row.get(0)?), items: unsigned(row.get(1)?), body: row.get(2)? })
+            Ok(OutboxRow { first: unsigned(row.get(0)?), items: unsigned(row.get(1)?), body: row.get(2)? })
         });
         row.and_then(|mut rows| rows.next().transpose()).doing("reading the outbox")
     }
 }
 
 /// A row of the table `outbox`.
-struct Row {
+struct OutboxRow {
     first: u64,
     items: u64,
     body: Vec<u8>,

@@ -4,7 +4,7 @@
 use super::item::{Cell, Reading, SeriesInfo};
 use crate::history::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use crate::history::rounding::rounded;
-use crate::history::rows::{Column, Rows, Word};
+use crate::history::rows::{Column, SeriesRows, Word};
 use crate::history::series::Series;
 use crate::history::tail::{comma, put_missing, put_number};
 use adapters::clock::TimeNs;
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// What is gathered for the sinks, and how much of it is kept.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct OutboxSettings {
     /// Only every so many ticks are looked at; 1 looks at each.
     pub every_nth: u32,
     /// A value that differs from the one sent last by at most this, in the unit of the series, is not sent again. A
@@ -29,7 +29,7 @@ pub struct Settings {
     pub max_age: Duration,
 }
 
-impl Default for Settings {
+impl Default for OutboxSettings {
     fn default() -> Self {
         Self {
             every_nth: 1,
@@ -51,7 +51,7 @@ enum Last {
 
 /// See the [module](self).
 #[derive(Debug)]
-pub(super) struct Report {
+pub(super) struct OutboxReport {
     every_nth: u64,
     refresh_ns: i64,
     bands: Vec<f64>,
@@ -60,8 +60,8 @@ pub(super) struct Report {
     whole_at: Option<TimeNs>,
 }
 
-impl Report {
-    pub(super) fn new(settings: &Settings, series: &[Series]) -> Self {
+impl OutboxReport {
+    pub(super) fn new(settings: &OutboxSettings, series: &[Series]) -> Self {
         let band = |series: &Series| {
             let named = settings.dead_bands.iter().find(|(name, _)| **name == *series.name);
             named.map_or(0.0, |(_, band)| *band)
@@ -79,7 +79,7 @@ impl Report {
     /// Hands the line of each tick that has something to tell to `put`, with the index of its row.
     pub(super) fn lines(
         &mut self,
-        rows: &Rows,
+        rows: &SeriesRows,
         series: &[Series],
         reasons: &Reasons,
         mut put: impl FnMut(usize, String),
@@ -102,7 +102,14 @@ impl Report {
         }
     }
 
-    fn line(&mut self, rows: &Rows, row: usize, whole: bool, series: &[Series], reasons: &Reasons) -> Option<String> {
+    fn line(
+        &mut self,
+        rows: &SeriesRows,
+        row: usize,
+        whole: bool,
+        series: &[Series],
+        reasons: &Reasons,
+    ) -> Option<String> {
         let mut out = String::new();
         let mut count = 0;
         for (index, (series, column)) in series.iter().zip(&rows.columns).enumerate() {
@@ -187,8 +194,8 @@ mod tests {
     }
 
     /// Power 100.0, 100.0, 100.4, stale, 100.4, ... a tenth of a second apart, and a state that changes once.
-    fn rows(powers: &[Option<f64>]) -> Rows {
-        let mut rows = Rows::of(&series());
+    fn rows(powers: &[Option<f64>]) -> SeriesRows {
+        let mut rows = SeriesRows::of(&series());
         let mut reasons = Reasons::default();
         let power = ChannelId::of("spindle_power_w").expect("in the table");
         for (row, watts) in powers.iter().enumerate() {
@@ -202,10 +209,10 @@ mod tests {
         rows
     }
 
-    fn lines(settings: &Settings, powers: &[Option<f64>]) -> Vec<(usize, Json)> {
+    fn lines(settings: &OutboxSettings, powers: &[Option<f64>]) -> Vec<(usize, Json)> {
         let series = series();
         let mut found = Vec::new();
-        let mut report = Report::new(settings, &series);
+        let mut report = OutboxReport::new(settings, &series);
         report.lines(&rows(powers), &series, &Reasons::default(), |row, line| {
             let line: Json = serde_json::from_str(&line).expect("JSON");
             found.push((row, line["s"].clone()));
@@ -217,7 +224,7 @@ mod tests {
 
     #[test]
     fn what_does_not_change_is_not_sent_again() {
-        let found = lines(&Settings::default(), &POWERS);
+        let found = lines(&OutboxSettings::default(), &POWERS);
         let rows: Vec<usize> = found.iter().map(|(row, _)| *row).collect();
         assert_eq!(rows, [0, 2, 3, 4], "{found:?}");
         assert_eq!(found[0].1.as_object().map(Map::len), Some(2), "power and state: nobody provides the rest");
@@ -229,17 +236,18 @@ mod tests {
 
     #[test]
     fn a_dead_band_and_every_nth_tick_thin_out() {
-        let banded = Settings { dead_bands: vec![("spindle_power_w".to_owned(), 0.5)], ..Settings::default() };
+        let banded =
+            OutboxSettings { dead_bands: vec![("spindle_power_w".to_owned(), 0.5)], ..OutboxSettings::default() };
         let found = lines(&banded, &POWERS[..3]);
         assert!(!found[1].1.to_string().contains("100.4"), "within the band; only the state changed: {found:?}");
-        let thinned = Settings { every_nth: 3, ..Settings::default() };
+        let thinned = OutboxSettings { every_nth: 3, ..OutboxSettings::default() };
         let rows: Vec<usize> = lines(&thinned, &POWERS).iter().map(|(row, _)| *row).collect();
         assert_eq!(rows, [0, 3]);
     }
 
     #[test]
     fn everything_is_sent_again_once_in_a_while() {
-        let often = Settings { refresh: Duration::from_millis(300), ..Settings::default() };
+        let often = OutboxSettings { refresh: Duration::from_millis(300), ..OutboxSettings::default() };
         let found = lines(&often, &[Some(1.0); 7]);
         let whole: Vec<usize> = found
             .iter()

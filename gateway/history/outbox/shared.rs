@@ -2,7 +2,7 @@
 
 use super::item::Reading;
 use super::position::Position;
-use super::report::Settings;
+use super::report::OutboxSettings;
 use crate::history::HistoryError;
 use adapters::clock::TimeNs;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use tokio::sync::watch;
 
 /// How far the outbox is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Head {
+pub struct OutboxHead {
     /// The number of the next item; everything below it is durable.
     pub next_sequence: u64,
     /// Time of the newest item.
@@ -23,7 +23,7 @@ pub struct Head {
 
 /// How full the outbox is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Figures {
+pub struct OutboxFigures {
     /// Bytes on disk.
     pub bytes: u64,
     /// Growth while nothing is delivered, bytes per second of machine time; `None` in the first minute.
@@ -34,10 +34,10 @@ pub struct Figures {
     pub lost: u64,
 }
 
-impl Figures {
+impl OutboxFigures {
     /// How long an outage fits from empty, hours, with these bounds.
     #[must_use]
-    pub fn outage_fits_h(&self, settings: &Settings) -> Option<f64> {
+    pub fn outage_fits_h(&self, settings: &OutboxSettings) -> Option<f64> {
         let by_size_s = settings.max_bytes as f64 / self.bytes_per_s.filter(|rate| *rate > 0.0)?;
         Some(by_size_s.min(settings.max_age.as_secs_f64()) / 3600.0)
     }
@@ -45,7 +45,7 @@ impl Figures {
 
 /// What a sink has and has not delivered.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
+pub struct DeliveryState {
     /// What it has still to deliver.
     pub position: Position,
     /// Items dropped before it had delivered them, since it was first configured.
@@ -53,26 +53,26 @@ pub struct Standing {
 }
 
 #[derive(Debug)]
-struct Shared {
+struct SharedOutbox {
     machine: String,
-    settings: Settings,
-    head: watch::Sender<Head>,
-    sinks: Mutex<BTreeMap<String, Standing>>,
+    settings: OutboxSettings,
+    head: watch::Sender<OutboxHead>,
+    sinks: Mutex<BTreeMap<String, DeliveryState>>,
     news: AtomicBool,
-    state: Mutex<State>,
+    state: Mutex<OutboxState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct OutboxState {
     box_id: String,
-    figures: Figures,
+    figures: OutboxFigures,
     latest: Arc<Vec<Reading>>,
 }
 
 /// The handle. Clones are the same outbox.
 #[derive(Debug, Clone)]
 pub struct Outbox {
-    shared: Arc<Shared>,
+    shared: Arc<SharedOutbox>,
 }
 
 impl PartialEq for Outbox {
@@ -89,15 +89,15 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::history::Options::outbox).
     #[must_use]
-    pub fn new(machine: &str, settings: Settings, sinks: impl IntoIterator<Item = String>) -> Self {
-        let standing = || Standing { position: Position::at(1), dropped: 0 };
-        let shared = Shared {
+    pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
+        let standing = || DeliveryState { position: Position::at(1), dropped: 0 };
+        let shared = SharedOutbox {
             machine: machine.to_owned(),
             settings,
-            head: watch::Sender::new(Head::default()),
+            head: watch::Sender::new(OutboxHead::default()),
             sinks: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
             news: AtomicBool::new(false),
-            state: Mutex::new(State::default()),
+            state: Mutex::new(OutboxState::default()),
         };
         Self { shared: Arc::new(shared) }
     }
@@ -117,19 +117,19 @@ impl Outbox {
 
     /// What is gathered and how much of it is kept.
     #[must_use]
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &OutboxSettings {
         &self.shared.settings
     }
 
     /// How far it is now, and every change of that.
     #[must_use]
-    pub fn head(&self) -> watch::Receiver<Head> {
+    pub fn head(&self) -> watch::Receiver<OutboxHead> {
         self.shared.head.subscribe()
     }
 
     /// How full it is.
     #[must_use]
-    pub fn figures(&self) -> Figures {
+    pub fn figures(&self) -> OutboxFigures {
         locked(&self.shared.state).figures
     }
 
@@ -142,7 +142,7 @@ impl Outbox {
 
     /// What sink `name` has delivered; `None` for a name that is not configured.
     #[must_use]
-    pub fn standing(&self, name: &str) -> Option<Standing> {
+    pub fn standing(&self, name: &str) -> Option<DeliveryState> {
         locked(&self.shared.sinks).get(name).cloned()
     }
 
@@ -168,7 +168,7 @@ impl Outbox {
         jumped
     }
 
-    fn change(&self, name: &str, change: impl FnOnce(&mut Standing)) {
+    fn change(&self, name: &str, change: impl FnOnce(&mut DeliveryState)) {
         if let Some(standing) = locked(&self.shared.sinks).get_mut(name) {
             change(standing);
             self.shared.news.store(true, Ordering::Release);
@@ -193,7 +193,7 @@ impl Outbox {
     /// The writer's side: looks at every sink, and may change it. What has been delivered until here is noted.
     pub(super) fn for_each_sink(
         &self,
-        mut each: impl FnMut(&str, &mut Standing) -> Result<(), HistoryError>,
+        mut each: impl FnMut(&str, &mut DeliveryState) -> Result<(), HistoryError>,
     ) -> Result<(), HistoryError> {
         self.shared.news.store(false, Ordering::Release);
         let mut sinks = locked(&self.shared.sinks);
@@ -227,7 +227,7 @@ impl Outbox {
     }
 
     /// The writer's side: what is durable now.
-    pub(super) fn publish(&self, head: Head, figures: Figures, latest: Vec<Reading>) {
+    pub(super) fn publish(&self, head: OutboxHead, figures: OutboxFigures, latest: Vec<Reading>) {
         let mut state = locked(&self.shared.state);
         state.figures = figures;
         state.latest = Arc::new(latest);

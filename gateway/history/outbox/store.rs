@@ -1,7 +1,7 @@
 //! The tables of the outbox: one row for the items of a commit, one for each sink.
 
 use super::position::Position;
-use super::shared::{Figures, Outbox, Standing};
+use super::shared::{DeliveryState, Outbox, OutboxFigures};
 use crate::history::HistoryError;
 use crate::history::error::Doing;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -35,7 +35,7 @@ const ROW_BYTES: u64 = 40;
 
 /// What lies in the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stored {
+pub(super) struct OutboxContents {
     pub(super) next_sequence: u64,
     pub(super) bytes: u64,
     pub(super) oldest_ns: Option<TimeNs>,
@@ -45,12 +45,12 @@ pub(super) struct Stored {
     pub(super) first_ns: Option<TimeNs>,
 }
 
-impl Stored {
-    pub(super) fn figures(&self, lost: u64) -> Figures {
+impl OutboxContents {
+    pub(super) fn figures(&self, lost: u64) -> OutboxFigures {
         let seconds =
             self.newest_ns.zip(self.first_ns).map(|(newest, first)| (newest - first) as f64 / SECOND_NS as f64);
         let rate = seconds.filter(|seconds| *seconds >= 60.0).map(|seconds| self.added_bytes as f64 / seconds);
-        Figures { bytes: self.bytes, bytes_per_s: rate, oldest_ns: self.oldest_ns, lost }
+        OutboxFigures { bytes: self.bytes, bytes_per_s: rate, oldest_ns: self.oldest_ns, lost }
     }
 }
 
@@ -63,7 +63,7 @@ fn signed(number: u64) -> i64 {
 }
 
 /// Creates the tables, takes up what each sink still has to deliver, and forgets sinks that are configured no more.
-pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<Stored, HistoryError> {
+pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<OutboxContents, HistoryError> {
     let opening = db.transaction().doing("opening the outbox")?;
     opening.execute_batch(TABLES).doing("creating the outbox")?;
     outbox.name_box(&box_mark(&opening)?);
@@ -82,9 +82,9 @@ pub(super) fn open(db: &mut Connection, outbox: &Outbox) -> Result<Stored, Histo
     Ok(stored)
 }
 
-fn measure(db: &Connection, next_sequence: u64) -> Result<Stored, HistoryError> {
+fn measure(db: &Connection, next_sequence: u64) -> Result<OutboxContents, HistoryError> {
     db.query_row("SELECT coalesce(sum(bytes), 0), min(start_ns), max(end_ns) FROM outbox", [], |row| {
-        Ok(Stored {
+        Ok(OutboxContents {
             next_sequence,
             bytes: unsigned(row.get(0)?),
             oldest_ns: row.get(1)?,
@@ -117,7 +117,7 @@ fn box_mark(db: &Connection) -> Result<String, HistoryError> {
 }
 
 /// A sink that is new begins with what is made from now on.
-fn load(db: &Connection, name: &str, next: u64, standing: &mut Standing) -> Result<(), HistoryError> {
+fn load(db: &Connection, name: &str, next: u64, standing: &mut DeliveryState) -> Result<(), HistoryError> {
     let found: Option<(String, i64)> = db
         .query_row("SELECT position, dropped FROM outbox_sinks WHERE name = ?1", [name], |row| {
             Ok((row.get(0)?, row.get(1)?))
@@ -138,7 +138,7 @@ fn load(db: &Connection, name: &str, next: u64, standing: &mut Standing) -> Resu
     Ok(())
 }
 
-fn save(db: &Connection, name: &str, standing: &Standing) -> Result<(), HistoryError> {
+fn save(db: &Connection, name: &str, standing: &DeliveryState) -> Result<(), HistoryError> {
     let position = serde_json::to_string(&standing.position).unwrap_or_default();
     db.prepare_cached("INSERT OR REPLACE INTO outbox_sinks (name, position, dropped) VALUES (?1, ?2, ?3)")
         .and_then(|mut save| save.execute(params![name, position, signed(standing.dropped)]))
@@ -148,7 +148,7 @@ fn save(db: &Connection, name: &str, standing: &Standing) -> Result<(), HistoryE
 
 /// What a transaction did to the outbox.
 pub(super) struct Put {
-    pub(super) stored: Stored,
+    pub(super) stored: OutboxContents,
     /// Stretches of numbers that were dropped before they were delivered everywhere.
     pub(super) dropped: Vec<(u64, u64)>,
 }
@@ -158,7 +158,7 @@ pub(super) struct Put {
 pub(super) fn put(
     db: &Connection,
     outbox: &Outbox,
-    before: &Stored,
+    before: &OutboxContents,
     lines: &[(TimeNs, Cow<'_, str>)],
     tidy: bool,
 ) -> Result<Put, HistoryError> {
@@ -185,7 +185,7 @@ pub(super) fn note(db: &Connection, outbox: &Outbox, dropped: &[(u64, u64)]) -> 
     })
 }
 
-fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -> Result<(), HistoryError> {
+fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, str>)]) -> Result<(), HistoryError> {
     let times = || lines.iter().map(|(at_ns, _)| *at_ns);
     let (Some(start_ns), Some(end_ns)) = (times().min(), times().max()) else { return Ok(()) };
     let text = lines.iter().map(|(_, line)| &**line).collect::<Vec<_>>().join("\n");
@@ -211,7 +211,12 @@ fn add(db: &Connection, stored: &mut Stored, lines: &[(TimeNs, Cow<'_, str>)]) -
 
 /// If `tidy`, removes what is delivered; then the oldest rows as long as they are too old or too much. Gives the stretches
 /// that were not delivered everywhere.
-fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> Result<Vec<(u64, u64)>, HistoryError> {
+fn remove(
+    db: &Connection,
+    outbox: &Outbox,
+    stored: &mut OutboxContents,
+    tidy: bool,
+) -> Result<Vec<(u64, u64)>, HistoryError> {
     let (settings, lowest) = (outbox.settings(), outbox.lowest().min(stored.next_sequence));
     let max_age_ns = i64::try_from(settings.max_age.as_nanos()).unwrap_or(i64::MAX);
     let horizon_ns = stored.newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(max_age_ns));
@@ -243,7 +248,7 @@ fn remove(db: &Connection, outbox: &Outbox, stored: &mut Stored, tidy: bool) -> 
 }
 
 /// Removes the oldest rows whose items are all below `lowest`, but never the newest row.
-fn remove_delivered(db: &Connection, lowest: u64, stored: &mut Stored) -> Result<(), HistoryError> {
+fn remove_delivered(db: &Connection, lowest: u64, stored: &mut OutboxContents) -> Result<(), HistoryError> {
     let end = signed(lowest.min(stored.next_sequence.saturating_sub(1)));
     let (last, bytes): (Option<i64>, i64) = db
         .prepare_cached(

@@ -9,7 +9,7 @@ use tokio::sync::Notify;
 
 /// What one connection is doing. Times are milliseconds since the book was opened.
 #[derive(Debug)]
-pub(super) struct Line {
+pub(super) struct ConnectionActivity {
     opened: Instant,
     from: IpAddr,
     answering: AtomicBool,
@@ -35,7 +35,7 @@ pub(super) enum Waits {
     Rest(Duration),
 }
 
-impl Line {
+impl ConnectionActivity {
     fn now_ms(&self) -> u64 {
         // From 1, so that 0 means never.
         u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX).saturating_add(1)
@@ -85,7 +85,7 @@ impl Line {
 
 /// All of them.
 #[derive(Debug, Clone)]
-pub(super) struct Book {
+pub(super) struct ConnectionTable {
     opened: Instant,
     most: usize,
     of_one: usize,
@@ -95,24 +95,24 @@ pub(super) struct Book {
 #[derive(Debug, Default)]
 struct Lines {
     next: u64,
-    by_number: HashMap<u64, Arc<Line>>,
+    by_number: HashMap<u64, Arc<ConnectionActivity>>,
 }
 
 /// A place in the book; it is given back when this goes.
 #[derive(Debug)]
-pub(super) struct Entry {
-    pub(super) line: Arc<Line>,
+pub(super) struct ConnectionEntry {
+    pub(super) line: Arc<ConnectionActivity>,
     number: u64,
-    book: Book,
+    book: ConnectionTable,
 }
 
-impl Drop for Entry {
+impl Drop for ConnectionEntry {
     fn drop(&mut self) {
         self.book.lock().by_number.remove(&self.number);
     }
 }
 
-impl Book {
+impl ConnectionTable {
     /// With room for so many, and for so many of one address.
     pub(super) fn new(most: usize, of_one: usize) -> Self {
         Self { opened: Instant::now(), most, of_one, lines: Arc::default() }
@@ -123,7 +123,7 @@ impl Book {
     }
 
     /// Another connection of this address. One that waits goes for it where there is no room; `None` where none waits.
-    pub(super) fn enter(&self, from: IpAddr) -> Option<Entry> {
+    pub(super) fn enter(&self, from: IpAddr) -> Option<ConnectionEntry> {
         let mut lines = self.lock();
         let own = lines.by_number.values().filter(|line| line.from == from).count();
         if own >= self.of_one {
@@ -132,7 +132,7 @@ impl Book {
             let crowded = lines.most_waiting()?;
             lines.close_one(|line| line.from == crowded)?;
         }
-        let line = Arc::new(Line {
+        let line = Arc::new(ConnectionActivity {
             opened: self.opened,
             from,
             answering: AtomicBool::new(false),
@@ -145,7 +145,7 @@ impl Book {
         let number = lines.next;
         lines.next += 1;
         lines.by_number.insert(number, line.clone());
-        Some(Entry { line, number, book: self.clone() })
+        Some(ConnectionEntry { line, number, book: self.clone() })
     }
 }
 
@@ -159,7 +159,7 @@ impl Lines {
     }
 
     /// Closes the oldest of these that wait.
-    fn close_one(&mut self, which: impl Fn(&Line) -> bool) -> Option<()> {
+    fn close_one(&mut self, which: impl Fn(&ConnectionActivity) -> bool) -> Option<()> {
         let waiting = self.by_number.iter().filter(|(_, line)| which(line) && line.state() != Waits::No);
         let oldest = waiting.min_by_key(|(number, line)| (line.since_ms.load(Ordering::Relaxed), **number));
         let number = oldest.map(|(number, _)| *number)?;
@@ -175,12 +175,12 @@ mod tests {
     #[test]
     fn whoever_only_waits_goes_for_another_and_whoever_is_answered_stays() {
         let address = |n: u8| IpAddr::from([10, 0, 0, n]);
-        let book = Book::new(10, 6);
-        let mut of_one: Vec<Entry> = (0..100).filter_map(|_| book.enter(address(1))).collect();
+        let book = ConnectionTable::new(10, 6);
+        let mut of_one: Vec<ConnectionEntry> = (0..100).filter_map(|_| book.enter(address(1))).collect();
         assert_eq!(of_one.len(), 100, "each finds a place");
         assert_eq!(book.lock().by_number.len(), 6, "and of each address there are only so many");
         of_one.drain(..94);
-        let mut others: Vec<Entry> = (2..6).filter_map(|n| book.enter(address(n))).collect();
+        let mut others: Vec<ConnectionEntry> = (2..6).filter_map(|n| book.enter(address(n))).collect();
         assert_eq!(book.lock().by_number.len(), 10);
         others.extend(book.enter(address(7)));
         assert_eq!(book.lock().by_number.values().filter(|line| line.from == address(1)).count(), 5, "the crowd pays");
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_line_tells_what_it_waits_for() {
-        let entry = Book::new(1, 1).enter(IpAddr::from([10, 0, 0, 1])).expect("room");
+        let entry = ConnectionTable::new(1, 1).enter(IpAddr::from([10, 0, 0, 1])).expect("room");
         let line = &entry.line;
         assert!(matches!(line.state(), Waits::First(_)));
         line.heard();

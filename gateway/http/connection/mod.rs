@@ -22,7 +22,7 @@ pub use tls::{Certificate, CertificateError};
 
 use super::ApiProblem;
 use axum::Router;
-use book::Book;
+use book::ConnectionTable;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use std::io::Write;
 use std::sync::Arc;
@@ -64,7 +64,8 @@ pub(super) async fn serve(
     mut stopped: watch::Receiver<bool>,
 ) {
     let most = room();
-    let (book, files) = (Book::new(most, OF_ONE_MAX.min(most)), Arc::new(Semaphore::new(most + CLOSING_MAX)));
+    let (book, files) =
+        (ConnectionTable::new(most, OF_ONE_MAX.min(most)), Arc::new(Semaphore::new(most + CLOSING_MAX)));
     let mut tasks = JoinSet::new();
     loop {
         let Ok(file) = files.clone().acquire_owned().await else { break };

@@ -1,7 +1,7 @@
 //! A stream whose reader must go on reading: when nothing can be written for too long, the connection is broken off. A client
 //! that asks for a year of history and reads a byte a minute would otherwise hold its answer in memory for a day.
 
-use super::book::Line;
+use super::book::ConnectionActivity;
 use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -16,13 +16,13 @@ const STALLED: Duration = Duration::from_secs(20);
 /// See the [module](self).
 pub(super) struct Paced<S> {
     stream: S,
-    line: Arc<Line>,
+    line: Arc<ConnectionActivity>,
     /// Runs while nothing can be written.
     patience: Option<Pin<Box<Sleep>>>,
 }
 
 impl<S> Paced<S> {
-    pub(super) fn new(stream: S, line: Arc<Line>) -> Self {
+    pub(super) fn new(stream: S, line: Arc<ConnectionActivity>) -> Self {
         Self { stream, line, patience: None }
     }
 

@@ -1,6 +1,6 @@
 //! One connection: encrypted where that is wanted, one request after another, each with its head in time.
 
-use super::book::{Entry, Line, Waits};
+use super::book::{ConnectionActivity, ConnectionEntry, Waits};
 use super::paced::Paced;
 use super::raw;
 use crate::http::ApiProblem;
@@ -46,7 +46,7 @@ pub(super) struct Talk {
 
 impl Talk {
     /// Until the client has gone, has to go, or the box stops.
-    pub(super) async fn run(self, stream: TcpStream, from: SocketAddr, entry: Entry) {
+    pub(super) async fn run(self, stream: TcpStream, from: SocketAddr, entry: ConnectionEntry) {
         let Ok(to) = stream.local_addr() else { return };
         let _as_it_is = stream.set_nodelay(true);
         let line = entry.line.clone();
@@ -69,7 +69,7 @@ impl Talk {
         drop(entry);
     }
 
-    async fn speak<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: S, peer: Peer, line: &Arc<Line>) {
+    async fn speak<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: S, peer: Peer, line: &Arc<ConnectionActivity>) {
         let service = hyper::service::service_fn(|request: Request<Incoming>| {
             line.answers();
             let (line, router) = (line.clone(), self.router.clone());
@@ -117,15 +117,20 @@ async fn farewell<S: AsyncWrite + Unpin>(mut stream: S) {
     .await;
 }
 
-async fn answer(router: Router, request: Request<Incoming>, peer: Peer, line: Arc<Line>) -> Response<Watched> {
+async fn answer(
+    router: Router,
+    request: Request<Incoming>,
+    peer: Peer,
+    line: Arc<ConnectionActivity>,
+) -> Response<TrackedBody> {
     let mut request = request.map(Body::new);
     request.extensions_mut().insert(peer);
     let Ok(response) = router.oneshot(request).await;
-    response.map(|body| Watched { body, _line: Answering(line) })
+    response.map(|body| TrackedBody { body, _line: Answering(line) })
 }
 
 /// While it is there, the connection answers.
-struct Answering(Arc<Line>);
+struct Answering(Arc<ConnectionActivity>);
 
 impl Drop for Answering {
     fn drop(&mut self) {
@@ -134,12 +139,12 @@ impl Drop for Answering {
 }
 
 /// A body that tells the book when it has gone.
-struct Watched {
+struct TrackedBody {
     body: Body,
     _line: Answering,
 }
 
-impl http_body::Body for Watched {
+impl http_body::Body for TrackedBody {
     type Data = Bytes;
     type Error = axum::Error;
 

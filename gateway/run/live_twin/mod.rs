@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::diagnosis::desk::Desk;
 use crate::diagnosis::kept::Kept;
 use crate::diagnosis::words;
-use crate::diagnosis::worker::{self, Finished, Loaded, Places, Report, Worker};
+use crate::diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
 use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
@@ -54,12 +54,12 @@ struct Due {
 /// The model in charge.
 struct ActiveModel {
     live: Live,
-    loaded: Loaded,
+    loaded: LoadedModel,
 }
 
 /// See the [module](self).
 pub struct Twin {
-    places: Places,
+    places: WorkerPaths,
     memory: PathBuf,
     active: Option<ActiveModel>,
     /// Unit and end of the name of the stored series; they stay while the box runs.
@@ -68,7 +68,7 @@ pub struct Twin {
     worker: Option<Worker>,
     told: Vec<Notice>,
     /// A model that has come into force and is not yet in the history.
-    new: Option<Loaded>,
+    new: Option<LoadedModel>,
     problem: Option<String>,
     /// Stays until the diagnosis is finished.
     due: Option<Due>,
@@ -87,7 +87,7 @@ impl Twin {
     pub fn of(config: &Config) -> Option<Self> {
         let model = config.twin.model.clone()?;
         let data_dir = &config.gateway.data_dir;
-        let places = Places {
+        let places = WorkerPaths {
             model,
             history: config.history.path.clone(),
             improved: data_dir.join("model-improved.toml"),
@@ -140,7 +140,7 @@ impl Twin {
         self.worker.as_ref().map(|worker| worker.desk().clone())
     }
 
-    fn put_in_charge(&mut self, loaded: Loaded, before: Remembered) {
+    fn put_in_charge(&mut self, loaded: LoadedModel, before: Remembered) {
         let same = before.toml == loaded.toml;
         let memory = if same { before.memory } else { before.memory.of_the_machine() };
         self.due = before.due.filter(|_| same);
@@ -182,7 +182,7 @@ impl Twin {
     /// The newest values of [`Twin::series`].
     #[must_use]
     pub fn values(&self) -> [ExtraValue<'static>; 2] {
-        let same_unit = |loaded: &Loaded| loaded.model.output.ends_with(&self.suffix);
+        let same_unit = |loaded: &LoadedModel| loaded.model.output.ends_with(&self.suffix);
         let compared = match &self.active {
             Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
             _ => Compared::none(live::NoTwin::NotYet),
@@ -195,7 +195,7 @@ impl Twin {
         let now_ns = sample.at_ns;
         self.listen(health, now_ns);
         self.told.drain(..).for_each(|notice| health.event(now_ns, SOURCE, &notice));
-        if let Some(Loaded { model, toml }) = self.new.take() {
+        if let Some(LoadedModel { model, toml }) = self.new.take() {
             let origin = self.places.model.display().to_string();
             health.keep(history::Model { at_ns: now_ns, name: model.name, origin, toml }.into());
         }
@@ -283,14 +283,14 @@ impl Twin {
     fn listen(&mut self, health: &mut Health, now_ns: TimeNs) {
         let Some(report) = self.worker.as_ref().and_then(Worker::take) else { return };
         match report {
-            Report::Model(loaded) => self.replace(*loaded, health, now_ns),
-            Report::Refused(problem) => self.refuse(problem),
-            Report::NotDiagnosed(problem, by) => {
+            WorkerReport::Model(loaded) => self.replace(*loaded, health, now_ns),
+            WorkerReport::Refused(problem) => self.refuse(problem),
+            WorkerReport::NotDiagnosed(problem, by) => {
                 self.was_due(by.as_deref());
                 let text = format!("{} could not be made: {problem}", diagnosis_of(by.as_deref()));
                 health.event(now_ns, SOURCE, &Notice::new(Severity::Warning, "diagnosis_failed", text));
             }
-            Report::Diagnosed(mut finished) => {
+            WorkerReport::Diagnosed(mut finished) => {
                 self.was_due(finished.by.as_deref());
                 finished.record.at_ns = now_ns;
                 let text = format!("{}: {}", diagnosis_of(finished.by.as_deref()), finished.record.summary);
@@ -309,7 +309,7 @@ impl Twin {
     }
 
     /// Another model: what the old one differed in is no alarm any more.
-    fn replace(&mut self, loaded: Loaded, health: &mut Health, now_ns: TimeNs) {
+    fn replace(&mut self, loaded: LoadedModel, health: &mut Health, now_ns: TimeNs) {
         for mismatch in self.mismatches() {
             let code = code(mismatch.regime);
             health.keep(AlarmClear { at_ns: now_ns, code, source: SOURCE.to_owned() }.into());

@@ -11,12 +11,12 @@ use std::time::Duration;
 /// Time between two looks at the library.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 
-type Found = Result<Vec<Arc<WearRecord>>, String>;
+type WearRecords = Result<Vec<Arc<WearRecord>>, String>;
 
 /// The models in force.
 #[derive(Debug)]
 pub(super) struct Library {
-    newest: Option<Receiver<Found>>,
+    newest: Option<Receiver<WearRecords>>,
     /// Dropped with the library: the thread ends.
     _ends: Option<std::sync::mpsc::Sender<()>>,
     models: Vec<Arc<WearRecord>>,
@@ -68,7 +68,7 @@ impl Library {
     }
 }
 
-fn look_again(history: &Path, send: &SyncSender<Found>, ended: &Receiver<()>) {
+fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<()>) {
     let mut known = 0;
     let mut said = None;
     loop {

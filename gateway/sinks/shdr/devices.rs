@@ -47,9 +47,9 @@ pub(super) fn uuid(machine: &str) -> String {
 }
 
 type Of<'a> = dyn Fn(Component) -> Vec<&'a DataItem> + 'a;
-type Put<'a> = dyn FnMut(usize, &str) + 'a;
+type WriteLine<'a> = dyn FnMut(usize, &str) + 'a;
 
-fn axes(of: &Of<'_>, put: &mut Put<'_>) {
+fn axes(of: &Of<'_>, put: &mut WriteLine<'_>) {
     let parts = [
         (Component::Spindle, "Rotary", "spindle", "C"),
         (Component::X, "Linear", "x_axis", "X"),
@@ -59,7 +59,7 @@ fn axes(of: &Of<'_>, put: &mut Put<'_>) {
     group(put, "Axes", "axes", &parts.map(|(part, tag, id, name)| (tag, id, Some(name), of(part))));
 }
 
-fn controller(of: &Of<'_>, put: &mut Put<'_>) {
+fn controller(of: &Of<'_>, put: &mut WriteLine<'_>) {
     put(8, "<Controller id=\"controller\" name=\"controller\">");
     put(10, "<DataItems>");
     of(Component::Controller).iter().for_each(|item| put(12, &data_item(item)));
@@ -74,7 +74,7 @@ fn controller(of: &Of<'_>, put: &mut Put<'_>) {
     put(8, "</Controller>");
 }
 
-fn systems(of: &Of<'_>, put: &mut Put<'_>) {
+fn systems(of: &Of<'_>, put: &mut WriteLine<'_>) {
     let systems = [(Component::Electric, "Electric", "electric"), (Component::Coolant, "Coolant", "coolant")];
     group(put, "Systems", "systems", &systems.map(|(part, tag, id)| (tag, id, None, of(part))));
     let around = [("Environmental", "environment", None, of(Component::Environment))];
@@ -82,7 +82,7 @@ fn systems(of: &Of<'_>, put: &mut Put<'_>) {
 }
 
 /// A component that only holds others; left out where they are all empty.
-fn group(put: &mut Put<'_>, tag: &str, id: &str, parts: &[(&str, &str, Option<&str>, Vec<&DataItem>)]) {
+fn group(put: &mut WriteLine<'_>, tag: &str, id: &str, parts: &[(&str, &str, Option<&str>, Vec<&DataItem>)]) {
     if parts.iter().all(|(.., items)| items.is_empty()) {
         return;
     }
@@ -95,7 +95,7 @@ fn group(put: &mut Put<'_>, tag: &str, id: &str, parts: &[(&str, &str, Option<&s
     put(8, &format!("</{tag}>"));
 }
 
-fn component(put: &mut Put<'_>, indent: usize, tag: &str, id: &str, name: Option<&str>, items: &[&DataItem]) {
+fn component(put: &mut WriteLine<'_>, indent: usize, tag: &str, id: &str, name: Option<&str>, items: &[&DataItem]) {
     // A name is optional in the standard; some agents cannot do without.
     put(indent, &format!("<{tag} id=\"{id}\" name=\"{}\">", name.unwrap_or(id)));
     put(indent + 2, "<DataItems>");

@@ -54,7 +54,7 @@ impl ShdrTarget {
 
 /// What all agents share.
 #[derive(Debug)]
-struct Shared {
+struct AgentContext {
     machine: Mutex<Machine>,
     lines: broadcast::Sender<Arc<str>>,
     heartbeat_ms: u128,
@@ -64,7 +64,7 @@ struct Shared {
 pub(super) struct ShdrSink {
     target: ShdrTarget,
     outbox: Outbox,
-    shared: Option<Arc<Shared>>,
+    shared: Option<Arc<AgentContext>>,
     listening: Option<AbortHandle>,
 }
 
@@ -94,7 +94,7 @@ impl ShdrSink {
         let listener = self.bind().await?;
         let at_ns = self.outbox.head().borrow().newest_ns.unwrap_or(0);
         let machine = Machine::new(self.outbox.machine(), &self.outbox.latest(), at_ns);
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(AgentContext {
             machine: Mutex::new(machine),
             lines: broadcast::Sender::new(WAITING_MAX),
             heartbeat_ms: self.target.heartbeat.as_millis(),
@@ -106,7 +106,7 @@ impl ShdrSink {
 }
 
 /// Takes agents on; they end with it.
-async fn listen(listener: TcpListener, shared: Arc<Shared>) {
+async fn listen(listener: TcpListener, shared: Arc<AgentContext>) {
     let mut agents = JoinSet::new();
     loop {
         let Ok((stream, _)) = listener.accept().await else {
@@ -121,7 +121,7 @@ async fn listen(listener: TcpListener, shared: Arc<Shared>) {
 }
 
 /// One agent, until it goes or is too slow. What is wrong with it concerns nobody else.
-async fn serve(stream: TcpStream, shared: Arc<Shared>) -> std::io::Result<()> {
+async fn serve(stream: TcpStream, shared: Arc<AgentContext>) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
     let (reading, mut writing) = stream.into_split();
     let (greeting, mut lines) = {

@@ -4,7 +4,7 @@
 //! range (`engLow`, `engHigh`), descriptions and whether it is inferred. A value that is missing is null, with the property
 //! `Quality` (0 bad, 500 stale) and the reason as one word in `missing`. Records are metrics of type String that hold JSON.
 
-use super::payload::{Metric, Payload, Property, PropertySet, Value, datatype};
+use super::payload::{Metric, MetricValue, Payload, Property, PropertySet, datatype};
 use crate::history::{Cell, Content, Item, Reading, SeriesInfo, SeriesKind};
 use adapters::clock::TimeNs;
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ pub(super) fn milliseconds(at_ns: TimeNs) -> u64 {
 
 /// What stands behind the will: a death is matched to its birth by this number.
 pub(super) fn birth_death(number: u8, at_ms: u64) -> Metric {
-    Metric::named(BIRTH_DEATH, datatype::UINT64, at_ms, Value::Long(number.into()))
+    Metric::named(BIRTH_DEATH, datatype::UINT64, at_ms, MetricValue::Long(number.into()))
 }
 
 /// Death of the node: no sequence number, the number of its birth.
@@ -49,7 +49,7 @@ pub(super) fn death(number: u8, at_ms: u64) -> Payload {
 
 /// What is only of the node: the number of its birth and the way to ask for another one.
 pub(super) fn node(number: u8, at_ms: u64) -> Vec<Metric> {
-    vec![birth_death(number, at_ms), Metric::named(REBIRTH, datatype::BOOLEAN, at_ms, Value::Boolean(false))]
+    vec![birth_death(number, at_ms), Metric::named(REBIRTH, datatype::BOOLEAN, at_ms, MetricValue::Boolean(false))]
 }
 
 /// Every metric of the machine with its last value; `known` is filled with the series that have one.
@@ -58,13 +58,13 @@ pub(super) fn machine(latest: &[Reading], known: &mut BTreeSet<i64>, at_ms: u64)
         alias: Some(SEQUENCE.1),
         value: None,
         is_null: Some(true),
-        ..Metric::named(SEQUENCE.0, datatype::UINT64, at_ms, Value::Long(0))
+        ..Metric::named(SEQUENCE.0, datatype::UINT64, at_ms, MetricValue::Long(0))
     };
     let of_record = |(name, alias): &(&str, u64)| Metric {
         alias: Some(*alias),
         value: None,
         is_null: Some(true),
-        ..Metric::named(name, datatype::STRING, at_ms, Value::Text(String::new()))
+        ..Metric::named(name, datatype::STRING, at_ms, MetricValue::Text(String::new()))
     };
     let provided = |reading: &&Reading| known.contains(&reading.series.id) || !is_unprovided(&reading.value);
     let readings: Vec<&Reading> = latest.iter().filter(provided).collect();
@@ -110,8 +110,8 @@ fn valued(reading: &Reading, at_ms: u64) -> Metric {
     let mut metric = Metric { alias: Some(alias(&reading.series)), timestamp: Some(at_ms), ..Metric::default() };
     metric.datatype = Some(kind(&reading.series));
     match &reading.value {
-        Cell::Number(number) => metric.value = Some(Value::Double(*number)),
-        Cell::Text(text) => metric.value = Some(Value::Text(text.to_string())),
+        Cell::Number(number) => metric.value = Some(MetricValue::Double(*number)),
+        Cell::Text(text) => metric.value = Some(MetricValue::Text(text.to_string())),
         Cell::Missing(reason) => {
             let mut quality = PropertySet::default();
             quality.put("Quality", Property::Int(if **reason == *"stale" { STALE } else { BAD }));
@@ -133,7 +133,7 @@ pub(super) fn data(item: &Item, historical: bool) -> Vec<Metric> {
         alias: Some(SEQUENCE.1),
         timestamp: Some(at_ms),
         datatype: Some(datatype::UINT64),
-        value: Some(Value::Long(item.sequence)),
+        value: Some(MetricValue::Long(item.sequence)),
         ..Metric::default()
     };
     let mut metrics = vec![sequence];
@@ -153,7 +153,7 @@ fn record(item: &Item, at_ms: u64) -> Option<Metric> {
         alias: Some(*alias),
         timestamp: Some(at_ms),
         datatype: Some(datatype::STRING),
-        value: Some(Value::Text(item.json()["record"].to_string())),
+        value: Some(MetricValue::Text(item.json()["record"].to_string())),
         ..Metric::default()
     })
 }
@@ -168,6 +168,7 @@ pub(super) fn is_unknown(item: &Item, known: &BTreeSet<i64>) -> bool {
 
 /// Does a command of the network ask for another birth?
 pub(super) fn asks_rebirth(payload: &Payload) -> bool {
-    let asks = |metric: &Metric| metric.name.as_deref() == Some(REBIRTH) && metric.value == Some(Value::Boolean(true));
+    let asks =
+        |metric: &Metric| metric.name.as_deref() == Some(REBIRTH) && metric.value == Some(MetricValue::Boolean(true));
     payload.metrics.iter().any(asks)
 }

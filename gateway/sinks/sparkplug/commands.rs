@@ -8,7 +8,7 @@
 //!
 //! A host may name a metric by its alias alone, as the birth gave it.
 
-use super::payload::{Metric, Payload, Value, datatype};
+use super::payload::{Metric, MetricValue, Payload, datatype};
 use crate::control::RequestedChange;
 use serde_json::json;
 
@@ -25,7 +25,7 @@ pub(super) fn metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
         alias: Some(alias),
         value: None,
         is_null: Some(true),
-        ..Metric::named(name, datatype, at_ms, Value::Boolean(false))
+        ..Metric::named(name, datatype, at_ms, MetricValue::Boolean(false))
     };
     let asked = [null(FEED_OVERRIDE, datatype::DOUBLE), null(ACKNOWLEDGE_ALARM, datatype::STRING)];
     let asked = asked.into_iter().filter(|_| allowed);
@@ -38,7 +38,7 @@ pub(super) fn answer(done: bool, text: &str, at_ms: u64) -> Metric {
         alias: Some(ANSWER.1),
         timestamp: Some(at_ms),
         datatype: Some(datatype::STRING),
-        value: Some(Value::Text(json!({"done": done, "text": text}).to_string())),
+        value: Some(MetricValue::Text(json!({"done": done, "text": text}).to_string())),
         ..Metric::default()
     }
 }
@@ -69,19 +69,19 @@ fn change(metric: &Metric) -> Option<Result<RequestedChange, String>> {
         });
     }
     is(ACKNOWLEDGE_ALARM).then(|| match &metric.value {
-        Some(Value::Text(code)) => Ok(RequestedChange::acknowledge_alarm(code)),
+        Some(MetricValue::Text(code)) => Ok(RequestedChange::acknowledge_alarm(code)),
         _ => Err("request/acknowledge_alarm is no text".to_owned()),
     })
 }
 
 /// Whole numbers are without sign in the payload: a negative one is far above what can be asked for, and refused there.
-fn number(value: &Value) -> Option<f64> {
+fn number(value: &MetricValue) -> Option<f64> {
     match value {
-        Value::Int(number) => Some(f64::from(*number)),
-        Value::Long(number) => Some(*number as f64),
-        Value::Float(number) => Some(f64::from(*number)),
-        Value::Double(number) => Some(*number),
-        Value::Boolean(_) | Value::Text(_) => None,
+        MetricValue::Int(number) => Some(f64::from(*number)),
+        MetricValue::Long(number) => Some(*number as f64),
+        MetricValue::Float(number) => Some(f64::from(*number)),
+        MetricValue::Double(number) => Some(*number),
+        MetricValue::Boolean(_) | MetricValue::Text(_) => None,
     }
 }
 
@@ -96,13 +96,13 @@ mod tests {
     #[test]
     fn a_request_is_known_by_name_or_alias_and_everything_else_is_passed_over() {
         let named = |name: &str, value| Metric::named(name, datatype::DOUBLE, 0, value);
-        let by_alias = Metric { alias: Some(9), value: Some(Value::Int(70)), ..Metric::default() };
+        let by_alias = Metric { alias: Some(9), value: Some(MetricValue::Int(70)), ..Metric::default() };
         let all = payload(vec![
-            named("request/feed_override_pct", Value::Double(80.0)),
+            named("request/feed_override_pct", MetricValue::Double(80.0)),
             by_alias,
-            named("request/acknowledge_alarm", Value::Text("overload".to_owned())),
-            named("spindle_power_w", Value::Double(1.0)),
-            named("request/answer", Value::Text("x".to_owned())),
+            named("request/acknowledge_alarm", MetricValue::Text("overload".to_owned())),
+            named("spindle_power_w", MetricValue::Double(1.0)),
+            named("request/answer", MetricValue::Text("x".to_owned())),
         ]);
         let expected = [
             RequestedChange::feed_override(80.0, ""),
@@ -115,12 +115,17 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_refused_and_null_withdraws() {
-        let of = |value: Option<Value>| {
+        let of = |value: Option<MetricValue>| {
             let metric = Metric { name: Some(FEED_OVERRIDE.0.to_owned()), value, ..Metric::default() };
             changes(&payload(vec![metric]), false).remove(0)
         };
         assert_eq!(of(None), Ok(RequestedChange::Withdraw));
-        for bad in [Value::Text("80".to_owned()), Value::Boolean(true), Value::Int(u32::MAX), Value::Double(f64::NAN)] {
+        for bad in [
+            MetricValue::Text("80".to_owned()),
+            MetricValue::Boolean(true),
+            MetricValue::Int(u32::MAX),
+            MetricValue::Double(f64::NAN),
+        ] {
             assert!(of(Some(bad.clone())).is_err(), "{bad:?}");
         }
     }

@@ -23,7 +23,7 @@ mod births;
 mod commands;
 mod payload;
 
-use super::broker::{BrokerTarget, Failure, Link, client_name};
+use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::control::{Reply, RequestedChange};
 use crate::history::{Cell, Outbox};
@@ -167,7 +167,7 @@ impl SparkplugSink {
         self.publish(messages).await.map_err(|(_, failure)| failure.of_item(0))
     }
 
-    async fn publish(&self, messages: Vec<Outgoing>) -> Result<(), (usize, Failure)> {
+    async fn publish(&self, messages: Vec<Outgoing>) -> Result<(), (usize, BrokerFailure)> {
         self.link.publish(messages, Qos::AtMostOnce, &self.target.broker).await
     }
 

@@ -47,13 +47,13 @@ pub(super) struct Metric {
     pub(super) is_null: Option<bool>,
     #[prost(message, optional, tag = "9")]
     pub(super) properties: Option<PropertySet>,
-    #[prost(oneof = "Value", tags = "10, 11, 12, 13, 14, 15")]
-    pub(super) value: Option<Value>,
+    #[prost(oneof = "MetricValue", tags = "10, 11, 12, 13, 14, 15")]
+    pub(super) value: Option<MetricValue>,
 }
 
 /// The value of a metric.
 #[derive(Clone, PartialEq, Oneof)]
-pub(super) enum Value {
+pub(super) enum MetricValue {
     #[prost(uint32, tag = "10")]
     Int(u32),
     #[prost(uint64, tag = "11")]
@@ -114,7 +114,7 @@ impl PropertySet {
 
 impl Metric {
     /// A metric by name, with a value whose type is known from it.
-    pub(super) fn named(name: &str, datatype: u32, timestamp: u64, value: Value) -> Self {
+    pub(super) fn named(name: &str, datatype: u32, timestamp: u64, value: MetricValue) -> Self {
         Self {
             name: Some(name.to_owned()),
             timestamp: Some(timestamp),
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_payload_is_what_the_schema_says() {
-        let metric = Metric::named("a", datatype::DOUBLE, 5, Value::Double(1.0));
+        let metric = Metric::named("a", datatype::DOUBLE, 5, MetricValue::Double(1.0));
         let payload = Payload { timestamp: Some(1), metrics: vec![metric], seq: Some(0) };
         let expected = b"\x08\x01\x12\x10\x0a\x01a\x18\x05\x20\x0a\x69\0\0\0\0\0\0\xf0\x3f\x18\x00";
         assert_eq!(payload.encode_to_vec(), expected);

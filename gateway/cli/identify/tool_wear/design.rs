@@ -1,7 +1,7 @@
 //! The cuts to make: a design of experiments as a work list.
 
 use super::ToolWearArguments;
-use crate::cli::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::diagnosis::put;
 use clap::Args;
 use rules::estimators::wear::{Array, Design, FACTORS, Factor, Levels, plan};
@@ -58,7 +58,7 @@ impl DesignArguments {
 /// Prints the list.
 pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     let own = &arguments.design;
-    let Some(array) = own.design else { return Ok(Outcome::Fine) };
+    let Some(array) = own.design else { return Ok(CommandOutcome::Fine) };
     let design = plan(array, &own.levels, own.seed)
         .map_err(|problems| CannotRun::new(format!("this design cannot be made:\n  {}", problems.join("\n  ")), ""))?;
     if let Some(path) = &arguments.out {
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     } else {
         print(&text(own, &design));
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 /// A table that comes back filled in: the columns that `identify tool-wear` reads, with the power still empty.

@@ -1,6 +1,6 @@
 //! The library: models stored in a history by machine, tool, work material and operation.
 
-use crate::cli::{CannotRun, CommandResult, Outcome, print, print_json};
+use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
 use adapters::clock::{Clock, SystemClock};
 use clap::Args;
@@ -80,7 +80,7 @@ pub(super) fn list(arguments: &LibraryArguments, as_json: bool) -> CommandResult
     } else {
         models.iter().for_each(|model| print(&line(model)));
     }
-    Ok(Outcome::Fine)
+    Ok(CommandOutcome::Fine)
 }
 
 fn document(model: &StoredWearModel) -> serde_json::Value {

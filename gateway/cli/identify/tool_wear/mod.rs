@@ -4,7 +4,7 @@
 mod design;
 mod library;
 
-use super::{Learned, Reading};
+use super::{IdentifyFiles, IdentifyOutput};
 use crate::cli::{CommandResult, recipe_from};
 use adapters::Recording;
 use clap::{Args, ValueEnum};
@@ -116,7 +116,7 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     arguments.reading().finish("tool-wear", learned)
 }
 
-fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(Learned, WearRecord), Refusal> {
+fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(IdentifyOutput, WearRecord), Refusal> {
     let gathered = gather(recording, &arguments.table.columns())?;
     let learned = identify_tool_wear(gathered.cuts, &arguments.fit.options())?;
     let origin = (arguments.recording.join(", "), learned.cuts.len(), learned.r2);
@@ -126,12 +126,12 @@ fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(Learne
     let mut json = learned.json();
     json["rows_used"] = json!(gathered.rows);
     json["rows_left_out"] = json!(gathered.left_out);
-    Ok((Learned { text, json, file: Some(file) }, record))
+    Ok((IdentifyOutput { text, json, file: Some(file) }, record))
 }
 
 impl ToolWearArguments {
-    fn reading(&self) -> Reading {
-        Reading { recording: self.recording.clone(), json: self.json, out: self.out.clone() }
+    fn reading(&self) -> IdentifyFiles {
+        IdentifyFiles { recording: self.recording.clone(), json: self.json, out: self.out.clone() }
     }
 }
 
