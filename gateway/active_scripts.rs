@@ -5,7 +5,7 @@ use crate::history::Event;
 use crate::reload::prepared;
 use crate::settings;
 use adapters::clock::TimeNs;
-use rules::script::{Host, Problem, ScriptFile, ScriptSet, prepare};
+use rules::script::{Host, ScriptFile, ScriptProblem, ScriptSet, prepare};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,7 @@ pub fn kept(data_dir: &Path) -> Option<Vec<ScriptFile>> {
 ///
 /// # Errors
 /// A newer program may find something wrong with it.
-pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<Problem>>> {
+pub fn last(data_dir: &Path) -> Option<Result<ScriptSet, Vec<ScriptProblem>>> {
     kept(data_dir).map(|files| prepared(&files, Some(&settings::path(data_dir))).or_else(|_| prepare(&files)))
 }
 

@@ -48,9 +48,9 @@ impl fmt::Display for CheckReport {
     }
 }
 
-impl From<script::Problem> for Problem {
-    fn from(problem: script::Problem) -> Self {
-        let script::Problem { file, line, column, what, next } = problem;
+impl From<script::ScriptProblem> for Problem {
+    fn from(problem: script::ScriptProblem) -> Self {
+        let script::ScriptProblem { file, line, column, what, next } = problem;
         Self { file, line, column, what, next }
     }
 }
@@ -150,7 +150,7 @@ fn check_scripts(config: &Config, report: &mut CheckReport) {
 }
 
 /// The name of the file as the user can open it.
-fn below(directory: &Path, problem: script::Problem) -> Problem {
+fn below(directory: &Path, problem: script::ScriptProblem) -> Problem {
     let mut problem = Problem::from(problem);
     if directory.join(&problem.file).is_file() {
         problem.file = directory.join(&problem.file).display().to_string();

@@ -4,7 +4,9 @@
 use crate::files::{Lookout, Mark, Rest, advice, mark, read_text, replace};
 use crate::settings;
 use adapters::channel::nearest;
-use rules::script::{Host, Problem, ScriptFile, ScriptSet, SettingValues, TEXT_MAX, prepare, prepare_with, shipped};
+use rules::script::{
+    Host, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TEXT_MAX, prepare, prepare_with, shipped,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +77,7 @@ pub fn digest(bytes: &[u8]) -> u64 {
 ///
 /// # Errors
 /// The directory, or files in it, cannot be read: all of them at once.
-pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<Problem>> {
+pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<ScriptProblem>> {
     let mut problems = Vec::new();
     let mut files = Vec::new();
     for path in paths(directory).map_err(|error| vec![unreadable(directory, &error)])? {
@@ -91,7 +93,7 @@ pub fn read_directory(directory: &Path) -> Result<Vec<ScriptFile>, Vec<Problem>>
 ///
 /// # Errors
 /// It cannot be read.
-pub fn read_file(path: &Path) -> Result<ScriptFile, Problem> {
+pub fn read_file(path: &Path) -> Result<ScriptFile, ScriptProblem> {
     read_script(path).map_err(|error| unreadable(path, &error))
 }
 
@@ -113,12 +115,12 @@ fn read_script(path: &Path) -> std::io::Result<ScriptFile> {
     Ok(ScriptFile { name, text: read_text(path, TEXT_MAX)? })
 }
 
-fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
+fn unreadable(path: &Path, error: &std::io::Error) -> ScriptProblem {
     let next = match error.kind() {
         std::io::ErrorKind::NotFound => misspelt(path),
         _ => advice(error).to_owned(),
     };
-    Problem {
+    ScriptProblem {
         file: path.display().to_string(),
         line: None,
         column: None,
@@ -143,10 +145,10 @@ fn misspelt(path: &Path) -> String {
 pub struct Watch {
     directory: PathBuf,
     rest: Rest<Vec<Mark>>,
-    content: Option<Result<Vec<ScriptFile>, Vec<Problem>>>,
+    content: Option<Result<Vec<ScriptFile>, Vec<ScriptProblem>>>,
     /// The file with the values of the settings, and what stood in it at the same look.
     settings: Option<PathBuf>,
-    values: Result<String, Vec<Problem>>,
+    values: Result<String, Vec<ScriptProblem>>,
 }
 
 impl Watch {
@@ -170,7 +172,7 @@ impl Watch {
 
     /// Everything, when it has changed and then stood still since the look before; at the first look, and with `now`,
     /// at once and whether it has changed or not.
-    pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<Problem>>> {
+    pub fn look(&mut self, now: bool) -> Option<&Result<Vec<ScriptFile>, Vec<ScriptProblem>>> {
         let paths = paths(&self.directory).unwrap_or_default();
         let marks = paths.iter().chain(&self.settings).map(|path| mark(path)).collect();
         if !(self.rest.look(marks, now) || now) {
@@ -185,7 +187,7 @@ impl Watch {
     }
 
     /// The scripts and the values of the last look, compiled and tried, with the name of whoever wrote the values.
-    fn prepared(&self, files: &[ScriptFile]) -> Result<Fresh, Vec<Problem>> {
+    fn prepared(&self, files: &[ScriptFile]) -> Result<Fresh, Vec<ScriptProblem>> {
         let text = self.values.as_ref().map_err(Clone::clone)?;
         let values = SettingValues::parse(settings::FILE, text)?;
         Ok(Fresh { set: prepare_with(files, &values)?, by: settings::author(text) })
@@ -193,7 +195,7 @@ impl Watch {
 }
 
 /// The newest scripts: ready to run, or what is wrong with them.
-pub type LoadedScripts = Result<ScriptSet, Vec<Problem>>;
+pub type LoadedScripts = Result<ScriptSet, Vec<ScriptProblem>>;
 
 /// What a reload found.
 struct Fresh {
@@ -211,7 +213,7 @@ pub struct Reloaded {
 }
 
 /// Watches and compiles on a thread of its own.
-pub struct Reloader(Lookout<Result<Fresh, Vec<Problem>>>);
+pub struct Reloader(Lookout<Result<Fresh, Vec<ScriptProblem>>>);
 
 impl Reloader {
     /// Starts to watch. Without `poll` only [`Reloader::ask`] makes it look. The first look is not repeated: load the
@@ -235,7 +237,7 @@ impl Reloader {
     }
 
     /// Puts newly found scripts in charge, or lets the host say why they are refused. Tells what happened, if anything.
-    pub fn step(&self, host: &mut Host) -> Option<Result<Reloaded, Vec<Problem>>> {
+    pub fn step(&self, host: &mut Host) -> Option<Result<Reloaded, Vec<ScriptProblem>>> {
         let (loaded, by) = match self.0.take()? {
             Ok(Fresh { set, by }) => (Ok(set), by),
             Err(problems) => (Err(problems), String::new()),
@@ -248,7 +250,7 @@ impl Reloader {
 ///
 /// # Errors
 /// Everything that is wrong; the host says so too, and whatever was in charge stays.
-pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> Result<usize, Vec<Problem>> {
+pub fn load_now(directory: &Path, settings: Option<&Path>, host: &mut Host) -> Result<usize, Vec<ScriptProblem>> {
     put_in_charge(read_directory(directory).and_then(|files| prepared(&files, settings)), host)
 }
 
@@ -277,7 +279,7 @@ pub enum Fallback {
 pub fn load_rest(
     (directory, settings): (&Path, Option<&Path>),
     last: Option<ScriptSet>,
-    problems: &[Problem],
+    problems: &[ScriptProblem],
     host: &mut Host,
 ) -> Fallback {
     if let Some(set) = last.filter(|set| !set.is_empty()) {
@@ -304,7 +306,7 @@ pub fn load_rest(
 
 /// The scripts that can be read and have no problems. Where a file could not be read, nobody has looked at the others yet:
 /// those that are not right by themselves are left out too.
-fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> LoadedScripts {
+fn right(directory: &Path, settings: Option<&Path>, problems: &[ScriptProblem]) -> LoadedScripts {
     // Values that cannot be used leave every setting at its default.
     let prepare = |files: &[ScriptFile]| prepared(files, settings).or_else(|_| prepare(files));
     let bad = |file: &ScriptFile| problems.iter().any(|problem| problem.file == file.name);
@@ -316,7 +318,7 @@ fn right(directory: &Path, settings: Option<&Path>, problems: &[Problem]) -> Loa
     })
 }
 
-fn put_in_charge(loaded: LoadedScripts, host: &mut Host) -> Result<usize, Vec<Problem>> {
+fn put_in_charge(loaded: LoadedScripts, host: &mut Host) -> Result<usize, Vec<ScriptProblem>> {
     match loaded {
         Ok(set) => {
             let count = set.len();

@@ -7,7 +7,7 @@
 use crate::files::{read_text, replace};
 use crate::reload::digest;
 use rules::script::{
-    Declared, Place, Problem, SETTINGS_TEXT_MAX, ScriptFile, SettingValue, SettingValues, prepare_with,
+    DeclarationPlace, Declared, SETTINGS_TEXT_MAX, ScriptFile, ScriptProblem, SettingValue, SettingValues, prepare_with,
 };
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -29,14 +29,14 @@ pub fn path(data_dir: &Path) -> PathBuf {
 ///
 /// # Errors
 /// It is there and cannot be read.
-pub fn text(path: &Path) -> Result<String, Vec<Problem>> {
+pub fn text(path: &Path) -> Result<String, Vec<ScriptProblem>> {
     match read_text(path, SETTINGS_TEXT_MAX) {
         Ok(text) => Ok(text),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
         Err(error) => {
             let (file, what) = (path.display().to_string(), format!("the settings cannot be read: {error}"));
             let next = "save it as UTF-8 text, or take it away: then every setting has its default".to_owned();
-            Err(vec![Problem { file, line: None, column: None, what, next }])
+            Err(vec![ScriptProblem { file, line: None, column: None, what, next }])
         }
     }
 }
@@ -45,7 +45,7 @@ pub fn text(path: &Path) -> Result<String, Vec<Problem>> {
 ///
 /// # Errors
 /// Everything in it that is no value.
-pub fn read(path: &Path) -> Result<SettingValues, Vec<Problem>> {
+pub fn read(path: &Path) -> Result<SettingValues, Vec<ScriptProblem>> {
     SettingValues::parse(FILE, &text(path)?)
 }
 
@@ -57,7 +57,7 @@ pub struct Wish {
     /// Name of the setting.
     pub name: String,
     /// For which tool or operation, or the machine.
-    pub place: Place,
+    pub place: DeclarationPlace,
     /// The value; `None`: as everywhere else again, or the default.
     pub value: Option<SettingValue>,
 }
@@ -66,7 +66,7 @@ pub struct Wish {
 ///
 /// # Errors
 /// Why the value cannot be used; nothing has been changed then.
-pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Result<String, Vec<Problem>> {
+pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Result<String, Vec<ScriptProblem>> {
     let path = path(data_dir);
     let before = read(&path)?;
     let mut after = before.clone();
@@ -80,7 +80,7 @@ pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Resu
     let words = changes(&before, &after, &declared).iter().map(SettingChange::words).collect::<Vec<_>>().join(", ");
     replace(&path, &signed(&body, by)).map_err(|error| {
         let (file, what) = (path.display().to_string(), format!("the settings cannot be written: {error}"));
-        vec![Problem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
+        vec![ScriptProblem { file, line: None, column: None, what, next: "look at the data directory".to_owned() }]
     })?;
     Ok(if words.is_empty() { format!("{script}.{name} stays as it is") } else { words })
 }
@@ -110,7 +110,7 @@ pub struct SettingChange {
     /// `constant_load.target_w`
     pub path: String,
     /// For what.
-    pub place: Place,
+    pub place: DeclarationPlace,
     /// Unit symbol.
     pub unit: String,
     /// What held before.
@@ -124,7 +124,7 @@ impl SettingChange {
     #[must_use]
     pub fn words(&self) -> String {
         let Self { path, place, unit, before, after } = self;
-        let place = if *place == Place::Machine { String::new() } else { format!(" for {place}") };
+        let place = if *place == DeclarationPlace::Machine { String::new() } else { format!(" for {place}") };
         format!("{path}{place}: {before} -> {after} {unit}").trim_end().to_owned()
     }
 
@@ -141,7 +141,7 @@ impl SettingChange {
 pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Declared]) -> Vec<SettingChange> {
     let mut found = Vec::new();
     for it in declared {
-        let mut places = vec![Place::Machine];
+        let mut places = vec![DeclarationPlace::Machine];
         places.extend(before.places(it.section()).into_iter().chain(after.places(it.section())));
         places.sort();
         places.dedup();
@@ -151,7 +151,8 @@ pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Decla
             if old == new {
                 continue;
             }
-            let usual = if place == Place::Machine { it.default.to_string() } else { "as the machine".to_owned() };
+            let usual =
+                if place == DeclarationPlace::Machine { it.default.to_string() } else { "as the machine".to_owned() };
             let word = |value: Option<SettingValue>| value.map_or_else(|| usual.clone(), |value| value.to_string());
             let (before, after) = (word(old), word(new));
             found.push(SettingChange { path: it.path(), place, unit: it.unit.clone(), before, after });
@@ -175,7 +176,7 @@ fn json_of(value: &SettingValue) -> Value {
 }
 
 fn row(it: &Declared, values: &SettingValues) -> Value {
-    let of = |place: &Place| values.of(it.section(), &it.name, place);
+    let of = |place: &DeclarationPlace| values.of(it.section(), &it.name, place);
     let special: Vec<Value> = values
         .places(it.section())
         .iter()
@@ -187,8 +188,8 @@ fn row(it: &Declared, values: &SettingValues) -> Value {
         })
         .collect();
     json!({
-        "script": it.section(), "name": it.name, "value": json_of(of(&Place::Machine).unwrap_or(&it.default)),
-        "chosen": of(&Place::Machine).is_some(), "default": json_of(&it.default), "unit": it.unit,
+        "script": it.section(), "name": it.name, "value": json_of(of(&DeclarationPlace::Machine).unwrap_or(&it.default)),
+        "chosen": of(&DeclarationPlace::Machine).is_some(), "default": json_of(&it.default), "unit": it.unit,
         "least": it.range.map(|range| range.0), "greatest": it.range.map(|range| range.1), "whole": it.whole,
         "one_of": it.one_of, "per": it.per.iter().map(|per| per.word()).collect::<Vec<_>>(), "special": special,
         "en": it.en, "zh": it.zh,
@@ -226,14 +227,14 @@ mod tests {
         let mut wish = Wish {
             script: "one".to_owned(),
             name: "x_w".to_owned(),
-            place: Place::Machine,
+            place: DeclarationPlace::Machine,
             value: Some(SettingValue::Number(7.0)),
         };
         assert_eq!(set(directory.path(), &files, &wish, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
         let written = std::fs::read_to_string(path(directory.path())).expect("written");
         assert_eq!(author(&written), "Li", "{written}");
         assert_eq!(author(&written.replace("7.0", "8.0")), BY_HAND);
-        wish.place = Place::Tool("T 1".to_owned());
+        wish.place = DeclarationPlace::Tool("T 1".to_owned());
         assert_eq!(
             set(directory.path(), &files, &wish, "Wu").as_deref(),
             Ok("one.x_w for tool T 1: as the machine -> 7.0 W")

@@ -6,7 +6,7 @@ use crate::config::AlignmentUse;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::SourceId;
 use adapters::{ChannelId, Reading};
-use rules::estimators::alignment::{Collector, Follower, Lag, NotIdentifiable, PowerPoint, SpeedPoint};
+use rules::estimators::alignment::{Collector, Lag, LagFollower, NotIdentifiable, PowerPoint, SpeedPoint};
 
 /// Pause between two estimates: at first, and at most.
 const PAUSE_NS: (i64, i64) = (60 * SECOND_NS, 600 * SECOND_NS);
@@ -20,7 +20,7 @@ pub(super) struct Pair {
     names: [String; 2],
     purpose: AlignmentUse,
     pub(super) collector: Collector,
-    pub(super) follower: Follower,
+    pub(super) follower: LagFollower,
     found: Option<LagResult>,
     pause_ns: i64,
     due_ns: TimeNs,
@@ -42,7 +42,7 @@ impl Pair {
             names,
             purpose,
             collector: Collector::new(),
-            follower: Follower::default(),
+            follower: LagFollower::default(),
             found: None,
             pause_ns: PAUSE_NS.0,
             due_ns: TimeNs::MIN,

@@ -5,7 +5,7 @@ use super::seconds;
 use crate::pipeline::Tally;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rules::estimators::State;
-use rules::script::{Decision, OverrideRequest, Problem, Stop};
+use rules::script::{Decision, OverrideRequest, ScriptProblem, Stop};
 use std::sync::Arc;
 
 /// A longer step between two samples is a gap.
@@ -66,7 +66,7 @@ pub struct Lane {
     asked: RequestTotals,
     pct: Option<f64>,
     notes: u64,
-    problems: Vec<Problem>,
+    problems: Vec<ScriptProblem>,
 }
 
 impl Lane {
@@ -198,7 +198,7 @@ impl Lane {
 
     /// Scripts that failed on the way.
     #[must_use]
-    pub fn problems(&self) -> &[Problem] {
+    pub fn problems(&self) -> &[ScriptProblem] {
         &self.problems
     }
 

@@ -8,7 +8,7 @@ use super::compare::{Spell, SpellKind};
 use crate::active_scripts::{self, Versions};
 use crate::history::{AlarmEntry, Event, HistoryError, Reader, RecordSpan};
 use adapters::clock::TimeNs;
-use rules::script::{Level, SCRIPT_STOPPED, ScriptSet};
+use rules::script::{AlarmLevel, SCRIPT_STOPPED, ScriptSet};
 use std::collections::BTreeMap;
 
 /// At most so many alarms and so many changes of scripts are read, the newest.
@@ -151,7 +151,7 @@ fn spell(alarm: &AlarmEntry, to_ns: TimeNs) -> Spell {
         script: alarm.source.as_str().into(),
         name: alarm.code.as_str().into(),
         text: alarm.en.as_str().into(),
-        level: Level::of(&alarm.severity).map_or("", Level::word),
+        level: AlarmLevel::of(&alarm.severity).map_or("", AlarmLevel::word),
         from_ns: alarm.raised_ns,
         to_ns: alarm.cleared_ns.filter(|cleared_ns| *cleared_ns <= to_ns),
     }

@@ -5,7 +5,7 @@ use super::lane::{Lane, RequestTotals};
 use super::recorded::Recorded;
 use super::seconds;
 use crate::moment::utc;
-use rules::script::Problem;
+use rules::script::ScriptProblem;
 use serde_json::{Value, json};
 use std::fmt;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ pub struct BacktestReport {
     /// Alarms and stops, in the order of time.
     pub differences: Vec<SpellDifference>,
     /// Trials of the edited scripts that fail: with them they would not come into charge.
-    pub trials: Vec<Problem>,
+    pub trials: Vec<ScriptProblem>,
     /// The alarms that were raised then.
     pub recorded: Recorded,
     /// The scripts in charge.
@@ -121,7 +121,7 @@ fn lane(lane: &Lane) -> Value {
             "least_pct": least_pct,
             "greatest_pct": greatest_pct,
         },
-        "failed": lane.problems().iter().map(Problem::to_string).collect::<Vec<_>>(),
+        "failed": lane.problems().iter().map(ScriptProblem::to_string).collect::<Vec<_>>(),
     })
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::files::replace;
 use crate::settings::{self, Wish};
-use rules::script::{Place, SettingValue, shipped};
+use rules::script::{DeclarationPlace, SettingValue, shipped};
 
 fn places(below: &Path) -> BackupPaths {
     BackupPaths {
@@ -37,7 +37,7 @@ fn furnish(places: &BackupPaths) {
         place,
         value: Some(SettingValue::Number(1800.0)),
     };
-    for place in [Place::Machine, Place::Tool("T3".to_owned())] {
+    for place in [DeclarationPlace::Machine, DeclarationPlace::Tool("T3".to_owned())] {
         settings::set(&places.data_dir, &shipped(), &wish(place), "Li").expect("set");
     }
     for (name, text) in [("persons.json", "secret"), ("annotations.jsonl", "{}\n"), ("wear.json", "{\"edges\":1}")] {

@@ -33,7 +33,7 @@ pub(crate) use crate::cannot_run::CannotRun;
 use crate::config::LogConfig;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
-use ::rules::script::{Host, Problem, shipped};
+use ::rules::script::{Host, ScriptProblem, shipped};
 use clap::{Args, Parser, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -245,7 +245,7 @@ fn recipe_from(path: &Path) -> Result<::rules::operations::Recipe, CannotRun> {
 }
 
 /// Files of the user that cannot be used.
-fn refused(problems: Vec<Problem>) -> CannotRun {
+fn refused(problems: Vec<ScriptProblem>) -> CannotRun {
     let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
     CannotRun::new(lines.join("\n"), "")
 }

@@ -9,7 +9,7 @@ use crate::history::Reader;
 use crate::moment;
 use crate::reload::{read_directory, read_file};
 use crate::settings;
-use ::rules::script::{self, Problem, ScriptFile, ScriptSet, SettingValues, TrialResult};
+use ::rules::script::{self, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TrialResult};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -142,7 +142,7 @@ fn test(arguments: &TestArguments) -> CommandResult {
 }
 
 /// Each file by itself, so that one that does not compile leaves the others their trials; then all of them together.
-fn tried(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec<Problem>) {
+fn tried(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec<ScriptProblem>) {
     let (mut results, mut problems) = (Vec::new(), Vec::new());
     for file in files {
         match script::compile_one(file, files, values) {
@@ -156,7 +156,7 @@ fn tried(files: &[ScriptFile], values: &SettingValues) -> (Vec<TrialResult>, Vec
     (results, problems)
 }
 
-fn told(files: &[ScriptFile], results: &[TrialResult], problems: &[Problem]) -> String {
+fn told(files: &[ScriptFile], results: &[TrialResult], problems: &[ScriptProblem]) -> String {
     let mut text = String::new();
     for result in results {
         let (file, line, name) = (&result.file, result.line, &result.name);
@@ -187,8 +187,8 @@ fn trial(result: &TrialResult) -> Value {
     })
 }
 
-fn problem(problem: &Problem) -> Value {
-    let Problem { file, line, column, what, next } = problem;
+fn problem(problem: &ScriptProblem) -> Value {
+    let ScriptProblem { file, line, column, what, next } = problem;
     json!({ "file": file, "line": line, "column": column, "what": what, "next": next })
 }
 

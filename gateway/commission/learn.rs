@@ -11,7 +11,9 @@ use rules::estimators::power_separation::{
 };
 use rules::estimators::regression::{Refusal, RefusalKind};
 use rules::estimators::thermal::{SelectionSettings, ThermalLearned, ThermalModel, collect, learn};
-use rules::estimators::wear::{Columns, Cut, Key, LearnedWear, WearOptions, WearRecord, gather, identify_tool_wear};
+use rules::estimators::wear::{
+    Cut, CutColumns, LearnedWear, WearKey, WearOptions, WearRecord, gather, identify_tool_wear,
+};
 
 /// One part of the job.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +144,7 @@ impl Learned {
         let predicted = |cut: &Cut| learned.model.predict(&cut.conditions).power_w;
         let dots = learned.cuts.iter().map(|cut| Dot { x: cut.cutting_power_w, y: predicted(cut), sd: 0.0 });
         self.pictures.push(Picture::agreement("Cutting power of the wear model 磨损模型", "W", dots.collect()));
-        let key = Key {
+        let key = WearKey {
             machine: machine.to_owned(),
             tool: String::new(),
             work_material: String::new(),
@@ -226,7 +228,7 @@ fn inner_rows(recording: &Recording) -> Vec<bool> {
 }
 
 fn wear_of(recording: &Recording, criterion_mm: f64) -> Result<LearnedWear, Refusal> {
-    let gathered = gather(recording, &Columns::default())?;
+    let gathered = gather(recording, &CutColumns::default())?;
     let levels = wear_levels(&gathered.cuts);
     if gathered.cuts.len() < 20 || levels < 3 {
         let what = format!("{} cuts at {levels} wears are known; the list has 27 at 3", gathered.cuts.len());

@@ -2,7 +2,7 @@
 //! (`simulate --machine lathe --plan`).
 
 use clap::ValueEnum;
-use rules::estimators::wear::{Array, Factor, Levels, plan};
+use rules::estimators::wear::{Array, ConditionFactor, FactorLevels, plan};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -112,8 +112,8 @@ fn ends(values: &[f64]) -> (f64, f64) {
 /// The nine cuts of one wear, in the order of the design.
 fn l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
     let factor = |symbol: &str, values: &[f64]| {
-        let factor = Factor::of(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
-        Ok::<_, String>(Levels { factor, values: values.to_vec() })
+        let factor = ConditionFactor::of(symbol).ok_or_else(|| format!("there is no factor {symbol}"))?;
+        Ok::<_, String>(FactorLevels { factor, values: values.to_vec() })
     };
     // The wears stand for the edges that come: what they are the microscope says.
     let factors = [

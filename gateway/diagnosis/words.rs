@@ -1,7 +1,7 @@
 //! What the twin notices, in plain words.
 
 use adapters::clock::{SECOND_NS, TimeNs};
-use rules::twin::live::{Mismatch, Onset, Regime};
+use rules::twin::live::{LevelChange, Mismatch, Regime};
 use rules::twin::text::short;
 
 /// A time in seconds since 1970 as nanoseconds.
@@ -41,8 +41,8 @@ pub fn mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String
     )
 }
 
-fn since(onset: Option<&Onset>) -> (String, String) {
-    let Some(Onset { at_s, low_s, high_s, .. }) = onset else {
+fn since(onset: Option<&LevelChange>) -> (String, String) {
+    let Some(LevelChange { at_s, low_s, high_s, .. }) = onset else {
         return ("Ever since the comparison began".to_owned(), "自开始比较以来".to_owned());
     };
     // Whole minutes that contain the interval.
@@ -77,7 +77,8 @@ mod tests {
 
     #[test]
     fn a_difference_reads_as_a_sentence() {
-        let onset = Onset { at_s: 1.8e9, low_s: 1.8e9 - 600.0, high_s: 1.8e9 + 86_400.0, mean: 61.0, expected: 1000.0 };
+        let onset =
+            LevelChange { at_s: 1.8e9, low_s: 1.8e9 - 600.0, high_s: 1.8e9 + 86_400.0, mean: 61.0, expected: 1000.0 };
         let found = Mismatch { regime: Regime::Cutting, onset: Some(onset), mean: 61.0, expected: 1000.0 };
         let (en, zh) = mismatch(&found, ("Power into the spindle drive, negative when it brakes", "主轴驱动功率"), "W");
         let expected = "Since 2027-01-15 08:00 UTC (between 07:50 and 2027-01-16 08:00), power into the spindle drive while \

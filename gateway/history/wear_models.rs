@@ -4,7 +4,7 @@ use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::schema;
 use adapters::clock::TimeNs;
-use rules::estimators::wear::{Key, WearModel, WearRecord};
+use rules::estimators::wear::{WearKey, WearModel, WearRecord};
 use rusqlite::{Connection, OptionalExtension, params};
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub struct StoredWearModel {
 pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
     let toml = record.to_toml().map_err(HistoryError::Question)?;
     let db = schema::open_for_writing(path)?;
-    let Key { machine, tool, work_material, operation } = &record.key;
+    let WearKey { machine, tool, work_material, operation } = &record.key;
     db.execute(
         "INSERT INTO wear_models (at_ns, machine, tool, work_material, operation, form, criterion_mm, cuts, residual_sd_w, r2,
          origin, toml) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",

@@ -15,7 +15,7 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::response::Response;
 use axum::routing::{get, post};
-use rules::script::{self, Problem, TEXT_MAX};
+use rules::script::{self, ScriptProblem, TEXT_MAX};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -116,7 +116,7 @@ async fn begin(
 }
 
 fn plan(shared: &ServerState, name: &str, asked: &Asked) -> Result<BacktestPlan, ApiProblem> {
-    let unusable = |found: Vec<Problem>| {
+    let unusable = |found: Vec<ScriptProblem>| {
         let all: Vec<String> = found.iter().map(ToString::to_string).collect();
         ApiProblem::request(all.join("\n"), "mend it; `Run trials` marks the line")
     };

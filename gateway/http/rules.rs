@@ -16,7 +16,7 @@ use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post, put};
-use rules::script::{self, Problem, ScriptFile, SettingValues, TEXT_MAX, TrialResult};
+use rules::script::{self, ScriptFile, ScriptProblem, SettingValues, TEXT_MAX, TrialResult};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -60,7 +60,8 @@ pub(super) fn named(name: &str) -> Result<(), ApiProblem> {
 }
 
 pub(super) fn on_disk(shared: &ServerState) -> Result<Vec<ScriptFile>, ApiProblem> {
-    let problems = |found: Vec<Problem>| broken(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
+    let problems =
+        |found: Vec<ScriptProblem>| broken(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
     read_directory(&shared.scripts).map_err(problems)
 }
 
@@ -167,16 +168,16 @@ fn trial(result: &TrialResult) -> Value {
 }
 
 /// Those of this file; problems of others are told without a place in it.
-fn problems(found: &[Problem], name: &str) -> Vec<Value> {
-    let place = |it: &Problem| if it.file == name { problem(it) } else { elsewhere(it) };
+fn problems(found: &[ScriptProblem], name: &str) -> Vec<Value> {
+    let place = |it: &ScriptProblem| if it.file == name { problem(it) } else { elsewhere(it) };
     found.iter().map(place).collect()
 }
 
-fn problem(it: &Problem) -> Value {
+fn problem(it: &ScriptProblem) -> Value {
     json!({ "file": it.file, "line": it.line, "column": it.column, "what": it.what, "next": it.next })
 }
 
-fn elsewhere(it: &Problem) -> Value {
+fn elsewhere(it: &ScriptProblem) -> Value {
     json!({ "file": it.file, "line": 0, "column": 0, "what": it.to_string(), "next": it.next })
 }
 
@@ -264,7 +265,7 @@ async fn activate(
     .await
 }
 
-fn refused(shared: &ServerState, name: &str, text: &str, found: &[Problem]) -> Response {
+fn refused(shared: &ServerState, name: &str, text: &str, found: &[ScriptProblem]) -> Response {
     let mut document = tried(shared, name, text);
     document["status"] = json!(422);
     document["title"] = json!("it does not come into charge: not every trial passes");

@@ -12,7 +12,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use axum::routing::{get, put};
-use rules::script::{Place, Problem, SettingValue, declarations};
+use rules::script::{DeclarationPlace, ScriptProblem, SettingValue, declarations};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -45,9 +45,9 @@ struct SettingRequest {
 impl SettingRequest {
     fn wish(self) -> Result<Wish, ApiProblem> {
         let place = match (self.tool, self.operation) {
-            (None, None) => Place::Machine,
-            (Some(tool), None) => Place::Tool(tool),
-            (None, Some(operation)) => Place::Operation(operation),
+            (None, None) => DeclarationPlace::Machine,
+            (Some(tool), None) => DeclarationPlace::Tool(tool),
+            (None, Some(operation)) => DeclarationPlace::Operation(operation),
             (Some(_), Some(_)) => {
                 return Err(ApiProblem::request("a tool and an operation are both named", "name one of them"));
             }
@@ -61,7 +61,7 @@ impl SettingRequest {
     }
 }
 
-fn refused(problems: &[Problem]) -> ApiProblem {
+fn refused(problems: &[ScriptProblem]) -> ApiProblem {
     let what: Vec<&str> = problems.iter().map(|problem| problem.what.as_str()).collect();
     let next = problems.iter().map(|problem| problem.next.as_str()).find(|next| !next.is_empty());
     ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))

@@ -10,7 +10,7 @@ use crate::log::{Notice, Severity};
 use crate::status;
 use adapters::Sample;
 use rules::operations::{Completion, Lookup, Recipe};
-use rules::script::Problem;
+use rules::script::ScriptProblem;
 use std::path::{Path, PathBuf};
 use watch::RecipeResult;
 
@@ -34,7 +34,7 @@ pub struct Operations {
     path: PathBuf,
     completion: Completion,
     active: Option<LoadedRecipe>,
-    refused: Vec<Problem>,
+    refused: Vec<ScriptProblem>,
     watcher: Option<Lookout<RecipeResult>>,
     told: Vec<Notice>,
     /// Name of the operation in force, or why there is none.

@@ -3,30 +3,30 @@
 use super::LoadedRecipe;
 use crate::files::{Lookout, Rest, advice, mark, read_text};
 use rules::operations::{TEXT_MAX, parse};
-use rules::script::Problem;
+use rules::script::ScriptProblem;
 use std::path::Path;
 
 /// The recipe in a file.
 ///
 /// # Errors
 /// The file cannot be read, or everything that is wrong in it.
-pub fn read(path: &Path) -> Result<LoadedRecipe, Vec<Problem>> {
+pub fn read(path: &Path) -> Result<LoadedRecipe, Vec<ScriptProblem>> {
     let name = path.display().to_string();
     let text = read_text(path, TEXT_MAX).map_err(|error| vec![unreadable(&name, &error)])?;
     Ok(LoadedRecipe { recipe: parse(&name, &text)?, text })
 }
 
-fn unreadable(name: &str, error: &std::io::Error) -> Problem {
+fn unreadable(name: &str, error: &std::io::Error) -> ScriptProblem {
     let next = match error.kind() {
         std::io::ErrorKind::NotFound => "`path` under [operations] names it; create it, or leave the section out",
         _ => advice(error),
     };
     let what = format!("the operations recipe cannot be read: {error}");
-    Problem { file: name.to_owned(), line: None, column: None, what, next: next.to_owned() }
+    ScriptProblem { file: name.to_owned(), line: None, column: None, what, next: next.to_owned() }
 }
 
 /// The recipe, or what is wrong with it.
-pub(super) type RecipeResult = Result<LoadedRecipe, Vec<Problem>>;
+pub(super) type RecipeResult = Result<LoadedRecipe, Vec<ScriptProblem>>;
 
 /// Watches one file; what is there now is known already. Asked, it takes a change without waiting for it to stand still.
 ///

@@ -5,7 +5,7 @@ use super::place::capital;
 use super::table::{ColumnHead, table};
 use super::text::{escape, exponent, fixed, law, number, unit_text, with_unit};
 use rules::physics::explain::Language;
-use rules::twin::diagnosis::{Estimate, Missing};
+use rules::twin::diagnosis::{Missing, ParameterEstimate};
 use std::fmt::Write as _;
 
 /// Share swallowed by the baseline above which the effect's whole size is uncertain.
@@ -68,7 +68,7 @@ fn parameters(data: &Data<'_>, missing: &Missing) -> String {
     table(&heads, &rows)
 }
 
-fn parameter(data: &Data<'_>, effect: &str, e: &Estimate) -> String {
+fn parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> String {
     let [value, low, high] = aligned(e);
     let meaning = data.tongue.parameter(effect, &e.name);
     let unit = unit_text(&e.unit);
@@ -88,7 +88,7 @@ fn parameter(data: &Data<'_>, effect: &str, e: &Estimate) -> String {
 }
 
 /// Value and interval with the same decimals: two significant digits of the interval's width.
-fn aligned(e: &Estimate) -> [String; 3] {
+fn aligned(e: &ParameterEstimate) -> [String; 3] {
     let numbers = [e.value, e.low, e.high];
     let width = 0.5 * (e.high - e.low);
     let greatest = numbers.iter().fold(0.0_f64, |top, x| top.max(x.abs()));

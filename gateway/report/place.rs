@@ -4,7 +4,7 @@ use super::data::Data;
 use super::strip::{REGIONS_MAX, strip};
 use super::text::{fixed, number, signed, with_unit};
 use rules::physics::explain::Language;
-use rules::twin::locate::{Onset, Region, active_rows};
+use rules::twin::locate::{OnsetInterval, Region, active_rows};
 
 /// Mean, as a share of the typical size, below which an effect counts as one of both signs.
 const MEAN_TELLS: f64 = 0.3;
@@ -82,7 +82,7 @@ fn stretches(data: &Data<'_>, region: &Region) -> String {
     }
 }
 
-fn since(data: &Data<'_>, onset: &Onset) -> String {
+fn since(data: &Data<'_>, onset: &OnsetInterval) -> String {
     let run = data.unit_name(&onset.run);
     let [at, low, high] = [onset.time_s, onset.low_s, onset.high_s].map(|t| fixed(t, 0));
     match data.tongue.0 {

@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use super::text::{escape, fixed};
-use rules::twin::locate::{Onset, Region, Span};
+use rules::twin::locate::{OnsetInterval, Region, Span};
 use std::fmt::Write as _;
 
 /// Runs above which every run becomes one tile.
@@ -126,7 +126,7 @@ fn paths(columns: &[f64], lane: usize) -> String {
     html
 }
 
-fn onset_mark(data: &Data<'_>, run: usize, onset: &Onset) -> String {
+fn onset_mark(data: &Data<'_>, run: usize, onset: &OnsetInterval) -> String {
     let start = data.time_s(data.runs[run].rows.start);
     let share = |time_s: f64| 100.0 * ((time_s - start) / longest_s(data)).clamp(0.0, 1.0);
     let (low, high) = (share(onset.low_s), share(onset.high_s));

@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Diagnosis, Verdict};
-use rules::twin::locate::{Onset, Span};
+use rules::twin::locate::{OnsetInterval, Span};
 use rules::twin::{diagnose, parse_model};
 
 const MODEL: &str = r#"
@@ -134,7 +134,7 @@ fn absent_figures_have_a_reason_and_an_onset_is_marked() {
         missing.parameters.iter_mut().for_each(|e| (e.low, e.high) = (f64::NEG_INFINITY, f64::INFINITY));
     }
     let region = diagnosis.mismatch.first_mut().expect("a region");
-    region.onset = Some(Onset { run: "r2".into(), time_s: 11.0, low_s: 10.5, high_s: 12.0 });
+    region.onset = Some(OnsetInterval { run: "r2".into(), time_s: 11.0, low_s: 10.5, high_s: 12.0 });
     region.spans = vec![Span { run: "r2".into(), from_s: 11.0, to_s: 13.0 }];
     let html = in_language(&diagnosis, &recording, Language::En);
     check(&html);

@@ -9,7 +9,7 @@ use crate::pipeline::Pipeline;
 use crate::reload::{Fallback, Reloaded, Reloader, furnish, load_now, load_rest};
 use crate::settings;
 use adapters::clock::TimeNs;
-use rules::script::{Host, Problem, SettingValues, shipped};
+use rules::script::{Host, ScriptProblem, SettingValues, shipped};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -64,7 +64,7 @@ fn remembered(config: &Config) -> Option<serde_json::Value> {
     serde_json::from_str(&text).ok()
 }
 
-fn refused(problems: &[Problem], consequence: &str) -> Notice {
+fn refused(problems: &[ScriptProblem], consequence: &str) -> Notice {
     let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
     let text = format!("scripts refused, {consequence}:\n  {}", lines.join("\n").replace('\n', "\n  "));
     Notice::new(Severity::Warning, "scripts_refused", text)
@@ -91,7 +91,7 @@ impl ScriptWatch {
 
     /// Prints what scripts have failed with at this tick, each once until scripts are reloaded or it fails with something else.
     /// The history has every one.
-    pub fn tell(&mut self, problems: &[Problem]) {
+    pub fn tell(&mut self, problems: &[ScriptProblem]) {
         for problem in problems {
             let text = format!("a script was stopped: {problem}");
             if self.failed.get(&problem.file) != Some(&text) {

@@ -13,7 +13,7 @@ use crate::log::{Notice, Severity};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Absence, ChannelId, Sample};
 use rules::estimators::thermal::{
-    AxisSituation, Compensator, Corrected, FollowSettings, Follower, Held, Prediction, ThermalModel,
+    AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, ThermalFollower, ThermalModel, ThermalPrediction,
 };
 use rules::script::OffsetProposal;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ const COUNT: usize = 6;
 /// See the [module](self).
 pub struct Thermal {
     settings: config::ThermalConfig,
-    follower: Follower,
+    follower: ThermalFollower,
     compensator: Compensator,
     sensors: Vec<ChannelId>,
     temperatures_c: Vec<Result<f64, Absence>>,
@@ -42,7 +42,7 @@ pub struct Thermal {
     told: Option<Notice>,
     last_ns: Option<TimeNs>,
     read_ns: Option<TimeNs>,
-    held: Option<Held>,
+    held: Option<HoldReason>,
     pulses: i64,
     values: [ExtraValue<'static>; COUNT],
     reason: Arc<str>,
@@ -68,7 +68,8 @@ impl Thermal {
         let memory = config.gateway.data_dir.join(MEMORY);
         let (corrected, told) = remembered(&memory, &model);
         let bounds = FollowSettings { step_um: config.thermal.step_um, total_um: config.thermal.total_um };
-        let follower = Follower::new(corrected, &names, bounds).map_err(|refusal| refused(refusal.to_string()))?;
+        let follower =
+            ThermalFollower::new(corrected, &names, bounds).map_err(|refusal| refused(refusal.to_string()))?;
         let compensator = Compensator::new(config.thermal.compensation)
             .map_err(|error| CannotRun::new(error.to_string(), "see [thermal]"))?;
         Ok(Some(Self {
@@ -146,7 +147,7 @@ impl Thermal {
         let dt_s = dt_ns as f64 / SECOND_NS as f64;
         let step = self.compensator.step(dt_s, predicted.as_ref().ok(), AxisSituation::default());
         self.pulses += step.increment_pulses;
-        let of = |value: fn(&Prediction) -> f64| match &predicted {
+        let of = |value: fn(&ThermalPrediction) -> f64| match &predicted {
             Ok(prediction) => ExtraValue::Number(value(prediction)),
             Err(reason) => ExtraValue::Missing(reason.word()),
         };
@@ -163,7 +164,12 @@ impl Thermal {
     }
 
     /// Measured less predicted at this moment; a reading corrects the law.
-    fn residual(&mut self, prediction: &Prediction, sample: &Sample, health: &mut Health) -> ExtraValue<'static> {
+    fn residual(
+        &mut self,
+        prediction: &ThermalPrediction,
+        sample: &Sample,
+        health: &mut Health,
+    ) -> ExtraValue<'static> {
         let measured_um = sample.number(self.error);
         let residual = match prediction.beside(measured_um).residual_um {
             Ok(residual) => ExtraValue::Number(residual.value),
@@ -176,7 +182,7 @@ impl Thermal {
             if let Ok(text) = serde_json::to_string(&self.follower.corrected()) {
                 health.put(&self.memory, text);
             }
-            if correction.held != self.held && correction.held == Some(Held::Total) {
+            if correction.held != self.held && correction.held == Some(HoldReason::Total) {
                 let text = format!(
                     "readings have moved the thermal law by {} um, as far as they may: run `cnc-gateway identify thermal` again",
                     self.settings.total_um

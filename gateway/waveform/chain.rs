@@ -4,7 +4,9 @@ use super::nanoseconds;
 use adapters::Stamp;
 use adapters::clock::TimeNs;
 use adapters::waveform::{AMPLITUDE, Block, WaveformHeader};
-use rules::estimators::spindle_current::{Design, Feature, FeatureKind, LowPass, PhaseFeature, Span, ThreePhase};
+use rules::estimators::spindle_current::{
+    Feature, FeatureKind, LowPass, LowPassDesign, PhaseFeature, ThreePhase, WindowSpan,
+};
 
 /// The low-pass of the source of the method, Hz, and its greatest share of the rate.
 const CUTOFF_HZ: f64 = 350.0;
@@ -51,10 +53,10 @@ impl WaveformChain {
         let rate_hz = header.rate_hz;
         let least_a = LEAST_SHARE * f64::from(header.full_scale) * header.scale[0].abs();
         let text = |refusal: rules::estimators::regression::Refusal| refusal.to_string();
-        let design = Design::low_pass(CUTOFF_HZ.min(CUTOFF_SHARE * rate_hz), rate_hz).map_err(text)?;
+        let design = LowPassDesign::low_pass(CUTOFF_HZ.min(CUTOFF_SHARE * rate_hz), rate_hz).map_err(text)?;
         // An amplitude passes no zero: its window has a length of its own.
         let amplitude = header.unit == AMPLITUDE;
-        let span = if amplitude { Span::Known { hz: AMPLITUDE_HZ } } else { Span::Crossings { least_a } };
+        let span = if amplitude { WindowSpan::Known { hz: AMPLITUDE_HZ } } else { WindowSpan::Crossings { least_a } };
         let phase = PhaseFeature::new(FeatureKind::Rms, span, HALVES, rate_hz).map_err(text)?;
         let phases = match (header.channels.len(), header.unit.as_str()) {
             (1, "A" | AMPLITUDE) => Phases::One(Box::new((design.filter(), phase))),

@@ -7,7 +7,7 @@ use adapters::{Absence, ChannelId, Sample};
 
 /// The channels in use, looked up once.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Channels {
+pub(super) struct InputChannels {
     pub(super) power: Option<ChannelId>,
     pub(super) total: Option<ChannelId>,
     pub(super) speed: Option<ChannelId>,
@@ -22,7 +22,7 @@ pub(super) type Input = Result<f64, Absence>;
 
 /// The inputs of one tick.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Inputs {
+pub(super) struct TickInputs {
     pub(super) at_ns: TimeNs,
     /// What `power` is.
     pub(super) basis: StateBasis,
@@ -46,7 +46,7 @@ pub(super) struct Inputs {
     pub(super) by_voltage_w: f64,
 }
 
-impl Channels {
+impl InputChannels {
     pub(super) fn new() -> Self {
         Self {
             power: ChannelId::of("spindle_power_w"),
@@ -60,7 +60,7 @@ impl Channels {
     }
 
     /// Reads the inputs. Without a channel for spindle power, total power above its standby level stands for it.
-    pub(super) fn read(&self, sample: &Sample, standby_w: Option<f64>, settings: &Settings) -> Inputs {
+    pub(super) fn read(&self, sample: &Sample, standby_w: Option<f64>, settings: &Settings) -> TickInputs {
         let total = number(sample, self.total);
         let feed = number(sample, self.feed);
         let basis = StateBasis::of(sample);
@@ -72,7 +72,7 @@ impl Channels {
         };
         let flagged = number(sample, self.rapid).is_ok_and(|rapid| rapid > 0.5);
         let fast = settings.rapid_feed_mm_min > 0.0 && feed.is_ok_and(|feed| feed > settings.rapid_feed_mm_min);
-        Inputs {
+        TickInputs {
             at_ns: sample.at_ns,
             basis,
             power,

@@ -8,7 +8,7 @@
 //! the other choice counts as uncertainty. Where the speeds lie so unevenly that a quadratic would amplify noise, a
 //! straight line serves; two known speeds make a line, one serves only itself.
 
-use super::no_load::Stage;
+use super::no_load::StagePowers;
 
 /// Within known speeds, a quadratic that amplifies noise more than this gives way to the straight line.
 const INSIDE_GAIN_LIMIT: f64 = 1.5;
@@ -92,7 +92,7 @@ impl Weights {
     }
 }
 
-impl Stage {
+impl StagePowers {
     /// Weights for `n` and those of another form, whose difference is the doubt in the interpolation itself.
     pub(super) fn forms(&self, n: f64) -> Option<(Weights, Weights)> {
         let speeds = &self.speeds_rpm;
@@ -173,8 +173,8 @@ impl Stage {
 mod tests {
     use super::*;
 
-    fn stage(points: &[(f64, f64)]) -> Stage {
-        let mut stage = Stage::default();
+    fn stage(points: &[(f64, f64)]) -> StagePowers {
+        let mut stage = StagePowers::default();
         stage.speeds_rpm.extend(points.iter().map(|(speed, _)| speed));
         stage.powers_w.extend(points.iter().map(|(_, power)| power));
         stage

@@ -11,7 +11,7 @@
 use super::bound::{self, Normal};
 use super::estimate::NoLoadOrigin;
 use super::no_load::{NoLoad, NoLoadPoint};
-use super::noise::Noise;
+use super::noise::RelativeVariances;
 use super::settings::Settings;
 use super::signals::{length, seconds};
 use crate::statistics::count;
@@ -156,7 +156,7 @@ impl IdleBlock {
     }
 
     /// Takes a tick and yields the observation of a full block.
-    fn push(&mut self, tick: IdleTick, noise: &Noise) -> Option<Observation> {
+    fn push(&mut self, tick: IdleTick, noise: &RelativeVariances) -> Option<Observation> {
         self.clear_if_other(&tick);
         self.broken |= seconds(self.last_ns, tick.at_ns) > PAUSE_S;
         self.last_ns = tick.at_ns;
@@ -174,7 +174,13 @@ impl IdleBlock {
         seen
     }
 
-    fn observe(&mut self, power_w: f64, first: IdleTick, at_ns: TimeNs, noise: &Noise) -> Option<Observation> {
+    fn observe(
+        &mut self,
+        power_w: f64,
+        first: IdleTick,
+        at_ns: TimeNs,
+        noise: &RelativeVariances,
+    ) -> Option<Observation> {
         let noise_w = noise.sd() * power_w;
         let settling_w = (self.blocks > 0).then(|| power_w - self.means_w[0]);
         // Rounding does not average out of a level that stands still.
@@ -226,7 +232,7 @@ impl Learner {
         &mut self,
         tick: IdleTick,
         known: Option<NoLoad>,
-        noise: &mut Noise,
+        noise: &mut RelativeVariances,
         settings: &Settings,
     ) -> Option<Observation> {
         let tick = if tick.rapid { Some(tick) } else { self.wait(tick, settings) };
@@ -251,7 +257,7 @@ impl Learner {
 
     /// Takes a tick of power under feed: no-load power cannot be above it. Yields an observation where it lies clearly
     /// below what is known. A block begins with the feed, so that the first holds the approach alone.
-    pub(super) fn fed(&mut self, tick: IdleTick, known: NoLoad, noise: &Noise) -> Option<Observation> {
+    pub(super) fn fed(&mut self, tick: IdleTick, known: NoLoad, noise: &RelativeVariances) -> Option<Observation> {
         let seen = self.fed.push(tick, noise)?;
         let noise_w = noise.sd() * seen.point.power_w * (MIDDLE_HALF / count(self.fed.length)).sqrt();
         let below_w = known.power_w - seen.point.power_w;

@@ -52,7 +52,7 @@ mod window;
 
 pub use basis::StateBasis;
 pub use evidence::Evidence;
-pub use window::{Means, Window, stationary};
+pub use window::{Means, PowerWindow, stationary};
 
 pub use cutting::{Balance, balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};

@@ -67,7 +67,7 @@ impl NoLoad {
 
 /// Known powers of one gear stage, ascending in speed, with their covariance.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct Stage {
+pub(super) struct StagePowers {
     pub(super) speeds_rpm: Vec<f64>,
     pub(super) powers_w: Vec<f64>,
     /// Logarithm of supply voltage over its reference at which each power was learned; shorter than the powers where the
@@ -79,7 +79,7 @@ pub(super) struct Stage {
     aged_ns: Option<TimeNs>,
 }
 
-impl Stage {
+impl StagePowers {
     pub(super) fn len(&self) -> usize {
         self.speeds_rpm.len()
     }
@@ -228,14 +228,14 @@ impl Stage {
 /// No-load power over speed for every gear stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoLoadTable {
-    stages: Vec<Stage>,
+    stages: Vec<StagePowers>,
 }
 
 impl NoLoadTable {
     /// A table that knows what the settings give beforehand.
     #[must_use]
     pub fn new(settings: &Settings) -> Self {
-        let mut table = Self { stages: vec![Stage::default(); STAGES] };
+        let mut table = Self { stages: vec![StagePowers::default(); STAGES] };
         for point in &settings.no_load_table {
             let sd_w = CONFIGURED_SD * point.power_w;
             let stage = &mut table.stages[point.stage.min(STAGES - 1)];

@@ -14,7 +14,7 @@ const CLIP_SD: f64 = 3.0;
 
 /// Relative variances.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Noise {
+pub(super) struct RelativeVariances {
     fast: f64,
     seen: f64,
     slow: f64,
@@ -29,7 +29,7 @@ pub(super) struct Noise {
 /// Standard deviation of the rounding to whole steps, in steps: that of an even distribution.
 const ROUNDING_SD: f64 = 0.289;
 
-impl Noise {
+impl RelativeVariances {
     pub(super) fn new(settings: &Settings) -> Self {
         Self {
             fast: settings.power_noise * settings.power_noise,
@@ -46,7 +46,7 @@ impl Noise {
         self.resolution_w = resolution_w;
     }
 
-    /// See [`Noise::resolves`].
+    /// See [`RelativeVariances::resolves`].
     pub(super) fn resolution_w(&self) -> f64 {
         self.resolution_w
     }

@@ -1,10 +1,10 @@
 //! The recent past of the inputs: filtered power, steadiness of the speed, feed with its debounce.
 
 use super::filter::AntiPulse;
-use super::inputs::Inputs;
-use super::noise::Noise;
+use super::inputs::TickInputs;
+use super::noise::RelativeVariances;
 use super::settings::Settings;
-use super::window::{Means, Window};
+use super::window::{Means, PowerWindow};
 use crate::statistics::count;
 use adapters::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
@@ -52,8 +52,8 @@ pub(super) enum Feed {
 #[serde(deny_unknown_fields)]
 pub(super) struct Signals {
     pub(super) filter: AntiPulse,
-    pub(super) window: Window,
-    pub(super) noise: Noise,
+    pub(super) window: PowerWindow,
+    pub(super) noise: RelativeVariances,
     speeds: [(TimeNs, f64); SPEEDS],
     speeds_seen: usize,
     stage: usize,
@@ -78,8 +78,8 @@ impl Signals {
     pub(super) fn new(settings: &Settings) -> Self {
         Self {
             filter: AntiPulse::new(length(settings.filter_samples)),
-            window: Window::new(length(settings.window_samples)),
-            noise: Noise::new(settings),
+            window: PowerWindow::new(length(settings.window_samples)),
+            noise: RelativeVariances::new(settings),
             speeds: [(0, 0.0); SPEEDS],
             speeds_seen: 0,
             stage: 0,
@@ -91,7 +91,7 @@ impl Signals {
     }
 
     /// Takes the inputs of a tick.
-    pub(super) fn push(&mut self, inputs: &Inputs, settings: &Settings) -> Break {
+    pub(super) fn push(&mut self, inputs: &TickInputs, settings: &Settings) -> Break {
         let gap = self.last_ns.is_some_and(|last| {
             let pause_s = seconds(last, inputs.at_ns);
             pause_s < 0.0 || pause_s > settings.gap_s
@@ -154,7 +154,7 @@ impl Signals {
         self.least_w = None;
     }
 
-    fn push_speed(&mut self, inputs: &Inputs) {
+    fn push_speed(&mut self, inputs: &TickInputs) {
         match inputs.speed {
             Ok(speed) => {
                 self.speeds.rotate_left(1);
@@ -198,7 +198,7 @@ impl Signals {
         self.fed_ns.map_or(f64::INFINITY, |fed| seconds(fed, now_ns))
     }
 
-    pub(super) fn feed(&self, inputs: &Inputs, settings: &Settings) -> Feed {
+    pub(super) fn feed(&self, inputs: &TickInputs, settings: &Settings) -> Feed {
         match inputs.feed {
             Ok(feed) if feed > settings.feed_min_mm_min => Feed::On,
             Ok(_) if self.fed_ago_s(inputs.at_ns) > settings.feed_debounce_s => Feed::Off,

@@ -2,7 +2,7 @@
 
 use super::basis::StateBasis;
 use super::estimate::NoEstimate;
-use super::inputs::Inputs;
+use super::inputs::TickInputs;
 use super::no_load::NoLoad;
 use super::settings::Settings;
 use super::signals::{Feed, Signals};
@@ -10,7 +10,7 @@ use adapters::{Absence, ChannelId};
 
 /// Everything the detector looks at in one tick.
 pub(super) struct Tick<'a> {
-    pub(super) inputs: &'a Inputs,
+    pub(super) inputs: &'a TickInputs,
     pub(super) signals: &'a Signals,
     pub(super) settings: &'a Settings,
     pub(super) filtered_w: Option<f64>,

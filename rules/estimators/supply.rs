@@ -48,7 +48,7 @@ struct Idle {
 
 /// An idle power that was just measured.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Measured {
+pub(super) struct MeasuredIdlePower {
     pub(super) at_ns: TimeNs,
     pub(super) stage: usize,
     pub(super) speed_rpm: f64,
@@ -105,7 +105,7 @@ impl Supply {
     }
 
     /// Takes an idle power and compares it with the last one of this speed. Returns the change of the exponent.
-    pub(super) fn learn(&mut self, measured: Measured, settings: &Settings) -> f64 {
+    pub(super) fn learn(&mut self, measured: MeasuredIdlePower, settings: &Settings) -> f64 {
         if self.reference_v.is_none() || measured.power_w <= 0.0 {
             return 0.0;
         }
@@ -171,7 +171,10 @@ mod tests {
             let supply_log = supply.see(Ok(voltage_v));
             let power_w = 500.0 * (exponent * supply_log).exp() / supply.ratio(supply_log);
             let at_ns = 5 * i64::from(k) * SECOND_NS;
-            supply.learn(Measured { at_ns, stage: 1, speed_rpm: 800.0, power_w, sd_w: 5.0, supply_log }, &settings);
+            supply.learn(
+                MeasuredIdlePower { at_ns, stage: 1, speed_rpm: 800.0, power_w, sd_w: 5.0, supply_log },
+                &settings,
+            );
         }
         supply
     }

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 /// The last 2 N filtered powers, W.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Window {
+pub struct PowerWindow {
     length: usize,
     values: VecDeque<f64>,
     /// Smallest difference that the measurement can show, W.
@@ -36,7 +36,7 @@ impl Means {
     }
 }
 
-impl Window {
+impl PowerWindow {
     /// Two windows of `length` values each.
     #[must_use]
     pub fn new(length: usize) -> Self {
@@ -137,7 +137,7 @@ mod tests {
     fn a_slow_decay_that_one_window_accepts_is_refused_by_two() {
         let settings = settings(1.0, 0.15);
         let power = |i: usize| 500.0 + 3000.0 * (-0.1 * count(i) / 2.0).exp();
-        let mut window = Window::new(10);
+        let mut window = PowerWindow::new(10);
         let (mut one, mut two) = (None, None);
         for i in 0..200 {
             window.push(power(i));
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn nothing_is_stationary_before_both_windows_are_full_or_at_zero_power() {
         let settings = Settings::default();
-        let mut window = Window::new(5);
+        let mut window = PowerWindow::new(5);
         for i in 0..10 {
             assert_eq!(window.stationary(1.0, &settings), None, "{i}");
             window.push(100.0);

@@ -20,7 +20,7 @@ pub(crate) struct NormalEquations<const N: usize> {
 
 /// What the sums say.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Solved<const N: usize> {
+pub(crate) struct LinearSolution<const N: usize> {
     /// One coefficient per column; zero for one that was left out.
     pub(crate) coefficients: [f64; N],
     /// Sum of the squared residuals.
@@ -49,7 +49,7 @@ impl<const N: usize> NormalEquations<N> {
     }
 
     /// The least squares solution.
-    pub(crate) fn solve(&self) -> Solved<N> {
+    pub(crate) fn solve(&self) -> LinearSolution<N> {
         let length: Vec<f64> = (0..N).map(|i| self.xx[i][i].sqrt()).collect();
         let (lower, used, half) = self.factor(&length);
         let mut coefficients = [0.0; N];
@@ -60,7 +60,7 @@ impl<const N: usize> NormalEquations<N> {
         let explained: f64 = half.iter().map(|half| half * half).sum();
         let rows = f64::from(u32::try_from(self.rows).unwrap_or(u32::MAX)).max(1.0);
         let total = (self.yy - self.y * self.y / rows).max(0.0);
-        Solved { coefficients, rss: (self.yy - explained).max(0.0), total, rows: self.rows }
+        LinearSolution { coefficients, rss: (self.yy - explained).max(0.0), total, rows: self.rows }
     }
 
     /// Lower factor of the scaled `X'X`, which columns take part, and the forward solution of the scaled `X'y`.

@@ -4,15 +4,15 @@
 //! Jacobi).
 
 /// Rows down, columns across: `columns[j][i]`.
-pub(crate) type Columns = Vec<Vec<f64>>;
+pub(crate) type MatrixColumns = Vec<Vec<f64>>;
 
 /// `X D^-1 = Q R` with `D` the lengths of the columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Factored {
     /// Orthonormal columns, as many as X has.
-    pub(crate) q: Columns,
+    pub(crate) q: MatrixColumns,
     /// Upper triangle, column by column, full height.
-    pub(crate) r: Columns,
+    pub(crate) r: MatrixColumns,
     /// Length of each column of X.
     pub(crate) lengths: Vec<f64>,
 }
@@ -34,9 +34,9 @@ fn reflect(v: &[f64], x: &mut [f64]) {
 /// Factors columns of equal height, at least as high as there are columns, none of length zero.
 pub(crate) fn factor(columns: &[Vec<f64>]) -> Factored {
     let lengths: Vec<f64> = columns.iter().map(|column| length(column)).collect();
-    let mut a: Columns =
+    let mut a: MatrixColumns =
         columns.iter().zip(&lengths).map(|(column, length)| column.iter().map(|x| x / length).collect()).collect();
-    let mut reflectors: Columns = Vec::with_capacity(a.len());
+    let mut reflectors: MatrixColumns = Vec::with_capacity(a.len());
     for k in 0..a.len() {
         let v = reflector(&a[k], k);
         a.iter_mut().skip(k).for_each(|column| reflect(&v, column));
@@ -82,7 +82,7 @@ pub(crate) fn back_substitute(r: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
 }
 
 /// Inverse of an upper triangle, column by column.
-pub(crate) fn inverse(r: &[Vec<f64>]) -> Columns {
+pub(crate) fn inverse(r: &[Vec<f64>]) -> MatrixColumns {
     let unit = |k| (0..r.len()).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     (0..r.len()).map(|k| back_substitute(r, &unit(k))).collect()
 }
@@ -90,8 +90,8 @@ pub(crate) fn inverse(r: &[Vec<f64>]) -> Columns {
 /// Singular values of a small square matrix and the right singular vector of the least, by one-sided Jacobi.
 pub(crate) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let size = matrix.len();
-    let mut a: Columns = matrix.to_vec();
-    let mut v: Columns = (0..size).map(|k| (0..size).map(|i| if i == k { 1.0 } else { 0.0 }).collect()).collect();
+    let mut a: MatrixColumns = matrix.to_vec();
+    let mut v: MatrixColumns = (0..size).map(|k| (0..size).map(|i| if i == k { 1.0 } else { 0.0 }).collect()).collect();
     for _sweep in 0..60 {
         let mut turned = false;
         for p in 0..size {
@@ -109,7 +109,7 @@ pub(crate) fn singular_values(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Makes columns `p` and `q` orthogonal; false when they were.
-fn rotate(a: &mut Columns, v: &mut Columns, p: usize, q: usize) -> bool {
+fn rotate(a: &mut MatrixColumns, v: &mut MatrixColumns, p: usize, q: usize) -> bool {
     let (pp, qq, pq) = (product(&a[p], &a[p]), product(&a[q], &a[q]), product(&a[p], &a[q]));
     if pq.abs() <= 1e-15 * (pp * qq).sqrt() {
         return false;

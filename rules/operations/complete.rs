@@ -101,7 +101,7 @@ impl Completion {
 }
 
 /// A text column of the table: its name, and its cell of one operation.
-type Text = (&'static str, fn(&Operation) -> Option<&str>);
+type TextColumn = (&'static str, fn(&Operation) -> Option<&str>);
 
 /// The recording with the empty cells of the table's columns filled in; how many rows an operation was found for.
 #[must_use]
@@ -124,7 +124,7 @@ pub fn complete_recording(mut recording: Recording, recipe: &Recipe) -> (Recordi
             recording.set_column(quantity.key, Cells::Numbers(column));
         }
     }
-    let texts: [Text; 4] = [
+    let texts: [TextColumn; 4] = [
         ("tool", |operation| operation.tool.as_deref()),
         ("work_material", |operation| operation.work_material.as_deref()),
         ("operation", |operation| Some(&operation.name)),

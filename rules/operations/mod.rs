@@ -24,6 +24,6 @@ mod read;
 mod recipe;
 
 pub use complete::{Completion, complete_recording};
-pub use quantity::{QUANTITIES, Quantity};
+pub use quantity::{OperationQuantity, QUANTITIES};
 pub use read::{OPERATIONS_MAX, TEXT_MAX, parse};
 pub use recipe::{Lookup, Operation, Recipe, block_number};

@@ -2,7 +2,7 @@
 
 /// One number of an operation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity {
+pub struct OperationQuantity {
     /// Key in the file and name of the channel; ends in the unit.
     pub key: &'static str,
     /// Least and greatest value that is believed.
@@ -14,26 +14,26 @@ pub struct Quantity {
 }
 
 /// Every number of an operation.
-pub const QUANTITIES: [Quantity; 4] = [
-    Quantity {
+pub const QUANTITIES: [OperationQuantity; 4] = [
+    OperationQuantity {
         key: "depth_of_cut_mm",
         range: (0.001, 50.0),
         en: "depth of cut ap",
         aliases: &["ap", "depth", "depth_of_cut", "axial_depth", "cut_depth"],
     },
-    Quantity {
+    OperationQuantity {
         key: "width_of_cut_mm",
         range: (0.001, 1000.0),
         en: "width of cut ae, in milling",
         aliases: &["ae", "width", "width_of_cut", "radial_depth", "cut_width"],
     },
-    Quantity {
+    OperationQuantity {
         key: "diameter_mm",
         range: (0.05, 5000.0),
         en: "diameter of the work in turning, of the tool in milling",
         aliases: &["diameter", "d", "dia", "tool_diameter", "work_diameter"],
     },
-    Quantity {
+    OperationQuantity {
         key: "teeth",
         range: (1.0, 200.0),
         en: "teeth of the tool",
@@ -45,7 +45,7 @@ pub const QUANTITIES: [Quantity; 4] = [
 const ENDINGS: [(&str, f64); 6] =
     [("_um", 1e-3), ("_cm", 10.0), ("_m", 1000.0), ("_in", 25.4), ("_inch", 25.4), ("_mm", 1.0)];
 
-impl Quantity {
+impl OperationQuantity {
     /// Is the number one that is believed?
     #[must_use]
     pub fn holds(&self, number: f64) -> bool {

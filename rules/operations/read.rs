@@ -2,7 +2,7 @@
 
 use super::quantity::{QUANTITIES, meant};
 use super::recipe::{Operation, Recipe};
-use crate::script::Problem;
+use crate::script::ScriptProblem;
 use adapters::channel::nearest;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -36,8 +36,8 @@ const OTHER_NAMES: [(&str, &str); 8] = [
 ///
 /// # Errors
 /// Everything that is wrong, in the order of the file.
-pub fn parse(file: &str, text: &str) -> Result<Recipe, Vec<Problem>> {
-    let mut reader = Reader { file, text, problems: Vec::new(), version: version(text) };
+pub fn parse(file: &str, text: &str) -> Result<Recipe, Vec<ScriptProblem>> {
+    let mut reader = RecipeReader { file, text, problems: Vec::new(), version: version(text) };
     let operations = reader.operations();
     reader.overlaps(&operations);
     reader.problems.sort_by_key(|problem| (problem.line.is_none(), problem.line, problem.column));
@@ -57,17 +57,17 @@ fn version(text: &str) -> Arc<str> {
 
 type Value<'a> = Spanned<DeValue<'a>>;
 
-struct Reader<'t> {
+struct RecipeReader<'t> {
     file: &'t str,
     text: &'t str,
-    problems: Vec<Problem>,
+    problems: Vec<ScriptProblem>,
     version: Arc<str>,
 }
 
-impl Reader<'_> {
+impl RecipeReader<'_> {
     fn wrong(&mut self, offset: usize, what: impl Into<String>, next: impl Into<String>) {
         let (line, column) = self.place(offset);
-        self.problems.push(Problem {
+        self.problems.push(ScriptProblem {
             file: self.file.to_owned(),
             line: Some(line),
             column: Some(column),
@@ -194,7 +194,7 @@ impl Reader<'_> {
         self.wrong(offset, format!("an operation has no `{name}`"), next);
     }
 
-    fn number(&mut self, quantity: &super::Quantity, value: &Value<'_>) -> Option<f64> {
+    fn number(&mut self, quantity: &super::OperationQuantity, value: &Value<'_>) -> Option<f64> {
         let Some(number) = plain_number(value.get_ref()) else {
             let what = format!("`{}` is no number", quantity.key);
             self.wrong(value.span().start, what, format!("{}, without quotes: {} = 1.0", quantity.en, quantity.key));
@@ -301,7 +301,7 @@ impl Reader<'_> {
                     }
                     None => format!("{:?} and {:?} both claim the rest of {}", earlier.name, later.name, later.program),
                 };
-                self.problems.push(Problem {
+                self.problems.push(ScriptProblem {
                     file: self.file.to_owned(),
                     line: Some(later.line),
                     column: None,

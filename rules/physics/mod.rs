@@ -95,7 +95,7 @@ impl EffectDoc {
 
 /// One concrete shape of an effect: a form of the law with values for its shape parameters.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Form {
+pub struct EffectForm {
     /// Which of the effect's forms; empty for the only one.
     pub name: &'static str,
     /// Shape parameters with their values.
@@ -112,7 +112,7 @@ pub struct Form {
 /// Name of the form of [`Effect::still`].
 pub const STILL: &str = "still";
 
-impl Form {
+impl EffectForm {
     /// A form with these shape parameters.
     #[must_use]
     pub fn of(shape: &[(&'static str, f64)]) -> Self {
@@ -146,7 +146,7 @@ impl Form {
 
 /// Contribution per unit of each linear parameter: name of the parameter and one number per row, in the output's
 /// unit over the parameter's unit.
-pub type Columns = Vec<(&'static str, Vec<f64>)>;
+pub type ParameterColumns = Vec<(&'static str, Vec<f64>)>;
 
 /// One physical law.
 pub trait Effect: Sync + Send {
@@ -155,7 +155,7 @@ pub trait Effect: Sync + Send {
 
     /// The forms worth trying as a candidate in this scene, coarse in the shape parameters; empty when the scene lacks
     /// what the effect needs or never excites it.
-    fn forms(&self, scene: &Scene) -> Vec<Form>;
+    fn forms(&self, scene: &Scene) -> Vec<EffectForm>;
 
     /// Names of its forms, as a model file gives them; none for an effect of one form.
     fn form_names(&self) -> &'static [&'static str] {
@@ -163,10 +163,10 @@ pub trait Effect: Sync + Send {
     }
 
     /// The columns of this form, `None` when the scene lacks an input.
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns>;
+    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns>;
 
     /// The form a model file means when it gives no form: its shape parameters are replaced by the file's.
-    fn default_form(&self, scene: &Scene) -> Form {
+    fn default_form(&self, scene: &Scene) -> EffectForm {
         self.forms(scene).into_iter().next().unwrap_or_default()
     }
 
@@ -182,7 +182,7 @@ pub trait Effect: Sync + Send {
 
     /// The form in which a state that changes with time stands still, for an effect that is nothing without it: to be
     /// compared with, never proposed.
-    fn still(&self) -> Option<Form> {
+    fn still(&self) -> Option<EffectForm> {
         None
     }
 

@@ -12,14 +12,14 @@ const NOTES_MAX: usize = 8;
 /// At most so many calls of `forget` in one run.
 const FORGET_MAX: usize = 16;
 
-pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
+pub(super) type ScriptResult<T> = Result<T, Box<EvalAltResult>>;
 
 /// A number asked for, and why.
 pub(super) type Asked = (f64, ImmutableString);
 
 /// What one run of one script leaves behind.
 #[derive(Debug, Default)]
-pub(super) struct Collected {
+pub(super) struct RunOutput {
     pub(super) now_ns: TimeNs,
     pub(super) timers: Timers,
     pub(super) request: Option<Asked>,
@@ -34,7 +34,7 @@ pub(super) struct Collected {
     forgotten: usize,
 }
 
-impl Collected {
+impl RunOutput {
     /// Ready for the next run; keeps the buffers.
     pub(super) fn begin(&mut self, now_ns: TimeNs) {
         self.now_ns = now_ns;
@@ -49,7 +49,7 @@ impl Collected {
     }
 
     /// Looks through everything that was put away, which a loop could make long.
-    pub(super) fn forget(&mut self, beginning: &str) -> Outcome<()> {
+    pub(super) fn forget(&mut self, beginning: &str) -> ScriptResult<()> {
         self.forgotten += 1;
         if self.forgotten > FORGET_MAX {
             return Err(format!("forget was called more than {FORGET_MAX} times in one run").into());
@@ -75,7 +75,7 @@ impl Collected {
         self.refusals.iter().map(|(method, reason)| format!("{method} has no value ({reason})"))
     }
 
-    pub(super) fn alarm(&mut self, name: ImmutableString, text: AlarmText) -> Outcome<()> {
+    pub(super) fn alarm(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
         if let Some(known) = self.alarms.iter_mut().find(|(known, _)| *known == name) {
             known.1 = text;
         } else if self.alarms.len() < NAMES_MAX {
@@ -99,7 +99,7 @@ impl Collected {
         wanted: Option<bool>,
         hold_s: f64,
         text: AlarmText,
-    ) -> Outcome<()> {
+    ) -> ScriptResult<()> {
         let stands = self.timers.alarm_turning(&name, wanted, hold_s, self.now_ns)?;
         if stands { self.alarm(name, text) } else { Ok(()) }
     }

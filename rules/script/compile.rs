@@ -1,15 +1,15 @@
 //! From texts to a set of scripts that can run, or everything that is wrong with them.
 
 use super::compiled::{Script, ScriptSet};
-use super::declared::{self, Declared, Force, Found, Place as Where, SettingValues};
+use super::declared::{self, DeclarationPlace as Where, Declared, Force, FoundDeclaration, SettingValues};
 use super::engine::{self, OPERATIONS_MAX, Shared, TEXT_MAX};
-use super::examine::{Findings, Place, Walk};
+use super::examine::{Findings, ScriptPlace, Walk};
 use super::handlers::{Called, called};
-use super::order::{self, Channels};
-use super::problem::{self, Problem};
-use super::settings::{Choice, merge, read_choices};
+use super::order::{self, PublishedChannels};
+use super::problem::{self, ScriptProblem};
+use super::settings::{ChosenSetting, merge, read_choices};
 use super::trials::prove;
-use super::variables::{self, Body};
+use super::variables::{self, ScriptBody};
 use adapters::clock::SECOND_NS;
 use rhai::{AST, CallFnOptions, Dynamic, Engine, ImmutableString, Map, Position, Scope};
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub struct ScriptFile {
 ///
 /// # Errors
 /// Everything that is wrong in any of the files.
-pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
+pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
     compile_with(files, &SettingValues::default())
 }
 
@@ -39,7 +39,7 @@ pub fn compile(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
 ///
 /// # Errors
 /// Everything that is wrong in any of the files, and every value that no script declares or that lies outside its range.
-pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<ScriptProblem>> {
     let compiler = Compiler::new(files);
     let mut problems = Vec::new();
     let mut scripts: BTreeMap<&str, Arc<Script>> = BTreeMap::new();
@@ -51,7 +51,7 @@ pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
     }
     if files.len() > SCRIPTS_MAX {
         let what = format!("{} scripts; at most {SCRIPTS_MAX} can run together", files.len());
-        problems.push(Problem::new("scripts", Position::NONE, what, "join some of them"));
+        problems.push(ScriptProblem::new("scripts", Position::NONE, what, "join some of them"));
     }
     // Where a script is broken its settings are not known, and a value of the file may be right.
     if problems.is_empty() {
@@ -71,7 +71,11 @@ pub fn compile_with(files: &[ScriptFile], values: &SettingValues) -> Result<Scri
 ///
 /// # Errors
 /// Everything that is wrong in this file.
-pub fn compile_one(file: &ScriptFile, files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+pub fn compile_one(
+    file: &ScriptFile,
+    files: &[ScriptFile],
+    values: &SettingValues,
+) -> Result<ScriptSet, Vec<ScriptProblem>> {
     let script = Compiler::new(files).script(file, |found| Force::of(found, values))?;
     let scripts = vec![Arc::new(script)];
     let mut problems = Vec::new();
@@ -86,7 +90,7 @@ pub(super) fn variant(
     script: &Script,
     values: &SettingValues,
     place: &Where,
-) -> Result<Arc<Script>, Vec<Problem>> {
+) -> Result<Arc<Script>, Vec<ScriptProblem>> {
     let Some(file) = set.files.iter().find(|file| file.name == *script.file) else { return Err(Vec::new()) };
     Compiler::new(&set.files).script(file, |found| Force::fixed(found, values, place)).map(Arc::new)
 }
@@ -95,7 +99,7 @@ pub(super) fn variant(
 ///
 /// # Errors
 /// Every declaration that cannot be read.
-pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<Problem>> {
+pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<ScriptProblem>> {
     let engine = engine::engine(&Shared::default(), false);
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for file in files.iter().filter(|file| file.text.len() <= TEXT_MAX) {
@@ -111,7 +115,7 @@ pub fn declarations(files: &[ScriptFile]) -> Result<Vec<Declared>, Vec<Problem>>
 ///
 /// # Errors
 /// Everything that is wrong in any of the files, or else everything that their trials found.
-pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
+pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<ScriptProblem>> {
     compile(files).and_then(prove)
 }
 
@@ -120,7 +124,7 @@ pub fn prepare(files: &[ScriptFile]) -> Result<ScriptSet, Vec<Problem>> {
 ///
 /// # Errors
 /// As [`prepare`], and every value that cannot be used.
-pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<Problem>> {
+pub fn prepare_with(files: &[ScriptFile], values: &SettingValues) -> Result<ScriptSet, Vec<ScriptProblem>> {
     compile_with(files, values).and_then(prove)
 }
 
@@ -129,7 +133,7 @@ struct Compiler {
     running: Engine,
     callable: Vec<(String, usize)>,
     /// The channels that any of the files publishes.
-    channels: Channels,
+    channels: PublishedChannels,
 }
 
 impl Compiler {
@@ -137,14 +141,18 @@ impl Compiler {
         let shared = Shared::default();
         let checking = engine::engine(&shared, false);
         let callable = engine::callable(&checking);
-        Self { running: engine::engine(&shared, true), checking, callable, channels: Channels::of(files) }
+        Self { running: engine::engine(&shared, true), checking, callable, channels: PublishedChannels::of(files) }
     }
 
-    fn script(&self, file: &ScriptFile, force: impl Fn(&[Found]) -> Force) -> Result<Script, Vec<Problem>> {
+    fn script(
+        &self,
+        file: &ScriptFile,
+        force: impl Fn(&[FoundDeclaration]) -> Force,
+    ) -> Result<Script, Vec<ScriptProblem>> {
         let name = file.name.as_str();
         if file.text.len() > TEXT_MAX {
             let what = format!("{} bytes; a script has at most {TEXT_MAX}", file.text.len());
-            return Err(vec![Problem::new(name, Position::NONE, what, "split it into several files")]);
+            return Err(vec![ScriptProblem::new(name, Position::NONE, what, "split it into several files")]);
         }
         let parse =
             |engine: &Engine, text: &str| engine.compile(text).map_err(|error| vec![problem::of_parse(name, &error)]);
@@ -174,7 +182,7 @@ impl Compiler {
         let ast = parse(&self.running, &filled.text)?;
         let choices = self.choices(&filled, &ast)?;
         let names = variables::names(&found, &constants, &force.live);
-        let body = Body::compile(&self.running, &filled.text, &names)
+        let body = ScriptBody::compile(&self.running, &filled.text, &names)
             .map_err(|error| vec![problem::of_parse(name, &error)])?;
         let handlers = called.ready(&self.running, &names).map_err(|error| vec![problem::of_parse(name, &error)])?;
         Ok(Script {
@@ -212,21 +220,21 @@ impl Compiler {
         let mut walk = Walk::new(file, plain, &self.callable, &self.channels);
         let mut body = plain.clone();
         body.clear_functions();
-        walk.read(&body, Place::Body);
-        walk.read(&called.others(plain), Place::Function);
+        walk.read(&body, ScriptPlace::Body);
+        walk.read(&called.others(plain), ScriptPlace::Function);
         let constants: Vec<ImmutableString> = constants.map(ImmutableString::from).collect();
         for handler in &called.handlers {
             let seen: Vec<ImmutableString> = handler.parameters.iter().chain(&constants).cloned().collect();
-            walk.read(&handler.plain, Place::Handler(&seen));
+            walk.read(&handler.plain, ScriptPlace::Handler(&seen));
         }
         for trial in &called.trials {
-            walk.read(&trial.plain, Place::Trial(&constants));
+            walk.read(&trial.plain, ScriptPlace::Trial(&constants));
         }
         walk.finish()
     }
 
     /// Calls `fn settings()` once.
-    fn choices(&self, file: &ScriptFile, ast: &AST) -> Result<Vec<Choice>, Vec<Problem>> {
+    fn choices(&self, file: &ScriptFile, ast: &AST) -> Result<Vec<ChosenSetting>, Vec<ScriptProblem>> {
         if !ast.iter_functions().any(|it| it.name == "settings" && it.params.is_empty()) {
             return Ok(Vec::new());
         }
@@ -240,7 +248,7 @@ impl Compiler {
 }
 
 /// `const EVERY_S = 1.0;` as nanoseconds; 0 when there is none.
-fn every_ns(file: &ScriptFile, ast: &AST) -> Result<i64, Problem> {
+fn every_ns(file: &ScriptFile, ast: &AST) -> Result<i64, ScriptProblem> {
     let Some((.., value)) = ast.iter_literal_variables(true, true).find(|(name, ..)| *name == "EVERY_S") else {
         return Ok(0);
     };
@@ -250,7 +258,7 @@ fn every_ns(file: &ScriptFile, ast: &AST) -> Result<i64, Problem> {
     }
     let what = format!("EVERY_S = {value} is outside 0.001 to 3600");
     let next = "EVERY_S is the time between two runs of this script in seconds; without it, it runs at every tick";
-    Err(Problem::new(&file.name, position_of(&file.text, "EVERY_S"), what, next))
+    Err(ScriptProblem::new(&file.name, position_of(&file.text, "EVERY_S"), what, next))
 }
 
 /// The constants at the top of the script that are plain values: what a page shows as thresholds.

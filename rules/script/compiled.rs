@@ -1,13 +1,13 @@
 //! Compiled scripts, and sets of them that belong together.
 
 use super::compile::ScriptFile;
-use super::declared::{Declared, Live, SettingValues};
+use super::declared::{Declared, LiveValues, SettingValues};
 use super::events::Event;
 use super::fields::Field;
 use super::handlers::Handling;
-use super::settings::Choice;
+use super::settings::ChosenSetting;
 use super::trials::Trial;
-use super::variables::Body;
+use super::variables::ScriptBody;
 use super::vocabulary::Word;
 use crate::estimators::Settings;
 use rhai::{AST, Dynamic, ImmutableString};
@@ -20,7 +20,7 @@ pub(super) struct Script {
     /// The functions of the script.
     pub(super) ast: AST,
     /// What runs from top to bottom.
-    pub(super) body: Body,
+    pub(super) body: ScriptBody,
     pub(super) reads: Vec<&'static Word>,
     pub(super) fields: Vec<Field>,
     /// Channels of its own: name and unit.
@@ -34,12 +34,12 @@ pub(super) struct Script {
     /// The settings that it declares.
     pub(super) declared: Vec<Declared>,
     /// The values that depend on tool and operation.
-    pub(super) live: Live,
+    pub(super) live: LiveValues,
     /// 0: at every tick.
     pub(super) every_ns: i64,
     /// Nothing to run: the file only has settings.
     pub(super) passive: bool,
-    pub(super) choices: Vec<Choice>,
+    pub(super) choices: Vec<ChosenSetting>,
     pub(super) thresholds: Vec<(String, String)>,
 }
 

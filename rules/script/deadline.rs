@@ -28,11 +28,11 @@ pub(super) const LATE_MAX: u8 = 3;
 
 /// What a stopped run gives as its error.
 #[derive(Debug, Clone, Copy)]
-struct Late;
+struct DeadlinePassed;
 
 pub(super) fn watch(engine: &mut Engine, deadline: Arc<dyn Deadline>) {
     engine.on_progress(move |operations| {
-        (operations.is_multiple_of(ASK_EVERY) && deadline.is_over()).then(|| Dynamic::from(Late))
+        (operations.is_multiple_of(ASK_EVERY) && deadline.is_over()).then(|| Dynamic::from(DeadlinePassed))
     });
 }
 
@@ -40,7 +40,7 @@ pub(super) fn watch(engine: &mut Engine, deadline: Arc<dyn Deadline>) {
 pub(super) fn is_late(error: &EvalAltResult) -> bool {
     match error {
         EvalAltResult::ErrorInFunctionCall(_, _, inner, _) => is_late(inner),
-        EvalAltResult::ErrorTerminated(token, _) => token.is::<Late>(),
+        EvalAltResult::ErrorTerminated(token, _) => token.is::<DeadlinePassed>(),
         _ => false,
     }
 }

@@ -1,6 +1,6 @@
 //! What the scripts want after one tick.
 
-use super::problem::Problem;
+use super::problem::ScriptProblem;
 use adapters::clock::TimeNs;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub struct Decision {
     /// Lines for the history.
     pub notes: Vec<Note>,
     /// Scripts that failed at this tick.
-    pub problems: Vec<Problem>,
+    pub problems: Vec<ScriptProblem>,
 }
 
 /// A request to the gate. Nothing has been checked: the number may be anything, NaN included.
@@ -111,7 +111,7 @@ pub struct Published<'a> {
 
 /// How grave an alarm is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
+pub enum AlarmLevel {
     /// To know.
     Info,
     /// To look at.
@@ -120,7 +120,7 @@ pub enum Level {
     Critical,
 }
 
-impl Level {
+impl AlarmLevel {
     /// Every level.
     pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Critical];
 
@@ -149,7 +149,7 @@ pub struct AlarmChange {
     /// Which script.
     pub script: Arc<str>,
     /// How grave.
-    pub level: Level,
+    pub level: AlarmLevel,
     /// What the operator reads, English.
     pub en: Arc<str>,
     /// What the operator reads, Chinese; the same as `en` where the script gives one text.
@@ -169,7 +169,7 @@ pub struct Alarm {
     /// Which script.
     pub script: Arc<str>,
     /// How grave.
-    pub level: Level,
+    pub level: AlarmLevel,
     /// What the operator reads, English.
     pub en: Arc<str>,
     /// What the operator reads, Chinese.

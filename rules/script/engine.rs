@@ -1,6 +1,6 @@
 //! The interpreter: what a script may use, and the limits on everything it does.
 
-use super::collect::{Collected, Outcome};
+use super::collect::{RunOutput, ScriptResult};
 use super::functions;
 use super::outcomes;
 use rhai::packages::{
@@ -34,10 +34,10 @@ const FORBIDDEN: [&str; 6] = ["sleep", "get_fn_metadata_list", "parse_json", "Fn
 
 /// What the running script leaves behind; one script runs at a time.
 #[derive(Clone, Default)]
-pub(super) struct Shared(Arc<Mutex<Collected>>);
+pub(super) struct Shared(Arc<Mutex<RunOutput>>);
 
 impl Shared {
-    pub(super) fn lock(&self) -> MutexGuard<'_, Collected> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, RunOutput> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -54,7 +54,7 @@ pub(super) fn engine(shared: &Shared, optimize: bool) -> Engine {
     outcomes::register(&mut engine, shared);
     functions::register(&mut engine, shared);
     // Registered functions go before those of the language.
-    let asleep = || -> Outcome<()> { Err("a script may not sleep".into()) };
+    let asleep = || -> ScriptResult<()> { Err("a script may not sleep".into()) };
     engine.register_fn("sleep", move |_: i64| asleep());
     engine.register_fn("sleep", move |_: f64| asleep());
     engine

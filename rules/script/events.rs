@@ -3,7 +3,7 @@
 //! The first value is no change, and silence is none either: a tool that is reported again after a gap as what it was
 //! has not been changed.
 
-use super::problem::Problem;
+use super::problem::ScriptProblem;
 use crate::estimators::{Estimates, State};
 use adapters::channel::nearest;
 use adapters::{ChannelId, Sample};
@@ -102,7 +102,7 @@ impl Event {
 /// Follows the machine from tick to tick.
 #[derive(Debug, Default)]
 pub(super) struct Happenings {
-    channels: Option<Channels>,
+    channels: Option<EventChannels>,
     state: Option<State>,
     count: Option<f64>,
     program: Option<Arc<str>>,
@@ -112,7 +112,7 @@ pub(super) struct Happenings {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Channels {
+struct EventChannels {
     count: ChannelId,
     program: ChannelId,
     tool: ChannelId,
@@ -142,9 +142,9 @@ impl Happenings {
     }
 }
 
-fn channels() -> Option<Channels> {
+fn channels() -> Option<EventChannels> {
     let of = ChannelId::of;
-    Some(Channels { count: of("part_count")?, program: of("program")?, tool: of("tool")?, alarm: of("alarm")? })
+    Some(EventChannels { count: of("part_count")?, program: of("program")?, tool: of("tool")?, alarm: of("alarm")? })
 }
 
 /// Before and now, when `now` is another text than the one before.
@@ -157,7 +157,12 @@ fn changed(last: &mut Option<Arc<str>>, now: Option<&str>) -> Option<(Arc<str>, 
 
 /// The kind of event that a function of this name handles; a problem when its name or its parameters are wrong. Functions
 /// that do not begin with `on_` are the script's own.
-pub(super) fn handled(file: &str, name: &str, parameters: usize, at: Position) -> Result<Option<EventKind>, Problem> {
+pub(super) fn handled(
+    file: &str,
+    name: &str,
+    parameters: usize,
+    at: Position,
+) -> Result<Option<EventKind>, ScriptProblem> {
     if !name.starts_with("on_") {
         return Ok(None);
     }
@@ -167,12 +172,12 @@ pub(super) fn handled(file: &str, name: &str, parameters: usize, at: Position) -
         let all: Vec<&str> = HANDLERS.iter().map(name_of).collect();
         let next = near
             .map_or_else(|| format!("these are called: {}", all.join(", ")), |near| format!("did you mean `{near}`?"));
-        return Err(Problem::new(file, at, format!("nothing ever calls `{name}`"), next));
+        return Err(ScriptProblem::new(file, at, format!("nothing ever calls `{name}`"), next));
     };
     let wanted = handler.signature.matches(',').count() + 1;
     if parameters != 0 && parameters != wanted {
         let what = format!("`{name}` has {parameters} parameters");
-        return Err(Problem::new(file, at, what, format!("write fn {} {{ ... }}", handler.signature)));
+        return Err(ScriptProblem::new(file, at, what, format!("write fn {} {{ ... }}", handler.signature)));
     }
     Ok(Some(handler.kind))
 }

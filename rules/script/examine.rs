@@ -4,8 +4,8 @@
 
 use super::callable::{FUNCTIONS, Function};
 use super::fields::{self, Field, Record};
-use super::order::Channels;
-use super::problem::Problem;
+use super::order::PublishedChannels;
+use super::problem::ScriptProblem;
 use super::trials::TRIAL_FUNCTIONS;
 use super::vocabulary::{Word, find, words};
 use adapters::channel::nearest;
@@ -39,12 +39,12 @@ pub(super) struct Findings {
     /// Channels of other scripts that it looks at.
     pub(super) foreign: Vec<ImmutableString>,
     /// Everything that is wrong.
-    pub(super) problems: Vec<Problem>,
+    pub(super) problems: Vec<ScriptProblem>,
 }
 
 /// Where a piece of a script stands, which decides what it sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place<'a> {
+pub(super) enum ScriptPlace<'a> {
     /// The body: variables of the vocabulary, and its own.
     Body,
     /// A handler: variables of the vocabulary, its parameters, the constants of the script.
@@ -60,19 +60,24 @@ pub(super) struct Walk<'a> {
     file: &'a str,
     callable: &'a [(String, usize)],
     own: Vec<(String, usize)>,
-    channels: &'a Channels,
+    channels: &'a PublishedChannels,
     pub(super) found: Findings,
 }
 
 impl<'a> Walk<'a> {
     /// `whole` is the whole file.
-    pub(super) fn new(file: &'a str, whole: &AST, callable: &'a [(String, usize)], channels: &'a Channels) -> Self {
+    pub(super) fn new(
+        file: &'a str,
+        whole: &AST,
+        callable: &'a [(String, usize)],
+        channels: &'a PublishedChannels,
+    ) -> Self {
         let own = whole.iter_functions().map(|it| (it.name.to_owned(), it.params.len())).collect();
         Self { file, callable, own, channels, found: Findings::default() }
     }
 
     /// Looks through everything that stands in this place.
-    pub(super) fn read(&mut self, ast: &AST, place: Place<'_>) {
+    pub(super) fn read(&mut self, ast: &AST, place: ScriptPlace<'_>) {
         ast.walk(&mut |path| self.node(path, place));
     }
 
@@ -83,7 +88,7 @@ impl<'a> Walk<'a> {
         self.found
     }
 
-    fn node(&mut self, path: &[ASTNode<'_>], place: Place<'_>) -> bool {
+    fn node(&mut self, path: &[ASTNode<'_>], place: ScriptPlace<'_>) -> bool {
         match path.last() {
             Some(ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at))) => {
                 self.call(call, call.args.len(), *at, place);
@@ -106,15 +111,15 @@ impl<'a> Walk<'a> {
     }
 
     fn problem(&mut self, at: Position, what: String, next: impl Into<String>) {
-        self.found.problems.push(Problem::new(self.file, at, what, next));
+        self.found.problems.push(ScriptProblem::new(self.file, at, what, next));
     }
 
-    fn call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: Place<'_>) {
+    fn call(&mut self, call: &FnCallExpr, arguments: usize, at: Position, place: ScriptPlace<'_>) {
         let name = call.name.as_str();
         if name == "publish" && call.args.len() == 3 {
             self.publishes(&call.args[0], &call.args[2], at);
         }
-        if matches!(place, Place::Handler(_)) && OF_THE_BODY.contains(&name) {
+        if matches!(place, ScriptPlace::Handler(_)) && OF_THE_BODY.contains(&name) {
             let next = "raise_alarm and clear_alarm work here; or set memory.x here and ask for it in the body";
             self.problem(at, format!("`{name}` lasts for one run of the body and does nothing in a handler"), next);
         }
@@ -137,7 +142,7 @@ impl<'a> Walk<'a> {
             return self.problem(at, "a script may not sleep".to_owned(), next);
         }
         let trials = TRIAL_FUNCTIONS.iter().filter_map(Function::name);
-        let trials = trials.filter(|_| matches!(place, Place::Trial(_)));
+        let trials = trials.filter(|_| matches!(place, ScriptPlace::Trial(_)));
         let names = self.callable.iter().chain(&self.own).map(|it| it.0.as_str()).chain(trials);
         let names = names.filter(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
         let next = suggestion(nearest(name, names));
@@ -155,10 +160,10 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: Place<'_>) {
+    fn trial_call(&mut self, function: &Function, arguments: usize, at: Position, place: ScriptPlace<'_>) {
         let wanted = parameters(function.signature);
         let name = function.name().unwrap_or_default();
-        if !matches!(place, Place::Trial(_)) {
+        if !matches!(place, ScriptPlace::Trial(_)) {
             let next = "write it into a function whose name begins with trial_";
             self.problem(at, format!("only a trial can call `{name}`"), next);
         } else if arguments != wanted {
@@ -167,32 +172,32 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn global(&mut self, name: &str, at: Position, place: Place<'_>) {
+    fn global(&mut self, name: &str, at: Position, place: ScriptPlace<'_>) {
         let names = match place {
-            Place::Handler(names) | Place::Trial(names) => names,
-            Place::Body | Place::Function => &[],
+            ScriptPlace::Handler(names) | ScriptPlace::Trial(names) => names,
+            ScriptPlace::Body | ScriptPlace::Function => &[],
         };
         let known = names.iter().any(|known| *known == *name);
         if known || self.is_own(name) {
             return;
         }
         match (find(name), place) {
-            (Some(_), Place::Function) => self.problem(
+            (Some(_), ScriptPlace::Function) => self.problem(
                 at,
                 format!("`{name}` is not visible inside a function"),
                 format!("hand it over: fn f({name}) {{ ... }} and call f({name})"),
             ),
-            (Some(_), Place::Trial(_)) => self.problem(
+            (Some(_), ScriptPlace::Trial(_)) => self.problem(
                 at,
                 format!("a trial does not see `{name}`"),
                 format!("it sets what the script sees: given(#{{ {name}: ... }})"),
             ),
             (Some(word), _) => self.reads(word),
-            (None, Place::Function) => {
+            (None, ScriptPlace::Function) => {
                 let next = "a function sees its own arguments and variables only; hand over what it needs";
                 self.problem(at, format!("there is no variable `{name}`"), next);
             }
-            (None, Place::Trial(_)) => self.no_variable(name, at),
+            (None, ScriptPlace::Trial(_)) => self.no_variable(name, at),
             (None, _) => match self.channels.publisher(name) {
                 Some(publisher) if publisher != self.file => self.reads_of_others(name),
                 Some(_) => {
@@ -206,7 +211,7 @@ impl<'a> Walk<'a> {
 
     fn no_variable(&mut self, name: &str, at: Position) {
         let names = words().iter().map(|word| word.name).chain(self.channels.names());
-        let shipped = || Channels::of(&super::shipped()).publisher(name).map(str::to_owned);
+        let shipped = || PublishedChannels::of(&super::shipped()).publisher(name).map(str::to_owned);
         let next = match (nearest(name, names), shipped()) {
             (_, Some(file)) => format!("{file}, which comes with the gateway, publishes it: put it among the scripts"),
             (near, None) => suggestion(near),
@@ -221,7 +226,7 @@ impl<'a> Walk<'a> {
     }
 
     /// `sample.x`: the record is the left side of a dot, and the right side is a field of it.
-    fn record(&mut self, record: &'static Record, path: &[ASTNode<'_>], at: Position, place: Place<'_>) {
+    fn record(&mut self, record: &'static Record, path: &[ASTNode<'_>], at: Position, place: ScriptPlace<'_>) {
         let name = record.name;
         let dot = path.len().checked_sub(2).and_then(|parent| path.get(parent));
         let property = match dot {
@@ -232,7 +237,7 @@ impl<'a> Walk<'a> {
             let next = format!("write {}, with the channel that is meant", record.example);
             return self.problem(at, format!("`{name}` is used as a whole"), next);
         };
-        if matches!(place, Place::Function | Place::Trial(_)) {
+        if matches!(place, ScriptPlace::Function | ScriptPlace::Trial(_)) {
             let what = format!("`{name}` is not visible inside a function");
             return self.problem(at, what, format!("hand the value over: f({name}.{field})"));
         }

@@ -4,7 +4,7 @@
 //! A record holds only the fields that the script names, which are known before it runs: so a misspelt one is told when
 //! the file is loaded, and one that nobody reads costs nothing.
 
-use super::vocabulary::{Seen, Source, View, Word, find, words};
+use super::vocabulary::{View, Word, WordSource, WordValue, find, words};
 use adapters::channel::nearest;
 use adapters::clock::SECOND_NS;
 
@@ -77,7 +77,7 @@ pub(super) struct Field {
 
 impl Field {
     /// The value in this run.
-    pub(super) fn see<'a>(&self, view: &View<'a>) -> Seen<'a> {
+    pub(super) fn see<'a>(&self, view: &View<'a>) -> WordValue<'a> {
         match self.record.tells {
             Tells::Channel | Tells::Estimate => self.word.see(view),
             Tells::Age => age(self.word, view),
@@ -86,27 +86,29 @@ impl Field {
     }
 }
 
-fn age<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
-    let (Source::Channel(id) | Source::Tool(id)) = word.source else { return Seen::Absent };
+fn age<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
+    let (WordSource::Channel(id) | WordSource::Tool(id)) = word.source else { return WordValue::Absent };
     let slot = view.sample.slot(id);
-    if slot.value.is_ok() { Seen::Number(slot.age_ns as f64 / SECOND_NS as f64) } else { Seen::Absent }
+    if slot.value.is_ok() { WordValue::Number(slot.age_ns as f64 / SECOND_NS as f64) } else { WordValue::Absent }
 }
 
-fn absence<'a>(word: &Word, view: &View<'a>) -> Seen<'a> {
+fn absence<'a>(word: &Word, view: &View<'a>) -> WordValue<'a> {
     let reason = match word.source {
-        Source::Channel(id) | Source::Tool(id) => {
+        WordSource::Channel(id) | WordSource::Tool(id) => {
             view.sample.slot(id).value.as_ref().err().map(|absence| absence.word())
         }
-        Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|reason| reason.word()),
+        WordSource::Quantity(read) | WordSource::Deviation(read) => {
+            read(view.estimates).err().map(|reason| reason.word())
+        }
         _ => None,
     };
-    reason.map_or(Seen::Absent, Seen::Text)
+    reason.map_or(WordValue::Absent, WordValue::Text)
 }
 
 impl Record {
     fn holds(&self, word: &Word) -> bool {
-        let channel = matches!(word.source, Source::Channel(_) | Source::Tool(_));
-        let quantity = matches!(word.source, Source::Quantity(_) | Source::Deviation(_));
+        let channel = matches!(word.source, WordSource::Channel(_) | WordSource::Tool(_));
+        let quantity = matches!(word.source, WordSource::Quantity(_) | WordSource::Deviation(_));
         match self.tells {
             Tells::Channel | Tells::Age => channel,
             Tells::Estimate => !channel && !["memory", "now_s", "dt_s"].contains(&word.name),

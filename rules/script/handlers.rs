@@ -6,16 +6,16 @@
 
 use super::compile::ScriptFile;
 use super::events::{EventKind, handled};
-use super::problem::{self, Problem};
+use super::problem::{self, ScriptProblem};
 use super::trials::{self, Trial};
-use super::variables::Body;
+use super::variables::ScriptBody;
 use rhai::{AST, Engine, ImmutableString, ParseError, Position, ScriptFuncDef};
 
 /// A handler, ready to run.
 pub(super) struct Handling {
     pub(super) kind: EventKind,
     pub(super) parameters: Vec<ImmutableString>,
-    pub(super) body: Body,
+    pub(super) body: ScriptBody,
 }
 
 /// A handler as it stands in a file.
@@ -36,7 +36,7 @@ pub(super) struct Called {
 }
 
 /// Every handler and every trial of a file; `whole` is the file, compiled without optimization.
-pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems: &mut Vec<Problem>) -> Called {
+pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems: &mut Vec<ScriptProblem>) -> Called {
     let mut called = Called::default();
     for function in whole.iter_fn_def() {
         if let Err(problem) = called.add(file, function, checking) {
@@ -48,7 +48,7 @@ pub(super) fn called(file: &ScriptFile, whole: &AST, checking: &Engine, problems
 }
 
 impl Called {
-    fn add(&mut self, file: &ScriptFile, function: &ScriptFuncDef, checking: &Engine) -> Result<(), Problem> {
+    fn add(&mut self, file: &ScriptFile, function: &ScriptFuncDef, checking: &Engine) -> Result<(), ScriptProblem> {
         let (begin, end) = (function.body.start_position(), function.body.end_position());
         let (name, parameters) = (function.name.clone(), function.params.to_vec());
         let trial = name.starts_with(trials::PREFIX);
@@ -58,7 +58,7 @@ impl Called {
         }
         if trial && !parameters.is_empty() {
             let next = format!("write fn {name}() {{ ... }}");
-            return Err(Problem::new(&file.name, begin, format!("the trial `{name}` has parameters"), next));
+            return Err(ScriptProblem::new(&file.name, begin, format!("the trial `{name}` has parameters"), next));
         }
         let text = only(&file.text, begin, end);
         let plain = checking.compile(&text).map_err(|error| problem::of_parse(&file.name, &error))?;
@@ -75,7 +75,7 @@ impl Called {
         let one = |handler: &Written| {
             let parameters = handler.parameters.iter().map(ToString::to_string);
             let names: Vec<String> = names.iter().cloned().chain(parameters).collect();
-            let body = Body::compile(running, &handler.text, &names)?;
+            let body = ScriptBody::compile(running, &handler.text, &names)?;
             Ok(Handling { kind: handler.kind, parameters: handler.parameters.clone(), body })
         };
         self.handlers.iter().map(one).collect()

@@ -7,7 +7,7 @@ use super::decision::{Alarm, AlarmChange, Decision, OverrideRequest, Published};
 use super::declared::{Declared, SettingValues};
 use super::engine::{Shared, engine};
 use super::events::Happenings;
-use super::problem::Problem;
+use super::problem::ScriptProblem;
 use super::settings::merge;
 use super::slot::{Moment, Outputs, Slot};
 use super::status::{ScriptStatus, Status};
@@ -33,7 +33,7 @@ pub struct Host {
     alarms: Vec<Alarm>,
     decision: Decision,
     pending: Vec<AlarmChange>,
-    refused: Vec<Problem>,
+    refused: Vec<ScriptProblem>,
     settings: Settings,
     files: Arc<[ScriptFile]>,
     values: Arc<SettingValues>,
@@ -89,7 +89,7 @@ impl Host {
     ///
     /// # Errors
     /// Everything that is wrong; [`Host::status`] tells it too until a set is accepted.
-    pub fn load(&mut self, files: &[ScriptFile]) -> Result<(), Vec<Problem>> {
+    pub fn load(&mut self, files: &[ScriptFile]) -> Result<(), Vec<ScriptProblem>> {
         match compile(files) {
             Ok(set) => {
                 self.install(set);
@@ -120,7 +120,7 @@ impl Host {
     }
 
     /// Remembers why a set was refused, so that [`Host::status`] says so.
-    pub fn refuse(&mut self, problems: Vec<Problem>) {
+    pub fn refuse(&mut self, problems: Vec<ScriptProblem>) {
         self.refused = problems;
     }
 

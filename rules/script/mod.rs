@@ -68,17 +68,17 @@ pub use compile::{ScriptFile, compile, compile_one, compile_with, declarations, 
 pub use compiled::ScriptSet;
 pub use deadline::Deadline;
 pub use decision::{
-    Alarm, AlarmChange, Axis, Decision, Level, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, Stop,
-    StopRequest,
+    Alarm, AlarmChange, AlarmLevel, Axis, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED,
+    Stop, StopRequest,
 };
-pub use declared::{Declared, Per, Place, SETTINGS_TEXT_MAX, SettingValue, SettingValues};
+pub use declared::{DeclarationPlace, Declared, Per, SETTINGS_TEXT_MAX, SettingValue, SettingValues};
 pub use engine::{OPERATIONS_MAX, TEXT_MAX};
 pub use events::{HANDLERS, Handler};
 pub use fields::{RECORDS, Record};
 pub use host::Host;
-pub use problem::Problem;
-pub use recipes::{RECIPES, Recipe, recipe};
+pub use problem::ScriptProblem;
+pub use recipes::{RECIPES, ScriptRecipe, recipe};
 pub use shipped::shipped;
-pub use status::{Condition, ScriptStatus, Status};
+pub use status::{ScriptCondition, ScriptStatus, Status};
 pub use trials::{TRIAL_FUNCTIONS, TrialResult, prove, trials};
 pub use vocabulary::{Word, WordKind, vocabulary, words};

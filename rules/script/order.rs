@@ -7,16 +7,16 @@
 use super::compile::ScriptFile;
 use super::compiled::Script;
 use super::declared::scan::{calls, quoted};
-use super::problem::Problem;
+use super::problem::ScriptProblem;
 use rhai::Position;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// The channels that files publish, known before any of them is compiled.
 #[derive(Debug, Default)]
-pub(super) struct Channels(BTreeMap<String, String>);
+pub(super) struct PublishedChannels(BTreeMap<String, String>);
 
-impl Channels {
+impl PublishedChannels {
     /// Those of these files.
     pub(super) fn of(files: &[ScriptFile]) -> Self {
         let mut channels = BTreeMap::new();
@@ -42,20 +42,20 @@ impl Channels {
 }
 
 /// A channel has one publisher.
-pub(super) fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<Problem>) {
+pub(super) fn one_publisher(scripts: &[Arc<Script>], problems: &mut Vec<ScriptProblem>) {
     let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
     for script in scripts {
         for (name, _) in &script.channels {
             if let Some(other) = taken.insert(name, &script.file) {
                 let what = format!("the channel {name} is also published in {other}");
-                problems.push(Problem::new(&script.file, Position::NONE, what, "keep one of the two"));
+                problems.push(ScriptProblem::new(&script.file, Position::NONE, what, "keep one of the two"));
             }
         }
     }
 }
 
 /// Whoever publishes stands before whoever reads it; otherwise the scripts stay in the order of their names, in which they come.
-pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<Problem>) -> Vec<Arc<Script>> {
+pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<ScriptProblem>) -> Vec<Arc<Script>> {
     let publisher =
         |channel: &str| scripts.iter().position(|script| script.channels.iter().any(|(name, _)| **name == *channel));
     let needs: Vec<BTreeSet<usize>> =
@@ -73,7 +73,7 @@ pub(super) fn ordered(scripts: Vec<Arc<Script>>, problems: &mut Vec<Problem>) ->
 }
 
 /// One circle among the scripts that have no place yet, in words.
-fn circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -> Problem {
+fn circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -> ScriptProblem {
     let open = |at: &usize| !order.contains(at);
     let mut path: Vec<usize> = (0..scripts.len()).filter(open).take(1).collect();
     while let Some(next) = path.last().and_then(|at| needs[*at].iter().copied().find(open)) {
@@ -95,7 +95,7 @@ fn circle(scripts: &[Arc<Script>], needs: &[BTreeSet<usize>], order: &[usize]) -
     let told: Vec<String> = path.iter().enumerate().map(step).collect();
     let first = path.first().map_or("scripts", |at| name(*at));
     let what = format!("the scripts read each other in a circle: {}", told.join(", "));
-    Problem::new(
+    ScriptProblem::new(
         first,
         Position::NONE,
         what,

@@ -1,8 +1,8 @@
 //! The functions through which a script leaves its effects: requests, alarms, notes, channels of its own, and what it
 //! remembers.
 
-use super::collect::{Collected, Outcome};
-use super::decision::{Axis, Level, Stop};
+use super::collect::{RunOutput, ScriptResult};
+use super::decision::{AlarmLevel, Axis, Stop};
 use super::engine::Shared;
 use super::problem::spoken;
 use super::timers::AlarmText;
@@ -13,7 +13,7 @@ type Text = ImmutableString;
 /// Makes every one of them callable; their effects go to `shared`.
 pub(super) fn register(engine: &mut Engine, shared: &Shared) {
     engine.register_fn("has", |value: Dynamic| !value.is_unit());
-    engine.register_fn("clamp", |value: Dynamic, least: Dynamic, greatest: Dynamic| -> Outcome<f64> {
+    engine.register_fn("clamp", |value: Dynamic, least: Dynamic, greatest: Dynamic| -> ScriptResult<f64> {
         let (least, greatest) = (number("clamp", &least)?, number("clamp", &greatest)?);
         Ok(number("clamp", &value)?.max(least).min(greatest))
     });
@@ -49,7 +49,7 @@ fn memory(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
     engine.register_fn("changed", move |name: Text, value: Dynamic| to.lock().timers.changed(&name, value));
     let to = shared.clone();
-    engine.register_fn("remember", move |name: Text, value: Dynamic| -> Outcome<()> {
+    engine.register_fn("remember", move |name: Text, value: Dynamic| -> ScriptResult<()> {
         let value = optional("remember", &value)?;
         to.lock().timers.remember(&name, value)
     });
@@ -63,7 +63,7 @@ fn memory(engine: &mut Engine, shared: &Shared) {
 
 fn requests(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
-    engine.register_fn("request_feed_override", move |pct: Dynamic, reason: Text| -> Outcome<()> {
+    engine.register_fn("request_feed_override", move |pct: Dynamic, reason: Text| -> ScriptResult<()> {
         let pct = number("request_feed_override", &pct)?;
         to.lock().request = Some((pct, reason));
         Ok(())
@@ -73,7 +73,7 @@ fn requests(engine: &mut Engine, shared: &Shared) {
         engine.register_fn(function, move |reason: Text| to.lock().stop(stop, reason));
     }
     let to = shared.clone();
-    engine.register_fn("propose_offset_um", move |axis: Text, offset: Dynamic, reason: Text| -> Outcome<()> {
+    engine.register_fn("propose_offset_um", move |axis: Text, offset: Dynamic, reason: Text| -> ScriptResult<()> {
         let offset_um = number("propose_offset_um", &offset)?;
         let axis =
             Axis::of(&axis).ok_or_else(|| format!("there is no axis \"{axis}\"; write \"x\", \"y\" or \"z\""))?;
@@ -81,7 +81,7 @@ fn requests(engine: &mut Engine, shared: &Shared) {
         Ok(())
     });
     let to = shared.clone();
-    engine.register_fn("publish", move |name: Text, value: Dynamic, _unit: Text| -> Outcome<()> {
+    engine.register_fn("publish", move |name: Text, value: Dynamic, _unit: Text| -> ScriptResult<()> {
         let value = optional("publish", &value)?.filter(|value| value.is_finite());
         to.lock().publish(name, value);
         Ok(())
@@ -92,13 +92,13 @@ fn alarms(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
     engine.register_fn("alarm", move |name: Text, text: Text| to.lock().alarm(name, AlarmText::of(text)));
     let to = shared.clone();
-    engine.register_fn("alarm", move |name: Text, level: Text, en: Text, zh: Text| -> Outcome<()> {
+    engine.register_fn("alarm", move |name: Text, level: Text, en: Text, zh: Text| -> ScriptResult<()> {
         to.lock().alarm(name, leveled(&level, en, zh)?)
     });
     let to = shared.clone();
     engine.register_fn("raise_alarm", move |name: Text, text: Text| to.lock().timers.raise(name, AlarmText::of(text)));
     let to = shared.clone();
-    engine.register_fn("raise_alarm", move |name: Text, level: Text, en: Text, zh: Text| -> Outcome<()> {
+    engine.register_fn("raise_alarm", move |name: Text, level: Text, en: Text, zh: Text| -> ScriptResult<()> {
         to.lock().timers.raise(name, leveled(&level, en, zh)?)
     });
     let to = shared.clone();
@@ -107,14 +107,17 @@ fn alarms(engine: &mut Engine, shared: &Shared) {
 
 fn alarm_when(engine: &mut Engine, shared: &Shared) {
     let to = shared.clone();
-    engine.register_fn("alarm_when", move |name: Text, condition: bool, hold_s: Dynamic, text: Text| -> Outcome<()> {
-        let hold_s = number("alarm_when", &hold_s)?;
-        to.lock().alarm_turning(name, Some(condition), hold_s, AlarmText::of(text))
-    });
+    engine.register_fn(
+        "alarm_when",
+        move |name: Text, condition: bool, hold_s: Dynamic, text: Text| -> ScriptResult<()> {
+            let hold_s = number("alarm_when", &hold_s)?;
+            to.lock().alarm_turning(name, Some(condition), hold_s, AlarmText::of(text))
+        },
+    );
     let to = shared.clone();
     engine.register_fn(
         "alarm_when",
-        move |name: Text, condition: bool, hold_s: Dynamic, level: Text, en: Text, zh: Text| -> Outcome<()> {
+        move |name: Text, condition: bool, hold_s: Dynamic, level: Text, en: Text, zh: Text| -> ScriptResult<()> {
             let hold_s = number("alarm_when", &hold_s)?;
             to.lock().alarm_turning(name, Some(condition), hold_s, leveled(&level, en, zh)?)
         },
@@ -122,7 +125,7 @@ fn alarm_when(engine: &mut Engine, shared: &Shared) {
 }
 
 /// A threshold with its hysteresis: function, sign (1 above, -1 below), and the three numbers.
-struct Threshold {
+struct HysteresisThreshold {
     function: &'static str,
     sign: f64,
     on: f64,
@@ -130,8 +133,8 @@ struct Threshold {
     hold_s: f64,
 }
 
-impl Threshold {
-    fn read(function: &'static str, sign: f64, [on, off, hold_s]: [&Dynamic; 3]) -> Outcome<Self> {
+impl HysteresisThreshold {
+    fn read(function: &'static str, sign: f64, [on, off, hold_s]: [&Dynamic; 3]) -> ScriptResult<Self> {
         let (on, off, hold_s) = (number(function, on)?, number(function, off)?, number(function, hold_s)?);
         if sign * off > sign * on {
             let what = format!("{function}: `off` = {off} lies beyond `on` = {on}; the alarm would never be quiet");
@@ -140,7 +143,7 @@ impl Threshold {
         Ok(Self { function, sign, on, off, hold_s })
     }
 
-    fn judge(&self, collected: &mut Collected, name: Text, value: &Dynamic, text: AlarmText) -> Outcome<()> {
+    fn judge(&self, collected: &mut RunOutput, name: Text, value: &Dynamic, text: AlarmText) -> ScriptResult<()> {
         let beyond = if collected.timers.alarm_active(&name) { self.off } else { self.on };
         let beside = |value: f64| self.sign * value > self.sign * beyond;
         let wanted = if value.is_unit() { None } else { Some(beside(number(self.function, value)?)) };
@@ -153,8 +156,8 @@ fn threshold(engine: &mut Engine, shared: &Shared, function: &'static str, sign:
     let to = shared.clone();
     engine.register_fn(
         function,
-        move |name: Text, value: Dynamic, on: Dynamic, off: Dynamic, hold_s: Dynamic, text: Text| -> Outcome<()> {
-            let threshold = Threshold::read(function, sign, [&on, &off, &hold_s])?;
+        move |name: Text, value: Dynamic, on: Dynamic, off: Dynamic, hold_s: Dynamic, text: Text| -> ScriptResult<()> {
+            let threshold = HysteresisThreshold::read(function, sign, [&on, &off, &hold_s])?;
             threshold.judge(&mut to.lock(), name, &value, AlarmText::of(text))
         },
     );
@@ -169,22 +172,22 @@ fn threshold(engine: &mut Engine, shared: &Shared, function: &'static str, sign:
               level: Text,
               en: Text,
               zh: Text|
-              -> Outcome<()> {
-            let threshold = Threshold::read(function, sign, [&on, &off, &hold_s])?;
+              -> ScriptResult<()> {
+            let threshold = HysteresisThreshold::read(function, sign, [&on, &off, &hold_s])?;
             threshold.judge(&mut to.lock(), name, &value, leveled(&level, en, zh)?)
         },
     );
 }
 
-fn leveled(level: &str, en: Text, zh: Text) -> Outcome<AlarmText> {
-    let Some(level) = Level::of(level) else {
+fn leveled(level: &str, en: Text, zh: Text) -> ScriptResult<AlarmText> {
+    let Some(level) = AlarmLevel::of(level) else {
         return Err(format!("\"{level}\" is no level; write \"info\", \"warning\" or \"critical\"").into());
     };
     Ok(AlarmText { level, en, zh })
 }
 
 /// A number; the absence of one is told apart from a wrong type.
-fn number(function: &str, value: &Dynamic) -> Outcome<f64> {
+fn number(function: &str, value: &Dynamic) -> ScriptResult<f64> {
     match optional(function, value)? {
         Some(number) => Ok(number),
         None => Err(Box::new(EvalAltResult::ErrorRuntime(Dynamic::UNIT, Position::NONE))),
@@ -192,7 +195,7 @@ fn number(function: &str, value: &Dynamic) -> Outcome<f64> {
 }
 
 /// A number, or no value.
-fn optional(function: &str, value: &Dynamic) -> Outcome<Option<f64>> {
+fn optional(function: &str, value: &Dynamic) -> ScriptResult<Option<f64>> {
     if value.is_unit() {
         return Ok(None);
     }

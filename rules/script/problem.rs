@@ -5,7 +5,7 @@ use std::fmt;
 
 /// One thing that is wrong with a script.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct ScriptProblem {
     /// The file, as it was named to the host.
     pub file: String,
     /// Line from 1, where it lies in a line.
@@ -18,13 +18,13 @@ pub struct Problem {
     pub next: String,
 }
 
-impl Problem {
+impl ScriptProblem {
     pub(super) fn new(file: &str, at: Position, what: impl Into<String>, next: impl Into<String>) -> Self {
         Self { file: file.to_owned(), line: at.line(), column: at.position(), what: what.into(), next: next.into() }
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for ScriptProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.file)?;
         for number in [self.line, self.column].into_iter().flatten() {
@@ -36,7 +36,7 @@ impl fmt::Display for Problem {
 }
 
 /// A text that is no script.
-pub(super) fn of_parse(file: &str, error: &ParseError) -> Problem {
+pub(super) fn of_parse(file: &str, error: &ParseError) -> ScriptProblem {
     let (what, next) = match error.err_type() {
         ParseErrorType::Reserved(word) | ParseErrorType::BadInput(rhai::LexError::ImproperSymbol(word, _)) => {
             reserved(word)
@@ -58,7 +58,7 @@ pub(super) fn of_parse(file: &str, error: &ParseError) -> Problem {
         }
         other => (other.to_string(), String::new()),
     };
-    Problem::new(file, error.position(), what, next)
+    ScriptProblem::new(file, error.position(), what, next)
 }
 
 fn reserved(word: &str) -> (String, String) {
@@ -72,14 +72,14 @@ fn reserved(word: &str) -> (String, String) {
 }
 
 /// The same in a text that was compiled behind `lines` lines of declarations.
-pub(super) fn of_run_behind(file: &str, error: &EvalAltResult, lines: usize) -> Problem {
+pub(super) fn of_run_behind(file: &str, error: &EvalAltResult, lines: usize) -> ScriptProblem {
     let mut problem = of_run(file, error, super::OPERATIONS_MAX);
     problem.line = problem.line.map(|line| line.saturating_sub(lines).max(1));
     problem
 }
 
 /// An error while running. `file` is where it happened.
-pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> Problem {
+pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> ScriptProblem {
     let (inner, at) = innermost(error);
     let (what, next) = match inner {
         EvalAltResult::ErrorTooManyOperations(_) => (
@@ -106,7 +106,7 @@ pub(super) fn of_run(file: &str, error: &EvalAltResult, operations: u64) -> Prob
         EvalAltResult::ErrorRuntime(value, _) => (value.to_string(), String::new()),
         other => (without_position(other), String::new()),
     };
-    Problem::new(file, at, what, next)
+    ScriptProblem::new(file, at, what, next)
 }
 
 fn without_position(error: &EvalAltResult) -> String {

@@ -5,7 +5,7 @@ use super::compile::ScriptFile;
 
 /// A recipe: a script whose head says in both languages what it does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Recipe {
+pub struct ScriptRecipe {
     /// What `cnc-gateway help` calls it; the name of the script without its ending.
     pub name: &'static str,
     /// The script.
@@ -15,8 +15,8 @@ pub struct Recipe {
 macro_rules! recipes {
     ($($name:literal),* $(,)?) => {
         /// Every recipe.
-        pub static RECIPES: &[Recipe] =
-            &[$(Recipe { name: $name, text: include_str!(concat!("../recipes/", $name, ".rhai")) }),*];
+        pub static RECIPES: &[ScriptRecipe] =
+            &[$(ScriptRecipe { name: $name, text: include_str!(concat!("../recipes/", $name, ".rhai")) }),*];
     };
 }
 
@@ -36,7 +36,7 @@ recipes! {
     "supply_guard",
 }
 
-impl Recipe {
+impl ScriptRecipe {
     /// The first line of the head: English and Chinese.
     #[must_use]
     pub fn title(&self) -> &'static str {
@@ -64,6 +64,6 @@ impl Recipe {
 
 /// The recipe of this name.
 #[must_use]
-pub fn recipe(name: &str) -> Option<&'static Recipe> {
+pub fn recipe(name: &str) -> Option<&'static ScriptRecipe> {
     RECIPES.iter().find(|recipe| recipe.name == name.trim_end_matches(".rhai"))
 }

@@ -1,15 +1,15 @@
 //! Runs of a compiled script, with what the interpreter may keep between two of them.
 
-use super::collect::Outcome;
+use super::collect::ScriptResult;
 use rhai::{AST, Caches, Engine, GlobalRuntimeState, Scope, Stmt};
 
 /// What the interpreter keeps for one script: its functions, and which function each call means. Looking every call up
 /// anew costs more than half of a run.
-pub(super) struct Running {
+pub(super) struct RunningScript {
     kept: Option<(GlobalRuntimeState, Caches)>,
 }
 
-impl Running {
+impl RunningScript {
     pub(super) fn new() -> Self {
         Self { kept: None }
     }
@@ -21,7 +21,7 @@ impl Running {
         scope: &mut Scope<'_>,
         ast: &AST,
         functions: &AST,
-    ) -> Outcome<()> {
+    ) -> ScriptResult<()> {
         self.begin(engine, functions);
         self.run(engine, scope, functions, ast.statements())
     }
@@ -39,7 +39,7 @@ impl Running {
         scope: &mut Scope<'_>,
         functions: &AST,
         statements: &[Stmt],
-    ) -> Outcome<()> {
+    ) -> ScriptResult<()> {
         let (mut global, mut caches) = self.kept.take().unwrap_or_else(|| begin(engine, functions));
         #[expect(
             deprecated,

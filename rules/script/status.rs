@@ -1,22 +1,22 @@
 //! Who is in charge, who is not, and why: what a page, the log and `/api/v1/status` show.
 
-use super::problem::Problem;
+use super::problem::ScriptProblem;
 use std::sync::Arc;
 
 /// How a script is doing.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Condition {
+pub enum ScriptCondition {
     /// It runs.
     Running,
     /// It worked on a value that is not there; it asks for nothing and tries again when due.
-    Waiting(Problem),
+    Waiting(ScriptProblem),
     /// The newest version failed while running; the version before it is in charge.
-    Reverted(Problem),
+    Reverted(ScriptProblem),
     /// It failed while running and has no good version; it asks for nothing until the file is changed.
-    Suspended(Option<Problem>),
+    Suspended(Option<ScriptProblem>),
 }
 
-impl Condition {
+impl ScriptCondition {
     /// The word in JSON and on the page.
     #[must_use]
     pub fn word(&self) -> &'static str {
@@ -30,7 +30,7 @@ impl Condition {
 
     /// Why it does not run as written.
     #[must_use]
-    pub fn problem(&self) -> Option<&Problem> {
+    pub fn problem(&self) -> Option<&ScriptProblem> {
         match self {
             Self::Running => None,
             Self::Waiting(problem) | Self::Reverted(problem) => Some(problem),
@@ -55,7 +55,7 @@ pub struct ScriptStatus {
     /// FNV-1a hash of the text in charge, as decisions are recorded with; shown as 16 hexadecimal digits.
     pub version: u64,
     /// How it is doing.
-    pub condition: Condition,
+    pub condition: ScriptCondition,
     /// Time between two runs; `None`: at every tick.
     pub every_s: Option<f64>,
     /// Runs since it came into charge.
@@ -72,7 +72,7 @@ pub struct Status {
     /// In the order of their names.
     pub scripts: Vec<ScriptStatus>,
     /// Problems of the newest files when they were refused; the set before them is in charge then.
-    pub refused: Vec<Problem>,
+    pub refused: Vec<ScriptProblem>,
 }
 
 impl Status {

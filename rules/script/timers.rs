@@ -1,8 +1,8 @@
 //! What the built-in functions of one script remember from run to run: how long something has lasted, which alarms stand,
 //! what was seen last, what was put away. Everything by name, every table bounded.
 
-use super::collect::Outcome;
-use super::decision::Level;
+use super::collect::ScriptResult;
+use super::decision::AlarmLevel;
 use adapters::clock::{SECOND_NS, TimeNs};
 use rhai::{Dynamic, ImmutableString};
 use serde_json::{Map, Value, json};
@@ -18,7 +18,7 @@ const KEPT_NAME_MAX: usize = 96;
 /// What an operator reads of an alarm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct AlarmText {
-    pub(super) level: Level,
+    pub(super) level: AlarmLevel,
     pub(super) en: ImmutableString,
     pub(super) zh: ImmutableString,
 }
@@ -26,7 +26,7 @@ pub(super) struct AlarmText {
 impl AlarmText {
     /// One text for both languages.
     pub(super) fn of(text: ImmutableString) -> Self {
-        Self { level: Level::Warning, zh: text.clone(), en: text }
+        Self { level: AlarmLevel::Warning, zh: text.clone(), en: text }
     }
 }
 
@@ -60,7 +60,7 @@ impl Timers {
         wanted: Option<bool>,
         hold_s: f64,
         now_ns: TimeNs,
-    ) -> Outcome<bool> {
+    ) -> ScriptResult<bool> {
         let timer = entry(&mut self.alarms, name, "alarms", NAMES_MAX)?;
         match wanted {
             Some(wanted) if wanted != timer.active => {
@@ -80,7 +80,7 @@ impl Timers {
     }
 
     /// The alarm stands until it is cleared.
-    pub(super) fn raise(&mut self, name: ImmutableString, text: AlarmText) -> Outcome<()> {
+    pub(super) fn raise(&mut self, name: ImmutableString, text: AlarmText) -> ScriptResult<()> {
         if !self.latched.contains_key(name.as_str()) {
             if self.latched.len() >= NAMES_MAX {
                 return Err(too_many("alarms", NAMES_MAX));
@@ -104,7 +104,7 @@ impl Timers {
     }
 
     /// Seconds for which the condition has been true.
-    pub(super) fn held_s(&mut self, name: &ImmutableString, condition: bool, now_ns: TimeNs) -> Outcome<f64> {
+    pub(super) fn held_s(&mut self, name: &ImmutableString, condition: bool, now_ns: TimeNs) -> ScriptResult<f64> {
         if !condition {
             self.held_since.remove(name.as_str());
             return Ok(0.0);
@@ -117,7 +117,7 @@ impl Timers {
     }
 
     /// Is `value` another one than the last? No value changes nothing.
-    pub(super) fn changed(&mut self, name: &ImmutableString, value: Dynamic) -> Outcome<bool> {
+    pub(super) fn changed(&mut self, name: &ImmutableString, value: Dynamic) -> ScriptResult<bool> {
         if value.is_unit() {
             return Ok(false);
         }
@@ -131,7 +131,7 @@ impl Timers {
     }
 
     /// Puts a number away; `None` forgets it.
-    pub(super) fn remember(&mut self, name: &ImmutableString, value: Option<f64>) -> Outcome<()> {
+    pub(super) fn remember(&mut self, name: &ImmutableString, value: Option<f64>) -> ScriptResult<()> {
         if name.len() > KEPT_NAME_MAX {
             return Err(format!("the name of a number to remember has at most {KEPT_NAME_MAX} bytes").into());
         }
@@ -184,7 +184,7 @@ impl Timers {
         for (name, text) in table("latched").take(NAMES_MAX) {
             let word = |key: &str| text[key].as_str().map(ImmutableString::from);
             if let (Some(level), Some(en), Some(zh)) =
-                (text["level"].as_str().and_then(Level::of), word("en"), word("zh"))
+                (text["level"].as_str().and_then(AlarmLevel::of), word("en"), word("zh"))
             {
                 timers.latched.insert(name.as_str().into(), AlarmText { level, en, zh });
             }
@@ -213,7 +213,7 @@ fn entry<'a, T: Default>(
     name: &ImmutableString,
     what: &str,
     most: usize,
-) -> Outcome<&'a mut T> {
+) -> ScriptResult<&'a mut T> {
     if !map.contains_key(name.as_str()) {
         if map.len() >= most {
             return Err(too_many(what, most));
@@ -240,7 +240,7 @@ mod tests {
         let mut timers = Timers::default();
         let name = ImmutableString::from("worn");
         timers
-            .raise(name.clone(), AlarmText { level: Level::Critical, en: "worn".into(), zh: "磨损".into() })
+            .raise(name.clone(), AlarmText { level: AlarmLevel::Critical, en: "worn".into(), zh: "磨损".into() })
             .expect("room");
         timers.changed(&"tool".into(), "T1".into()).expect("room");
         timers.changed(&"count".into(), 3.0.into()).expect("room");

@@ -5,13 +5,13 @@
 //! are the constants at the head of the script, whose values stand in the scope once and for all.
 
 use super::compiled::Script;
-use super::declared::Live;
+use super::declared::LiveValues;
 use super::examine::Findings;
-use super::vocabulary::{Seen, View};
+use super::vocabulary::{View, WordValue};
 use rhai::{AST, ASTFlags, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
 
 /// The variables that the body and every handler find, in the order of [`scope_of`].
-pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &Live) -> Vec<String> {
+pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &LiveValues) -> Vec<String> {
     let mut names = vec!["memory".to_owned()];
     names.extend(found.reads.iter().filter(|word| !word.writable()).map(|word| word.name.to_owned()));
     let records = super::fields::RECORDS.iter().map(|record| record.name);
@@ -23,7 +23,7 @@ pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &Li
 }
 
 /// Statements that run with the variables of [`names`] in the scope.
-pub(super) struct Body {
+pub(super) struct ScriptBody {
     ast: AST,
     /// Declarations before the first statement of the script.
     skip: usize,
@@ -31,7 +31,7 @@ pub(super) struct Body {
     pub(super) lines: usize,
 }
 
-impl Body {
+impl ScriptBody {
     /// Compiles a text behind declarations of these names.
     pub(super) fn compile(engine: &Engine, text: &str, names: &[String]) -> Result<Self, ParseError> {
         let head: String = names.iter().map(|name| format!("let {name};")).collect();
@@ -106,7 +106,7 @@ pub(super) fn fill(
     }
     for (name, value) in script.foreign.iter().zip(foreign) {
         if let Some(place) = scope.get_mut(name) {
-            set(place, &value.map_or(Seen::Absent, Seen::Number));
+            set(place, &value.map_or(WordValue::Absent, WordValue::Number));
         }
     }
     for (name, index) in &script.live.constants {
@@ -116,11 +116,11 @@ pub(super) fn fill(
     }
 }
 
-fn set(place: &mut Dynamic, seen: &Seen<'_>) {
+fn set(place: &mut Dynamic, seen: &WordValue<'_>) {
     match seen {
-        Seen::Number(number) => *place = Dynamic::from_float(*number),
-        Seen::Absent => *place = Dynamic::UNIT,
-        Seen::Text(text) => set_text(place, text),
+        WordValue::Number(number) => *place = Dynamic::from_float(*number),
+        WordValue::Absent => *place = Dynamic::UNIT,
+        WordValue::Text(text) => set_text(place, text),
     }
 }
 

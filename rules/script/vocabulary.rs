@@ -34,12 +34,12 @@ pub struct Word {
     pub en: &'static str,
     /// What it is, in Chinese.
     pub zh: &'static str,
-    pub(super) source: Source,
+    pub(super) source: WordSource,
 }
 
 /// Where the value of a word comes from.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Source {
+pub(super) enum WordSource {
     Channel(ChannelId),
     /// The tool of a name that may name its edge.
     Tool(ChannelId),
@@ -59,7 +59,7 @@ pub(super) struct View<'a> {
 
 /// A word's value in one run.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Seen<'a> {
+pub(super) enum WordValue<'a> {
     Number(f64),
     Text(&'a str),
     Absent,
@@ -67,46 +67,58 @@ pub(super) enum Seen<'a> {
 
 impl Word {
     /// The value in this run.
-    pub(super) fn see<'a>(&self, view: &View<'a>) -> Seen<'a> {
+    pub(super) fn see<'a>(&self, view: &View<'a>) -> WordValue<'a> {
         match self.source {
-            Source::Channel(id) => channel(view.sample, id),
-            Source::Tool(id) => view.sample.text(id).map_or(Seen::Absent, |name| Seen::Text(tool_of(name))),
-            Source::Quantity(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.value)),
-            Source::Deviation(read) => read(view.estimates).map_or(Seen::Absent, |it| Seen::Number(it.sd)),
-            Source::Number(read) => Seen::Number(read(view)),
-            Source::Text(read) => Seen::Text(read(view.estimates)),
-            Source::Memory => Seen::Absent,
+            WordSource::Channel(id) => channel(view.sample, id),
+            WordSource::Tool(id) => {
+                view.sample.text(id).map_or(WordValue::Absent, |name| WordValue::Text(tool_of(name)))
+            }
+            WordSource::Quantity(read) => {
+                read(view.estimates).map_or(WordValue::Absent, |it| WordValue::Number(it.value))
+            }
+            WordSource::Deviation(read) => {
+                read(view.estimates).map_or(WordValue::Absent, |it| WordValue::Number(it.sd))
+            }
+            WordSource::Number(read) => WordValue::Number(read(view)),
+            WordSource::Text(read) => WordValue::Text(read(view.estimates)),
+            WordSource::Memory => WordValue::Absent,
         }
     }
 
     /// Why there is no value, for the operator; `None` when there is one.
     pub(super) fn why_absent(&self, view: &View<'_>) -> Option<String> {
         match self.source {
-            Source::Channel(id) | Source::Tool(id) => {
+            WordSource::Channel(id) | WordSource::Tool(id) => {
                 view.sample.slot(id).value.as_ref().err().map(ToString::to_string)
             }
-            Source::Quantity(read) | Source::Deviation(read) => read(view.estimates).err().map(|why| why.to_string()),
-            Source::Number(_) | Source::Text(_) | Source::Memory => None,
+            WordSource::Quantity(read) | WordSource::Deviation(read) => {
+                read(view.estimates).err().map(|why| why.to_string())
+            }
+            WordSource::Number(_) | WordSource::Text(_) | WordSource::Memory => None,
         }
     }
 
     /// May a script write to it?
     pub(super) fn writable(&self) -> bool {
-        matches!(self.source, Source::Memory)
+        matches!(self.source, WordSource::Memory)
     }
 }
 
-fn channel(sample: &Sample, id: ChannelId) -> Seen<'_> {
+fn channel(sample: &Sample, id: ChannelId) -> WordValue<'_> {
     match &sample.slot(id).value {
-        Ok(value) => value.as_number().map(Seen::Number).or(value.as_text().map(Seen::Text)).unwrap_or(Seen::Absent),
-        Err(_) => Seen::Absent,
+        Ok(value) => value
+            .as_number()
+            .map(WordValue::Number)
+            .or(value.as_text().map(WordValue::Text))
+            .unwrap_or(WordValue::Absent),
+        Err(_) => WordValue::Absent,
     }
 }
 
-type Quantity = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
+type QuantityRow = (&'static str, &'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Estimated);
 
 /// The estimated quantities: name, name of the standard deviation, unit, texts, value.
-const QUANTITIES: [Quantity; 10] = [
+const QUANTITIES: [QuantityRow; 10] = [
     (
         "filtered_power_w",
         "filtered_power_sd_w",
@@ -189,7 +201,7 @@ const fn word(
     unit: &'static str,
     kind: WordKind,
     texts: (&'static str, &'static str),
-    source: Source,
+    source: WordSource,
 ) -> Word {
     Word { name, unit, kind, en: texts.0, zh: texts.1, source }
 }
@@ -204,21 +216,21 @@ const OWN: [Word; 7] = [
         "",
         WordKind::Text,
         ("State of the machine: off, standby, spindle_start, idle, cutting, speed_change, rapid, unknown", "机床状态"),
-        Source::Text(|it| it.state.word()),
+        WordSource::Text(|it| it.state.word()),
     ),
     word(
         "state_s",
         "s",
         WordKind::Number,
         ("How long the machine has been in this state", "当前状态持续时间"),
-        Source::Number(|view| since_s(view.sample.at_ns, view.estimates.since_ns)),
+        WordSource::Number(|view| since_s(view.sample.at_ns, view.estimates.since_ns)),
     ),
     word(
         "visibility",
         "",
         WordKind::Text,
         ("Can cutting be seen in the power: not_asked, visible, below_visibility, no_reference", "切削是否可分辨"),
-        Source::Text(|it| it.visibility.word()),
+        WordSource::Text(|it| it.visibility.word()),
     ),
     word(
         "no_load_origin",
@@ -228,21 +240,21 @@ const OWN: [Word; 7] = [
             "Where the no-load power comes from: none, measured, interpolated, extrapolated, upper_bound",
             "空载功率的来源",
         ),
-        Source::Text(|it| it.no_load_origin.word()),
+        WordSource::Text(|it| it.no_load_origin.word()),
     ),
     word(
         "now_s",
         "s",
         WordKind::Number,
         ("Time of this tick, seconds since 1970", "当前时间"),
-        Source::Number(|view| since_s(view.sample.at_ns, 0)),
+        WordSource::Number(|view| since_s(view.sample.at_ns, 0)),
     ),
     word(
         "dt_s",
         "s",
         WordKind::Number,
         ("Time since this script ran last; 0 at the first run and after a pause", "距上次运行的时间"),
-        Source::Number(|view| view.dt_s),
+        WordSource::Number(|view| view.dt_s),
     ),
     word(
         "memory",
@@ -252,7 +264,7 @@ const OWN: [Word; 7] = [
             "What this script remembers between runs, also when the file is changed or the box starts again: memory.count = 1",
             "脚本自身的存储",
         ),
-        Source::Memory,
+        WordSource::Memory,
     ),
 ];
 
@@ -263,21 +275,21 @@ fn since_s(now_ns: i64, then_ns: i64) -> f64 {
 static WORDS: LazyLock<Vec<Word>> = LazyLock::new(|| {
     let mut words = OWN.to_vec();
     for (name, deviation, unit, en, zh, read) in QUANTITIES {
-        words.push(word(name, unit, WordKind::Number, (en, zh), Source::Quantity(read)));
+        words.push(word(name, unit, WordKind::Number, (en, zh), WordSource::Quantity(read)));
         let texts = ("One standard deviation of the quantity of this name", "标准不确定度");
-        words.push(word(deviation, unit, WordKind::Number, texts, Source::Deviation(read)));
+        words.push(word(deviation, unit, WordKind::Number, texts, WordSource::Deviation(read)));
     }
     for id in ChannelId::all() {
         let row = id.channel();
         let kind = if row.kind == adapters::channel::Kind::Text { WordKind::Text } else { WordKind::Number };
         if row.name != TOOL {
-            words.push(word(row.name, row.unit, kind, (row.en, row.zh), Source::Channel(id)));
+            words.push(word(row.name, row.unit, kind, (row.en, row.zh), WordSource::Channel(id)));
             continue;
         }
         let texts = ("Tool in use, without its edge: T1 for every edge of T1", "刀具（不含刀刃号）");
-        words.push(word(TOOL, "", kind, texts, Source::Tool(id)));
+        words.push(word(TOOL, "", kind, texts, WordSource::Tool(id)));
         let texts = ("Edge in use, as the controller names it: T1-2 is the second edge of T1", "刀刃（控制器名称）");
-        words.push(word("edge", "", kind, texts, Source::Channel(id)));
+        words.push(word("edge", "", kind, texts, WordSource::Channel(id)));
     }
     words
 });

@@ -4,7 +4,7 @@
 use super::fit::{Fit, UNITS_MIN};
 use super::frame::Frame;
 use super::linear::{extend_basis, project_out};
-use super::model::{Body, Part};
+use super::model::{Part, PartFunction};
 use crate::statistics::count;
 
 /// Deviation of the runs' own coefficients, as a share of the common one, beyond which they do not share it. Effects
@@ -40,13 +40,13 @@ pub(super) fn differs_by_run(fit: &Fit, frame: &Frame, part: usize) -> bool {
     if !is_of_the_machine(&fit.parts[part].kind) || !is_law(&fit.parts[part]) {
         return false;
     }
-    Columns::of(fit, frame, part).disagree(&runs(frame), SHARE, DEVIATE)
+    ParameterInformation::of(fit, frame, part).disagree(&runs(frame), SHARE, DEVIATE)
 }
 
 /// Is there, in one of these groupings, no parameter of this part with one value for all groups?
 #[must_use]
 pub(super) fn differs_in_any(fit: &Fit, frame: &Frame, part: usize, groupings: &[Grouping]) -> bool {
-    let columns = Columns::of(fit, frame, part);
+    let columns = ParameterInformation::of(fit, frame, part);
     groupings.iter().any(|grouping| columns.disagree(&grouping.group, grouping.share_max, FAR_DEVIATE))
 }
 
@@ -69,14 +69,14 @@ pub(super) fn is_of_the_machine(kind: &str) -> bool {
 }
 
 /// What the rows tell of each parameter of a part.
-struct Columns<'a> {
+struct ParameterInformation<'a> {
     fit: &'a Fit,
     innovations: Vec<f64>,
     /// Free parameter, and its whitened tangent with those of all others taken out.
     own: Vec<(usize, Vec<f64>)>,
 }
 
-impl<'a> Columns<'a> {
+impl<'a> ParameterInformation<'a> {
     fn of(fit: &'a Fit, frame: &Frame, part: usize) -> Self {
         let white: Vec<Vec<f64>> = fit.tangent.iter().map(|column| frame.whiten(column, fit.noise)).collect();
         let of_part = (0..fit.free.len()).filter(|index| fit.free[*index].part == part);
@@ -95,7 +95,7 @@ impl<'a> Columns<'a> {
 }
 
 fn is_law(part: &Part) -> bool {
-    matches!(&part.body, Body::Effect(_, form) if form.place.is_none() && form.name != "latent")
+    matches!(&part.body, PartFunction::Effect(_, form) if form.place.is_none() && form.name != "latent")
 }
 
 /// How far groups disagree on one parameter.

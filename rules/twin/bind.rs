@@ -1,6 +1,6 @@
 //! Binding a model to a recording: forms and missing parameters are completed, missing inputs are named.
 
-use super::model::{Body, Model, Parameter, Part};
+use super::model::{Model, Parameter, Part, PartFunction};
 use crate::physics::{Entry, Role, Scene};
 
 /// Completes every part for this scene.
@@ -28,7 +28,7 @@ pub fn bind(model: &Model, scene: &Scene) -> Result<Vec<Part>, Vec<String>> {
 
 fn complete(part: &Part, scene: &Scene) -> Part {
     let mut part = part.clone();
-    let Body::Effect(effect, form) = &mut part.body else { return part };
+    let PartFunction::Effect(effect, form) = &mut part.body else { return part };
     let effect = *effect;
     let mut stand_in = scene.clone();
     stand_in.set_load(Some(vec![1.0; scene.rows()]));
@@ -44,7 +44,7 @@ fn complete(part: &Part, scene: &Scene) -> Part {
             part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
-    let shaped = crate::physics::Form { shape: default.shape.clone(), ..form.clone() };
+    let shaped = crate::physics::EffectForm { shape: default.shape.clone(), ..form.clone() };
     for (name, _) in effect.columns(&stand_in, &shaped).unwrap_or_default() {
         if !known(&part.parameters, name) {
             let doc = effect.doc().parameter(name);
@@ -87,16 +87,18 @@ fn missing_input(part: &Part, scene: &Scene) -> String {
     let unknown = |name: &&str| super::channel::channel_values(scene, name).is_none();
     let absent = part.inputs().into_iter().filter(unknown).collect::<Vec<_>>().join(", ");
     match &part.body {
-        Body::Linear(_) => format!("{place} needs the columns {absent}: record them"),
-        Body::Expression(_) if absent.is_empty() => {
+        PartFunction::Linear(_) => format!("{place} needs the columns {absent}: record them"),
+        PartFunction::Expression(_) if absent.is_empty() => {
             format!("{place}: the expression fails on this recording (a result that is no finite number)")
         }
-        Body::Expression(_) => format!("{place} needs {absent}: record these columns or give them as parameters"),
-        Body::Empirical(form) => format!("{place} needs {}: record it", form.channel),
-        Body::Table(_) => {
+        PartFunction::Expression(_) => {
+            format!("{place} needs {absent}: record these columns or give them as parameters")
+        }
+        PartFunction::Empirical(form) => format!("{place} needs {}: record it", form.channel),
+        PartFunction::Table(_) => {
             format!("{place} needs the spindle speed: record spindle_speed_rpm or declare the role speed")
         }
-        Body::Effect(effect, _) => {
+        PartFunction::Effect(effect, _) => {
             format!("{place} needs {}: record it, or declare a role", lacking(effect.doc().needs, scene))
         }
     }

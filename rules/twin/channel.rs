@@ -138,7 +138,7 @@ fn cut_per_krpm(scene: &Scene) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::physics::Entry;
-    use crate::twin::empirical::{Empirical, Factor, Shape};
+    use crate::twin::empirical::{Empirical, Multiplier, Shape};
     use crate::twin::expression::Expression;
     use crate::twin::model::{Parameter, simulate};
     use crate::twin::parse_model;
@@ -212,15 +212,17 @@ mod tests {
             "time_since_change_of_depth_of_cut_mm",
             "lag_of_5_s_behind_depth_of_cut_mm",
         ];
-        for factor in [Factor::Always, Factor::InTheCut, Factor::WithTheSpeed, Factor::WithTheSpeedSquared] {
+        for factor in
+            [Multiplier::Always, Multiplier::InTheCut, Multiplier::WithTheSpeed, Multiplier::WithTheSpeedSquared]
+        {
             same_as_formulas(&cut(), &channels, factor);
         }
-        for factor in [Factor::AgainstMotion, Factor::WithTheAcceleration] {
+        for factor in [Multiplier::AgainstMotion, Multiplier::WithTheAcceleration] {
             same_as_formulas(&slide(), &["axis_position_mm", TIME_IN_RUN, DIRECTION, ACCELERATION], factor);
         }
     }
 
-    fn same_as_formulas(scene: &Scene, channels: &[&str], factor: Factor) {
+    fn same_as_formulas(scene: &Scene, channels: &[&str], factor: Multiplier) {
         let shapes = || {
             vec![
                 Shape::Bent(vec![2.0, 5.0]),

@@ -4,8 +4,8 @@
 //! the error rate). Alone, each hides the other: the pass falls while the edge wears.
 
 use super::gate::p_value;
-use super::scan::Bank;
-use super::search::{Hypothesis, P_MAX, Search};
+use super::scan::HypothesisBank;
+use super::search::{EffectSearch, Hypothesis, P_MAX};
 
 /// Kinds that describe what happens within a pass.
 const WITHIN_A_PASS: [&str; 2] = ["entry_exit", "depth_taper"];
@@ -15,7 +15,7 @@ const WITHIN_A_PASS: [&str; 2] = ["entry_exit", "depth_taper"];
 /// do wear.
 const SHOWN_P_MAX: f64 = 0.1;
 
-impl Search<'_, '_> {
+impl EffectSearch<'_, '_> {
     /// The hypothesis of the causes that the feed drives show, as far as this output shows them too, with their
     /// p-values.
     pub(super) fn corroborated(&mut self, from: &Hypothesis) -> Option<(Hypothesis, Vec<f64>)> {
@@ -53,7 +53,7 @@ impl Search<'_, '_> {
     /// Could noise alone have made one of these designs as good on top of `from` as it is in `best`?
     fn p_of(&self, from: &Hypothesis, best: &Hypothesis, designs: &[usize]) -> f64 {
         let designs: Vec<_> = designs.iter().map(|index| self.bank.designs[*index].clone()).collect();
-        let bank = Bank::new(&designs, self.bank.frame());
+        let bank = HypothesisBank::new(&designs, self.bank.frame());
         p_value(&bank, &from.fit, &best.fit, None, self.ln_rows, self.seed, false)
     }
 }

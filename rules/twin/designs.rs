@@ -1,10 +1,10 @@
 //! The hypotheses of a search: every form of every effect the scene can excite, as columns.
 
 use super::frame::Frame;
-use super::model::{Body, Model, Parameter, Part};
+use super::model::{Model, Parameter, Part, PartFunction};
 use super::noise::Arma;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, Form, Role, Scene};
+use crate::physics::{CATALOGUE, Effect, EffectForm, Role, Scene};
 use crate::statistics::count;
 
 /// Kinds that build a model and are never a finding by themselves.
@@ -12,7 +12,7 @@ const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 
 /// What a flexible or seldom cause must explain beyond the price of its parameters, in units of information: whoever
 /// bends at a threshold, steps at any word or acts at edges only imitates others easily.
-fn reluctance(kind: &str, form: &Form) -> f64 {
+fn reluctance(kind: &str, form: &EffectForm) -> f64 {
     match kind {
         // A stage that is recorded has not been chosen to fit.
         "gear_stage" if form.place.is_some() => 0.0,
@@ -62,7 +62,9 @@ impl Design {
     #[must_use]
     pub fn law(&self) -> &'static str {
         match &self.part.body {
-            Body::Effect(_, form) if ["meter_window", "dry_friction"].contains(&self.kind.as_str()) => form.name,
+            PartFunction::Effect(_, form) if ["meter_window", "dry_friction"].contains(&self.kind.as_str()) => {
+                form.name
+            }
             _ => "",
         }
     }
@@ -165,7 +167,7 @@ const INERTIA: [&str; 2] = ["axis_inertia", "spindle_inertia"];
 fn weighs_acceleration(model: &Model) -> bool {
     let Some(acceleration) = model.roles.get(&Role::Acceleration) else { return false };
     let weighs = |part: &Part| match &part.body {
-        Body::Linear(terms) => {
+        PartFunction::Linear(terms) => {
             let of = |(term, parameter): (&Term, &Parameter)| {
                 term.input() == Some(acceleration.as_str()) && !parameter.fixed
             };
@@ -178,7 +180,7 @@ fn weighs_acceleration(model: &Model) -> bool {
 
 /// The columns of one form.
 #[must_use]
-pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &Frame) -> Option<Design> {
+pub fn design(effect: &'static dyn Effect, form: &EffectForm, scene: &Scene, frame: &Frame) -> Option<Design> {
     debug_assert!(form.name.is_empty() || effect.form_names().contains(&form.name), "{:?}", form.name);
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();
@@ -221,7 +223,7 @@ fn hypothesis(part: &Part, scene: &Scene, frame: &Frame) -> Option<Design> {
 /// The columns of a part, or of an expression its derivatives by the parameters.
 pub(super) fn law_columns(part: &Part, scene: &Scene) -> Option<Vec<Vec<f64>>> {
     match &part.body {
-        Body::Expression(_) => (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect(),
+        PartFunction::Expression(_) => (0..part.parameters.len()).map(|index| derivative(part, index, scene)).collect(),
         _ => Some(part.columns(scene)?.into_iter().map(|(_, column)| column).collect()),
     }
 }

@@ -7,13 +7,13 @@ use super::edge_weights::SeenForm;
 use super::excerpt;
 use super::fit::{Data, Fit, fit};
 use super::frame::{FOLDS, Frame, Unit, group_size, held_out, units};
-use super::holdout::{Noise, Prediction, predict, rmse};
+use super::holdout::{HoldoutNoise, Prediction, predict, rmse};
 use super::model::{Model, Part, simulate};
 use super::noise::Arma;
-use super::outcome::{Answer, Outcome};
+use super::outcome::{Outcome, SearchAnswer};
 use super::quality::{Fault, clean};
-use super::scan::Bank;
-use super::search::{Found, Hypothesis, Search};
+use super::scan::HypothesisBank;
+use super::search::{EffectSearch, Hypothesis, SearchResult};
 use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median, robust_deviation};
@@ -158,12 +158,12 @@ impl<'a> Case<'a> {
     }
 
     /// What is found, without some kinds, and what is doubted of it.
-    pub(super) fn answered(&mut self, base: Fit, refused: &[String], seed: u64) -> Answer {
+    pub(super) fn answered(&mut self, base: Fit, refused: &[String], seed: u64) -> SearchAnswer {
         let (mut found, designs) = self.search(&base, refused, seed);
         let base = self.settle(base, &mut found);
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
-        Answer { base, found, designs, doubt, slight_entry: false }
+        SearchAnswer { base, found, designs, doubt, slight_entry: false }
     }
 
     /// The case in which the answer is told: the whole recording.
@@ -199,7 +199,7 @@ impl<'a> Case<'a> {
 
     /// Weighs the rows by what the best hypothesis leaves, and fits it and the baseline again: rows that looked
     /// outlandish because an effect was missing count in full once it is there.
-    fn settle(&mut self, base: Fit, found: &mut Found) -> Fit {
+    fn settle(&mut self, base: Fit, found: &mut SearchResult) -> Fit {
         let best = &mut found.best;
         if best.members.is_empty() {
             return base;
@@ -231,7 +231,7 @@ impl<'a> Case<'a> {
         found.map(|frame| self.frame = frame).is_some()
     }
 
-    fn search(&mut self, base: &Fit, refused: &[String], seed: u64) -> (Found, Vec<Design>) {
+    fn search(&mut self, base: &Fit, refused: &[String], seed: u64) -> (SearchResult, Vec<Design>) {
         self.simulate_baseline(base);
         let mut designs = designs(&self.scene, &self.frame, self.model);
         if self.frame.levels.is_some() {
@@ -252,11 +252,11 @@ impl<'a> Case<'a> {
         (found, designs)
     }
 
-    pub(super) fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> Found {
+    pub(super) fn searched(&mut self, base: &Fit, designs: &[Design], seed: u64) -> SearchResult {
         let frame = self.frame.clone();
-        let bank = Bank::new(designs, &frame);
+        let bank = HypothesisBank::new(designs, &frame);
         let unbent = self.unbent.clone();
-        self.with_data(|data| Search::new(data, base, &bank, seed).beside(unbent).run())
+        self.with_data(|data| EffectSearch::new(data, base, &bank, seed).beside(unbent).run())
     }
 
     /// The hypothesis with one member taken out and everything else refitted.
@@ -283,7 +283,7 @@ impl<'a> Case<'a> {
 
     /// The same of what is fitted here, be it but an excerpt.
     pub(super) fn predict_here(&mut self, fit: &Fit) -> Option<Prediction> {
-        let noise = Noise { arma: fit.noise, deviation: ordinary_noise(fit) };
+        let noise = HoldoutNoise { arma: fit.noise, deviation: ordinary_noise(fit) };
         predict(&mut self.scene, &fit.parts, self.parts.len(), &self.units, &self.held, noise)
     }
 

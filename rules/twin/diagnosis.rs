@@ -35,7 +35,7 @@ impl Verdict {
 
 /// A fitted number with its 95 % interval.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct ParameterEstimate {
     /// Name of the parameter.
     pub name: String,
     /// Fitted value.
@@ -58,7 +58,7 @@ pub struct Missing {
     /// The law.
     pub equation: String,
     /// Fitted parameters.
-    pub parameters: Vec<Estimate>,
+    pub parameters: Vec<ParameterEstimate>,
     /// Information lost without it.
     pub delta_ic: f64,
     /// Chance that noise alone does as well, over the whole search.

@@ -10,10 +10,10 @@ use super::fit::{Fit, fit, fit_levels, residual};
 use super::model::{Part, simulate};
 use super::noise::Arma;
 use super::sampled::{self, Edges};
-use super::scan::{Bank, best_of_each_law};
+use super::scan::{HypothesisBank, best_of_each_law};
 use super::search::FIRST_INFORMATION;
 use crate::physics::state::BETWEEN_SAMPLES;
-use crate::physics::{Effect, Form};
+use crate::physics::{Effect, EffectForm};
 use crate::statistics::robust_deviation;
 
 /// Outlandish rows below which it makes no difference that they weigh little.
@@ -28,7 +28,7 @@ const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
 /// A form of an effect at edges as fitted with every row in full, and the noise beside it.
 pub struct SeenForm {
     effect: &'static dyn Effect,
-    form: Form,
+    form: EffectForm,
     noise: Arma,
 }
 
@@ -104,7 +104,7 @@ impl Case<'_> {
         let at_edges = |kind: &str| AT_EDGES.contains(&kind) || AT_EDGES_OF_SPEED.contains(&kind);
         let at_edges = designs_of(&self.scene, &self.frame, self.model, at_edges);
         let frame = self.frame.clone();
-        let bank = Bank::new(&at_edges, &frame);
+        let bank = HypothesisBank::new(&at_edges, &frame);
         let mut scores = bank.scan(&base, self.ln_rows(&base));
         scores.retain(|score| score.gain > 0.0);
         let chosen = best_of_each_law(&scores, &at_edges, FITTED);
@@ -149,7 +149,7 @@ impl Case<'_> {
     }
 
     /// A delay that shows between samples in this residual, with the edges it has late as the hidden state of the scene.
-    fn between_samples(&mut self, effect: &dyn Effect, residual: &[f64], noise: (Arma, f64)) -> Option<Form> {
+    fn between_samples(&mut self, effect: &dyn Effect, residual: &[f64], noise: (Arma, f64)) -> Option<EffectForm> {
         let period_s = self.scene.period_s();
         let at = |rows: i32| {
             let mut form = effect.default_form(&self.scene);
@@ -167,11 +167,11 @@ impl Case<'_> {
         self.scene.set_latent(kind, late_s);
         let delay_s = found.rows * period_s;
         self.delay_errors_s.insert(kind, found.rows_error * period_s);
-        Some(Form {
+        Some(EffectForm {
             name: BETWEEN_SAMPLES,
             known: vec![("share", 1.0), ("delay_s", delay_s)],
             ln_choices: 0.5 * found.price,
-            ..Form::of(&[("delay_s", delay_s)])
+            ..EffectForm::of(&[("delay_s", delay_s)])
         })
     }
 }

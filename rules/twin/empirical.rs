@@ -8,14 +8,14 @@
 use super::channel::{ACCELERATION, DIRECTION, channel_values};
 use super::designs::Design;
 use super::frame::Frame;
-use super::model::{Body, Parameter, Part};
+use super::model::{Parameter, Part, PartFunction};
 use crate::physics::{Entry, OutputKind, Role, Scene};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// By what the bent line is multiplied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Factor {
+pub enum Multiplier {
     /// Nothing: it acts always.
     Always,
     /// The engagement: it acts in the cut.
@@ -74,7 +74,7 @@ pub struct Empirical {
     /// Channel distance that counts as one.
     pub scale: f64,
     /// What multiplies it.
-    pub factor: Factor,
+    pub factor: Multiplier,
 }
 
 /// Sampling periods below which what fades is an edge.
@@ -154,7 +154,7 @@ impl Empirical {
             }
         };
         let mut columns = vec![("slope".to_owned(), column(&|x| x))];
-        if self.factor != Factor::Always {
+        if self.factor != Multiplier::Always {
             columns.insert(0, ("level".to_owned(), column(&|_| 1.0)));
         }
         for (index, knot) in knots.iter().enumerate() {
@@ -168,14 +168,14 @@ impl Empirical {
     #[must_use]
     pub fn equation(&self) -> String {
         let factor = match self.factor {
-            Factor::Always => "",
-            Factor::InTheCut => "engaged * ",
-            Factor::WithTheCut => "removal rate * ",
-            Factor::Turning => "(spindle turning) * ",
-            Factor::WithTheSpeed => "spindle krpm * ",
-            Factor::WithTheSpeedSquared => "spindle krpm^2 * ",
-            Factor::WithTheAcceleration => "acceleration * ",
-            Factor::AgainstMotion => "(direction of motion) * ",
+            Multiplier::Always => "",
+            Multiplier::InTheCut => "engaged * ",
+            Multiplier::WithTheCut => "removal rate * ",
+            Multiplier::Turning => "(spindle turning) * ",
+            Multiplier::WithTheSpeed => "spindle krpm * ",
+            Multiplier::WithTheSpeedSquared => "spindle krpm^2 * ",
+            Multiplier::WithTheAcceleration => "acceleration * ",
+            Multiplier::AgainstMotion => "(direction of motion) * ",
         };
         let shape = match &self.shape {
             Shape::Bent(knots) if knots.is_empty() => format!("line over {}", self.channel),
@@ -201,14 +201,14 @@ impl Empirical {
         let x = format!("(({} - {:?}) / {:?})", self.channel, self.origin, self.scale);
         let form = self.shape_expression(&x);
         let factor = match self.factor {
-            Factor::Always => "1.0",
-            Factor::InTheCut => "engaged",
-            Factor::WithTheCut => "engaged * removal_rate_cm3_min",
-            Factor::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
-            Factor::WithTheSpeed => "abs(spindle_speed_rpm) / 1000.0",
-            Factor::WithTheSpeedSquared => "(spindle_speed_rpm / 1000.0) ** 2.0",
-            Factor::WithTheAcceleration => ACCELERATION,
-            Factor::AgainstMotion => DIRECTION,
+            Multiplier::Always => "1.0",
+            Multiplier::InTheCut => "engaged",
+            Multiplier::WithTheCut => "engaged * removal_rate_cm3_min",
+            Multiplier::Turning => "(if spindle_speed_rpm > 1.0 { 1.0 } else { 0.0 })",
+            Multiplier::WithTheSpeed => "abs(spindle_speed_rpm) / 1000.0",
+            Multiplier::WithTheSpeedSquared => "(spindle_speed_rpm / 1000.0) ** 2.0",
+            Multiplier::WithTheAcceleration => ACCELERATION,
+            Multiplier::AgainstMotion => DIRECTION,
         };
         format!("({factor}) * ({form})")
     }
@@ -240,7 +240,7 @@ impl Empirical {
             }
         };
         let mut terms = vec![format!("slope * {x}")];
-        if self.factor != Factor::Always {
+        if self.factor != Multiplier::Always {
             terms.insert(0, "level".to_owned());
         }
         for (index, knot) in knots.iter().enumerate() {
@@ -251,20 +251,20 @@ impl Empirical {
     }
 }
 
-pub(super) fn factor_values(scene: &Scene, factor: Factor) -> Option<Vec<f64>> {
+pub(super) fn factor_values(scene: &Scene, factor: Multiplier) -> Option<Vec<f64>> {
     let speed = || scene.role(Role::Speed);
     match factor {
-        Factor::Always => Some(vec![1.0; scene.rows()]),
-        Factor::InTheCut => scene.role(Role::Engaged).map(<[f64]>::to_vec),
-        Factor::AgainstMotion => {
+        Multiplier::Always => Some(vec![1.0; scene.rows()]),
+        Multiplier::InTheCut => scene.role(Role::Engaged).map(<[f64]>::to_vec),
+        Multiplier::AgainstMotion => {
             let force = scene.output_kind() == OutputKind::Force;
             force.then(|| channel_values(scene, DIRECTION))?.map(Cow::into_owned)
         }
-        Factor::WithTheSpeed => speed().map(|n| n.iter().map(|n| n.abs() / 1000.0).collect()),
-        Factor::WithTheSpeedSquared => speed().map(|n| n.iter().map(|n| (n / 1000.0).powi(2)).collect()),
-        Factor::WithTheAcceleration => channel_values(scene, ACCELERATION).map(Cow::into_owned),
-        Factor::Turning => speed().map(|n| n.iter().map(|n| f64::from(u8::from(n.abs() > 1.0))).collect()),
-        Factor::WithTheCut => {
+        Multiplier::WithTheSpeed => speed().map(|n| n.iter().map(|n| n.abs() / 1000.0).collect()),
+        Multiplier::WithTheSpeedSquared => speed().map(|n| n.iter().map(|n| (n / 1000.0).powi(2)).collect()),
+        Multiplier::WithTheAcceleration => channel_values(scene, ACCELERATION).map(Cow::into_owned),
+        Multiplier::Turning => speed().map(|n| n.iter().map(|n| f64::from(u8::from(n.abs() > 1.0))).collect()),
+        Multiplier::WithTheCut => {
             let (engaged, rate) = (scene.role(Role::Engaged)?, scene.column("removal_rate_cm3_min")?);
             Some(engaged.iter().zip(rate).map(|(engaged, rate)| engaged * rate).collect())
         }
@@ -298,7 +298,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
         kind: "unknown".to_owned(),
         name: None,
         parameters: parameters.collect(),
-        body: Body::Empirical(form),
+        body: PartFunction::Empirical(form),
         line: 0,
     };
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
@@ -325,7 +325,7 @@ mod tests {
             shape: Shape::Bent(knots),
             origin: 0.0,
             scale: 1.0,
-            factor: Factor::InTheCut,
+            factor: Multiplier::InTheCut,
         };
         assert_eq!(over(Vec::new()).equation(), "y = engaged * line over depth_mm");
         assert_eq!(over(vec![1.5]).equation(), "y = engaged * bent line over depth_mm with bends at 1.5000");

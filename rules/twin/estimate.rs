@@ -15,11 +15,11 @@
 
 use super::agreement::{between, cleared};
 use super::diagnose::Case;
-use super::diagnosis::Estimate;
+use super::diagnosis::ParameterEstimate;
 use super::fit::Fit;
 use super::hidden_tone;
 use super::linear::dot;
-use super::model::{Body, Part};
+use super::model::{Part, PartFunction};
 use super::ripple::Ripple;
 use super::verdicts::unit_of;
 use crate::physics::state::BETWEEN_SAMPLES;
@@ -42,7 +42,7 @@ const OF_THE_CUT: [&str; 1] = ["recipe_error"];
 
 /// The parameters of part number `part` of a fit, with intervals in their own units.
 #[must_use]
-pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate> {
+pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<ParameterEstimate> {
     let variances = fit.variances(&case.frame);
     let differences = differences(case, fit, part);
     let passed_on = passed_on(case, fit, part);
@@ -63,7 +63,7 @@ pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Estimate
                 Entry::Linear => (low.min(low / passed_on), high.max(high / passed_on)),
                 Entry::Shape => (low, high),
             };
-            Estimate {
+            ParameterEstimate {
                 name: parameter.name.clone(),
                 value: parameter.value,
                 low: low.max(parameter.range.0),
@@ -140,7 +140,7 @@ fn between_levels(own: &[f64], innovations: &[f64], levels: &[Option<usize>], va
 /// for a part that does not change the cut.
 fn passed_on(case: &Case<'_>, fit: &Fit, part: usize) -> f64 {
     let in_the_cut = |part: &Part| match &part.body {
-        Body::Effect(effect, _) => effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str()),
+        PartFunction::Effect(effect, _) => effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str()),
         _ => false,
     };
     let losses: Vec<&Part> = fit.parts[..case.parts.len()].iter().filter(|part| part.kind == "load_loss").collect();
@@ -156,14 +156,14 @@ fn passed_on(case: &Case<'_>, fit: &Fit, part: usize) -> f64 {
 }
 
 /// Frequency and size of a wave that was followed.
-fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
+fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [ParameterEstimate; 2] {
     let per_s = 1.0 / case.scene.period_s();
     let (hz, half_hz) = (ripple.wave.frequency * per_s, INTERVAL * ripple.frequency_error * per_s);
     let amplitude = std::f64::consts::SQRT_2 * ripple.deviation;
     // A wave that renews itself over `turns` rows has been seen that many times less often than there are rows.
     let seen = count(case.frame.len()) * (1.0 - ripple.wave.rho.powi(2));
     let half = INTERVAL * amplitude / (2.0 * seen.max(1.0)).sqrt();
-    let estimate = |name: &str, value: f64, half: f64, unit: &str| Estimate {
+    let estimate = |name: &str, value: f64, half: f64, unit: &str| ParameterEstimate {
         name: name.to_owned(),
         value,
         low: value - half,
@@ -174,20 +174,26 @@ fn wave_estimates(case: &Case<'_>, ripple: &Ripple) -> [Estimate; 2] {
 }
 
 /// Size of a tone that was followed, in the cut.
-fn tone_estimate(case: &Case<'_>, part: &Part) -> Option<Estimate> {
+fn tone_estimate(case: &Case<'_>, part: &Part) -> Option<ParameterEstimate> {
     let tone = case.tone.as_ref().filter(|_| part.kind == hidden_tone::KIND && part.has_form("latent"))?;
     let value = std::f64::consts::SQRT_2 * tone.deviation;
     let half = INTERVAL * value / (2.0 * count(tone.spells)).sqrt();
     let (low, high) = (value - half, value + half);
-    Some(Estimate { name: "amplitude".to_owned(), value, low, high, unit: "1".to_owned() })
+    Some(ParameterEstimate { name: "amplitude".to_owned(), value, low, high, unit: "1".to_owned() })
 }
 
 /// The delay of a part that acts between samples: as often as edges were late.
-fn delay_between_samples(case: &Case<'_>, part: &Part) -> Option<Estimate> {
+fn delay_between_samples(case: &Case<'_>, part: &Part) -> Option<ParameterEstimate> {
     let (_, form) = part.effect_and_form().filter(|_| part.has_form(BETWEEN_SAMPLES))?;
     let value = form.value("delay_s")?;
     let half = INTERVAL * case.delay_errors_s.get(part.kind.as_str())?;
-    Some(Estimate { name: "delay_s".to_owned(), value, low: value - half, high: value + half, unit: "s".to_owned() })
+    Some(ParameterEstimate {
+        name: "delay_s".to_owned(),
+        value,
+        low: value - half,
+        high: value + half,
+        unit: "s".to_owned(),
+    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use super::channel::{LAG_OF, LAG_OF_WHAT, TIME, TIME_SINCE_CHANGE_OF, changes_of, channel_values, positions};
 use super::designs::Design;
-use super::empirical::{Empirical, FADING_PERIODS, Factor, Shape, as_design};
+use super::empirical::{Empirical, FADING_PERIODS, Multiplier, Shape, as_design};
 use super::fit::Fit;
 use super::frame::Frame;
 use super::noise::Arma;
@@ -53,7 +53,7 @@ pub(super) fn event_designs(scene: &Scene, frame: &Frame, from: &Fit) -> Vec<Des
 
 /// A peak somewhere over the clock.
 fn once(scene: &Scene) -> Vec<Empirical> {
-    peaks_along(TIME, (0.0, scene.clock_s().last().copied().unwrap_or(0.0)), &[Factor::Always])
+    peaks_along(TIME, (0.0, scene.clock_s().last().copied().unwrap_or(0.0)), &[Multiplier::Always])
 }
 
 /// A peak somewhere along a slide: a chip, a dent, a cover that drags.
@@ -61,15 +61,15 @@ fn at_a_place(scene: &Scene) -> Vec<Empirical> {
     let along = |position: &str| {
         let at = scene.column(position).unwrap_or_default();
         let ends = at.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-        peaks_along(position, ends, &[Factor::Always, Factor::AgainstMotion])
+        peaks_along(position, ends, &[Multiplier::Always, Multiplier::AgainstMotion])
     };
     positions(scene).flat_map(along).collect()
 }
 
 /// Peaks of two widths at places from one end of a channel to the other; none where they are the same.
-fn peaks_along(channel: &str, (low, high): (f64, f64), factors: &[Factor]) -> Vec<Empirical> {
+fn peaks_along(channel: &str, (low, high): (f64, f64), factors: &[Multiplier]) -> Vec<Empirical> {
     let length = high - low;
-    let peak = |place: usize, width: f64, factor: Factor| Empirical {
+    let peak = |place: usize, width: f64, factor: Multiplier| Empirical {
         channel: channel.to_owned(),
         shape: Shape::Peak(low + length * (count(place) + 0.5) / count(PLACES), width * length),
         origin: 0.0,
@@ -83,13 +83,13 @@ fn peaks_along(channel: &str, (low, high): (f64, f64), factors: &[Factor]) -> Ve
 /// What each change of the tool begins with and loses over time.
 fn after_changes(scene: &Scene) -> Vec<Empirical> {
     let told = |over_s: &f64| *over_s >= FADING_PERIODS * scene.period_s();
-    let factors: &[Factor] = match scene.output_kind() {
-        OutputKind::Displacement => &[Factor::Always],
-        _ => &[Factor::Always, Factor::InTheCut, Factor::WithTheCut],
+    let factors: &[Multiplier] = match scene.output_kind() {
+        OutputKind::Displacement => &[Multiplier::Always],
+        _ => &[Multiplier::Always, Multiplier::InTheCut, Multiplier::WithTheCut],
     };
     let columns = tool_columns(scene);
     let forms = columns.iter().flat_map(|column| FADING_S.iter().filter(|s| told(s)).map(move |s| (column, *s)));
-    let fading = |(column, over_s): (&String, f64), factor: Factor| Empirical {
+    let fading = |(column, over_s): (&String, f64), factor: Multiplier| Empirical {
         channel: format!("{TIME_SINCE_CHANGE_OF}{column}"),
         shape: Shape::Fading(over_s),
         origin: 0.0,
@@ -108,7 +108,7 @@ fn lagging(scene: &Scene) -> Vec<Empirical> {
         let values = channel_values(scene, &channel)?;
         let high = values.iter().fold(0.0_f64, |high, x| high.max(x.abs()));
         let form =
-            Empirical { channel, shape: Shape::Bent(Vec::new()), origin: 0.0, scale: high, factor: Factor::Always };
+            Empirical { channel, shape: Shape::Bent(Vec::new()), origin: 0.0, scale: high, factor: Multiplier::Always };
         (high > 0.0).then_some(form)
     };
     let columns = empirical_channels(scene);

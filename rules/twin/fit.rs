@@ -77,7 +77,7 @@ pub(super) fn fit_levels(data: &mut Data<'_>, parts: &[Part]) -> Option<Fit> {
 /// Fits `parts` in noise that is known.
 #[must_use]
 pub(super) fn fit_at(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option<Fit> {
-    let mut state = State::new(data, parts.to_vec())?;
+    let mut state = FitState::new(data, parts.to_vec())?;
     state.descend(data, parts, noise)?;
     let log_likelihood = data.frame.log_likelihood(state.cost(data, noise), noise);
     let tangent = tangent(data, &state.parts, &state.free)?;
@@ -85,7 +85,7 @@ pub(super) fn fit_at(data: &mut Data<'_>, parts: &[Part], noise: Arma) -> Option
 }
 
 fn fit_from(data: &mut Data<'_>, nominal: &[Part], start: Arma) -> Option<Fit> {
-    let mut state = State::new(data, nominal.to_vec())?;
+    let mut state = FitState::new(data, nominal.to_vec())?;
     state.descend(data, nominal, start)?;
     let (_, noise) = super::noise::fit_near(&state.residual, data.frame, start);
     state.descend(data, nominal, noise)?;
@@ -169,13 +169,13 @@ pub fn free_parameters(parts: &[Part]) -> Vec<Free> {
     parts.iter().enumerate().flat_map(of_part).collect()
 }
 
-struct State {
+struct FitState {
     parts: Vec<Part>,
     free: Vec<Free>,
     residual: Vec<f64>,
 }
 
-impl State {
+impl FitState {
     fn new(data: &mut Data<'_>, parts: Vec<Part>) -> Option<Self> {
         let free = free_parameters(&parts);
         let residual = residual(data, &parts)?;
@@ -260,7 +260,7 @@ impl State {
         let mut share = 1.0;
         loop {
             let parts = self.moved(step, share);
-            let trial = State { residual: residual(data, &parts)?, parts, free: Vec::new() };
+            let trial = FitState { residual: residual(data, &parts)?, parts, free: Vec::new() };
             let new_cost = trial.cost(data, noise);
             if new_cost < cost || share < 0.05 {
                 return Some((trial.parts, trial.residual, new_cost));

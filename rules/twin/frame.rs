@@ -3,7 +3,7 @@
 //! A long recording is reduced by averaging groups of neighbouring rows *after* every law has been evaluated at full
 //! rate, so that edges keep their shape.
 
-use super::levels::Levels;
+use super::levels::PassAndToolLevels;
 use super::noise::{Arma, GRID, log_likelihood, whiten};
 use crate::physics::Scene;
 use crate::statistics::{count, mean, robust_deviation};
@@ -79,7 +79,7 @@ pub struct Frame {
     /// all are taken to be alike.
     quiet: Vec<f64>,
     /// Levels of their own that passes and tools have, where they have been found.
-    pub levels: Option<Levels>,
+    pub levels: Option<PassAndToolLevels>,
 }
 
 /// Innovations beyond this many robust standard deviations lose weight.

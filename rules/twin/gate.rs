@@ -6,7 +6,7 @@
 use super::fit::Fit;
 use super::frame::Frame;
 use super::linear::{dot, project_out};
-use super::scan::{Bank, Stage, price};
+use super::scan::{HypothesisBank, WhitenedFit, price};
 use crate::statistics::count;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -26,7 +26,7 @@ const REFINED: f64 = 10.0;
 /// the scan shows, where it moves a time constant or frees a bent baseline: `tested` is its fit with its price.
 #[must_use]
 pub fn p_value(
-    bank: &Bank<'_>,
+    bank: &HypothesisBank<'_>,
     base: &Fit,
     best: &Fit,
     tested: Option<(&Fit, f64)>,
@@ -70,7 +70,7 @@ enum Blocks {
     Units,
 }
 
-fn best_score(bank: &Bank<'_>, stage: &Stage<'_>, target: &[f64], ln_rows: f64) -> f64 {
+fn best_score(bank: &HypothesisBank<'_>, stage: &WhitenedFit<'_>, target: &[f64], ln_rows: f64) -> f64 {
     let rss = dot(target, target);
     let rows = count(target.len());
     let score = |index: usize| {

@@ -9,12 +9,12 @@ use super::latent::{self, Switching};
 use super::linear::dot;
 use super::model::simulate;
 use super::noise::Arma;
-use super::rhythm::{self, Spell};
+use super::rhythm::{self, OnOffSpell};
 use super::ripple;
 use super::search::Hypothesis;
 use super::wave::{self, Wave};
 use crate::physics::drive::is_axis_output;
-use crate::physics::{Form, OutputKind, Role};
+use crate::physics::{EffectForm, OutputKind, Role};
 use crate::statistics::{count, median};
 use std::ops::Range;
 
@@ -57,7 +57,7 @@ impl Case<'_> {
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
         self.switching = Some(found.clone());
-        let form = Form { name: "latent", ln_choices: 0.5 * found.price, ..Form::default() };
+        let form = EffectForm { name: "latent", ln_choices: 0.5 * found.price, ..EffectForm::default() };
         let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         Some(Design { noise: Some(found.noise), ..design })
     }
@@ -146,7 +146,7 @@ impl Case<'_> {
         let information = found.gain - ripple::price(self.frame.len());
         let (ln_choices, noise) = self.seeming_choices(base, &found.values, found.wave.noise, information);
         let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
-        let form = Form { name: "latent", ln_choices, shape, ..Form::default() };
+        let form = EffectForm { name: "latent", ln_choices, shape, ..EffectForm::default() };
         let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         design.freedom = 1;
         design.noise = Some(noise);
@@ -232,7 +232,7 @@ impl Case<'_> {
         let Some(coolant) = self.scene.column("coolant_on") else { return true };
         let on: Vec<f64> = (0..self.frame.len()).map(|group| coolant[self.frame.rows(group).start].round()).collect();
         let spells = self.frame.stretches.iter().flat_map(|stretch| rhythm::spells(&on, stretch));
-        let (on, off): (Vec<Spell>, Vec<Spell>) = spells.partition(|spell| spell.on);
+        let (on, off): (Vec<OnOffSpell>, Vec<OnOffSpell>) = spells.partition(|spell| spell.on);
         [on, off].into_iter().all(|spells| {
             let spells: Vec<Range<usize>> = spells.into_iter().map(|spell| spell.rows).collect();
             !ripple::is_absent(residual, &spells, wave)

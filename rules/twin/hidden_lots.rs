@@ -11,7 +11,7 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::linear::dot;
 use crate::physics::catalogue::hardness_batch::{LOTS_MAX, odd_lot, unwritten_lots};
-use crate::physics::{Form, effect};
+use crate::physics::{EffectForm, effect};
 use crate::statistics::count;
 use std::ops::Range;
 
@@ -53,13 +53,13 @@ impl Case<'_> {
     }
 
     /// What each run tells of the weight of its cut.
-    fn sums_of_runs(&self, base: &Fit) -> Option<Sums> {
+    fn sums_of_runs(&self, base: &Fit) -> Option<RunSums> {
         let first = self.scene.run_names().first()?.clone();
-        let always = Form { name: "step", place: Some(("run".to_owned(), first)), ..Form::default() };
+        let always = EffectForm { name: "step", place: Some(("run".to_owned(), first)), ..EffectForm::default() };
         let (_, cut) = effect("hardness_batch")?.columns(&self.scene, &always)?.pop()?;
         let cut = self.frame.whiten(&self.frame.reduce(&cut), base.noise);
         let left = base.innovations(&self.frame);
-        let mut sums = Sums(vec![(0.0, 0.0)]);
+        let mut sums = RunSums(vec![(0.0, 0.0)]);
         let mut group = 0;
         for run in self.scene.runs() {
             let begin = group;
@@ -75,9 +75,9 @@ impl Case<'_> {
 }
 
 /// Running sums over the runs: of the cut squared, and of the cut times what is left.
-struct Sums(Vec<(f64, f64)>);
+struct RunSums(Vec<(f64, f64)>);
 
-impl Sums {
+impl RunSums {
     /// The stretch of runs that explains most with a gain of its own, and among how many it was chosen.
     fn odd(&self) -> Option<(Range<usize>, f64)> {
         let runs = self.0.len() - 1;
@@ -143,7 +143,7 @@ fn ln_ways(runs: usize, edges: usize) -> f64 {
 mod tests {
     use super::*;
 
-    fn sums(gains: &[f64]) -> Sums {
+    fn sums(gains: &[f64]) -> RunSums {
         let mut all = vec![(0.0, 0.0)];
         for (run, gain) in gains.iter().enumerate() {
             let (xx, xy) = all[run];
@@ -151,7 +151,7 @@ mod tests {
             let weight = if run == 1 { 0.0 } else { 10.0 };
             all.push((xx + weight, xy + weight * gain));
         }
-        Sums(all)
+        RunSums(all)
     }
 
     #[test]

@@ -2,9 +2,9 @@
 //! worn this tool is) is followed through a held-out run from that run's own earlier rows.
 
 use super::frame::{Frame, Unit};
-use super::model::{Body, Part, simulate};
+use super::model::{Part, PartFunction, simulate};
 use super::noise::Arma;
-use crate::physics::{Form, Scene};
+use crate::physics::{EffectForm, Scene};
 use crate::statistics::count;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,7 @@ pub fn predict(
     first: usize,
     units: &[Unit],
     held: &BTreeSet<usize>,
-    noise: Noise,
+    noise: HoldoutNoise,
 ) -> Option<Prediction> {
     let simulated = simulate(parts, scene)?;
     let mut prediction = Prediction { total: simulated.total, contributions: simulated.contributions };
@@ -42,7 +42,7 @@ pub fn predict(
 
 /// The noise against which a state is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub struct HoldoutNoise {
     /// Its memory.
     pub arma: Arma,
     /// Standard deviation of a row.
@@ -52,7 +52,7 @@ pub struct Noise {
 /// Steps and stretches of runs: whether a held-out run beside an edge lies before or after it must be followed.
 fn follows_state(part: &Part) -> bool {
     match &part.body {
-        Body::Effect(effect, form) => {
+        PartFunction::Effect(effect, form) => {
             effect.has_hidden_state()
                 && form.name != "stretches"
                 && form.place.as_ref().is_some_and(|(column, _)| column == "run")
@@ -67,7 +67,7 @@ fn follow(
     index: usize,
     units: &[Unit],
     held: &BTreeSet<usize>,
-    noise: Noise,
+    noise: HoldoutNoise,
     prediction: &mut Prediction,
 ) {
     let Some(column) = unit_contribution(scene, &parts[index]) else { return };
@@ -88,7 +88,7 @@ fn follow(
 fn unit_contribution(scene: &Scene, part: &Part) -> Option<Vec<f64>> {
     let mut always = part.clone();
     let first = scene.run_names().first()?.clone();
-    if let Body::Effect(_, form) = &mut always.body {
+    if let PartFunction::Effect(_, form) = &mut always.body {
         form.place = Some(("run".to_owned(), first));
     }
     always.contribution(scene)
@@ -97,7 +97,9 @@ fn unit_contribution(scene: &Scene, part: &Part) -> Option<Vec<f64>> {
 /// Is it another hardness in lots that are written down?
 fn is_of_recorded_lots(part: &Part) -> bool {
     match &part.body {
-        Body::Effect(effect, form) => effect.doc().kind == "hardness_batch" && ["lot", "lots"].contains(&form.name),
+        PartFunction::Effect(effect, form) => {
+            effect.doc().kind == "hardness_batch" && ["lot", "lots"].contains(&form.name)
+        }
         _ => false,
     }
 }
@@ -110,14 +112,14 @@ fn follow_new_lots(
     index: usize,
     units: &[Unit],
     held: &BTreeSet<usize>,
-    noise: Noise,
+    noise: HoldoutNoise,
     prediction: &mut Prediction,
 ) -> Option<()> {
     let lots = scene.words("lot")?;
     let fitted = (0..units.len()).filter(|unit| !held.contains(unit)).flat_map(|unit| units[unit].rows.clone());
     let known: BTreeSet<&str> = fitted.filter_map(|row| lots.get(row)).collect();
     let first = scene.run_names().first()?.clone();
-    let always = Form { name: "step", place: Some(("run".to_owned(), first)), ..Form::default() };
+    let always = EffectForm { name: "step", place: Some(("run".to_owned(), first)), ..EffectForm::default() };
     let (_, cut) = part.effect_and_form()?.0.columns(scene, &always)?.pop()?;
     let gains: Vec<f64> = part.parameters.iter().map(|gain| gain.value).collect();
     let lots_known = count(known.len().max(2));
@@ -148,7 +150,7 @@ fn follow_unit(
     present: &[f64],
     index: usize,
     rows: std::ops::Range<usize>,
-    noise: Noise,
+    noise: HoldoutNoise,
     prediction: &mut Prediction,
 ) {
     let variance = (noise.deviation * noise.deviation * noise.arma.inflation()).max(f64::MIN_POSITIVE);

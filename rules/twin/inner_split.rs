@@ -7,7 +7,7 @@
 
 use super::diagnose::{Case, ordinary_noise};
 use super::fit::{Data, Fit, fit_at, fit_levels};
-use super::holdout::{Noise, predict};
+use super::holdout::{HoldoutNoise, predict};
 use super::linear::dot;
 use super::model::Part;
 use super::noise::Arma;
@@ -112,7 +112,7 @@ impl Case<'_> {
         let recorded = train.reduce(self.scene.recorded());
         let mut data = Data { scene: &mut self.scene, frame: &train, recorded: &recorded };
         let refitted = fit_at(&mut data, &parts, noise)?;
-        let known = Noise { arma: fit.noise, deviation: ordinary_noise(fit) };
+        let known = HoldoutNoise { arma: fit.noise, deviation: ordinary_noise(fit) };
         let prediction = predict(&mut self.scene, &refitted.parts, self.parts.len(), &self.units, out, known)?;
         let recorded = test.reduce(self.scene.recorded());
         let simulated = test.reduce(&prediction.total);

@@ -1,6 +1,6 @@
 //! Inputs of a model in a recording: which columns its parts read, and in which rows they have a value.
 
-use super::model::{Body, Part};
+use super::model::{Part, PartFunction};
 use crate::physics::{Role, Scene};
 
 /// Longest stretch, in rows, over which a held input still counts as known.
@@ -19,9 +19,11 @@ pub fn columns(scene: &Scene, parts: &[Part]) -> Vec<String> {
 fn columns_of(scene: &Scene, part: &Part) -> Vec<String> {
     let role = |role: Role| scene.role_name(role).map(str::to_owned);
     match &part.body {
-        Body::Table(_) => role(Role::Speed).into_iter().collect(),
-        Body::Effect(effect, _) if effect.doc().kind == "no_load_power" => role(Role::Speed).into_iter().collect(),
-        Body::Effect(effect, _) if effect.doc().kind == "cutting_power" => {
+        PartFunction::Table(_) => role(Role::Speed).into_iter().collect(),
+        PartFunction::Effect(effect, _) if effect.doc().kind == "no_load_power" => {
+            role(Role::Speed).into_iter().collect()
+        }
+        PartFunction::Effect(effect, _) if effect.doc().kind == "cutting_power" => {
             ["depth_of_cut_mm", "feed_per_rev_mm", "cutting_speed_m_min"].map(str::to_owned).to_vec()
         }
         _ => part.inputs().into_iter().map(str::to_owned).collect(),

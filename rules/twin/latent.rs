@@ -61,14 +61,14 @@ pub struct Switching {
 /// Finds the switch in a residual of this noise, if there is one that explains more than its price: that of every switching.
 #[must_use]
 pub fn find(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
-    Search::new(residual, frame, noise).likeliest().filter(Offer::holds).map(|offer| offer.found)
+    SwitchSearch::new(residual, frame, noise).likeliest().filter(Offer::holds).map(|offer| offer.found)
 }
 
 /// The same, and where its switchings cost too much, as its rhythm tells it. For what is left where nothing is named: beside
 /// others it is no noise that a rhythm could be read from.
 #[must_use]
 pub fn find_alone(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switching> {
-    let search = Search::new(residual, frame, noise);
+    let search = SwitchSearch::new(residual, frame, noise);
     let best = search.likeliest()?;
     let near = best.gain > -RHYTHM_SHARE * best.found.price;
     let told = if near { best.found.with_rhythms(residual, frame) } else { Vec::new() };
@@ -78,7 +78,7 @@ pub fn find_alone(residual: &[f64], frame: &Frame, noise: Arma) -> Option<Switch
 }
 
 /// Where a switch is looked for.
-struct Search<'a> {
+struct SwitchSearch<'a> {
     residual: &'a [f64],
     frame: &'a Frame,
     noise: Arma,
@@ -86,7 +86,7 @@ struct Search<'a> {
     without: f64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> SwitchSearch<'a> {
     fn new(residual: &'a [f64], frame: &'a Frame, noise: Arma) -> Self {
         let one = frame.whiten(&vec![1.0; residual.len()], noise);
         let mean = least_squares(&[one], &frame.whiten(residual, noise)).coefficients[0];

@@ -27,7 +27,7 @@ const TOOL_SIZE_MIN: f64 = 8.0;
 
 /// Levels of passes and of tools.
 #[derive(Debug, Clone, Default)]
-pub struct Levels {
+pub struct PassAndToolLevels {
     /// Per stretch: does it have a level (is the tool in the work)?
     in_pass: Vec<bool>,
     /// Stretches of each tool or run.
@@ -36,7 +36,7 @@ pub struct Levels {
     size: (f64, f64),
 }
 
-impl Levels {
+impl PassAndToolLevels {
     /// Whitens columns that are white but for the levels.
     pub fn whiten(&self, frame: &Frame, column: &mut [f64], noise: Arma) {
         let mut ones = frame.evened(&vec![1.0; column.len()], noise);
@@ -54,7 +54,7 @@ impl Levels {
         }
     }
 
-    /// Logarithm of the determinant of what [`Levels::whiten`] multiplies by.
+    /// Logarithm of the determinant of what [`PassAndToolLevels::whiten`] multiplies by.
     #[must_use]
     pub fn log_determinant(&self, frame: &Frame, noise: Arma) -> f64 {
         let ones = frame.evened(&vec![1.0; frame.len()], noise);
@@ -101,7 +101,7 @@ pub(super) fn found(scene: &Scene, frame: &Frame, residual: &[f64]) -> Option<Fr
     // A handful of tools says little of how much tools differ: never less than TOOL_SIZE_MIN.
     let sizes = SIZES.iter().flat_map(|pass| [1.0, 4.0].map(|times| (*pass, times * TOOL_SIZE_MIN)));
     for size in sizes {
-        broken.levels = Some(Levels { in_pass: in_pass.clone(), tools: tools.clone(), size });
+        broken.levels = Some(PassAndToolLevels { in_pass: in_pass.clone(), tools: tools.clone(), size });
         let (likelihood, _) = fit_near(residual, &broken, start);
         if best.as_ref().is_none_or(|(known, _)| likelihood > *known) {
             best = Some((likelihood, broken.clone()));
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn what_is_whitened_has_the_length_that_its_covariance_says() {
         let (_, mut frame) = recording(0.0);
-        let levels = Levels { in_pass: vec![true], tools: vec![vec![0]], size: (3.0, 2.0) };
+        let levels = PassAndToolLevels { in_pass: vec![true], tools: vec![vec![0]], size: (3.0, 2.0) };
         // Only the first stretch has levels; the frame behind it is longer.
         frame.stretches.truncate(1);
         frame.stretches[0] = 0..20;

@@ -47,7 +47,7 @@ impl Case<'_> {
 #[must_use]
 fn quiet_under_load(frame: &Frame, load: &[f64], residual: &[f64]) -> Option<Vec<f64>> {
     let bins = bins(frame, load, residual)?;
-    let law = Law::of(&bins)?;
+    let law = VarianceLaw::of(&bins)?;
     let quiet: Vec<f64> = load.iter().map(|load| law.variance(*load).sqrt().recip()).collect();
     let middle = median(quiet.clone())?;
     Some(quiet.iter().map(|x| (x / middle).clamp(1.0 / NOISE_RATIO_MAX, QUIET_MAX)).collect())
@@ -77,12 +77,12 @@ fn bins(frame: &Frame, load: &[f64], residual: &[f64]) -> Option<Vec<Bin>> {
 }
 
 /// Variance over load.
-struct Law {
+struct VarianceLaw {
     constant: f64,
     slope: f64,
 }
 
-impl Law {
+impl VarianceLaw {
     fn variance(&self, load: f64) -> f64 {
         self.constant + self.slope * load * load
     }

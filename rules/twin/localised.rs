@@ -8,13 +8,13 @@
 use super::channel::channel_values;
 use super::designs::Design;
 use super::diagnose::Case;
-use super::empirical::{Empirical, Factor, Shape, as_design, factor_values};
+use super::empirical::{Empirical, Multiplier, Shape, as_design, factor_values};
 use super::fit::{Fit, fit};
 use super::frame::Frame;
-use super::model::{Body, Part};
+use super::model::{Part, PartFunction};
 use super::offered::empirical_channels;
-use super::scan::{self, Bank, price};
-use super::unknown::{Form, NOTHING_NAMED_INFORMATION};
+use super::scan::{self, HypothesisBank, price};
+use super::unknown::{EmpiricalForm, NOTHING_NAMED_INFORMATION};
 use super::verdicts::CLASS_INFORMATION;
 use crate::physics::Scene;
 use crate::statistics::count;
@@ -34,7 +34,7 @@ const FURTHER_MAX: usize = 2;
 pub(super) fn end_designs(scene: &Scene, frame: &Frame) -> Vec<Design> {
     let over = |channel: String| {
         let form =
-            Empirical { channel, shape: Shape::Bent(Vec::new()), origin: 0.0, scale: 1.0, factor: Factor::Always };
+            Empirical { channel, shape: Shape::Bent(Vec::new()), origin: 0.0, scale: 1.0, factor: Multiplier::Always };
         ends(&form, scene, frame, &FEW_BEGINNINGS)
     };
     empirical_channels(scene).into_iter().flat_map(over).filter_map(|end| as_design(end, scene, frame)).collect()
@@ -77,16 +77,17 @@ fn is_visited(groups: &[usize], frame: &Frame) -> bool {
 
 impl Case<'_> {
     /// The form over where it acts, and what happens at other ends beside it; `from` is what it was fitted on top of.
-    pub(super) fn localised(&mut self, from: &Fit, whole: Form) -> Form {
+    pub(super) fn localised(&mut self, from: &Fit, whole: EmpiricalForm) -> EmpiricalForm {
         let form = self.over_one_end(from, whole);
         let form = self.with_further_ends(form);
         self.without_bent_line(from, form)
     }
 
     /// Ends alone, where the bent line has become superfluous beside them.
-    fn without_bent_line(&mut self, from: &Fit, form: Form) -> Form {
+    fn without_bent_line(&mut self, from: &Fit, form: EmpiricalForm) -> EmpiricalForm {
         let first = from.parts.len();
-        let bent = |part: &Part| matches!(&part.body, Body::Empirical(form) if matches!(form.shape, Shape::Bent(_)));
+        let bent =
+            |part: &Part| matches!(&part.body, PartFunction::Empirical(form) if matches!(form.shape, Shape::Bent(_)));
         if form.fit.parts.len() < first + 2 || !bent(&form.fit.parts[first]) {
             return form;
         }
@@ -98,11 +99,11 @@ impl Case<'_> {
         if lost > CLASS_INFORMATION {
             return form;
         }
-        Form { information: form.information - lost, fit, ..form }
+        EmpiricalForm { information: form.information - lost, fit, ..form }
     }
 
     /// What is described, and lines over other ends on top of it that are as good as alarms of their own.
-    fn with_further_ends(&mut self, mut form: Form) -> Form {
+    fn with_further_ends(&mut self, mut form: EmpiricalForm) -> EmpiricalForm {
         let mut designs = end_designs(&self.scene, &self.frame);
         for number in 2..2 + FURTHER_MAX {
             let name = format!("unknown_{number}");
@@ -110,14 +111,15 @@ impl Case<'_> {
             let Some(best) = self.likeliest(&form.fit, &designs) else { break };
             let more = self.with_form(&form.fit, &designs[best]);
             let Some(more) = more.filter(|more| more.information > NOTHING_NAMED_INFORMATION) else { break };
-            form = Form { design: form.design, fit: more.fit, information: form.information + more.information };
+            form =
+                EmpiricalForm { design: form.design, fit: more.fit, information: form.information + more.information };
         }
         form
     }
 
     /// A line over one end of the form's channel instead of a bent one, where it explains as much.
-    fn over_one_end(&mut self, from: &Fit, whole: Form) -> Form {
-        let Body::Empirical(form) = &whole.design.part.body else { return whole };
+    fn over_one_end(&mut self, from: &Fit, whole: EmpiricalForm) -> EmpiricalForm {
+        let PartFunction::Empirical(form) = &whole.design.part.body else { return whole };
         if !matches!(form.shape, Shape::Bent(_)) {
             return whole;
         }
@@ -131,7 +133,7 @@ impl Case<'_> {
 
     /// The design that explains most on top of a fit.
     fn likeliest(&self, from: &Fit, designs: &[Design]) -> Option<usize> {
-        let scores = Bank::new(designs, &self.frame).scan(from, self.ln_rows(from));
+        let scores = HypothesisBank::new(designs, &self.frame).scan(from, self.ln_rows(from));
         scan::likeliest(&scores).map(|score| score.design)
     }
 }

@@ -61,7 +61,7 @@ pub struct Span {
 
 /// Since when, with an interval.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Onset {
+pub struct OnsetInterval {
     /// The run.
     pub run: String,
     /// Time within the recording.
@@ -86,7 +86,7 @@ pub struct Region {
     /// Every stretch of affected rows.
     pub spans: Vec<Span>,
     /// Since when, where it was not there from the start.
-    pub onset: Option<Onset>,
+    pub onset: Option<OnsetInterval>,
 }
 
 /// Rows in which a contribution is noticeable.

@@ -8,7 +8,7 @@
 use super::diagnose::Case;
 use super::fit::{Fit, fit};
 use super::model::Part;
-use super::outcome::Answer;
+use super::outcome::SearchAnswer;
 use super::search::Hypothesis;
 use crate::physics::Scene;
 
@@ -23,7 +23,7 @@ pub(super) const ENTRY: &str = "entry_exit";
 
 impl Case<'_> {
     /// What is found, without what is not what it is called: no kind is refused twice, and only a few can be.
-    pub(super) fn answer(&mut self, base: &Fit, seed: u64) -> Answer {
+    pub(super) fn answer(&mut self, base: &Fit, seed: u64) -> SearchAnswer {
         let weighed = self.frame.clone();
         let mut refused = Vec::new();
         let mut slight = None;

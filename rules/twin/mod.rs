@@ -89,5 +89,5 @@ pub use compare::compare;
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
 pub use examine::{Examination, examine};
-pub use model::{Body, Model, Parameter, Part, Simulated, simulate};
+pub use model::{Model, Parameter, Part, PartFunction, Simulated, simulate};
 pub use model_file::{Problem, parse_hypotheses, parse_model, write_model};

@@ -4,7 +4,7 @@ use super::channel::{SIMULATED_OUTPUT, is_simulated};
 use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
-use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
+use crate::physics::{Effect, EffectForm, Entry, ParameterDoc, Role, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -28,9 +28,9 @@ pub struct Parameter {
 
 /// What a part computes.
 #[derive(Clone)]
-pub enum Body {
+pub enum PartFunction {
     /// An effect of the catalogue in a form; the shape values stand in the parameters.
-    Effect(&'static dyn Effect, Form),
+    Effect(&'static dyn Effect, EffectForm),
     /// A sum of coefficient times term; one parameter per term.
     Linear(Vec<Term>),
     /// No-load power as a table over speed; one parameter per speed, interpolated quadratically.
@@ -41,7 +41,7 @@ pub enum Body {
     Empirical(Empirical),
 }
 
-impl fmt::Debug for Body {
+impl fmt::Debug for PartFunction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Effect(effect, form) => write!(f, "Effect({}, {form:?})", effect.doc().kind),
@@ -61,7 +61,7 @@ pub struct Part {
     /// The user's name for it, where given.
     pub name: Option<String>,
     /// What it computes.
-    pub body: Body,
+    pub body: PartFunction,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
     /// Line of the file, 0 when it was not read from one.
@@ -71,7 +71,7 @@ pub struct Part {
 impl Part {
     /// A candidate as a part, its linear parameters at zero where they are not known.
     #[must_use]
-    pub fn candidate(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
+    pub fn candidate(effect: &'static dyn Effect, form: &EffectForm, linear: &[&'static str]) -> Self {
         let shape = form.shape.iter().map(|(name, value)| parameter(effect, name, *value, Entry::Shape));
         let linear = linear.iter().map(|name| parameter(effect, name, 0.0, Entry::Linear));
         let mut parameters: Vec<Parameter> = linear.chain(shape).collect();
@@ -80,7 +80,7 @@ impl Part {
                 (parameter.value, parameter.fixed) = (*value, true);
             }
         }
-        let body = Body::Effect(effect, form.clone());
+        let body = PartFunction::Effect(effect, form.clone());
         Self { kind: effect.doc().kind.to_owned(), name: None, body, parameters, line: 0 }
     }
 
@@ -94,30 +94,30 @@ impl Part {
     #[must_use]
     pub fn inputs(&self) -> Vec<&str> {
         match &self.body {
-            Body::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
-            Body::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
-            Body::Empirical(form) => vec![&form.channel],
-            Body::Effect(..) | Body::Table(_) => Vec::new(),
+            PartFunction::Linear(terms) => terms.iter().filter_map(Term::input).collect(),
+            PartFunction::Expression(expression) => expression.inputs().iter().map(String::as_str).collect(),
+            PartFunction::Empirical(form) => vec![&form.channel],
+            PartFunction::Effect(..) | PartFunction::Table(_) => Vec::new(),
         }
     }
 
     /// The effect of the catalogue with the form as it is now; `None` of any other part.
     #[must_use]
-    pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, Form)> {
+    pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, EffectForm)> {
         match &self.body {
-            Body::Effect(effect, form) => Some((*effect, self.form(form))),
+            PartFunction::Effect(effect, form) => Some((*effect, self.form(form))),
             _ => None,
         }
     }
 
     /// The form with the present shape values.
-    fn form(&self, form: &Form) -> Form {
+    fn form(&self, form: &EffectForm) -> EffectForm {
         let mut form = form.clone();
         for parameter in self.parameters.iter().filter(|parameter| parameter.entry == Entry::Shape) {
             match form.shape.iter_mut().find(|(name, _)| *name == parameter.name) {
                 Some((_, value)) => *value = parameter.value,
                 None => {
-                    if let Body::Effect(effect, _) = &self.body
+                    if let PartFunction::Effect(effect, _) = &self.body
                         && let Some(doc) = effect.doc().parameter(&parameter.name)
                     {
                         form.shape.push((doc.name, parameter.value));
@@ -131,30 +131,30 @@ impl Part {
     /// Is it an effect of the catalogue in the form of this name?
     #[must_use]
     pub(super) fn has_form(&self, name: &str) -> bool {
-        matches!(&self.body, Body::Effect(_, form) if form.name == name)
+        matches!(&self.body, PartFunction::Effect(_, form) if form.name == name)
     }
 
     /// One column per linear parameter, by name; `None` when an input is missing. An expression has none.
     #[must_use]
     pub fn columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
         match &self.body {
-            Body::Effect(effect, form) => {
+            PartFunction::Effect(effect, form) => {
                 let columns = effect.columns(scene, &self.form(form))?;
                 Some(columns.into_iter().map(|(name, column)| (name.to_owned(), column)).collect())
             }
-            Body::Linear(terms) => {
+            PartFunction::Linear(terms) => {
                 terms.iter().map(|term| Some((term.text().to_owned(), term.column(scene)?))).collect()
             }
-            Body::Table(table) => table.columns(scene),
-            Body::Empirical(form) => form.columns(scene),
-            Body::Expression(_) => Some(Vec::new()),
+            PartFunction::Table(table) => table.columns(scene),
+            PartFunction::Empirical(form) => form.columns(scene),
+            PartFunction::Expression(_) => Some(Vec::new()),
         }
     }
 
     /// What the part adds to the output, in the output's unit.
     #[must_use]
     pub fn contribution(&self, scene: &Scene) -> Option<Vec<f64>> {
-        if let Body::Expression(expression) = &self.body {
+        if let PartFunction::Expression(expression) = &self.body {
             return expression.evaluate(scene, &self.parameters);
         }
         let mut sum = vec![0.0; scene.rows()];
@@ -177,14 +177,15 @@ impl Part {
 
     /// Is it a form or a formula over such a channel?
     fn is_drawn_over(&self, such: impl Fn(&str) -> bool) -> bool {
-        matches!(&self.body, Body::Empirical(_) | Body::Expression(_)) && self.inputs().into_iter().any(such)
+        matches!(&self.body, PartFunction::Empirical(_) | PartFunction::Expression(_))
+            && self.inputs().into_iter().any(such)
     }
 
     /// Does it read the load that the cut simulates?
     #[must_use]
     pub fn reads_load(&self) -> bool {
         match &self.body {
-            Body::Effect(effect, _) => effect.reads_load(),
+            PartFunction::Effect(effect, _) => effect.reads_load(),
             _ => self.is_drawn_over(is_simulated),
         }
     }
@@ -192,7 +193,7 @@ impl Part {
     /// Does it read what the load comes to at the output, losses included?
     #[must_use]
     pub fn reads_load_at_output(&self) -> bool {
-        matches!(&self.body, Body::Effect(effect, _) if effect.reads_load_at_output())
+        matches!(&self.body, PartFunction::Effect(effect, _) if effect.reads_load_at_output())
     }
 
     /// Does this part have to be simulated again after that one of the same model has changed?
@@ -283,9 +284,13 @@ pub(super) fn simulate_changed(
 }
 
 /// The total and what each part adds to it.
-type Sums<'a> = (Vec<f64>, Vec<Cow<'a, [f64]>>);
+type PartSums<'a> = (Vec<f64>, Vec<Cow<'a, [f64]>>);
 
-fn simulate_again<'a>(parts: &[Part], scene: &mut Scene, before: Option<(&'a Simulated, usize)>) -> Option<Sums<'a>> {
+fn simulate_again<'a>(
+    parts: &[Part],
+    scene: &mut Scene,
+    before: Option<(&'a Simulated, usize)>,
+) -> Option<PartSums<'a>> {
     let mut contributions: Vec<Cow<'a, [f64]>> = vec![Cow::Borrowed(&[]); parts.len()];
     let mut total = vec![0.0; scene.rows()];
     scene.set_load(None);

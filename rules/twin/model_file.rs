@@ -1,10 +1,10 @@
 //! Model files (`model/1`): read with every problem at once, each with its line; written back in the same form.
 
 use super::expression::Expression;
-use super::model::{Body, Model, Parameter, Part};
+use super::model::{Model, Parameter, Part, PartFunction};
 use super::table::SpeedTable;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, effect};
+use crate::physics::{CATALOGUE, Effect, EffectForm, Entry, Role, effect};
 use adapters::channel::nearest;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -180,7 +180,7 @@ impl<'t> Reader<'t> {
                 Err(reason) => self.wrong(offset, reason),
             }
         }
-        Some(part("linear", Body::Linear(terms), parameters))
+        Some(part("linear", PartFunction::Linear(terms), parameters))
     }
 
     fn expression(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
@@ -195,7 +195,7 @@ impl<'t> Reader<'t> {
         };
         let names: Vec<String> = parameters.iter().map(|parameter| parameter.name.clone()).collect();
         match Expression::compile(text, &names) {
-            Ok(expression) => Some(part("expression", Body::Expression(expression), parameters)),
+            Ok(expression) => Some(part("expression", PartFunction::Expression(expression), parameters)),
             Err(reason) => {
                 let offset = table.get("expression").map_or(offset, |text| text.span().start);
                 self.wrong(offset, format!("the expression does not compile: {reason}"));
@@ -222,7 +222,7 @@ impl<'t> Reader<'t> {
             .map(|(index, power)| free(&format!("power_w[{index}]"), *power, Entry::Linear))
             .collect();
         let gear_stage = table.get("gear_stage").and_then(|stage| number(stage.get_ref()));
-        Some(part("no_load_power", Body::Table(SpeedTable { speeds_rpm: speeds, gear_stage }), parameters))
+        Some(part("no_load_power", PartFunction::Table(SpeedTable { speeds_rpm: speeds, gear_stage }), parameters))
     }
 
     fn catalogue(&mut self, kind: &str, table: &Table<'_>, offset: usize) -> Option<Part> {
@@ -254,11 +254,11 @@ impl<'t> Reader<'t> {
             parameters.push(parameter);
         }
         let form = self.form(effect, table);
-        Some(part(kind, Body::Effect(effect, form), parameters))
+        Some(part(kind, PartFunction::Effect(effect, form), parameters))
     }
 
-    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
-        let mut form = Form::plain();
+    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> EffectForm {
+        let mut form = EffectForm::plain();
         let chosen = table.get("form").or_else(|| table.get("process"));
         if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
             match effect.form_names().iter().find(|known| **known == name) {
@@ -351,7 +351,7 @@ fn has_table(table: &Table<'_>) -> bool {
     inside.is_some_and(|inside| inside.contains_key("speeds_rpm") || inside.contains_key("power_w"))
 }
 
-fn part(kind: &str, body: Body, parameters: Vec<Parameter>) -> Part {
+fn part(kind: &str, body: PartFunction, parameters: Vec<Parameter>) -> Part {
     Part { kind: kind.to_owned(), name: None, body, parameters, line: 0 }
 }
 
@@ -406,18 +406,18 @@ fn write_part(part: &Part) -> String {
         .collect();
     let numbers = numbers.join(", ");
     match &part.body {
-        Body::Linear(_) => text.push_str(&format!("columns = {{ {numbers} }}\n")),
-        Body::Table(table) => text.push_str(&write_table(part, table)),
-        Body::Expression(expression) => {
+        PartFunction::Linear(_) => text.push_str(&format!("columns = {{ {numbers} }}\n")),
+        PartFunction::Table(table) => text.push_str(&write_table(part, table)),
+        PartFunction::Expression(expression) => {
             text.push_str(&format!("expression = {}\nparameters = {{ {numbers} }}\n", quoted(expression.text())));
         }
-        Body::Empirical(form) => {
+        PartFunction::Empirical(form) => {
             let expression = quoted(&form.expression());
             text = "\n[[effect]]\nkind = \"expression\"\n".to_owned();
             text.push_str(&format!("name = {}\n", quoted(part.label())));
             text.push_str(&format!("expression = {expression}\nparameters = {{ {numbers} }}\n"));
         }
-        Body::Effect(_, form) => {
+        PartFunction::Effect(_, form) => {
             text.push_str(&format!("parameters = {{ {numbers} }}\n"));
             if !form.name.is_empty() {
                 let key = if part.kind == "cutting_power" { "process" } else { "form" };
@@ -494,11 +494,11 @@ mod tests {
             for name in effect.form_names() {
                 let offset = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"offset\"\n";
                 let mut model = parse_model(offset).expect("reads");
-                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::plain() }, &linear)];
+                model.parts = vec![Part::candidate(*effect, &EffectForm { name, ..EffectForm::plain() }, &linear)];
                 let read = parse_model(&write_model(&model));
                 let read = read.unwrap_or_else(|problems| panic!("{}: {problems:?}", effect.doc().kind));
                 assert_eq!(read.parts[0].parameters.len(), linear.len());
-                assert!(matches!(&read.parts[0].body, Body::Effect(_, form) if form.name == *name));
+                assert!(matches!(&read.parts[0].body, PartFunction::Effect(_, form) if form.name == *name));
             }
         }
     }

@@ -7,7 +7,7 @@ use super::channel::{
 };
 use super::diagnosis::{Alternative, Experiment, Verdict};
 use super::empirical::Empirical;
-use super::model::{Body, Part};
+use super::model::{Part, PartFunction};
 use super::outcome::Outcome;
 use crate::physics::effect;
 
@@ -57,7 +57,7 @@ pub(super) fn experiment(statement: String, minutes: f64, gain: f64, effect: &st
 
 fn form_of(part: &Part) -> Option<&Empirical> {
     match &part.body {
-        Body::Empirical(form) => Some(form),
+        PartFunction::Empirical(form) => Some(form),
         _ => None,
     }
 }

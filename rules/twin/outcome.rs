@@ -8,20 +8,20 @@ use super::fit::Fit;
 use super::holdout::Prediction;
 use super::inner_split::Left;
 use super::scan::price;
-use super::search::{Found, Hypothesis};
+use super::search::{Hypothesis, SearchResult};
 use super::unknown::{Doubt, Nameless, Unknown};
 
 /// What was found, before it is told.
-pub(super) struct Answer {
+pub(super) struct SearchAnswer {
     pub(super) base: Fit,
-    pub(super) found: Found,
+    pub(super) found: SearchResult,
     pub(super) designs: Vec<Design>,
     pub(super) doubt: Doubt,
     /// Did an entry or an exit that is too slight to be one explain as much?
     pub(super) slight_entry: bool,
 }
 
-impl Answer {
+impl SearchAnswer {
     /// What is named, or what is described without a name, explains so much.
     pub(super) fn information(&self) -> f64 {
         self.doubt.unknown.as_ref().map_or(self.found.best.information, |unknown| unknown.information)
@@ -30,7 +30,7 @@ impl Answer {
 
 /// What does not hold in runs that took no part in fitting it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Withdrawn {
+pub struct FailedHoldout {
     /// The kinds that had been named; empty where there was no name.
     pub kinds: Vec<String>,
     /// Were they fitted runs (the inner split), or those held out?
@@ -54,9 +54,9 @@ pub struct Outcome {
     /// What the inner split leaves before and after.
     pub(super) inner: Option<(Left, Left)>,
     /// What had been found and does not hold in runs that took no part in fitting it.
-    pub withdrawn: Option<Withdrawn>,
+    pub withdrawn: Option<FailedHoldout>,
     /// What the search found.
-    pub found: Found,
+    pub found: SearchResult,
     /// Every hypothesis of the search.
     pub designs: Vec<Design>,
     /// What remains unexplained.
@@ -77,8 +77,8 @@ pub struct Outcome {
 
 impl Outcome {
     /// Simulates what was found over every row.
-    pub(super) fn new(case: &mut Case<'_>, answer: Answer) -> Self {
-        let Answer { base, found, designs, doubt: Doubt { unknown, nameless }, slight_entry } = answer;
+    pub(super) fn new(case: &mut Case<'_>, answer: SearchAnswer) -> Self {
+        let SearchAnswer { base, found, designs, doubt: Doubt { unknown, nameless }, slight_entry } = answer;
         let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
         let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
         let none = empty();
@@ -129,7 +129,7 @@ impl Outcome {
 
     /// What was found, if runs that took no part in fitting it are predicted no better with it than without: the inner
     /// split decides, and the runs held out may only withdraw.
-    fn refuted(&self) -> Option<Withdrawn> {
+    fn refuted(&self) -> Option<FailedHoldout> {
         let best = &self.found.best;
         if best.members.is_empty() && self.unknown.is_none() {
             return None;
@@ -140,7 +140,7 @@ impl Outcome {
         let inner = inner.map(|(before, after)| (true, (before.error(), after.error())));
         let held_out = held_out.filter(|(before, after)| after >= before).map(|errors| (false, errors));
         let (among_fitted, errors) = inner.or(held_out)?;
-        Some(Withdrawn { kinds, among_fitted, errors, information: self.information(), added: self.added.clone() })
+        Some(FailedHoldout { kinds, among_fitted, errors, information: self.information(), added: self.added.clone() })
     }
 
     /// Units of information of what is told or was withdrawn.
@@ -158,10 +158,10 @@ impl Outcome {
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
             let doubt = Doubt { unknown: None, nameless };
-            return Self::new(case, Answer { base, found, designs, doubt, slight_entry }).confirmed(case);
+            return Self::new(case, SearchAnswer { base, found, designs, doubt, slight_entry }).confirmed(case);
         }
         found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
-        let nothing = Answer { base, found, designs, doubt: Doubt::NONE, slight_entry: false };
+        let nothing = SearchAnswer { base, found, designs, doubt: Doubt::NONE, slight_entry: false };
         Self { withdrawn: Some(withdrawn), ..Self::new(case, nothing) }
     }
 

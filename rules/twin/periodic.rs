@@ -6,7 +6,7 @@
 //! Astrophysics and Space Science 39 (1976)), the noise's own colour taken into account, and become empirical forms.
 
 use super::channel::{TIME, TIME_IN_CUT, channel_values, positions};
-use super::empirical::{Empirical, Factor, Shape, factor_values};
+use super::empirical::{Empirical, Multiplier, Shape, factor_values};
 use super::frame::Frame;
 use super::linear::dot;
 use super::noise::{Arma, unwhiten};
@@ -34,7 +34,7 @@ const WEIGHED: usize = 6;
 /// this noise.
 #[must_use]
 pub(super) fn waves(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
-    let factors = [Factor::Always, Factor::InTheCut, Factor::WithTheCut];
+    let factors = [Multiplier::Always, Multiplier::InTheCut, Multiplier::WithTheCut];
     let tracks = positions(scene).chain([TIME_IN_CUT]).flat_map(|position| factors.map(|factor| (position, factor)));
     waves_along(tracks, scene, frame, residual, noise)
 }
@@ -42,7 +42,7 @@ pub(super) fn waves(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma)
 /// The waves over a recorded position of a friction: a nut that is tighter at one place of every turn.
 #[must_use]
 pub(super) fn waves_of_friction(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
-    let tracks = positions(scene).chain([TIME]).map(|over| (over, Factor::AgainstMotion));
+    let tracks = positions(scene).chain([TIME]).map(|over| (over, Multiplier::AgainstMotion));
     waves_along(tracks, scene, frame, residual, noise)
 }
 
@@ -50,11 +50,11 @@ pub(super) fn waves_of_friction(scene: &Scene, frame: &Frame, residual: &[f64], 
 /// whatever the machine does.
 #[must_use]
 pub(super) fn waves_in_time(scene: &Scene, frame: &Frame, residual: &[f64], noise: Arma) -> Vec<Empirical> {
-    waves_along([(TIME, Factor::Always)], scene, frame, residual, noise)
+    waves_along([(TIME, Multiplier::Always)], scene, frame, residual, noise)
 }
 
 fn waves_along<'s>(
-    tracks: impl IntoIterator<Item = (&'s str, Factor)>,
+    tracks: impl IntoIterator<Item = (&'s str, Multiplier)>,
     scene: &Scene,
     frame: &Frame,
     residual: &[f64],
@@ -73,7 +73,7 @@ fn waves_along<'s>(
 /// The rows of a frame along a position, in so far as a factor acts.
 struct Track<'a> {
     position: &'a str,
-    factor: Factor,
+    factor: Multiplier,
     /// Share of the way, 0 to 1, per group.
     along: Vec<f64>,
     /// The factor, per group.
@@ -86,7 +86,7 @@ struct Track<'a> {
 
 impl<'a> Track<'a> {
     /// `None` where there are too few rows to tell a wave.
-    fn new(scene: &Scene, frame: &Frame, position: &'a str, factor: Factor) -> Option<Self> {
+    fn new(scene: &Scene, frame: &Frame, position: &'a str, factor: Multiplier) -> Option<Self> {
         let at = frame.reduce(&channel_values(scene, position)?);
         let acts = frame.reduce(&factor_values(scene, factor)?);
         let inside = |group: &usize| acts[*group] != 0.0;
@@ -236,7 +236,7 @@ mod tests {
         let tight = |row: usize| direction(row) * (TAU * position[row] / 10.0 + 0.4).sin();
         let residual: Vec<f64> = (0..2000).map(|row| 1.2 * tight(row) + noise[row]).collect();
         let found = waves_of_friction(&scene, &frame, &residual, SLOW);
-        assert_eq!(found[0].factor, Factor::AgainstMotion);
+        assert_eq!(found[0].factor, Multiplier::AgainstMotion);
         let Shape::Wave(period, _) = found[0].shape else { panic!("{:?}", found[0]) };
         assert!((period / 10.0 - 1.0).abs() < 0.02, "{period}");
     }

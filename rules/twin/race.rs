@@ -20,7 +20,7 @@ struct Lanes<T> {
 }
 
 /// From a state and an age to those of the next row.
-struct Way {
+struct StateTransition {
     from: (usize, usize),
     to: (usize, usize),
     weight: f64,
@@ -37,14 +37,14 @@ impl<T: Copy> Lanes<T> {
 
     /// Goes on by a row: a spell lasts, and is a row older, or the other one begins. `meet` puts what comes along a way to
     /// what is there already, at first `none`.
-    fn step(&mut self, none: T, mut meet: impl FnMut(&mut T, T, &Way)) {
+    fn step(&mut self, none: T, mut meet: impl FnMut(&mut T, T, &StateTransition)) {
         let ages = self.now[0].len();
         self.next.iter_mut().for_each(|lanes| lanes.fill(none));
         for on in [0, 1] {
             for (age, lane) in self.now[on].iter().enumerate() {
                 let older = (age + 1).min(ages - 1);
                 for (to, weight) in [((on, older), self.stay[on][age]), ((1 - on, 0), self.turn[on][age])] {
-                    meet(&mut self.next[to.0][to.1], *lane, &Way { from: (on, age), to, weight });
+                    meet(&mut self.next[to.0][to.1], *lane, &StateTransition { from: (on, age), to, weight });
                 }
             }
         }

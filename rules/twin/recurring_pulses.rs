@@ -5,7 +5,7 @@
 //! at which most of them meet become an empirical form.
 
 use super::channel::TIME;
-use super::empirical::{Empirical, FADING_PERIODS, Factor, Shape};
+use super::empirical::{Empirical, FADING_PERIODS, Multiplier, Shape};
 use super::frame::Frame;
 use super::noise::Arma;
 use crate::physics::Scene;
@@ -34,7 +34,7 @@ pub(super) fn recurring_pulses(scene: &Scene, frame: &Frame, residual: &[f64], n
     let Some(found) = fold(&clock_s, &cut_off(frame.whiten(residual, noise)), scene.period_s(), whole_s) else {
         return Vec::new();
     };
-    let form = |rows: f64, factor: Factor| Empirical {
+    let form = |rows: f64, factor: Multiplier| Empirical {
         channel: TIME.to_owned(),
         shape: Shape::RecurringPulses {
             every: found.every_s,
@@ -47,7 +47,7 @@ pub(super) fn recurring_pulses(scene: &Scene, frame: &Frame, residual: &[f64], n
         factor,
     };
     let paces = OVER_ROWS.into_iter().filter(|rows| *rows >= FADING_PERIODS && rows * scene.period_s() < found.every_s);
-    paces.flat_map(|rows| [Factor::Always, Factor::WithTheSpeed].map(|factor| form(rows, factor))).collect()
+    paces.flat_map(|rows| [Multiplier::Always, Multiplier::WithTheSpeed].map(|factor| form(rows, factor))).collect()
 }
 
 /// Innovations in deviations, cut off.

@@ -9,7 +9,7 @@ use super::designs::Design;
 use super::diagnose::Case;
 use super::fit::Fit;
 use super::scan::price;
-use super::search::{Found, Hypothesis};
+use super::search::{Hypothesis, SearchResult};
 use super::unknown::{STANDS_SHARE, Yardsticks, margin};
 
 /// Share of all that is named from which a member leads.
@@ -78,7 +78,7 @@ impl Case<'_> {
     pub(super) fn drop_minor(
         &mut self,
         base: &Fit,
-        found: &mut Found,
+        found: &mut SearchResult,
         designs: &[Design],
         forms: &Yardsticks<'_>,
         mut replaceable: Vec<Replaceable>,

@@ -1,7 +1,7 @@
 //! The diagnosis as JSON (`diagnosis/1`) and as rows.
 
-use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Fits, Missing, Quality, Rows, Shift};
-use super::locate::{Condition, Onset, Region, Span};
+use super::diagnosis::{Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift};
+use super::locate::{Condition, OnsetInterval, Region, Span};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
@@ -78,7 +78,7 @@ fn span(span: &Span) -> Value {
     json!({ "run": span.run, "from_s": span.from_s, "to_s": span.to_s })
 }
 
-fn onset_value(onset: &Onset) -> Value {
+fn onset_value(onset: &OnsetInterval) -> Value {
     json!({ "run": onset.run, "time_s": onset.time_s, "low_s": onset.low_s, "high_s": onset.high_s })
 }
 
@@ -96,7 +96,7 @@ fn missing(missing: &Missing) -> Value {
     })
 }
 
-fn estimate(e: &Estimate) -> Value {
+fn estimate(e: &ParameterEstimate) -> Value {
     json!({ "name": e.name, "value": number(e.value), "low": number(e.low), "high": number(e.high), "unit": e.unit })
 }
 

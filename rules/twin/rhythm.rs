@@ -35,16 +35,16 @@ const PARAMETERS: f64 = 4.0;
 const SURPRISE_MAX: f64 = 25.0;
 
 /// Rows next to each other in which it is on, or off.
-pub(super) struct Spell {
+pub(super) struct OnOffSpell {
     pub(super) on: bool,
     pub(super) rows: Range<usize>,
 }
 
 /// The spells of a stretch, in order.
-pub(super) fn spells(state: &[f64], stretch: &Range<usize>) -> Vec<Spell> {
+pub(super) fn spells(state: &[f64], stretch: &Range<usize>) -> Vec<OnOffSpell> {
     let mut start = stretch.start;
     let of_rows = |rows: &[f64]| {
-        let spell = Spell { on: rows[0] > 0.5, rows: start..start + rows.len() };
+        let spell = OnOffSpell { on: rows[0] > 0.5, rows: start..start + rows.len() };
         start = spell.rows.end;
         spell
     };

@@ -2,7 +2,7 @@
 //! only where each has found its best noise and its best baseline.
 
 use super::model::Part;
-use super::search::{Hypothesis, Search};
+use super::search::{EffectSearch, Hypothesis};
 use std::collections::BTreeSet;
 
 /// Information by which a rival may be behind before it is fitted again.
@@ -20,7 +20,7 @@ struct Rival {
     part: Part,
 }
 
-impl Search<'_, '_> {
+impl EffectSearch<'_, '_> {
     /// The best after its near rivals have been fitted again from where it stands.
     pub(super) fn beside_rivals(&mut self, mut best: Hypothesis) -> Hypothesis {
         for rival in self.rivals(&best) {

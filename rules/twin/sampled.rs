@@ -82,7 +82,7 @@ struct Looks {
 }
 
 /// From a look of the row before to a look of this one.
-struct Way {
+struct LookTransition {
     from: usize,
     to: usize,
     /// The innovation of the path so far.
@@ -173,7 +173,7 @@ impl<'a> Edges<'a> {
         looks: &'b Looks,
         row: usize,
         last: Option<(Looks, [f64; 2])>,
-    ) -> impl Iterator<Item = Way> + 'b {
+    ) -> impl Iterator<Item = LookTransition> + 'b {
         let noise = self.noise;
         let way = move |from: usize, to: usize| {
             let x = looks.x[to];
@@ -187,7 +187,7 @@ impl<'a> Edges<'a> {
                 }
             };
             let surprise = (innovation * self.frame.weight(row) / self.deviation).powi(2).min(SURPRISE_MAX);
-            Some(Way { from, to, e, surprise })
+            Some(LookTransition { from, to, e, surprise })
         };
         let looked = (0..2).filter(|to| looks.chance[*to] > 0.0);
         looked.flat_map(move |to| (0..2).filter_map(move |from| way(from, to)))

@@ -75,7 +75,7 @@ pub fn price_of(designs: &[Design], members: &[usize], ln_rows: f64) -> f64 {
 }
 
 /// Every hypothesis, whitened at the settings that have been asked for.
-pub struct Bank<'a> {
+pub struct HypothesisBank<'a> {
     /// The hypotheses.
     pub designs: &'a [Design],
     frame: &'a Frame,
@@ -89,7 +89,7 @@ struct White {
     gram: Vec<Vec<f64>>,
 }
 
-impl<'a> Bank<'a> {
+impl<'a> HypothesisBank<'a> {
     /// A bank that has whitened nothing yet.
     #[must_use]
     pub fn new(designs: &'a [Design], frame: &'a Frame) -> Self {
@@ -150,11 +150,11 @@ impl<'a> Bank<'a> {
 
     /// A fit seen through exactly this noise.
     #[must_use]
-    pub fn through(&self, fit: &Fit, noise: Arma) -> Stage<'_> {
+    pub fn through(&self, fit: &Fit, noise: Arma) -> WhitenedFit<'_> {
         self.stage(fit, noise, Cow::Owned(self.white(noise)))
     }
 
-    fn stage<'s>(&self, fit: &Fit, noise: Arma, white: Cow<'s, [White]>) -> Stage<'s> {
+    fn stage<'s>(&self, fit: &Fit, noise: Arma, white: Cow<'s, [White]>) -> WhitenedFit<'s> {
         let mut basis = Vec::new();
         for column in &fit.tangent {
             extend_basis(&mut basis, self.frame.whiten(column, noise), 1e-7);
@@ -163,12 +163,12 @@ impl<'a> Bank<'a> {
         project_out(&basis, &mut residual);
         let rss = dot(&residual, &residual);
         let outside = white.iter().map(|white| outside(white, &basis)).collect();
-        Stage { white, basis, residual, rss, outside }
+        WhitenedFit { white, basis, residual, rss, outside }
     }
 
     /// Sum of squares of `target`, which lies outside the basis, that a design explains with lawful signs.
     #[must_use]
-    pub fn explained(&self, stage: &Stage<'_>, design: usize, target: &[f64]) -> f64 {
+    pub fn explained(&self, stage: &WhitenedFit<'_>, design: usize, target: &[f64]) -> f64 {
         let white = &stage.white[design];
         let along: Vec<f64> = white.columns.iter().map(|column| dot(column, target)).collect();
         lawful_gain(&stage.outside[design], &along, &self.designs[design].ranges)
@@ -182,7 +182,7 @@ impl<'a> Bank<'a> {
 }
 
 /// A fit seen through one noise.
-pub struct Stage<'s> {
+pub struct WhitenedFit<'s> {
     white: Cow<'s, [White]>,
     /// Orthonormal basis of the whitened tangent.
     pub basis: Vec<Vec<f64>>,

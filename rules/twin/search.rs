@@ -5,7 +5,7 @@ use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::scan::{Bank, best_of_each_law, likeliest, price_of};
+use super::scan::{HypothesisBank, best_of_each_law, likeliest, price_of};
 use crate::physics::catalogue::dry_friction::slips;
 use crate::physics::catalogue::meter_window::LATE;
 use crate::physics::drive::{is_axis_output, is_power, motion, turns};
@@ -71,7 +71,7 @@ impl Hypothesis {
 }
 
 /// What a search found.
-pub struct Found {
+pub struct SearchResult {
     /// The accepted hypothesis; no members when nothing passed the gate.
     pub best: Hypothesis,
     /// The p-value of each member, in order of acceptance.
@@ -82,7 +82,7 @@ pub struct Found {
     pub refused_p: Option<f64>,
 }
 
-impl Found {
+impl SearchResult {
     /// Do others explain much more than what is named? What they name besides was not worth a name, so that something
     /// real is left, and what is named may be no more than its likeness.
     #[must_use]
@@ -93,13 +93,13 @@ impl Found {
 }
 
 /// A search in progress.
-pub struct Search<'a, 'b> {
+pub struct EffectSearch<'a, 'b> {
     /// The recording.
     pub data: &'a mut Data<'b>,
     /// The baseline fitted alone.
     pub base: &'a Fit,
     /// Every hypothesis.
-    pub bank: &'a Bank<'a>,
+    pub bank: &'a HypothesisBank<'a>,
     /// Logarithm of the number of independent rows.
     pub ln_rows: f64,
     /// Seed of the resampling.
@@ -111,10 +111,10 @@ pub struct Search<'a, 'b> {
     unbent: Option<Vec<Part>>,
 }
 
-impl<'a, 'b> Search<'a, 'b> {
+impl<'a, 'b> EffectSearch<'a, 'b> {
     /// A search that has not begun.
     #[must_use]
-    pub fn new(data: &'a mut Data<'b>, base: &'a Fit, bank: &'a Bank<'a>, seed: u64) -> Self {
+    pub fn new(data: &'a mut Data<'b>, base: &'a Fit, bank: &'a HypothesisBank<'a>, seed: u64) -> Self {
         let rows = count(data.frame.len());
         let ln_rows = (rows / base.noise.inflation()).max(20.0).ln();
         Self { data, base, bank, ln_rows, seed, tried: Vec::new(), standing: 0, unbent: None }
@@ -132,7 +132,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The gate resamples the innovations of the deepest hypothesis: what a later member explains must not count as
     /// noise against an earlier one.
     #[must_use]
-    pub fn run(mut self) -> Found {
+    pub fn run(mut self) -> SearchResult {
         let nothing = Hypothesis { members: Vec::new(), fit: self.base.clone(), information: 0.0 };
         let (first, mut p_values) = self.corroborated(&nothing).unwrap_or((nothing, Vec::new()));
         self.standing = first.members.len();
@@ -161,7 +161,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let best = self.meter_first(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
-        Found { best, p_values, others: self.tried, refused_p }
+        SearchResult { best, p_values, others: self.tried, refused_p }
     }
 
     /// The next hypothesis on the path, swapped to its best, when it brings enough.

@@ -5,7 +5,7 @@ use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::{Fit, fit};
 use super::scan::{price, price_of};
-use super::search::{FIRST_INFORMATION, Found, Hypothesis};
+use super::search::{FIRST_INFORMATION, Hypothesis, SearchResult};
 use super::verdicts::CLASS_INFORMATION;
 use crate::statistics::count;
 
@@ -25,7 +25,7 @@ const OUTPUT_FLOOR: f64 = 0.1;
 
 impl Case<'_> {
     /// Drops members whose remaining part is too small to claim, and those beside others on which the runs disagree.
-    pub(super) fn worth_claiming(&mut self, mut found: Found, base: &Fit, designs: &[Design]) -> Found {
+    pub(super) fn worth_claiming(&mut self, mut found: SearchResult, base: &Fit, designs: &[Design]) -> SearchResult {
         let ln_rows = self.ln_rows(base);
         let mut refunded = 0.0;
         while let Some(position) = self.smallest_unclaimable(&found.best, base, designs) {
@@ -47,7 +47,7 @@ impl Case<'_> {
 
     /// What is left after members were dropped need not be the best of its size: then the best stands in its place. Its
     /// information has the price of the dropped ones taken off still, for what was close to it before stays so.
-    fn take_likelier_of_as_many(&mut self, found: &mut Found, refunded: f64) {
+    fn take_likelier_of_as_many(&mut self, found: &mut SearchResult, refunded: f64) {
         let as_many = found.others.iter().filter(|other| other.members.len() == found.best.members.len());
         let likeliest = as_many.max_by(|a, b| a.information.total_cmp(&b.information));
         let clearly = found.best.information + refunded + CLASS_INFORMATION;

@@ -7,11 +7,11 @@ use crate::physics::state::delayed;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     text: String,
-    law: Law,
+    law: TermKind,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Law {
+enum TermKind {
     One,
     Column(String),
     Power(String, i32),
@@ -28,21 +28,24 @@ impl Term {
     pub fn parse(text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         let law = if trimmed == "one" {
-            Law::One
+            TermKind::One
         } else if let Some((column, power)) = trimmed.split_once('^') {
             let power = power.trim().parse().ok().filter(|power| [2, 3].contains(power));
-            Law::Power(name(column)?, power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?)
+            TermKind::Power(name(column)?, power.ok_or_else(|| format!("{text}: the power must be 2 or 3"))?)
         } else if let Some(inside) = call(trimmed, "sign") {
-            Law::Sign(name(inside)?)
+            TermKind::Sign(name(inside)?)
         } else if let Some(inside) = call(trimmed, "abs") {
-            Law::Abs(name(inside)?)
+            TermKind::Abs(name(inside)?)
         } else if let Some(inside) = call(trimmed, "delay") {
             let (column, delay) =
                 inside.split_once(',').ok_or_else(|| format!("{text}: write delay(column, seconds)"))?;
             let delay = delay.trim().parse().ok().filter(|delay: &f64| delay.is_finite());
-            Law::Delay(name(column)?, delay.ok_or_else(|| format!("{text}: the delay must be a number of seconds"))?)
+            TermKind::Delay(
+                name(column)?,
+                delay.ok_or_else(|| format!("{text}: the delay must be a number of seconds"))?,
+            )
         } else {
-            Law::Column(name(trimmed)?)
+            TermKind::Column(name(trimmed)?)
         };
         Ok(Self { text: trimmed.to_owned(), law })
     }
@@ -57,10 +60,12 @@ impl Term {
     #[must_use]
     pub fn input(&self) -> Option<&str> {
         match &self.law {
-            Law::One => None,
-            Law::Column(name) | Law::Power(name, _) | Law::Sign(name) | Law::Abs(name) | Law::Delay(name, _) => {
-                Some(name)
-            }
+            TermKind::One => None,
+            TermKind::Column(name)
+            | TermKind::Power(name, _)
+            | TermKind::Sign(name)
+            | TermKind::Abs(name)
+            | TermKind::Delay(name, _) => Some(name),
         }
     }
 
@@ -70,11 +75,11 @@ impl Term {
         let Some(input) = self.input() else { return Some(vec![1.0; scene.rows()]) };
         let values = scene.column(input)?;
         Some(match &self.law {
-            Law::One | Law::Column(_) => values.to_vec(),
-            Law::Power(_, power) => values.iter().map(|x| x.powi(*power)).collect(),
-            Law::Sign(_) => values.iter().map(|x| if *x == 0.0 { 0.0 } else { x.signum() }).collect(),
-            Law::Abs(_) => values.iter().map(|x| x.abs()).collect(),
-            Law::Delay(_, delay_s) => delayed(scene, values, *delay_s),
+            TermKind::One | TermKind::Column(_) => values.to_vec(),
+            TermKind::Power(_, power) => values.iter().map(|x| x.powi(*power)).collect(),
+            TermKind::Sign(_) => values.iter().map(|x| if *x == 0.0 { 0.0 } else { x.signum() }).collect(),
+            TermKind::Abs(_) => values.iter().map(|x| x.abs()).collect(),
+            TermKind::Delay(_, delay_s) => delayed(scene, values, *delay_s),
         })
     }
 }

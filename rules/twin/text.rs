@@ -1,6 +1,6 @@
 //! The whole diagnosis in plain words for standard output, in English or Chinese.
 
-use super::diagnosis::{Alternative, Diagnosis, Estimate, Fits, Missing, Shift, Verdict};
+use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
 use super::locate::{Condition, Region};
 use super::words;
 use crate::physics::effect;
@@ -167,7 +167,7 @@ impl Say<'_> {
         lines
     }
 
-    fn estimate(&self, estimate: &Estimate) -> String {
+    fn estimate(&self, estimate: &ParameterEstimate) -> String {
         let (name, unit) = (&estimate.name, if estimate.unit == "1" { "" } else { &estimate.unit });
         let (value, low, high) = (short(estimate.value), short(estimate.low), short(estimate.high));
         self.words(

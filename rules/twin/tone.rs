@@ -49,7 +49,7 @@ pub struct Tone {
 }
 
 /// A spell, and what it tells of its two numbers.
-struct Spell {
+struct ToneSpell {
     rows: Range<usize>,
     cc: f64,
     cs: f64,
@@ -58,7 +58,7 @@ struct Spell {
     sx: f64,
 }
 
-impl Spell {
+impl ToneSpell {
     fn new(rows: Range<usize>, [c, s]: [&[f64]; 2], x: &[f64]) -> Self {
         Self { cc: dot(c, c), cs: dot(c, s), ss: dot(s, s), cx: dot(c, x), sx: dot(s, x), rows }
     }
@@ -104,7 +104,7 @@ pub(super) fn follow(residual: &[f64], turning: &Turning, tone: &Tone) -> Vec<f6
         let whole = 0..rows.len();
         let white = |values: &[f64]| whiten(&values[rows.clone()], std::slice::from_ref(&whole), tone.noise);
         let (white_c, white_s, white_x) = (white(c), white(s), white(residual));
-        let mut spell = Spell { rows: rows.clone(), cc: 0.0, cs: 0.0, ss: 0.0, cx: 0.0, sx: 0.0 };
+        let mut spell = ToneSpell { rows: rows.clone(), cc: 0.0, cs: 0.0, ss: 0.0, cx: 0.0, sx: 0.0 };
         for (row, ((wc, ws), wx)) in rows.zip(white_c.iter().zip(&white_s).zip(&white_x)) {
             let ([cosine, sine], ..) = spell.told(tone.size);
             expected[row] = cosine * c[row] + sine * s[row];
@@ -168,12 +168,13 @@ struct Look<'a> {
 
 impl Look<'_> {
     /// The spells, and the sum of the squares of all innovations without a tone.
-    fn spells(&self, turning: &Turning, noise: Arma) -> (Vec<Spell>, f64) {
+    fn spells(&self, turning: &Turning, noise: Arma) -> (Vec<ToneSpell>, f64) {
         let x = self.frame.whiten(self.residual, noise);
         let [c, s] = [0, 1].map(|of| self.frame.whiten(&turning[of], noise));
         let stretches = self.frame.stretches.iter();
         let rows = stretches.flat_map(|stretch| spells(stretch.clone(), turning, self.rows_max));
-        let told = rows.map(|rows| Spell::new(rows.clone(), [&c[rows.clone()], &s[rows.clone()]], &x[rows])).collect();
+        let told =
+            rows.map(|rows| ToneSpell::new(rows.clone(), [&c[rows.clone()], &s[rows.clone()]], &x[rows])).collect();
         (told, dot(&x, &x))
     }
 

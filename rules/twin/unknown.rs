@@ -9,17 +9,17 @@ use super::agreement::differs_by_run;
 use super::channel::SIMULATED_OUTPUT;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
-use super::empirical::{Factor, as_design};
+use super::empirical::{Multiplier, as_design};
 use super::events::event_designs;
 use super::fit::{Fit, fit};
 use super::gate::p_value;
 use super::localised::end_designs;
-use super::model::{Body, simulate};
+use super::model::{PartFunction, simulate};
 use super::offered::{empirical_designs, products};
 use super::periodic::waves;
 use super::replaceable::LEADING_SHARE;
-use super::scan::{Bank, Score, likeliest, price};
-use super::search::{Found, Hypothesis, P_MAX};
+use super::scan::{HypothesisBank, Score, likeliest, price};
+use super::search::{Hypothesis, P_MAX, SearchResult};
 use super::size::BEYOND_DOUBT_INFORMATION;
 use crate::physics::Role;
 use adapters::channel::ChannelId;
@@ -83,19 +83,19 @@ pub struct Nameless {
 /// speed or what fades through every pass is as good a cause as those with a name.
 pub(super) fn margin(form: &Design, named: f64) -> f64 {
     match &form.part.body {
-        Body::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
+        PartFunction::Empirical(form) if form.is_simple() => SIMPLE_INFORMATION,
         _ => (BETTER_SHARE * named).max(BETTER_INFORMATION),
     }
 }
 
 /// Is it a friction over something, of which a friction that is the same everywhere is part?
 fn is_against_motion(design: &Design) -> bool {
-    matches!(&design.part.body, Body::Empirical(form) if form.factor == Factor::AgainstMotion)
+    matches!(&design.part.body, PartFunction::Empirical(form) if form.factor == Multiplier::AgainstMotion)
 }
 
 /// Is it drawn over the output as a whole?
 fn is_over_output(design: &Design) -> bool {
-    matches!(&design.part.body, Body::Empirical(form) if form.channel == SIMULATED_OUTPUT)
+    matches!(&design.part.body, PartFunction::Empirical(form) if form.channel == SIMULATED_OUTPUT)
 }
 
 /// Is something among the parts of a fit that bends the output as a whole?
@@ -111,7 +111,7 @@ fn has_friction(fit: &Fit) -> bool {
 
 /// An empirical form fitted on top of something.
 #[derive(Clone)]
-pub(super) struct Form {
+pub(super) struct EmpiricalForm {
     pub(super) design: Design,
     pub(super) fit: Fit,
     /// Information over what it was fitted on top of.
@@ -133,7 +133,7 @@ impl Doubt {
 
 /// Why names are withdrawn, whatever a form without a name explains.
 #[derive(Debug, Clone, Copy)]
-struct Withdrawn<'a> {
+struct WithdrawnNames<'a> {
     /// A nameless form replaces the leading one.
     leading: bool,
     /// What the model file excludes, where it explains clearly more.
@@ -144,13 +144,13 @@ struct Withdrawn<'a> {
 
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
 pub(super) struct Yardsticks<'a> {
-    pub(super) bank: Bank<'a>,
+    pub(super) bank: HypothesisBank<'a>,
     of_base: Vec<Score>,
 }
 
 impl Case<'_> {
     /// Weighs what was found against causes without a name.
-    pub(super) fn doubt(&mut self, base: &Fit, found: &mut Found, designs: &[Design], seed: u64) -> Doubt {
+    pub(super) fn doubt(&mut self, base: &Fit, found: &mut SearchResult, designs: &[Design], seed: u64) -> Doubt {
         let _ = simulate(&found.best.fit.parts, &mut self.scene);
         let mut forms = self.empirical_forms();
         let left = [base, &found.best.fit].map(|fit| waves(&self.scene, &self.frame, &fit.residual, fit.noise));
@@ -162,13 +162,13 @@ impl Case<'_> {
             forms.extend(products(&self.scene, &self.frame));
         }
         let frame = self.frame.clone();
-        let bank = Bank::new(&forms, &frame);
+        let bank = HypothesisBank::new(&forms, &frame);
         let of_base = bank.scan(base, self.ln_rows(base));
         let yardsticks = Yardsticks { bank, of_base };
         let replaceable = self.replaceable(base, &found.best, designs, &yardsticks);
         let leading = replaceable.iter().any(|replaceable| replaceable.share >= LEADING_SHARE);
         let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
-        let withdrawn = Withdrawn { leading, excluded: excluded.as_deref(), unnamed: false };
+        let withdrawn = WithdrawnNames { leading, excluded: excluded.as_deref(), unnamed: false };
         let unknown = self.unknown(base, found, &yardsticks, withdrawn, seed);
         let mut beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
         if unknown.is_some() && beside.is_none() {
@@ -176,7 +176,7 @@ impl Case<'_> {
         }
         self.drop_minor(base, found, designs, &yardsticks, replaceable);
         if beside.is_none() && found.leaves_much_unnamed() {
-            let unknown = self.unknown(base, found, &yardsticks, Withdrawn { unnamed: true, ..withdrawn }, seed);
+            let unknown = self.unknown(base, found, &yardsticks, WithdrawnNames { unnamed: true, ..withdrawn }, seed);
             beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
             if unknown.is_some() && beside.is_none() {
                 return Doubt { unknown, nameless: None };
@@ -191,11 +191,11 @@ impl Case<'_> {
     /// The cause without a name as one beside the names, where few names explain nearly as much as it does: no machine
     /// follows a law to the letter, and a free form always explains the rest. Not where it lies over a column of the user's
     /// own, which no law of the catalogue could follow.
-    fn named_nearly_as_well(&self, unknown: &Unknown, found: &Found, designs: &[Design]) -> Option<Nameless> {
+    fn named_nearly_as_well(&self, unknown: &Unknown, found: &SearchResult, designs: &[Design]) -> Option<Nameless> {
         let best = &found.best;
         let few = (1..=NAMES_MAX).contains(&best.members.len());
         let own_column = unknown.fit.parts[self.parts.len()..].iter().any(|part| match &part.body {
-            Body::Empirical(form) => {
+            PartFunction::Empirical(form) => {
                 self.scene.column(&form.channel).is_some() && ChannelId::of(&form.channel).is_none()
             }
             _ => false,
@@ -215,7 +215,7 @@ impl Case<'_> {
             // a tool has been asked for by name.
             let named = ["time_s", "time_in_run_s", "cutting_time_min"];
             forms.retain(|design| match &design.part.body {
-                Body::Empirical(form) => !named.contains(&form.channel.as_str()),
+                PartFunction::Empirical(form) => !named.contains(&form.channel.as_str()),
                 _ => true,
             });
         }
@@ -226,9 +226,9 @@ impl Case<'_> {
     fn unknown(
         &mut self,
         base: &Fit,
-        found: &Found,
+        found: &SearchResult,
         forms: &Yardsticks<'_>,
-        withdrawn: Withdrawn<'_>,
+        withdrawn: WithdrawnNames<'_>,
         seed: u64,
     ) -> Option<Unknown> {
         let best = &found.best;
@@ -247,13 +247,13 @@ impl Case<'_> {
             && alone.information > named + margin(&alone.design, named)
             && !self.is_another_shape(&alone.design, best);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
-        let stands = |given: Form| named + on_top.information - given.information > STANDS_SHARE * named;
+        let stands = |given: EmpiricalForm| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
         let own = self.is_over_own_column(&alone.design, best);
         let unlike = anything && close && !own && self.unlike(&found.best);
         let refined = self.is_another_shape(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
-        let Withdrawn { leading, excluded, unnamed } = withdrawn;
+        let WithdrawnNames { leading, excluded, unnamed } = withdrawn;
         let unnamed = unnamed && alone.information > named;
         let instead = better || unlike || leading || unnamed || excluded.is_some() && alone.information > 0.0;
         if !(doubted || instead) {
@@ -283,13 +283,13 @@ impl Case<'_> {
 
     /// A form with others on top of it, as long as they explain something: one form seldom describes the whole of what is
     /// left, and its rest is no noise to be resampled.
-    fn deepened(&mut self, form: &Form, forms: &Yardsticks<'_>) -> Form {
+    fn deepened(&mut self, form: &EmpiricalForm, forms: &Yardsticks<'_>) -> EmpiricalForm {
         let mut deepest = form.clone();
         for _ in 0..DEEPER_MAX {
             let scores = forms.bank.scan(&deepest.fit, self.ln_rows(&deepest.fit));
             let more = self.best_empirical(&deepest.fit, forms, &scores);
             let Some(more) = more.filter(|more| more.information > UNKNOWN_INFORMATION) else { break };
-            deepest = Form { fit: more.fit, information: deepest.information + more.information, ..deepest };
+            deepest = EmpiricalForm { fit: more.fit, information: deepest.information + more.information, ..deepest };
         }
         deepest
     }
@@ -297,13 +297,19 @@ impl Case<'_> {
     /// A peak at one speed, or what fades through every pass, that fits as well as all that is named: then the recording
     /// does not tell that the name is right. Prices are left out, for where a peak stands and how wide it is is nothing
     /// that a recording of a few speeds could tell.
-    fn nameless(&mut self, base: &Fit, found: &Found, designs: &[Design], forms: &Yardsticks<'_>) -> Option<Nameless> {
+    fn nameless(
+        &mut self,
+        base: &Fit,
+        found: &SearchResult,
+        designs: &[Design],
+        forms: &Yardsticks<'_>,
+    ) -> Option<Nameless> {
         let best = &found.best;
         if best.members.is_empty() {
             return None;
         }
         let simple = |score: &&Score| match &forms.bank.designs[score.design].part.body {
-            Body::Empirical(form) => form.is_simple() && score.gain.is_finite(),
+            PartFunction::Empirical(form) => form.is_simple() && score.gain.is_finite(),
             _ => false,
         };
         let likeliest = forms.of_base.iter().filter(simple).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
@@ -335,7 +341,7 @@ impl Case<'_> {
     /// that effect's.
     pub(super) fn is_another_shape(&self, empirical: &Design, named: &Hypothesis) -> bool {
         let of_velocity = match &empirical.part.body {
-            Body::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
+            PartFunction::Empirical(form) => Some(form.channel.as_str()) == self.scene.role_name(Role::Velocity),
             _ => false,
         };
         (of_velocity || is_against_motion(empirical)) && has_friction(&named.fit)
@@ -345,14 +351,19 @@ impl Case<'_> {
 
     /// Does it bend over a column that only an effect among the named ones follows?
     fn is_over_own_column(&self, empirical: &Design, named: &Hypothesis) -> bool {
-        let Body::Empirical(form) = &empirical.part.body else { return false };
+        let PartFunction::Empirical(form) = &empirical.part.body else { return false };
         let members = &named.fit.parts[named.first_part()..];
         let mut own = members.iter().filter_map(|part| part.effect_and_form()?.0.own_column(&self.scene));
         own.any(|column| column == form.channel)
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    pub(super) fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<Form> {
+    pub(super) fn best_empirical(
+        &mut self,
+        from: &Fit,
+        forms: &Yardsticks<'_>,
+        scores: &[Score],
+    ) -> Option<EmpiricalForm> {
         let best = likeliest(scores)?;
         let design = self.sharpened(from, &forms.bank.designs[best.design], best.gain);
         self.with_form(from, &design)
@@ -364,10 +375,10 @@ impl Case<'_> {
         let mut best = (gain, design.clone());
         for step in SHARPENING {
             for _ in 0..SHARPENINGS_MAX {
-                let Body::Empirical(form) = &best.1.part.body else { return best.1 };
+                let PartFunction::Empirical(form) = &best.1.part.body else { return best.1 };
                 let near = form.neighbours(step).into_iter();
                 let near: Vec<Design> = near.filter_map(|form| as_design(form, &self.scene, &self.frame)).collect();
-                let bank = Bank::new(&near, &self.frame);
+                let bank = HypothesisBank::new(&near, &self.frame);
                 let scores = bank.scan(from, self.ln_rows(from));
                 let Some(next) = scores.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else { return best.1 };
                 if next.gain.is_nan() || next.gain < best.0 + SHARPER {
@@ -380,12 +391,12 @@ impl Case<'_> {
     }
 
     /// An empirical form on top of `from`, fitted in full.
-    pub(super) fn with_form(&mut self, from: &Fit, design: &Design) -> Option<Form> {
+    pub(super) fn with_form(&mut self, from: &Fit, design: &Design) -> Option<EmpiricalForm> {
         let mut parts = from.parts.clone();
         parts.push(design.part.clone());
         let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
         let gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
         let information = gain - price(design, self.ln_rows(from));
-        Some(Form { design: design.clone(), fit, information })
+        Some(EmpiricalForm { design: design.clone(), fit, information })
     }
 }

@@ -1,12 +1,12 @@
 //! The verdict: names, intervals, alternatives, regions, the next experiment, and the sentence for the machinist.
 
 use super::diagnose::Case;
-use super::diagnosis::{Alternative, Diagnosis, Estimate, Experiment, Missing, Rows, Shift, Verdict};
+use super::diagnosis::{Alternative, Diagnosis, Experiment, Missing, ParameterEstimate, Rows, Shift, Verdict};
 use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::misnamed::ENTRY;
-use super::model::{Body, Model, Part, simulate};
+use super::model::{Model, Part, PartFunction, simulate};
 use super::outcome::Outcome;
 use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
@@ -144,7 +144,7 @@ fn missing(case: &mut Case<'_>, outcome: &Outcome) -> Vec<Missing> {
         for (number, part) in fit.parts.iter().enumerate().skip(case.parts.len() + 1) {
             let more = described(case, outcome, fit, part, number);
             found[0].equation = format!("{}; {}", found[0].equation, more.equation);
-            let named = |e: Estimate| Estimate { name: format!("{}.{}", part.label(), e.name), ..e };
+            let named = |e: ParameterEstimate| ParameterEstimate { name: format!("{}.{}", part.label(), e.name), ..e };
             found[0].parameters.extend(more.parameters.into_iter().map(named));
         }
         if let Some(excluded) = &unknown.excluded {
@@ -199,16 +199,16 @@ fn described(case: &Case<'_>, outcome: &Outcome, fit: &Fit, part: &Part, index: 
 
 fn texts(part: &Part) -> (String, String) {
     match &part.body {
-        Body::Empirical(form) => (
+        PartFunction::Empirical(form) => (
             "Something real that no effect of the catalogue explains; described by its shape only".to_owned(),
             form.equation(),
         ),
-        Body::Expression(expression) => ("The user's hypothesis".to_owned(), expression.text().to_owned()),
-        Body::Effect(effect, form) => {
+        PartFunction::Expression(expression) => ("The user's hypothesis".to_owned(), expression.text().to_owned()),
+        PartFunction::Effect(effect, form) => {
             let place = form.place.as_ref().map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
             (format!("{}{place}", effect.doc().en.statement), effect.doc().law.to_owned())
         }
-        Body::Linear(_) | Body::Table(_) => (part.kind.clone(), part.kind.clone()),
+        PartFunction::Linear(_) | PartFunction::Table(_) => (part.kind.clone(), part.kind.clone()),
     }
 }
 

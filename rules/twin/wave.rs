@@ -103,11 +103,11 @@ const SETTLED: f64 = 1e-9;
 /// each, without further noise. Its gains do not depend on the data: they are computed once, until they settle.
 struct Gains {
     turn: Matrix,
-    gains: Vec<Gain>,
+    gains: Vec<KalmanGain>,
 }
 
 /// The gain of one row.
-struct Gain {
+struct KalmanGain {
     /// How far the state moves per unit of what was not expected.
     along: Vector,
     /// Variance of what was not expected.
@@ -122,13 +122,13 @@ impl Gains {
     fn new(wave: &Wave, rows: usize) -> Self {
         let (turn, renewal, mut covariance) = system(wave);
         let back = transposed(&turn);
-        let mut gains: Vec<Gain> = Vec::new();
+        let mut gains: Vec<KalmanGain> = Vec::new();
         for _ in 0..rows {
             let sum_along: Vector = std::array::from_fn(|i| covariance[i][0] + covariance[i][2]);
             let variance = (sum_along[0] + sum_along[2]).max(1e-12);
             let along = sum_along.map(|x| x / variance);
             let settled = gains.last().is_some_and(|last| (last.variance - variance).abs() < SETTLED * variance);
-            gains.push(Gain { along, variance, ln_variance: variance.ln(), covariance: covariance[0] });
+            gains.push(KalmanGain { along, variance, ln_variance: variance.ln(), covariance: covariance[0] });
             if settled {
                 break;
             }
@@ -139,12 +139,12 @@ impl Gains {
         Self { turn, gains }
     }
 
-    fn at(&self, row: usize) -> &Gain {
+    fn at(&self, row: usize) -> &KalmanGain {
         &self.gains[row.min(self.gains.len() - 1)]
     }
 
     /// Takes a row into the state; returns what was not expected.
-    fn update(&self, state: &mut Vector, x: f64, gain: &Gain) -> f64 {
+    fn update(&self, state: &mut Vector, x: f64, gain: &KalmanGain) -> f64 {
         let error = x - state[0] - state[2];
         let moved: Vector = std::array::from_fn(|i| state[i] + gain.along[i] * error);
         *state = apply(&self.turn, &moved);

@@ -2,7 +2,7 @@
 
 use super::diagnosis::{Diagnosis, Verdict};
 use super::locate::Condition;
-use super::outcome::Withdrawn;
+use super::outcome::FailedHoldout;
 
 /// One or two sentences for the machinist.
 #[must_use]
@@ -33,7 +33,7 @@ pub fn summary(diagnosis: &Diagnosis) -> String {
 
 /// Why nothing is told although something was found in the fitted runs.
 #[must_use]
-pub(super) fn withdrawn(withdrawn: &Withdrawn, unit: &str) -> String {
+pub(super) fn withdrawn(withdrawn: &FailedHoldout, unit: &str) -> String {
     let names: Vec<String> = withdrawn.kinds.iter().map(|kind| kind.replace('_', " ")).collect();
     let what = if names.is_empty() { "something without a name".to_owned() } else { names.join(" and ") };
     let runs = if withdrawn.among_fitted {

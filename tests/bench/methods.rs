@@ -7,9 +7,9 @@ use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rules::estimators::spindle_current::{
-    Cubic, CurveAtDepth, Design, Family, FeatureKind, PhaseFeature, Span, ThreePhase,
+    Cubic, CurveAtDepth, CurveFamily, FeatureKind, LowPassDesign, PhaseFeature, ThreePhase, WindowSpan,
 };
-use rules::estimators::thermal::{Path, Predictor, Term, ThermalLaw};
+use rules::estimators::thermal::{Path, Predictor, ThermalLaw, ThermalTerm};
 use rules::estimators::{Inference, Settings, balance};
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -42,8 +42,9 @@ criterion_main!(methods);
 
 /// 1 kHz, 33 Hz: filter of 4th order and feature of each of three phases.
 fn three_phases(criterion: &mut Criterion) {
-    let design = Design::low_pass(350.0, 1000.0).expect("a filter");
-    let spans = [("zero crossings", Span::Crossings { least_a: 0.2 }), ("from speed", Span::Known { hz: 33.0 })];
+    let design = LowPassDesign::low_pass(350.0, 1000.0).expect("a filter");
+    let spans =
+        [("zero crossings", WindowSpan::Crossings { least_a: 0.2 }), ("from speed", WindowSpan::Known { hz: 33.0 })];
     let waves: Vec<[f64; 3]> = (0..1000_u32)
         .map(|n| [0.0, 1.0, 2.0].map(|lag| 8.0 * (TAU * (33.0 * f64::from(n) / 1000.0 - lag / 3.0)).sin()))
         .collect();
@@ -63,7 +64,7 @@ fn constant_load(criterion: &mut Criterion) {
         curve: Cubic { coefficients: [1.4 + 0.05 * h, 0.7 * h, 0.35 * h, 0.08 * h], feed_min: 0.2, feed_max: 3.0 },
         sd: 0.02,
     };
-    let family = Family::new([0.4, 0.8, 1.2, 1.6].map(curve).to_vec()).expect("a family");
+    let family = CurveFamily::new([0.4, 0.8, 1.2, 1.6].map(curve).to_vec()).expect("a family");
     measure(criterion, "depth from feed and feature, feed for a wanted feature", |step| {
         let feature = 2.0 + 0.25 * (step % 7) as f64;
         let feed = family.depth(1.1, feature, 0.02).and_then(|depth| family.feed(depth.depth_mm, 2.5));
@@ -74,7 +75,7 @@ fn constant_load(criterion: &mut Criterion) {
 /// A law of 13 points, all of them through a lag.
 fn thermal(criterion: &mut Criterion) {
     let names: Vec<String> = (1..=13).map(|point| format!("temperature_{point}_c")).collect();
-    let term = |name: &String| Term {
+    let term = |name: &String| ThermalTerm {
         sensor: name.clone(),
         path: Path::Lagged,
         um_per_k: 0.7,

@@ -2,14 +2,14 @@
 
 use super::process::{Gateway, get, run, stderr, text, wait_for};
 use gateway::history::store_wear_model;
-use rules::estimators::wear::{Conditions, Cut, Key, WearModel, WearRecord, fit_physical};
+use rules::estimators::wear::{Cut, CutConditions, WearKey, WearModel, WearRecord, fit_physical};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
 /// Roughly what the cuts of the simulated lathe take, W.
-fn law(conditions: &Conditions) -> f64 {
+fn law(conditions: &CutConditions) -> f64 {
     let [wear, speed, feed, depth] = conditions.vector();
     (980.0 * feed.powf(0.75) * (speed / 150.0).powf(-0.08) + 22.0 + 190.0 * wear) * depth * speed / 60.0
 }
@@ -20,14 +20,14 @@ fn record(criterion_mm: f64) -> WearRecord {
     for (index, wear) in [0.0, 0.2, 0.4, 0.6].into_iter().enumerate() {
         for speed in [120.0, 190.0, 260.0] {
             for (feed, depth) in [(0.09, 0.3), (0.16, 1.0), (0.26, 2.0), (0.26, 0.3), (0.09, 2.0)] {
-                let conditions = Conditions::of([wear, speed, feed, depth]);
+                let conditions = CutConditions::of([wear, speed, feed, depth]);
                 let scatter = if (cuts.len() + index).is_multiple_of(2) { 4.0 } else { -4.0 };
                 cuts.push(Cut { conditions, cutting_power_w: law(&conditions) + scatter });
             }
         }
     }
     let found = fit_physical(&cuts, &[]).expect("a fit");
-    let key = Key { machine: "Lathe".to_owned(), ..Key::default() };
+    let key = WearKey { machine: "Lathe".to_owned(), ..WearKey::default() };
     WearRecord::new(key, criterion_mm, ("test".to_owned(), cuts.len(), found.r2), WearModel::Physical(found.physical))
 }
 

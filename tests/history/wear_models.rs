@@ -2,11 +2,11 @@
 
 use crate::round_trip::options;
 use gateway::history::{Reader, Writer, store_wear_model};
-use rules::estimators::wear::{Key, WearModel, WearRecord, published};
+use rules::estimators::wear::{WearKey, WearModel, WearRecord, published};
 use std::path::Path;
 
 fn record(tool: &str, criterion_mm: f64) -> WearRecord {
-    let key = Key {
+    let key = WearKey {
         machine: "CHK460".to_owned(),
         tool: tool.to_owned(),
         work_material: "45# steel".to_owned(),

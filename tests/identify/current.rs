@@ -15,7 +15,9 @@ use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use rules::estimators::regression::RefusalKind;
-use rules::estimators::spindle_current::{Design, FeatureKind, PhaseFeature, Span, ThreePhase, identify_feed_curve};
+use rules::estimators::spindle_current::{
+    FeatureKind, LowPassDesign, PhaseFeature, ThreePhase, WindowSpan, identify_feed_curve,
+};
 use rules::script::{Host, ScriptFile};
 use std::f64::consts::TAU;
 
@@ -26,8 +28,8 @@ const FEEDS: [f64; 8] = [0.4, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8, 3.2];
 /// A cut at one feed: 33 Hz with a fifth harmonic, hum of the inverter, an offset of the sensors, and an amplitude that
 /// differs from cut to cut and wanders within one. Mean feature of each period, once per row.
 fn currents(dice: &mut Pcg64Mcg, amplitude_a: f64, seconds: u32) -> Vec<f64> {
-    let design = Design::low_pass(350.0, 1000.0).expect("the filter of the source");
-    let span = Span::Crossings { least_a: 0.2 };
+    let design = LowPassDesign::low_pass(350.0, 1000.0).expect("the filter of the source");
+    let span = WindowSpan::Crossings { least_a: 0.2 };
     let phase = PhaseFeature::new(FeatureKind::MeanAbsolute, span, 4, 1000.0).expect("a feature");
     let mut three = ThreePhase::new(&design, phase);
     let of_this_cut = 1.0 + 0.004 * dice.sample::<f64, _>(StandardNormal);
@@ -50,7 +52,7 @@ fn currents(dice: &mut Pcg64Mcg, amplitude_a: f64, seconds: u32) -> Vec<f64> {
 
 /// Mean absolute value of the filtered wave of amplitude 1, by adding up many points of one period.
 fn per_amplitude() -> f64 {
-    let design = Design::low_pass(350.0, 1000.0).expect("the filter of the source");
+    let design = LowPassDesign::low_pass(350.0, 1000.0).expect("the filter of the source");
     let gain = |hz: f64| 10_f64.powf(design.gain_db(hz) / 20.0);
     let wave = |phase: f64| gain(33.0) * phase.sin() + 0.05 * gain(165.0) * (5.0 * phase).sin();
     (0..10_000).map(|k| wave(TAU * f64::from(k) / 10_000.0).abs()).sum::<f64>() / 10_000.0

@@ -9,8 +9,8 @@ use adapters::recording::{Cells, Numbers, Words};
 use adapters::simulated::{ExperimentCut, ExperimentStep};
 use gateway::diagnosis::execute;
 use rules::estimators::wear::{
-    Array, Columns, Conditions, Cut, FACTORS, Fitted, Levels, WearModel, WearOptions, estimate_wear, fit_physical,
-    gather, identify_tool_wear, plan, threshold,
+    Array, Cut, CutColumns, CutConditions, FACTORS, FactorLevels, FittedNumber, WearModel, WearOptions, estimate_wear,
+    fit_physical, gather, identify_tool_wear, plan, threshold,
 };
 
 const DIAMETER_MM: f64 = 60.0;
@@ -20,20 +20,25 @@ const AIR_S: f64 = 14.0;
 const CUT_S: f64 = 14.0;
 
 /// The cutting law of the simulated lathe at nominal hardness, W; W per mm of wear comes with it.
-fn law(conditions: &Conditions) -> f64 {
+fn law(conditions: &CutConditions) -> f64 {
     let [wear, speed, feed, depth] = conditions.vector();
     let force_n = (980.0 * feed.powf(0.75) * (speed / 150.0).powf(-0.08) + 22.0 + 190.0 * wear) * depth;
     force_n * speed / 60.0
 }
 
-fn planned() -> Vec<Conditions> {
+fn planned() -> Vec<CutConditions> {
     let levels = [WEARS_MM.to_vec(), vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.25, 1.75]];
-    let factors: Vec<Levels> = FACTORS.iter().zip(levels).map(|(factor, values)| Levels { factor, values }).collect();
+    let factors: Vec<FactorLevels> =
+        FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
     let design = plan(Array::L27, &factors, 1).expect("a design");
-    design.cuts.iter().map(|cut| Conditions::of([cut.values[0], cut.values[1], cut.values[2], cut.values[3]])).collect()
+    design
+        .cuts
+        .iter()
+        .map(|cut| CutConditions::of([cut.values[0], cut.values[1], cut.values[2], cut.values[3]]))
+        .collect()
 }
 
-fn step(cut: &Conditions) -> ExperimentStep {
+fn step(cut: &CutConditions) -> ExperimentStep {
     let rpm = 1000.0 * cut.cutting_speed_m_min / (std::f64::consts::PI * DIAMETER_MM);
     let planned = ExperimentCut {
         feed_mm_min: cut.feed_per_rev_mm * rpm,
@@ -56,7 +61,7 @@ const NAMES: [&str; 6] =
 
 /// The cuts of one wear on one machine: the meter's power in the cut less that in the air before, less the load loss (which
 /// `identify load-loss` is about and which counts as known here).
-fn cuts_of(seed: u64, wear_mm: f64, cuts: &[Conditions], table: &mut Table) {
+fn cuts_of(seed: u64, wear_mm: f64, cuts: &[CutConditions], table: &mut Table) {
     let settings = adapters::simulated::SimulatedSettings { wear_mm, ..lathe(seed) };
     let steps: Vec<ExperimentStep> =
         cuts.iter().flat_map(|cut| [idle(AIR_S, step(cut).spindle_rpm, 1), step(cut)]).collect();
@@ -93,7 +98,7 @@ fn cuts_of(seed: u64, wear_mm: f64, cuts: &[Conditions], table: &mut Table) {
 fn table(seed: u64) -> Recording {
     let mut table = Table::default();
     for wear_mm in WEARS_MM {
-        let cuts: Vec<Conditions> = planned().into_iter().filter(|cut| cut.flank_wear_mm == wear_mm).collect();
+        let cuts: Vec<CutConditions> = planned().into_iter().filter(|cut| cut.flank_wear_mm == wear_mm).collect();
         cuts_of(seed, wear_mm, &cuts, &mut table);
     }
     let rows = table.runs.len();
@@ -107,7 +112,7 @@ fn table(seed: u64) -> Recording {
 }
 
 /// The numbers of the fitted form that come nearest to the machine's own law at the planned cuts.
-fn nearest() -> Vec<Fitted> {
+fn nearest() -> Vec<FittedNumber> {
     let cuts: Vec<Cut> =
         planned().into_iter().map(|conditions| Cut { conditions, cutting_power_w: law(&conditions) }).collect();
     fit_physical(&cuts, &[]).expect("a fit").coefficients
@@ -118,9 +123,9 @@ fn coverage(repetitions: u64) {
     let mut numbers: Vec<Coverage> = truths.iter().map(|it| Coverage::new(format!("tool wear: {}", it.name))).collect();
     let mut limits = Coverage::new("tool wear: [Pc] of a single cut, W");
     let mut wears = Coverage::new("tool wear: wear from the power of a single cut, mm");
-    let free = Conditions::of([0.24, 105.0, 0.125, 1.5]);
+    let free = CutConditions::of([0.24, 105.0, 0.125, 1.5]);
     for seed in 1..=repetitions {
-        let gathered = gather(&table(seed), &Columns::default()).expect("cuts");
+        let gathered = gather(&table(seed), &CutColumns::default()).expect("cuts");
         assert_eq!(gathered.cuts.len(), 27);
         let found = fit_physical(&gathered.cuts, &[]).expect("a fit");
         for ((one, truth), count) in found.coefficients.iter().zip(&truths).zip(&mut numbers) {
@@ -145,7 +150,7 @@ fn reference_scale(reference: &[f64; 3]) -> f64 {
         let cuts = planned();
         (cuts.iter().map(|cut| cut.vector()[at].ln()).sum::<f64>() / cuts.len() as f64).exp()
     };
-    let sharp = |at: [f64; 3]| law(&Conditions::of([0.0, at[0], at[1], at[2]]));
+    let sharp = |at: [f64; 3]| law(&CutConditions::of([0.0, at[0], at[1], at[2]]));
     sharp(*reference) / sharp([middle(1), middle(2), middle(3)])
 }
 
@@ -200,14 +205,14 @@ fn the_command_fits_both_forms_and_keeps_the_model_in_the_library() {
 fn tables_that_cannot_tell_are_refused_with_what_is_needed() {
     let directory = tempfile::tempdir().expect("a directory");
     let good = "time_s,flank_wear_mm,cutting_speed_m_min,feed_per_rev_mm,depth_of_cut_mm,cutting_power_w\n";
-    let rows = |change: &dyn Fn(&Conditions) -> [f64; 5]| {
-        let line = |(index, cut): (usize, &Conditions)| {
+    let rows = |change: &dyn Fn(&CutConditions) -> [f64; 5]| {
+        let line = |(index, cut): (usize, &CutConditions)| {
             let values = change(cut).map(|value| value.to_string());
             format!("{index},{}\n", values.join(","))
         };
         format!("{good}{}", planned().iter().enumerate().map(line).collect::<String>())
     };
-    let all = |cut: &Conditions| {
+    let all = |cut: &CutConditions| {
         let [wear, speed, feed, depth] = cut.vector();
         [wear, speed, feed, depth, law(cut)]
     };
@@ -285,7 +290,7 @@ fn a_work_list_is_printed_and_comes_back_as_a_table() {
         .map(|(at, line)| {
             let cells: Vec<f64> = line.split(',').skip(2).take(4).filter_map(|cell| cell.parse().ok()).collect();
             match cells[..] {
-                [a, b, c, d] if at > 0 => format!("{line}{}\n", law(&Conditions::of([a, b, c, d]))),
+                [a, b, c, d] if at > 0 => format!("{line}{}\n", law(&CutConditions::of([a, b, c, d]))),
                 _ => format!("{line}\n"),
             }
         })
@@ -297,7 +302,7 @@ fn a_work_list_is_printed_and_comes_back_as_a_table() {
 
 #[test]
 fn both_forms_are_compared_on_cuts_that_they_have_not_seen() {
-    let gathered = gather(&table(2), &Columns::default()).expect("cuts");
+    let gathered = gather(&table(2), &CutColumns::default()).expect("cuts");
     let learned = identify_tool_wear(gathered.cuts, &WearOptions::default()).expect("both");
     println!("{learned}");
     let [surface, physical] = &learned.comparison.forms;

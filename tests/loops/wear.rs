@@ -9,7 +9,7 @@ use super::bench::{Bench, limits, script};
 use super::steps::{DIAMETER_MM, SPEED_RPM, air, cut};
 use adapters::simulated::{ExperimentCut, ExperimentStep, SimulatedSettings};
 use rules::estimators::State;
-use rules::estimators::wear::{Conditions, Cut, Physical, fit_physical};
+use rules::estimators::wear::{Cut, CutConditions, Physical, fit_physical};
 use rules::script::ScriptFile;
 use std::f64::consts::PI;
 
@@ -68,7 +68,7 @@ fn design(wear_mm: f64, seed: u64) -> Vec<Cut> {
     }
     let of = |(index, (rpm, feed_mm_min, depth_mm)): (usize, (f64, f64, f64))| {
         let (count, power, wear) = sums[2 * index + 3];
-        let conditions = Conditions::of([wear / count, speed_m_min(rpm), feed_mm_min / rpm, depth_mm]);
+        let conditions = CutConditions::of([wear / count, speed_m_min(rpm), feed_mm_min / rpm, depth_mm]);
         (count > 60.0).then_some(Cut { conditions, cutting_power_w: power / (count - 40.0) })
     };
     plan.into_iter().enumerate().filter_map(of).collect()

@@ -4,7 +4,7 @@
 use super::bench::{Bench, limits};
 use adapters::address::SimulatedMachine;
 use adapters::simulated::SimulatedSettings;
-use rules::estimators::wear::{Key, WearModel, WearRecord};
+use rules::estimators::wear::{WearKey, WearModel, WearRecord};
 use rules::script::shipped;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -104,7 +104,7 @@ fn score(name: &str, shifts: &[Shift]) -> usize {
 
 fn record() -> WearRecord {
     let model = WearModel::Physical(super::wear::model());
-    WearRecord::new(Key::default(), CRITERION_MM, ("test".to_owned(), 36, 1.0), model)
+    WearRecord::new(WearKey::default(), CRITERION_MM, ("test".to_owned(), 36, 1.0), model)
 }
 
 /// Runs so many seeds on both cores.

@@ -1,7 +1,7 @@
 //! Constant-load feed control on the spindle current (DM4600): filter, feature window, cubic and its inverse.
 
 use crate::Row;
-use rules::estimators::spindle_current::{Cubic, Design, FeatureKind, PhaseFeature, Span};
+use rules::estimators::spindle_current::{Cubic, FeatureKind, LowPassDesign, PhaseFeature, WindowSpan};
 use std::f64::consts::TAU;
 
 const B: [f64; 5] = [0.27541329, 1.10165315, 1.65247973, 1.10165315, 0.27541329];
@@ -39,7 +39,7 @@ pub(crate) fn rows() -> Vec<Row> {
 }
 
 fn filter() -> Vec<Row> {
-    let design = Design::low_pass(350.0, 1000.0).expect("the filter of the source");
+    let design = LowPassDesign::low_pass(350.0, 1000.0).expect("the filter of the source");
     let source = "001, Butterworth 350 Hz, 1 kHz";
     let (b, a) = design.polynomials();
     let mut rows = Vec::new();
@@ -73,7 +73,7 @@ fn spread(values: &[f64]) -> f64 {
 }
 
 /// The same of the feature as it is built here.
-fn ripple_of_feature(span: Span) -> f64 {
+fn ripple_of_feature(span: WindowSpan) -> f64 {
     let mut feature = PhaseFeature::new(FeatureKind::MeanAbsolute, span, 2, 1000.0).expect("a feature");
     let current = |n: i32| 10.0 * (TAU * f64::from(n) / 30.0 + 0.3).sin();
     let values: Vec<f64> = (0..3000).filter_map(|n| feature.push(current(n))).map(|found| found.value).collect();
@@ -91,9 +91,9 @@ fn window() -> Vec<Row> {
         })
         .collect();
     rows.push(Row::new("ripple of mean |i|, 30 samples, %", 0.01, ripple(30), 0.01, source));
-    let crossings = ripple_of_feature(Span::Crossings { least_a: 0.1 });
+    let crossings = ripple_of_feature(WindowSpan::Crossings { least_a: 0.1 });
     rows.push(Row::new("ripple of our feature, zero crossings, %", 0.01, crossings, 0.01, source));
-    let known = ripple_of_feature(Span::of_speed(1000.0, 2).expect("a frequency"));
+    let known = ripple_of_feature(WindowSpan::of_speed(1000.0, 2).expect("a frequency"));
     rows.push(Row::new("ripple of our feature, from 1000 rpm, 2 pole pairs, %", 0.01, known, 0.01, source));
     rows
 }

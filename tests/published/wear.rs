@@ -2,7 +2,7 @@
 
 use crate::Row;
 use rules::estimators::wear::{
-    Array, Coding, Conditions, Cut, SurfaceOptions, WearModel, estimate_wear, fit_surface, published, published_over,
+    Array, Coding, Cut, CutConditions, SurfaceOptions, WearModel, estimate_wear, fit_surface, published, published_over,
 };
 
 const SOURCE: &str = "004";
@@ -133,7 +133,7 @@ fn fitted() -> Vec<Row> {
 fn inverse() -> Vec<Row> {
     let surface = published_over(coding());
     let model = WearModel::Surface(surface.clone());
-    let middle = Conditions::of([0.0, 120.0, 0.15, 1.0]);
+    let middle = CutConditions::of([0.0, 120.0, 0.15, 1.0]);
     let power_w = surface.predict(&middle.with_wear(0.276)).power_w;
     let found = estimate_wear(&model, &middle, (power_w, 0.0), 0.3).expect("a wear");
     let slope = surface.wear_slope_w_per_mm(&middle);

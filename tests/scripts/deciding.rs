@@ -42,7 +42,7 @@ fn a_comparison_with_a_missing_value_is_false_and_arithmetic_waits() {
     assert_eq!(request(&mut host, 0.0, &[("spindle_load_pct", 70.0)]), Some(80.0));
     assert_eq!(request(&mut host, 0.1, &[]), None, "a request does not outlive its reason");
     let status = host.status();
-    let Condition::Waiting(problem) = &status.scripts[0].condition else { panic!("{status:?}") };
+    let ScriptCondition::Waiting(problem) = &status.scripts[0].condition else { panic!("{status:?}") };
     assert_eq!(
         problem.to_string(),
         "test.rhai:1:29: spindle_load_pct has no value (not_provided)\n    \

@@ -4,7 +4,7 @@ use super::*;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rules::script::{
-    Place, SettingValue, SettingValues, compile_with, declarations, prepare, prepare_with, shipped, trials,
+    DeclarationPlace, SettingValue, SettingValues, compile_with, declarations, prepare, prepare_with, shipped, trials,
 };
 
 /// What is wrong with one shipped script under these values; empty where nothing is.
@@ -32,7 +32,7 @@ fn every_setting_at_the_ends_of_its_range_and_at_twenty_random_points_leaves_its
         for setting in &declared {
             let mut put = |value: SettingValue| {
                 let mut values = SettingValues::default();
-                values.put(setting.section(), &setting.name, &Place::Machine, Some(value.clone()));
+                values.put(setting.section(), &setting.name, &DeclarationPlace::Machine, Some(value.clone()));
                 try_with(&values, &format!("{} = {value}", setting.path()));
             };
             match setting.range {
@@ -45,7 +45,12 @@ fn every_setting_at_the_ends_of_its_range_and_at_twenty_random_points_leaves_its
             for (setting, (least, greatest)) in declared.iter().filter_map(|it| Some((it, it.range?))) {
                 let number: f64 = random.random_range(least..=greatest);
                 let number = if setting.whole { number.round() } else { number };
-                values.put(setting.section(), &setting.name, &Place::Machine, Some(SettingValue::Number(number)));
+                values.put(
+                    setting.section(),
+                    &setting.name,
+                    &DeclarationPlace::Machine,
+                    Some(SettingValue::Number(number)),
+                );
             }
             try_with(&values, &values.text());
         }

@@ -16,7 +16,7 @@ mod wear;
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
 use rules::estimators::{Estimate, Estimates, State};
-use rules::script::{Condition, Host, Problem, ScriptFile, compile};
+use rules::script::{Host, ScriptCondition, ScriptFile, ScriptProblem, compile};
 
 fn file(name: &str, text: &str) -> ScriptFile {
     ScriptFile { name: name.to_owned(), text: text.to_owned() }
@@ -29,7 +29,7 @@ fn host(text: &str) -> Host {
     host
 }
 
-fn told(problems: &[Problem]) -> String {
+fn told(problems: &[ScriptProblem]) -> String {
     problems.iter().map(|problem| format!("{problem}\n")).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use super::{file, host, sample, told};
 use rules::estimators::Estimates;
-use rules::script::{Condition, Host, compile};
+use rules::script::{Host, ScriptCondition, compile};
 
 /// The notes of one run of a script.
 fn notes(text: &str, values: &[(&str, f64)]) -> Vec<String> {
@@ -66,7 +66,7 @@ fn a_script_that_computes_with_the_missing_number_waits_and_says_why() {
     host.tick(&sample, &Estimates::none(sample.at_ns));
     let status = host.status();
     match &status.scripts[0].condition {
-        Condition::Waiting(problem) => assert!(problem.what.contains("noise gain 33.6"), "{problem}"),
+        ScriptCondition::Waiting(problem) => assert!(problem.what.contains("noise gain 33.6"), "{problem}"),
         other => panic!("{other:?}"),
     }
 }
@@ -83,5 +83,5 @@ fn a_mistake_in_a_call_is_told_before_the_script_runs_or_stops_it() {
     let mut host = host("let x = feed_curve_feed(7, 1.0, 2.0);");
     let sample = sample(1.0, &[]);
     host.tick(&sample, &Estimates::none(sample.at_ns));
-    assert!(matches!(host.status().scripts[0].condition, Condition::Suspended(Some(_))));
+    assert!(matches!(host.status().scripts[0].condition, ScriptCondition::Suspended(Some(_))));
 }

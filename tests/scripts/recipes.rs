@@ -2,7 +2,8 @@
 
 use super::*;
 use rules::script::{
-    Place, RECIPES, SettingValue, SettingValues, compile_with, declarations, prepare_with, recipe, shipped, trials,
+    DeclarationPlace, RECIPES, SettingValue, SettingValues, compile_with, declarations, prepare_with, recipe, shipped,
+    trials,
 };
 
 /// A recipe beside teach, whose channels some of them read.
@@ -29,7 +30,12 @@ fn at_least_twelve_recipes_pass_their_trials_at_every_end_of_their_settings() {
         for setting in declarations(&files[..1]).expect("readable") {
             for number in setting.range.into_iter().flat_map(|(least, greatest)| [least, greatest]) {
                 let mut values = SettingValues::default();
-                values.put(setting.section(), &setting.name, &Place::Machine, Some(SettingValue::Number(number)));
+                values.put(
+                    setting.section(),
+                    &setting.name,
+                    &DeclarationPlace::Machine,
+                    Some(SettingValue::Number(number)),
+                );
                 wanted.push(values);
             }
         }

@@ -15,7 +15,7 @@ fn write(directory: &Path, name: &str, text: &str) {
     file.set_modified(std::time::SystemTime::now() + Duration::from_secs(text.len() as u64)).expect("set");
 }
 
-fn newest(reloader: &Reloader, host: &mut Host) -> Result<usize, Vec<Problem>> {
+fn newest(reloader: &Reloader, host: &mut Host) -> Result<usize, Vec<ScriptProblem>> {
     let began = Instant::now();
     loop {
         if let Some(outcome) = reloader.step(host) {

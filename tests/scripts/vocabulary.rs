@@ -3,7 +3,7 @@
 
 use super::*;
 use adapters::Absence;
-use rules::script::{Axis, Level, Stop};
+use rules::script::{AlarmLevel, Axis, Stop};
 
 fn refused(text: &str) -> String {
     told(&compile(&[file("x.rhai", text)]).err().expect("refused"))
@@ -40,7 +40,7 @@ fn a_misspelt_field_is_told_before_the_script_runs() {
 fn a_field_without_a_value_makes_the_script_wait() {
     let mut host = host("request_feed_override(2.0 * sample.spindle_load_pct, \"twice\");");
     assert_eq!(request(&mut host, 0.0, &[]), None);
-    let Condition::Waiting(problem) = &host.status().scripts[0].condition.clone() else {
+    let ScriptCondition::Waiting(problem) = &host.status().scripts[0].condition.clone() else {
         panic!("{:?}", host.status())
     };
     assert!(problem.what.contains("spindle_load_pct has no value (not_provided)"), "{problem}");
@@ -94,7 +94,7 @@ fn a_handler_runs_at_its_tick_also_when_the_script_has_a_slower_pace() {
         let decision = host.tick(&sample, &cutting(at_s, 1.0));
         seen.extend(decision.alarms.iter().map(|change| (tick, change.name.to_string(), change.level, change.raised)));
     }
-    let expected = [(0, "stands", Level::Warning), (2, "tool", Level::Info)];
+    let expected = [(0, "stands", AlarmLevel::Warning), (2, "tool", AlarmLevel::Info)];
     assert_eq!(seen, expected.map(|(tick, name, level)| (tick, name.to_owned(), level, true)));
     assert_eq!(&*host.alarms()[1].zh, "新");
 }

@@ -14,7 +14,7 @@ use crate::log::{Notice, Severity};
 use crate::pipeline::Pipeline;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
-use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
+use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 use rules::twin::verdicts::unit_of;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -185,7 +185,7 @@ impl Twin {
         let same_unit = |loaded: &LoadedModel| loaded.model.output.ends_with(&self.suffix);
         let compared = match &self.active {
             Some(ActiveModel { live, loaded }) if same_unit(loaded) => live.compared(),
-            _ => Compared::none(live::NoTwin::NotYet),
+            _ => ComparedSecond::none(live::NoTwin::NotYet),
         };
         [compared.expected, compared.residual].map(|value| value.map_err(live::NoTwin::word).into())
     }
@@ -264,7 +264,7 @@ impl Twin {
 
     fn mismatches(&self) -> Vec<Mismatch> {
         let stages = self.active.iter().flat_map(|active| active.live.stages());
-        let differing = |(_, stage)| if let Stage::Differing(mismatch) = stage { Some(mismatch) } else { None };
+        let differing = |(_, stage)| if let RegimeStage::Differing(mismatch) = stage { Some(mismatch) } else { None };
         stages.filter_map(differing).collect()
     }
 

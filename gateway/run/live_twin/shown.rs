@@ -5,7 +5,7 @@ use crate::diagnosis::status::{DiagnosisStatus, RegimeStatus, TwinStatus};
 use crate::diagnosis::words;
 use crate::diagnosis::worker::Finished;
 use crate::status::AlarmStatus;
-use rules::twin::live::{self, Compared, Live, Mismatch, Regime, Stage};
+use rules::twin::live::{self, ComparedSecond, Live, Mismatch, Regime, RegimeStage};
 
 impl Twin {
     /// Differences that stand.
@@ -41,7 +41,7 @@ impl Twin {
     #[must_use]
     pub fn status(&self) -> TwinStatus {
         let active = self.active.as_ref();
-        let compared = active.map_or(Compared::none(live::NoTwin::NotYet), |active| active.live.compared());
+        let compared = active.map_or(ComparedSecond::none(live::NoTwin::NotYet), |active| active.live.compared());
         let why = active.and_then(|active| active.live.why().map(str::to_owned));
         let reason = compared.residual.err();
         TwinStatus {
@@ -61,7 +61,7 @@ impl Twin {
     }
 
     fn regimes(&self, live: &Live) -> Vec<RegimeStatus> {
-        let status = |(regime, stage): (Regime, Stage)| {
+        let status = |(regime, stage): (Regime, RegimeStage)| {
             let none = RegimeStatus {
                 regime: regime.word(),
                 stage: "learning",
@@ -74,9 +74,9 @@ impl Twin {
                 zh: None,
             };
             match stage {
-                Stage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
-                Stage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
-                Stage::Differing(mismatch) => self.differing(&mismatch, none),
+                RegimeStage::Learning(blocks, needed) => RegimeStatus { learned: Some((blocks, needed)), ..none },
+                RegimeStage::Watching(usual) => RegimeStatus { stage: "watching", usual: Some(usual), ..none },
+                RegimeStage::Differing(mismatch) => self.differing(&mismatch, none),
             }
         };
         live.stages().map(status).collect()

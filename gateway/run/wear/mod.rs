@@ -11,7 +11,7 @@ use crate::pipeline::Pipeline;
 use crate::status::WearStatus;
 use adapters::clock::TimeNs;
 use library::Library;
-use rules::estimators::wear::{Observability, Reference, WearNews};
+use rules::estimators::wear::{Observability, WearNews, WorkReference};
 
 /// Who writes the events.
 const SOURCE: &str = "wear";
@@ -77,7 +77,7 @@ pub fn status(pipeline: &Pipeline) -> Option<WearStatus> {
     let (model, outlook) = (wear.model(), wear.outlook());
     let model = model?;
     let limit = wear.limit().and_then(|limit| limit.as_ref().ok());
-    let learned = outlook.filter(|(reference, _)| *reference == Reference::Model).map(|(_, outlook)| outlook);
+    let learned = outlook.filter(|(reference, _)| *reference == WorkReference::Model).map(|(_, outlook)| outlook);
     let outlook = outlook.map(|(_, outlook)| outlook);
     let why = match (wear.limit(), &outlook) {
         (Some(Err(why)), _) => Some(why.clone()),

@@ -28,7 +28,7 @@ const GAP_S: f64 = 1.0;
 
 /// What has been collected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Gathered {
+pub struct AlignmentData {
     /// Transients kept.
     pub transients: usize,
     /// Changes of speed that were not used because something was cut.
@@ -46,7 +46,7 @@ pub struct Collector {
     /// From and to, the oldest first.
     cuts: VecDeque<(f64, f64)>,
     kept: VecDeque<Transient>,
-    gathered: Gathered,
+    gathered: AlignmentData,
 }
 
 impl Collector {
@@ -136,8 +136,8 @@ impl Collector {
     }
 
     /// What there is; `new` is then false until the next transient.
-    pub fn gathered(&mut self) -> Gathered {
-        let gathered = Gathered { transients: self.kept.len(), ..self.gathered };
+    pub fn gathered(&mut self) -> AlignmentData {
+        let gathered = AlignmentData { transients: self.kept.len(), ..self.gathered };
         self.gathered.new = false;
         gathered
     }

@@ -1,6 +1,6 @@
 //! Lag, width, drift and window over all transients, or why they cannot be known.
 
-use super::fit::{Fitted, PowerModel, Ready, Shape, fit, residual};
+use super::fit::{FittedLag, PowerModel, PredictorSet, Ready, fit, residual};
 use super::profile::{Best, lowest, search, search_at};
 use super::speed::Transient;
 use std::fmt;
@@ -251,9 +251,10 @@ fn joint(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
         usable.iter().map(|one| Ready::of(one, top_rpm, tau_s, settings.lags_s, settings.window_max_s)).collect()
     };
     let plain = make(1.0);
-    let best = search(&plain, settings.lags_s, settings.window_max_s, Shape { excess: false, ..Shape::WHOLE });
+    let best =
+        search(&plain, settings.lags_s, settings.window_max_s, PredictorSet { excess: false, ..PredictorSet::WHOLE });
     let with_excess = EXCESS_TAU_S.into_iter().map(|tau_s| {
-        let (ready, shape) = (make(tau_s), Shape::WHOLE);
+        let (ready, shape) = (make(tau_s), PredictorSet::WHOLE);
         let best = search_at(&ready, settings.lags_s, &[best.window_s], shape, settings.window_max_s);
         (ready, best)
     });
@@ -264,24 +265,25 @@ fn joint(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
     }
 }
 
-fn shape(best: &Best) -> Shape {
-    Shape { excess: best.fitted.model[EXCESS] != 0.0, ..Shape::WHOLE }
+fn shape(best: &Best) -> PredictorSet {
+    PredictorSet { excess: best.fitted.model[EXCESS] != 0.0, ..PredictorSet::WHOLE }
 }
 
 /// Share of the power's variance that only changing the speed explains.
 fn inertia_share(ready: &[Ready], best: &Best) -> f64 {
-    let without = fit(ready, best.lag_s, best.window_s, Shape { inertia: false, ..shape(best) });
+    let without = fit(ready, best.lag_s, best.window_s, PredictorSet { inertia: false, ..shape(best) });
     (without.rss - best.fitted.rss) / best.fitted.total.max(f64::MIN_POSITIVE)
 }
 
 /// How far the lag moves when a term of the no-load power is left out: what an imperfect law may do to it.
 fn of_model_s(ready: &[Ready], best: &Best) -> f64 {
-    let moved_s = |without: Shape| {
+    let moved_s = |without: PredictorSet| {
         let rss = |lag_s: f64| fit(ready, lag_s, best.window_s, without).rss;
         let lag_s = lowest(best.lag_s, 0.05, (best.lag_s - 0.5, best.lag_s + 0.5), rss);
         (lag_s - best.lag_s).abs()
     };
-    moved_s(Shape { cube: false, ..shape(best) }).max(0.5 * moved_s(Shape { turning: false, ..shape(best) }))
+    moved_s(PredictorSet { cube: false, ..shape(best) })
+        .max(0.5 * moved_s(PredictorSet { turning: false, ..shape(best) }))
 }
 
 /// Time and lag of each transient under the common model, with the weight of its residual's curvature.
@@ -298,7 +300,7 @@ fn each(ready: &[Ready], best: &Best) -> Vec<(f64, f64, f64)> {
 }
 
 /// A residual that noise alone could make as small as the least one (F-like bound, generous for correlated residuals).
-fn as_good(rss: f64, fitted: &Fitted) -> bool {
+fn as_good(rss: f64, fitted: &FittedLag) -> bool {
     let freedom = (count(fitted.rows) / 4.0 - 8.0).max(4.0);
     rss <= fitted.rss * (1.0 + 8.0 / freedom)
 }

@@ -1,8 +1,8 @@
 //! The power model at one lag and window, and its residual.
 
-use super::speed::{PREDICTORS, Running, Transient};
+use super::speed::{PREDICTORS, RunningIntegrals, Transient};
 use super::steady::steadied;
-use crate::linear::cholesky::{NormalEquations, Solved};
+use crate::linear::cholesky::{LinearSolution, NormalEquations};
 
 /// Constant, and every predictor.
 const COLUMNS: usize = PREDICTORS + 1;
@@ -31,7 +31,7 @@ pub struct PowerModel {
 /// A transient, ready to be compared at any lag and window.
 #[derive(Debug, Clone)]
 pub(super) struct Ready {
-    running: Running,
+    running: RunningIntegrals,
     power: Vec<(f64, f64)>,
     pub(super) middle_s: f64,
 }
@@ -40,7 +40,7 @@ impl Ready {
     /// Power readings for which every lag up to `reach_s` and window up to `window_s` lies within the course of speed, so
     /// that all are judged by the same rows.
     pub(super) fn of(transient: &Transient, top_rpm: f64, tau_s: f64, reach_s: (f64, f64), window_s: f64) -> Self {
-        let running = Running::of(&steadied(&transient.speed), top_rpm, tau_s);
+        let running = RunningIntegrals::of(&steadied(&transient.speed), top_rpm, tau_s);
         let inside = |time_s: f64| {
             running.mean(time_s - reach_s.0, window_s).is_some() && running.mean(time_s - reach_s.1, window_s).is_some()
         };
@@ -56,7 +56,7 @@ impl Ready {
 
 /// A fit.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fitted {
+pub(super) struct FittedLag {
     pub(super) model: [f64; COLUMNS],
     pub(super) rss: f64,
     pub(super) rows: usize,
@@ -64,7 +64,7 @@ pub(super) struct Fitted {
     pub(super) total: f64,
 }
 
-impl Fitted {
+impl FittedLag {
     pub(super) fn power_model(&self) -> PowerModel {
         let [constant_w, linear_w_krpm, square_w_krpm2, cube_w_krpm3, up, down, excess_w, turning_w] = self.model;
         PowerModel {
@@ -82,7 +82,7 @@ impl Fitted {
 
 /// Which predictors take part besides those that always do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
+pub(super) struct PredictorSet {
     /// The cube of the speed.
     pub(super) cube: bool,
     /// That it turns at all.
@@ -93,13 +93,13 @@ pub(super) struct Shape {
     pub(super) excess: bool,
 }
 
-impl Shape {
+impl PredictorSet {
     /// Every predictor.
     pub(super) const WHOLE: Self = Self { cube: true, turning: true, inertia: true, excess: true };
 }
 
 /// Fits all transients together at one lag and window; a predictor that takes no part has the coefficient 0.
-pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: Shape) -> Fitted {
+pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: PredictorSet) -> FittedLag {
     let mut sums = NormalEquations::<COLUMNS>::new();
     for one in ready {
         for (time_s, power_w) in &one.power {
@@ -107,21 +107,21 @@ pub(super) fn fit(ready: &[Ready], lag_s: f64, window_s: f64, shape: Shape) -> F
             sums.add(&row(&mean, shape), *power_w);
         }
     }
-    let Solved { coefficients, rss, total, rows } = sums.solve();
-    Fitted { model: coefficients, rss, rows, total }
+    let LinearSolution { coefficients, rss, total, rows } = sums.solve();
+    FittedLag { model: coefficients, rss, rows, total }
 }
 
 /// Residual sum of squares of one transient under a given model.
 pub(super) fn residual(one: &Ready, model: &[f64; COLUMNS], lag_s: f64, window_s: f64) -> f64 {
     let each = one.power.iter().filter_map(|(time_s, power_w)| {
         let mean = one.running.mean(time_s - lag_s, window_s)?;
-        let said: f64 = row(&mean, Shape::WHOLE).iter().zip(model).map(|(x, c)| x * c).sum();
+        let said: f64 = row(&mean, PredictorSet::WHOLE).iter().zip(model).map(|(x, c)| x * c).sum();
         Some((power_w - said).powi(2))
     });
     each.sum()
 }
 
-fn row(mean: &[f64; PREDICTORS], shape: Shape) -> [f64; COLUMNS] {
+fn row(mean: &[f64; PREDICTORS], shape: PredictorSet) -> [f64; COLUMNS] {
     let [linear, square, cube, up, down, start, turning] = *mean;
     let with = |takes_part: bool, value: f64| if takes_part { value } else { 0.0 };
     let (up, down) = (with(shape.inertia, up), with(shape.inertia, down));

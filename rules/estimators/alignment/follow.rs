@@ -13,13 +13,13 @@ const WORTH_TELLING_S: f64 = 0.005;
 
 /// A lag that is aimed at, and the one that is in force.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Follower {
+pub struct LagFollower {
     aim_s: Option<f64>,
     told_s: Option<f64>,
     applied_s: f64,
 }
 
-impl Follower {
+impl LagFollower {
     /// Aims at a new estimate as of `at_s`. The aim when it has moved enough to be told.
     pub fn aim(&mut self, lag: &Lag, at_s: f64) -> Option<f64> {
         let wanted_s = lag.at(at_s);
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn it_is_taken_up_slowly_and_stands_still_while_cutting() {
-        let mut follower = Follower::default();
+        let mut follower = LagFollower::default();
         assert_eq!(follower.step(100.0, false), 0.0, "nothing is known yet");
         assert_eq!(follower.aim(&lag(0.2), 0.0), Some(0.2));
         assert!((follower.step(1.0, false) - 0.05).abs() < 1e-12);
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn an_estimate_that_jumps_is_followed_in_steps() {
-        let mut follower = Follower::default();
+        let mut follower = LagFollower::default();
         follower.aim(&lag(0.2), 0.0);
         assert_eq!(follower.aim(&lag(0.201), 0.0), None, "not worth a word");
         let told = follower.aim(&lag(0.8), 0.0).expect("a step");

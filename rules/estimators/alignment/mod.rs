@@ -41,9 +41,9 @@ mod steady;
 #[cfg(test)]
 mod tests;
 
-pub use collect::{Collector, Gathered};
+pub use collect::{AlignmentData, Collector};
 pub use courses::{Matched, match_courses};
 pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, align};
 pub use fit::PowerModel;
-pub use follow::Follower;
+pub use follow::LagFollower;
 pub use speed::{PowerPoint, SpeedPoint, Transient};

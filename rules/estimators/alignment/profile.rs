@@ -1,6 +1,6 @@
 //! The residual over lag and window: its minimum, and whether another lag does as well.
 
-use super::fit::{Fitted, Ready, Shape, fit};
+use super::fit::{FittedLag, PredictorSet, Ready, fit};
 
 /// Windows that are tried before the best one is refined, s.
 const WINDOWS_S: [f64; 6] = [0.03, 0.1, 0.2, 0.4, 0.7, 1.2];
@@ -12,7 +12,7 @@ const STEP_S: f64 = 0.05;
 pub(super) struct Best {
     pub(super) lag_s: f64,
     pub(super) window_s: f64,
-    pub(super) fitted: Fitted,
+    pub(super) fitted: FittedLag,
     /// Least residual at a lag that is another minimum, with that lag.
     pub(super) rival: Option<(f64, f64)>,
     /// Does the minimum lie at an end of the lags that were tried?
@@ -20,13 +20,19 @@ pub(super) struct Best {
 }
 
 /// Residuals over all lags at the window that is best for each.
-pub(super) fn search(ready: &[Ready], lags_s: (f64, f64), window_max_s: f64, shape: Shape) -> Best {
+pub(super) fn search(ready: &[Ready], lags_s: (f64, f64), window_max_s: f64, shape: PredictorSet) -> Best {
     let windows: Vec<f64> = WINDOWS_S.into_iter().filter(|window| *window <= window_max_s).collect();
     search_at(ready, lags_s, &windows, shape, window_max_s)
 }
 
 /// The same over these windows only, before the best one is refined.
-pub(super) fn search_at(ready: &[Ready], lags_s: (f64, f64), windows: &[f64], shape: Shape, window_max_s: f64) -> Best {
+pub(super) fn search_at(
+    ready: &[Ready],
+    lags_s: (f64, f64),
+    windows: &[f64],
+    shape: PredictorSet,
+    window_max_s: f64,
+) -> Best {
     let course: Vec<(f64, f64, f64)> = lags(lags_s)
         .map(|lag_s| {
             let tried = windows.iter().map(|window_s| (fit(ready, lag_s, *window_s, shape).rss, *window_s));
@@ -51,7 +57,7 @@ fn lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
 }
 
 /// Lag and window in turn, each by a search that halves its step.
-fn refine(ready: &[Ready], lag_s: f64, window_s: f64, window_max_s: f64, shape: Shape) -> (f64, f64) {
+fn refine(ready: &[Ready], lag_s: f64, window_s: f64, window_max_s: f64, shape: PredictorSet) -> (f64, f64) {
     let (mut lag_s, mut window_s) = (lag_s, window_s);
     for _ in 0..2 {
         let of_window = |window_s: f64| fit(ready, lag_s, window_s, shape).rss;

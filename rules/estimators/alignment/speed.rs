@@ -42,12 +42,12 @@ const TURNING_KRPM: f64 = 0.01;
 
 /// Running integrals at the stamps of the speed.
 #[derive(Debug, Clone)]
-pub(super) struct Running {
+pub(super) struct RunningIntegrals {
     times_s: Vec<f64>,
     sums: Vec<[f64; PREDICTORS]>,
 }
 
-impl Running {
+impl RunningIntegrals {
     /// `tau_s`: how fast the excess of a run-up dies away.
     pub(super) fn of(speed: &[SpeedPoint], top_rpm: f64, tau_s: f64) -> Self {
         let krpm: Vec<f64> = speed.iter().map(|point| point.speed_rpm.abs() / 1000.0).collect();
@@ -167,7 +167,7 @@ mod tests {
         // 0 to 3000 rpm in 3 s.
         let speed: Vec<SpeedPoint> =
             (0..=30).map(|k| SpeedPoint { time_s: 0.1 * f64::from(k), speed_rpm: 100.0 * f64::from(k) }).collect();
-        let running = Running::of(&speed, 1e-9, 1.0);
+        let running = RunningIntegrals::of(&speed, 1e-9, 1.0);
         let mean = running.mean(1.5, 1.0).expect("inside");
         let rad_s2 = TAU * 1000.0 / 60.0;
         let per_inertia = 0.5 * rad_s2 * rad_s2 * (4.0 - 1.0);
@@ -181,7 +181,7 @@ mod tests {
         let speed: Vec<SpeedPoint> = (0..200)
             .map(|k| SpeedPoint { time_s: 0.05 * f64::from(k), speed_rpm: 3000.0 + f64::from(k % 3) })
             .collect();
-        let mean = Running::of(&speed, 3000.0, 1.0).mean(5.0, 8.0).expect("inside");
+        let mean = RunningIntegrals::of(&speed, 3000.0, 1.0).mean(5.0, 8.0).expect("inside");
         assert!(mean[3] < 1e-9 && mean[4] > -1e-9);
     }
 }

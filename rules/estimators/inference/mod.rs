@@ -8,7 +8,7 @@ mod voltage;
 use super::cutting::balance;
 use super::detector::{Detected, Detector};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
-use super::inputs::{Channels, Inputs};
+use super::inputs::{InputChannels, TickInputs};
 use super::learning::{IdleTick, Learner};
 use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 use super::settings::Settings;
@@ -35,7 +35,7 @@ pub struct RestoreError(#[from] serde_json::Error);
 #[derive(Debug, Clone)]
 pub struct Inference {
     settings: Settings,
-    channels: Channels,
+    channels: InputChannels,
     memory: InferenceState,
     estimates: Estimates,
 }
@@ -79,7 +79,7 @@ impl Inference {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let memory = InferenceState::new(&settings);
-        Self { settings, channels: Channels::new(), memory, estimates: Estimates::none(0) }
+        Self { settings, channels: InputChannels::new(), memory, estimates: Estimates::none(0) }
     }
 
     /// Takes one sample; samples come in the order of time.
@@ -114,7 +114,7 @@ impl Inference {
 
     /// No-load power at the speed of this tick: learned; or else an upper bound at this very speed; or else a rough idea,
     /// which serves the detector alone.
-    fn reference(&self, inputs: &Inputs) -> Result<NoLoad, NoEstimate> {
+    fn reference(&self, inputs: &TickInputs) -> Result<NoLoad, NoEstimate> {
         let speed_rpm = inputs.speed.map_err(|absence| self.input(self.channels.speed, absence))?.abs();
         if speed_rpm < self.settings.spindle_min_rpm {
             return Err(NoEstimate::SpindleStopped);
@@ -147,7 +147,7 @@ impl Inference {
     }
 
     /// The power has settled at a speed without a known no-load power.
-    fn settled_at(&mut self, power_w: f64, feed: Feed, inputs: &Inputs) {
+    fn settled_at(&mut self, power_w: f64, feed: Feed, inputs: &TickInputs) {
         let Ok(speed) = inputs.speed else { return };
         let point = NoLoadPoint { stage: self.memory.signals.stage(), speed_rpm: speed.abs(), power_w };
         if feed == Feed::Off {
@@ -161,7 +161,7 @@ impl Inference {
     /// Noise, standby power, upper bound and idle learning follow the state.
     fn follow(
         &mut self,
-        inputs: &Inputs,
+        inputs: &TickInputs,
         filtered_w: Option<f64>,
         no_load: Result<NoLoad, NoEstimate>,
         verdict: &Detected,
@@ -203,7 +203,7 @@ impl Inference {
         }
     }
 
-    fn learn(&mut self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
+    fn learn(&mut self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
         let memory = &mut self.memory;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
         let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
@@ -241,7 +241,7 @@ impl Inference {
 
     fn estimate(
         &self,
-        inputs: &Inputs,
+        inputs: &TickInputs,
         filtered_w: Option<f64>,
         no_load: Result<NoLoad, NoEstimate>,
         verdict: &Detected,
@@ -286,7 +286,7 @@ impl Inference {
     }
 
     /// Why the table gives no estimate at this speed.
-    fn refusal(&self, inputs: &Inputs) -> NoEstimate {
+    fn refusal(&self, inputs: &TickInputs) -> NoEstimate {
         let speed_rpm = inputs.speed.unwrap_or(0.0);
         let table = &self.memory.no_load;
         let refused = table.at(self.memory.signals.stage(), speed_rpm, inputs.at_ns, &self.settings);
@@ -294,7 +294,7 @@ impl Inference {
     }
 
     /// Does the balance of a steady spindle hold at this tick?
-    fn steady(&self, inputs: &Inputs, verdict: &Detected) -> Result<(), NoEstimate> {
+    fn steady(&self, inputs: &TickInputs, verdict: &Detected) -> Result<(), NoEstimate> {
         match verdict.state {
             State::Off => Err(NoEstimate::MachineOff),
             State::Standby => Err(NoEstimate::SpindleStopped),
@@ -345,7 +345,7 @@ impl Inference {
         Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
     }
 
-    fn visibility(&self, inputs: &Inputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) -> Visibility {
+    fn visibility(&self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) -> Visibility {
         let fed = self.memory.signals.feed(inputs, &self.settings) == Feed::On;
         match verdict.state {
             State::Cutting => Visibility::Visible,

@@ -1,16 +1,16 @@
 //! Power as it would be at the reference of the supply voltage.
 
 use super::{Inference, InferenceState};
-use crate::estimators::inputs::Inputs;
+use crate::estimators::inputs::TickInputs;
 use crate::estimators::learning::Observation;
 use crate::estimators::no_load::{NoLoad, NoLoadPoint};
 use crate::estimators::settings::Settings;
-use crate::estimators::supply::Measured;
+use crate::estimators::supply::MeasuredIdlePower;
 
 impl Inference {
     /// Takes off the power what the supply voltage does to no-load power, so that all that follows compares like with like; no
     /// effect without a voltage. Where no-load power is not known yet, the whole power is taken for it.
-    pub(super) fn take_to_reference_voltage(&mut self, inputs: &mut Inputs) {
+    pub(super) fn take_to_reference_voltage(&mut self, inputs: &mut TickInputs) {
         if !inputs.basis.in_watts() {
             return;
         }
@@ -23,7 +23,7 @@ impl Inference {
     }
 
     /// The same no-load power at the voltage of this tick.
-    pub(super) fn at_voltage(&self, known: NoLoad, inputs: &Inputs) -> NoLoad {
+    pub(super) fn at_voltage(&self, known: NoLoad, inputs: &TickInputs) -> NoLoad {
         let ratio = self.memory.supply.ratio(inputs.supply_log);
         NoLoad { power_w: ratio * known.power_w, sd_w: ratio * known.sd_w, ..known }
     }
@@ -37,7 +37,8 @@ impl InferenceState {
         }
         let NoLoadPoint { stage, speed_rpm, power_w } = seen.point;
         let (at_ns, sd_w, supply_log) = (seen.at_ns, seen.sd_w, seen.supply_log);
-        let change = self.supply.learn(Measured { at_ns, stage, speed_rpm, power_w, sd_w, supply_log }, settings);
+        let change =
+            self.supply.learn(MeasuredIdlePower { at_ns, stage, speed_rpm, power_w, sd_w, supply_log }, settings);
         self.no_load.correct_exponent(change);
     }
 }

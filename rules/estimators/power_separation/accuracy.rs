@@ -4,7 +4,7 @@
 //! the other cuts, so that no cut judges numbers that were made of it. Beside it stands what the fixed load losses of
 //! practice, 0.15 and 0.25 of the cutting power, would have told from the same power and the same no-load power.
 
-use super::cuts::Point;
+use super::cuts::SteadyPoint;
 use super::load_loss::{near, regression};
 use crate::estimators::cutting::balance;
 use crate::statistics::count;
@@ -44,7 +44,7 @@ pub struct Accuracy {
 }
 
 /// Accuracy of the separation on these points of one gear stage; `None` where too few cuts are left to learn from without one.
-pub(super) fn accuracy(points: &[&Point], speeds: &[f64]) -> Option<Accuracy> {
+pub(super) fn accuracy(points: &[&SteadyPoint], speeds: &[f64]) -> Option<Accuracy> {
     let groups: Vec<GroupAccuracy> =
         points.iter().filter(|point| point.cut).filter_map(|cut| group(points, speeds, cut)).collect();
     if groups.is_empty() {
@@ -59,9 +59,9 @@ pub(super) fn accuracy(points: &[&Point], speeds: &[f64]) -> Option<Accuracy> {
     })
 }
 
-fn group(points: &[&Point], speeds: &[f64], cut: &Point) -> Option<GroupAccuracy> {
-    let others: Vec<&Point> = points.iter().copied().filter(|it| !std::ptr::eq(*it, cut)).collect();
-    let at_speed = |point: &&&Point| near(point.speed_rpm, cut.speed_rpm);
+fn group(points: &[&SteadyPoint], speeds: &[f64], cut: &SteadyPoint) -> Option<GroupAccuracy> {
+    let others: Vec<&SteadyPoint> = points.iter().copied().filter(|it| !std::ptr::eq(*it, cut)).collect();
+    let at_speed = |point: &&&SteadyPoint| near(point.speed_rpm, cut.speed_rpm);
     let cuts_left = others.iter().filter(|it| it.cut && near(it.speed_rpm, cut.speed_rpm)).count();
     if cuts_left == 0 || cut.cutting_power_w <= 0.0 {
         return None;

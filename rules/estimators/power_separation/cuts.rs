@@ -1,10 +1,10 @@
 //! Steady cuts of a recording, and idle stretches, each with power and reference.
 
 use super::reference::Referenced;
-use super::rows::Row;
+use super::rows::MachineRow;
 use super::stretches::{SAME_SPEED, Stretch, settled_from};
 use crate::estimators::State;
-use crate::estimators::regression::{Level, level, without_pulses};
+use crate::estimators::regression::{SteadyLevel, level, without_pulses};
 use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
@@ -16,7 +16,7 @@ const LEAST_S: f64 = 3.0;
 
 /// A steady cut, or an idle stretch (reference 0).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Point {
+pub struct SteadyPoint {
     /// Gear stage.
     pub stage: usize,
     /// Spindle speed.
@@ -24,7 +24,7 @@ pub struct Point {
     /// Middle, s.
     pub at_s: f64,
     /// Spindle power.
-    pub power: Level,
+    pub power: SteadyLevel,
     /// Cutting power by the reference, less what the reference shows on the mean of idling at this speed, W.
     pub cutting_power_w: f64,
     /// Is it a cut?
@@ -33,7 +33,7 @@ pub struct Point {
 
 /// What must stay the same within a cut.
 #[derive(Clone, Copy, PartialEq)]
-struct Conditions {
+struct ConstantConditions {
     stage: usize,
     speed_rpm: f64,
     feed: f64,
@@ -41,8 +41,13 @@ struct Conditions {
 }
 
 /// The idle stretches and the steady cuts, in the order of time.
-pub(super) fn points(recording: &Recording, rows: &[Row], idle: &[Stretch], reference: &Referenced) -> Vec<Point> {
-    let mut found: Vec<Point> = idle.iter().map(of_idle).collect();
+pub(super) fn points(
+    recording: &Recording,
+    rows: &[MachineRow],
+    idle: &[Stretch],
+    reference: &Referenced,
+) -> Vec<SteadyPoint> {
+    let mut found: Vec<SteadyPoint> = idle.iter().map(of_idle).collect();
     let mut open: Vec<usize> = Vec::new();
     for (at, row) in rows.iter().enumerate() {
         let usable = row.state == State::Cutting && row.power_w.is_some() && reference.power_w[at].is_some();
@@ -61,15 +66,15 @@ pub(super) fn points(recording: &Recording, rows: &[Row], idle: &[Stretch], refe
     found
 }
 
-fn of_idle(stretch: &Stretch) -> Point {
+fn of_idle(stretch: &Stretch) -> SteadyPoint {
     let at_s = 0.5 * (stretch.from_s + stretch.to_s);
     let (stage, speed_rpm, power) = (stretch.stage, stretch.speed_rpm, stretch.level);
-    Point { stage, speed_rpm, at_s, power, cutting_power_w: 0.0, cut: false }
+    SteadyPoint { stage, speed_rpm, at_s, power, cutting_power_w: 0.0, cut: false }
 }
 
-fn conditions(recording: &Recording, row: &Row) -> Conditions {
+fn conditions(recording: &Recording, row: &MachineRow) -> ConstantConditions {
     let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row.row)).unwrap_or(0.0);
-    Conditions {
+    ConstantConditions {
         stage: row.stage,
         speed_rpm: row.speed_rpm.unwrap_or(0.0),
         feed: number("feed_mm_min"),
@@ -77,13 +82,13 @@ fn conditions(recording: &Recording, row: &Row) -> Conditions {
     }
 }
 
-fn same(recording: &Recording, a: &Row, b: &Row) -> bool {
+fn same(recording: &Recording, a: &MachineRow, b: &MachineRow) -> bool {
     let (a, b) = (conditions(recording, a), conditions(recording, b));
     let near = |a: f64, b: f64| (a - b).abs() <= SAME_SPEED * a.abs().max(b.abs());
     a.stage == b.stage && near(a.speed_rpm, b.speed_rpm) && near(a.feed, b.feed) && near(a.depth, b.depth)
 }
 
-fn close(rows: &[Row], open: &[usize], reference: &Referenced) -> Option<Point> {
+fn close(rows: &[MachineRow], open: &[usize], reference: &Referenced) -> Option<SteadyPoint> {
     let (begin_s, end_s) = (rows[*open.first()?].time_s + GUARD_S, rows[*open.last()?].time_s - GUARD_S);
     let inner: Vec<usize> =
         open.iter().copied().filter(|at| rows[*at].time_s >= begin_s && rows[*at].time_s <= end_s).collect();
@@ -98,7 +103,7 @@ fn close(rows: &[Row], open: &[usize], reference: &Referenced) -> Option<Point> 
     let kept = &inner[settled..];
     let mean =
         |of: &dyn Fn(usize) -> Option<f64>| kept.iter().filter_map(|at| of(*at)).sum::<f64>() / count(kept.len());
-    Some(Point {
+    Some(SteadyPoint {
         stage: rows[kept[0]].stage,
         speed_rpm: mean(&|at| rows[at].speed_rpm),
         at_s: 0.5 * (from_s + to_s),
@@ -111,9 +116,9 @@ fn close(rows: &[Row], open: &[usize], reference: &Referenced) -> Option<Point> 
 /// A torque sensor's zero and the friction behind it are no cutting power: what it shows while idling at a speed, on the mean of
 /// all idle stretches, is taken off every point of that speed. An idle stretch keeps its own difference from that mean, so
 /// that the sensor's noise counts in the fit as it does in the cuts.
-fn subtract_idle(points: &mut [Point], rows: &[Row], idle: &[Stretch], reference: &Referenced) {
+fn subtract_idle(points: &mut [SteadyPoint], rows: &[MachineRow], idle: &[Stretch], reference: &Referenced) {
     let shown = |stretch: &Stretch| {
-        let inside = |row: &Row| row.time_s >= stretch.from_s && row.time_s <= stretch.to_s;
+        let inside = |row: &MachineRow| row.time_s >= stretch.from_s && row.time_s <= stretch.to_s;
         let values: Vec<f64> = rows
             .iter()
             .zip(&reference.power_w)

@@ -3,8 +3,8 @@
 //! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals.
 
 use super::accuracy::{Accuracy, accuracy};
-use super::cuts::{Point, points};
-use super::reference::{Reference, ReferenceChoice, referenced};
+use super::cuts::{SteadyPoint, points};
+use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
 use crate::estimators::STAGES;
@@ -27,7 +27,7 @@ const QUADRATIC_RANGE: (f64, f64) = (-0.001, 0.01);
 
 /// A number with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Told {
+pub struct IntervalEstimate {
     /// The value.
     pub value: f64,
     /// Standard error.
@@ -42,11 +42,11 @@ pub struct StageLearned {
     /// Gear stage; 0 where the recording has none.
     pub stage: usize,
     /// a0, load loss per watt of cutting power.
-    pub linear: Told,
+    pub linear: IntervalEstimate,
     /// a1, 1/W.
-    pub quadratic_per_w: Told,
+    pub quadratic_per_w: IntervalEstimate,
     /// Load loss over cutting power at the mean cut, and its standard error.
-    pub share_at_mean: Told,
+    pub share_at_mean: IntervalEstimate,
     /// Cutting powers from, to and mean, W.
     pub cutting_power_w: (f64, f64, f64),
     /// Speeds with cuts, rpm.
@@ -69,11 +69,11 @@ pub struct StageLearned {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoadLossLearned {
     /// What told the cutting power.
-    pub reference: Reference,
+    pub reference: PowerReference,
     /// By gear stage.
     pub stages: Vec<StageLearned>,
     /// The cuts and idle stretches.
-    pub points: Vec<Point>,
+    pub points: Vec<SteadyPoint>,
     /// Stages that cannot be told, and why.
     pub refused: Vec<Refusal>,
     /// What the reader should know.
@@ -96,7 +96,7 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
         notes: Vec::new(),
     };
     for stage in 0..STAGES {
-        let own: Vec<&Point> = points.iter().filter(|point| point.stage == stage).collect();
+        let own: Vec<&SteadyPoint> = points.iter().filter(|point| point.stage == stage).collect();
         if own.iter().any(|point| point.cut) {
             match of_stage(&own, reference.reference) {
                 Ok(found) => learned.stages.push(found),
@@ -121,7 +121,7 @@ fn nothing() -> Refusal {
     )
 }
 
-fn of_stage(points: &[&Point], reference: Reference) -> Result<StageLearned, Refusal> {
+fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageLearned, Refusal> {
     let cuts: Vec<f64> = points.iter().filter(|point| point.cut).map(|point| point.cutting_power_w).collect();
     let speeds = speeds(points);
     check_span(&cuts)?;
@@ -157,7 +157,7 @@ fn greatest(values: &[f64]) -> f64 {
 }
 
 /// Speeds that have cuts.
-fn speeds(points: &[&Point]) -> Vec<f64> {
+fn speeds(points: &[&SteadyPoint]) -> Vec<f64> {
     let mut speeds: Vec<f64> = Vec::new();
     for point in points.iter().filter(|point| point.cut) {
         if !speeds.iter().any(|known| near(*known, point.speed_rpm)) {
@@ -191,7 +191,7 @@ fn check_span(cuts: &[f64]) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn check_idle(points: &[&Point], speeds: &[f64]) -> Result<(), Refusal> {
+fn check_idle(points: &[&SteadyPoint], speeds: &[f64]) -> Result<(), Refusal> {
     let idles = |speed: &&f64| points.iter().any(|point| !point.cut && near(**speed, point.speed_rpm));
     match speeds.iter().find(|speed| !idles(speed)) {
         None => Ok(()),
@@ -204,16 +204,18 @@ fn check_idle(points: &[&Point], speeds: &[f64]) -> Result<(), Refusal> {
 }
 
 /// Columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each.
-pub(super) fn regression(points: &[&Point], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
-    let used: Vec<&&Point> = points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
-    let column = |name: String, of: &dyn Fn(&Point) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
-    let at = |speed: f64, point: &Point| f64::from(u8::from(near(speed, point.speed_rpm)));
+pub(super) fn regression(points: &[&SteadyPoint], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
+    let used: Vec<&&SteadyPoint> =
+        points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
+    let column =
+        |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
+    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
     let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
     let mut columns: Vec<Column> =
         speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();
     let groups: Vec<Option<f64>> = if each { speeds.iter().copied().map(Some).collect() } else { vec![None] };
     for group in groups {
-        let inside = |point: &Point| group.map_or(1.0, |speed| at(speed, point));
+        let inside = |point: &SteadyPoint| group.map_or(1.0, |speed| at(speed, point));
         let name = group.map_or_else(String::new, |speed| format!(" {speed:.0} rpm"));
         columns.push(column(format!("Pc{name}"), &|point| inside(point) * point.cutting_power_w));
         columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * point.cutting_power_w.powi(2)));
@@ -222,8 +224,8 @@ pub(super) fn regression(points: &[&Point], speeds: &[f64], each: bool) -> Resul
 }
 
 /// Cutting power and spindle power must be of one size.
-fn check_share(points: &[&Point], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
-    let no_load = |point: &Point| {
+fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
+    let no_load = |point: &SteadyPoint| {
         let at = speeds.iter().position(|speed| near(*speed, point.speed_rpm)).unwrap_or(0);
         regression.coefficients[at].value
     };
@@ -251,11 +253,11 @@ struct Widening {
 }
 
 impl Widening {
-    fn of(regression: &Regression, at: usize, reference: Reference) -> Self {
+    fn of(regression: &Regression, at: usize, reference: PowerReference) -> Self {
         let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
         let scale = match reference {
-            Reference::Removal { relative_sd } => relative_sd * relative_sd,
-            Reference::Torque | Reference::Force => 0.0,
+            PowerReference::Removal { relative_sd } => relative_sd * relative_sd,
+            PowerReference::Torque | PowerReference::Force => 0.0,
         };
         Self {
             gain,
@@ -268,15 +270,19 @@ impl Widening {
     }
 
     /// `offset + a (1 + a0) + b a1`.
-    fn told(&self, offset: f64, a: f64, b: f64) -> Told {
+    fn told(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
         let value = offset + a * self.gain + b * self.quadratic;
         let variance = a * a * self.gain_variance + 2.0 * a * b * self.covariance + b * b * self.quadratic_variance;
         let standard_error = variance.max(0.0).sqrt();
-        Told { value, standard_error, interval: (value - self.t * standard_error, value + self.t * standard_error) }
+        IntervalEstimate {
+            value,
+            standard_error,
+            interval: (value - self.t * standard_error, value + self.t * standard_error),
+        }
     }
 }
 
-fn by_speed(points: &[&Point], speeds: &[f64], together: &Regression) -> Option<FTest> {
+fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Regression) -> Option<FTest> {
     if speeds.len() < 2 {
         return None;
     }

@@ -24,9 +24,9 @@ mod stretches;
 mod words;
 
 pub use accuracy::{Accuracy, FIXED_LOSSES, GroupAccuracy};
-pub use cuts::Point;
-pub use load_loss::{LoadLossLearned, StageLearned, Told, identify_load_loss};
+pub use cuts::SteadyPoint;
+pub use load_loss::{IntervalEstimate, LoadLossLearned, StageLearned, identify_load_loss};
 pub use no_load::{NoLoadLearned, SpeedLearned, identify_no_load};
-pub use reference::{Reference, ReferenceChoice};
+pub use reference::{PowerReference, ReferenceChoice};
 pub use stretches::Stretch;
 pub(super) use stretches::settled_from;

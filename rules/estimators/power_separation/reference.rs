@@ -3,7 +3,7 @@
 //! A sensor may count against the drive, so its sign is settled once per recording and direction of rotation, from the mean of
 //! all cuts less that of idling. Never row by row: the magnitude of noise about zero has a mean of its own.
 
-use super::rows::Row;
+use super::rows::MachineRow;
 use crate::estimators::State;
 use crate::estimators::regression::{Plausible, Refusal, RefusalKind};
 use adapters::Recording;
@@ -28,7 +28,7 @@ impl Default for ReferenceChoice {
 /// What tells the power at the edge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reference {
+pub enum PowerReference {
     /// Torque times angular speed.
     Torque,
     /// Main cutting force times cutting speed.
@@ -42,7 +42,7 @@ pub enum Reference {
 
 /// The reference of every row, W.
 pub(super) struct Referenced {
-    pub(super) reference: Reference,
+    pub(super) reference: PowerReference,
     pub(super) power_w: Vec<Option<f64>>,
 }
 
@@ -50,29 +50,33 @@ pub(super) struct Referenced {
 ///
 /// # Errors
 /// No reference, or a unit that was mistaken.
-pub(super) fn referenced(recording: &Recording, rows: &[Row], choice: &ReferenceChoice) -> Result<Referenced, Refusal> {
+pub(super) fn referenced(
+    recording: &Recording,
+    rows: &[MachineRow],
+    choice: &ReferenceChoice,
+) -> Result<Referenced, Refusal> {
     let column = |name: &str| recording.numbers(name);
-    let per_row = |of: &dyn Fn(&Row) -> Option<f64>| rows.iter().map(of).collect::<Vec<Option<f64>>>();
+    let per_row = |of: &dyn Fn(&MachineRow) -> Option<f64>| rows.iter().map(of).collect::<Vec<Option<f64>>>();
     if let Some(torque) = column(&choice.torque_column) {
         Plausible::TORQUE_NM
             .check(cutting(rows, |row| torque.get(row.row)))
             .map_err(|it| it.at(&choice.torque_column))?;
-        let power = |row: &Row| Some(torque.get(row.row)? * row.speed_rpm? * TAU / 60.0);
-        return Ok(Referenced { reference: Reference::Torque, power_w: oriented(rows, per_row(&power)) });
+        let power = |row: &MachineRow| Some(torque.get(row.row)? * row.speed_rpm? * TAU / 60.0);
+        return Ok(Referenced { reference: PowerReference::Torque, power_w: oriented(rows, per_row(&power)) });
     }
     if let (Some(force), Some(diameter)) = (column("cutting_force_n"), column("diameter_mm")) {
         Plausible::CUTTING_FORCE_N
             .check(cutting(rows, |row| force.get(row.row)))
             .map_err(|it| it.at("cutting_force_n"))?;
         let power =
-            |row: &Row| Some(force.get(row.row)? * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
-        return Ok(Referenced { reference: Reference::Force, power_w: oriented(rows, per_row(&power)) });
+            |row: &MachineRow| Some(force.get(row.row)? * PI * diameter.get(row.row)? / 1000.0 * row.speed_rpm? / 60.0);
+        return Ok(Referenced { reference: PowerReference::Force, power_w: oriented(rows, per_row(&power)) });
     }
     let removal = adapters::recording::with_derived(recording.clone());
     match (removal.numbers("removal_rate_cm3_min"), choice.specific_energy_j_mm3) {
         (Some(removal), Some((energy_j_mm3, sd))) if energy_j_mm3 > 0.0 && sd >= 0.0 => {
-            let power = |row: &Row| Some(removal.get(row.row)? * 1000.0 / 60.0 * energy_j_mm3);
-            let reference = Reference::Removal { relative_sd: sd / energy_j_mm3 };
+            let power = |row: &MachineRow| Some(removal.get(row.row)? * 1000.0 / 60.0 * energy_j_mm3);
+            let reference = PowerReference::Removal { relative_sd: sd / energy_j_mm3 };
             Ok(Referenced { reference, power_w: per_row(&power) })
         }
         (Some(_), _) => Err(alone("the removal rate is known, the cutting energy of the material is not")),
@@ -81,7 +85,7 @@ pub(super) fn referenced(recording: &Recording, rows: &[Row], choice: &Reference
 }
 
 /// The same powers with the sign that makes cuts positive, settled for each direction of rotation.
-fn oriented(rows: &[Row], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
+fn oriented(rows: &[MachineRow], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
     for backward in [false, true] {
         let mean = |state: State| {
             let own = rows.iter().zip(&power_w).filter(|(row, _)| row.backward == backward && row.state == state);
@@ -97,7 +101,7 @@ fn oriented(rows: &[Row], mut power_w: Vec<Option<f64>>) -> Vec<Option<f64>> {
     power_w
 }
 
-fn cutting<'a>(rows: &'a [Row], of: impl Fn(&Row) -> Option<f64> + 'a) -> impl Iterator<Item = f64> + 'a {
+fn cutting<'a>(rows: &'a [MachineRow], of: impl Fn(&MachineRow) -> Option<f64> + 'a) -> impl Iterator<Item = f64> + 'a {
     rows.iter().filter(|row| row.state == State::Cutting).filter_map(of)
 }
 

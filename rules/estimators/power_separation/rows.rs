@@ -14,7 +14,7 @@ const LOOKED_AT: [&str; 7] =
 
 /// One row and what the machine was doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Row {
+pub(super) struct MachineRow {
     /// Row of the recording.
     pub(super) row: usize,
     /// Seconds.
@@ -37,7 +37,7 @@ pub(super) struct Row {
 ///
 /// # Errors
 /// A column that is missing, a unit that was mistaken, a recording too slow to show states.
-pub(super) fn rows(recording: &Recording) -> Result<Vec<Row>, Refusal> {
+pub(super) fn rows(recording: &Recording) -> Result<Vec<MachineRow>, Refusal> {
     check(recording)?;
     let period_s = period_s(recording)?;
     let mut settings = Settings::default();
@@ -105,13 +105,13 @@ fn sample(recording: &Recording, row: usize, time_s: f64) -> Sample {
     sample
 }
 
-fn seen(recording: &Recording, row: usize, time_s: f64, state: State, settings: &Settings) -> Row {
+fn seen(recording: &Recording, row: usize, time_s: f64, state: State, settings: &Settings) -> MachineRow {
     let number = |name: &str| recording.numbers(name).and_then(|numbers| numbers.get(row));
     let own = recording.numbers("spindle_power_w").is_some();
     let feed = number("feed_mm_min").unwrap_or(f64::INFINITY);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what a machine has")]
     let stage = number("gear_stage").map_or(0, |stage| stage.clamp(0.0, 7.0).round() as usize);
-    Row {
+    MachineRow {
         row,
         time_s,
         power_w: if own { number("spindle_power_w") } else { number("total_power_w") },

@@ -1,8 +1,8 @@
 //! Idle stretches of one speed, their settled part, and its level.
 
-use super::rows::Row;
+use super::rows::MachineRow;
 use crate::estimators::State;
-use crate::estimators::regression::{Level, level, without_pulses};
+use crate::estimators::regression::{SteadyLevel, level, without_pulses};
 use crate::statistics::{count, mean};
 use serde::Serialize;
 
@@ -31,7 +31,7 @@ pub struct Stretch {
     /// Time that was left out because the power still settled, s.
     pub settling_s: f64,
     /// Level and trend of the power, W.
-    pub level: Level,
+    pub level: SteadyLevel,
 }
 
 impl Stretch {
@@ -50,7 +50,7 @@ impl Stretch {
 }
 
 /// The settled idle stretches of a recording, in the order of time.
-pub(super) fn stretches(rows: &[Row]) -> Vec<Stretch> {
+pub(super) fn stretches(rows: &[MachineRow]) -> Vec<Stretch> {
     let mut found = Vec::new();
     let mut open: Vec<(f64, f64, f64)> = Vec::new();
     let mut stage = 0;
@@ -74,7 +74,7 @@ pub(super) fn stretches(rows: &[Row]) -> Vec<Stretch> {
 }
 
 /// Speed and power of a row in which the spindle idles without any axis moving.
-fn idle(row: &Row) -> Option<(f64, f64)> {
+fn idle(row: &MachineRow) -> Option<(f64, f64)> {
     let idling = row.state == State::Idle && !row.feeding;
     Some((row.speed_rpm.filter(|_| idling)?, row.power_w?))
 }

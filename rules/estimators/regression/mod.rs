@@ -19,9 +19,9 @@ mod series;
 pub use distributions::{f_quantile, f_upper_tail, t_quantile, t_two_sided};
 pub use least_squares::{Coefficient, Column, Intercept, Regression, fit, fit_weighted};
 pub use plausible::{Mistake, Plausible};
-pub use prediction::{FTest, Prediction};
+pub use prediction::{FTest, FitPrediction};
 pub use refusal::{Refusal, RefusalKind};
-pub use series::{Level, integrated_autocorrelation, level, without_pulses};
+pub use series::{SteadyLevel, integrated_autocorrelation, level, without_pulses};
 
 /// The probability that every stated interval covers.
 pub const CONFIDENCE: f64 = 0.95;

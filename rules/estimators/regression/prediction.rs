@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// The value of a fit at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Prediction {
+pub struct FitPrediction {
     /// The value.
     pub value: f64,
     /// Standard error of the mean at this point: how well the law is known there.
@@ -39,7 +39,7 @@ impl Regression {
     /// The value at a point: one number per column, without the constant. `None` for a wrong number of them, or one that
     /// is not finite.
     #[must_use]
-    pub fn predict(&self, point: &[f64]) -> Option<Prediction> {
+    pub fn predict(&self, point: &[f64]) -> Option<FitPrediction> {
         let ones = (self.intercept == Intercept::Fitted).then_some(1.0);
         let x: Vec<f64> = ones.into_iter().chain(point.iter().copied()).collect();
         if x.len() != self.coefficients.len() || x.iter().any(|x| !x.is_finite()) {
@@ -52,7 +52,7 @@ impl Regression {
         let observation_sd = self.residual_sd * (1.0 + leverage).sqrt();
         let t = t_quantile(0.5 + 0.5 * CONFIDENCE, self.degrees_of_freedom);
         let around = |sd: f64| (value - t * sd, value + t * sd);
-        Some(Prediction {
+        Some(FitPrediction {
             value,
             standard_error,
             observation_sd,

@@ -15,7 +15,7 @@ const PULSE_SD: f64 = 6.0;
 
 /// What a steady stretch says about its level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Level {
+pub struct SteadyLevel {
     /// Mean.
     pub mean: f64,
     /// Standard error of the mean, the memory of the noise counted.
@@ -33,7 +33,7 @@ pub struct Level {
 /// Level and trend of samples at times in seconds. `None` for fewer than 4 samples, times that do not increase, or numbers
 /// that are not finite.
 #[must_use]
-pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
+pub fn level(time_s: &[f64], values: &[f64]) -> Option<SteadyLevel> {
     let n = values.len();
     let increasing = time_s.windows(2).all(|pair| pair[1] > pair[0]);
     if n < 4 || time_s.len() != n || !increasing || values.iter().chain(time_s).any(|value| !value.is_finite()) {
@@ -50,7 +50,7 @@ pub fn level(time_s: &[f64], values: &[f64]) -> Option<Level> {
     let sd = (product(&residuals, &residuals) / (count - 2.0)).sqrt();
     let memory = integrated_autocorrelation(&residuals);
     let independent = (count / memory).max(1.0);
-    Some(Level {
+    Some(SteadyLevel {
         mean,
         standard_error: sd / independent.sqrt(),
         sd,
@@ -118,7 +118,7 @@ mod tests {
         let mut dice = Pcg64Mcg::seed_from_u64(3);
         let time_s: Vec<f64> = (0..400_i32).map(|i| 0.1 * f64::from(i)).collect();
         for keep in [0.0_f64, 0.6, 0.9] {
-            let levels: Vec<Level> =
+            let levels: Vec<SteadyLevel> =
                 (0..400).map(|_| level(&time_s, &remembering(&mut dice, keep, 400)).expect("a level")).collect();
             let inside = levels.iter().filter(|it| it.mean.abs() < 2.0 * it.standard_error).count();
             let trends = levels.iter().filter(|it| it.slope_per_s.abs() < 2.0 * it.slope_standard_error).count();

@@ -25,13 +25,13 @@ struct Section {
 
 /// A designed low-pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Design {
+pub struct LowPassDesign {
     sections: [Section; SECTIONS],
     rate_hz: f64,
     cutoff_hz: f64,
 }
 
-impl Design {
+impl LowPassDesign {
     /// The low-pass whose gain is 1/sqrt(2) at `cutoff_hz`, for samples at `rate_hz`. Cutoffs from 1/10 000 to 0.499 of
     /// the rate.
     ///
@@ -156,8 +156,8 @@ fn quiet(state: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn source() -> Design {
-        Design::low_pass(350.0, 1000.0).expect("the filter of the source")
+    fn source() -> LowPassDesign {
+        LowPassDesign::low_pass(350.0, 1000.0).expect("the filter of the source")
     }
 
     #[test]
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn the_gain_is_that_of_butterworth_at_every_rate_and_cutoff() {
         for (cutoff, rate) in [(350.0, 1000.0), (50.0, 8000.0), (2.0, 10_000.0), (490.0, 1000.0), (0.3, 1000.0)] {
-            let design = Design::low_pass(cutoff, rate).expect("in range");
+            let design = LowPassDesign::low_pass(cutoff, rate).expect("in range");
             let warped = |hz: f64| (PI * hz / rate).tan() / (PI * cutoff / rate).tan();
             for share in [0.1, 0.5, 1.0, 1.5] {
                 let hz = share * cutoff;
@@ -205,7 +205,7 @@ mod tests {
         assert!((settled - 5.0).abs() < 1e-12, "no gain at rest");
         for (cutoff, rate) in [(500.0, 1000.0), (0.0, 1000.0), (350.0, 0.0), (f64::NAN, 1000.0), (350.0, f64::INFINITY)]
         {
-            assert!(Design::low_pass(cutoff, rate).is_err(), "{cutoff} {rate}");
+            assert!(LowPassDesign::low_pass(cutoff, rate).is_err(), "{cutoff} {rate}");
         }
     }
 }

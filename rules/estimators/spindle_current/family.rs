@@ -38,11 +38,11 @@ pub struct Inferred {
 
 /// Curves over depth that do not cross.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Family {
+pub struct CurveFamily {
     curves: Vec<CurveAtDepth>,
 }
 
-impl Family {
+impl CurveFamily {
     /// Curves at different depths, in any order. One curve has no depth to infer; it still gives feeds.
     ///
     /// # Errors
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn depth_and_feed_are_found_back() {
-        let family = Family::new([1.6, 0.4, 0.8, 1.2].map(curve).to_vec()).expect("apart");
+        let family = CurveFamily::new([1.6, 0.4, 0.8, 1.2].map(curve).to_vec()).expect("apart");
         for depth in [0.4, 0.7, 1.2, 1.55] {
             let feature = curve(depth).curve.at(1.3);
             let found = family.depth(1.3, feature, 0.02).expect("in the family");
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn what_is_not_in_the_family_is_refused() {
-        let family = Family::new([0.4, 1.2].map(curve).to_vec()).expect("apart");
+        let family = CurveFamily::new([0.4, 1.2].map(curve).to_vec()).expect("apart");
         let told = |refusal: Refusal| refusal.to_string();
         assert!(told(family.depth(1.3, 1.42, 0.02).expect_err("air")).contains("in the air"));
         assert!(told(family.depth(1.3, 9.0, 0.02).expect_err("too heavy")).contains("slow down"));
@@ -250,11 +250,11 @@ mod tests {
     fn curves_that_cross_are_refused() {
         let mut crossing = curve(1.2);
         crossing.curve.coefficients = [2.0, 0.05, 0.01, 0.0];
-        let refusal = Family::new(vec![curve(0.8), crossing]).expect_err("they cross");
+        let refusal = CurveFamily::new(vec![curve(0.8), crossing]).expect_err("they cross");
         assert!(refusal.kind == RefusalKind::Ambiguous && refusal.what.contains("0.8 mm and 1.2 mm"), "{refusal}");
-        let one = Family::new(vec![curve(0.8)]).expect("one curve gives feeds");
+        let one = CurveFamily::new(vec![curve(0.8)]).expect("one curve gives feeds");
         assert!(one.depth(1.0, 2.0, 0.1).is_err() && one.feed(0.8, 2.0).is_ok() && one.feed(0.9, 2.0).is_err());
-        assert!(Family::new(Vec::new()).is_err());
-        assert!(Family::new(vec![curve(0.8), curve(0.8)]).is_err(), "a depth twice");
+        assert!(CurveFamily::new(Vec::new()).is_err());
+        assert!(CurveFamily::new(vec![curve(0.8), curve(0.8)]).is_err(), "a depth twice");
     }
 }

@@ -5,8 +5,8 @@
 //! value or its square is meant; which one is a choice here. Over a window that is no whole number of half periods the
 //! feature ripples (13.9 % with 40 samples at 33.3 Hz and 1 kHz), so the window follows the current, or the speed.
 
-use super::butterworth::{Design, LowPass};
-use super::half_periods::{Splitter, Sums};
+use super::butterworth::{LowPass, LowPassDesign};
+use super::half_periods::{CurrentSums, Splitter};
 use crate::estimators::regression::{Refusal, RefusalKind};
 
 /// At most this many half periods make a window.
@@ -32,7 +32,7 @@ pub enum FeatureKind {
 
 /// Where the window begins and ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Span {
+pub enum WindowSpan {
     /// At passages of zero; currents below `least_a` pass no zero.
     Crossings {
         /// Greater than the noise about zero, A.
@@ -45,7 +45,7 @@ pub enum Span {
     },
 }
 
-impl Span {
+impl WindowSpan {
     /// The window of a motor with `pole_pairs` whose rotor turns at `motor_speed_rpm`. An induction motor slips by a few
     /// percent, and the window is off by as much; a synchronous one does not.
     ///
@@ -76,11 +76,11 @@ pub struct Feature {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhaseFeature {
     kind: FeatureKind,
-    span: Span,
+    span: WindowSpan,
     rate_hz: f64,
     halves: usize,
     splitter: Splitter,
-    window: Sums,
+    window: CurrentSums,
     filled: usize,
     level_a: f64,
     waited: f64,
@@ -92,7 +92,7 @@ impl PhaseFeature {
     ///
     /// # Errors
     /// A rate, number or threshold out of range; a known frequency above a quarter of the rate.
-    pub fn new(kind: FeatureKind, span: Span, halves: usize, rate_hz: f64) -> Result<Self, Refusal> {
+    pub fn new(kind: FeatureKind, span: WindowSpan, halves: usize, rate_hz: f64) -> Result<Self, Refusal> {
         let refuse = |what: String, next: &str| Err(Refusal::new(RefusalKind::OutOfRange, what, next));
         if !(1..=HALVES_MAX).contains(&halves) {
             return refuse(format!("{halves} half periods"), "take 1 to 64; 2 are a whole period");
@@ -101,15 +101,15 @@ impl PhaseFeature {
             return refuse(format!("{rate_hz} samples per second"), "give the rate of the samples");
         }
         match span {
-            Span::Crossings { least_a } if !(least_a.is_finite() && least_a > 0.0) => {
+            WindowSpan::Crossings { least_a } if !(least_a.is_finite() && least_a > 0.0) => {
                 return refuse(format!("a threshold of {least_a} A"), "give a little more than the noise about zero");
             }
-            Span::Known { hz } if !(hz > 0.0 && hz <= 0.25 * rate_hz) => {
+            WindowSpan::Known { hz } if !(hz > 0.0 && hz <= 0.25 * rate_hz) => {
                 return refuse(format!("a current of {hz} Hz at {rate_hz} samples per second"), "sample faster");
             }
             _ => {}
         }
-        let (splitter, window) = (Splitter::new(), Sums::default());
+        let (splitter, window) = (Splitter::new(), CurrentSums::default());
         Ok(Self { kind, span, rate_hz, halves, splitter, window, filled: 0, level_a: 0.0, waited: 0.0 })
     }
 
@@ -120,14 +120,14 @@ impl PhaseFeature {
             return None;
         }
         match self.span {
-            Span::Crossings { least_a } => self.crossing(sample_a, least_a),
-            Span::Known { hz } => self.known(sample_a, hz),
+            WindowSpan::Crossings { least_a } => self.crossing(sample_a, least_a),
+            WindowSpan::Known { hz } => self.known(sample_a, hz),
         }
     }
 
     /// Begins a window anew.
     pub fn restart(&mut self) {
-        (self.splitter, self.window, self.filled, self.waited) = (Splitter::new(), Sums::default(), 0, 0.0);
+        (self.splitter, self.window, self.filled, self.waited) = (Splitter::new(), CurrentSums::default(), 0, 0.0);
         self.level_a = 0.0;
     }
 
@@ -148,14 +148,15 @@ impl PhaseFeature {
 
     /// Rectangles of one sample each; the last one is split between this window and the next.
     fn known(&mut self, sample_a: f64, hz: f64) -> Option<Feature> {
-        let one = Sums { samples: 1.0, absolute: sample_a.abs(), square: sample_a * sample_a };
+        let one = CurrentSums { samples: 1.0, absolute: sample_a.abs(), square: sample_a * sample_a };
         let length = crate::statistics::count(self.halves) * 0.5 * self.rate_hz / hz;
         let rest = length - self.window.samples;
         if rest > 1.0 {
             self.window.add(one);
             return None;
         }
-        let part = |share: f64| Sums { samples: share, absolute: one.absolute * share, square: one.square * share };
+        let part =
+            |share: f64| CurrentSums { samples: share, absolute: one.absolute * share, square: one.square * share };
         self.window.add(part(rest));
         let feature = self.finish();
         self.window = part(1.0 - rest);
@@ -163,7 +164,7 @@ impl PhaseFeature {
     }
 
     fn finish(&mut self) -> Feature {
-        let Sums { samples, absolute, square } = std::mem::take(&mut self.window);
+        let CurrentSums { samples, absolute, square } = std::mem::take(&mut self.window);
         self.filled = 0;
         let window_s = samples / self.rate_hz;
         let value = match self.kind {
@@ -186,7 +187,7 @@ pub struct ThreePhase {
 impl ThreePhase {
     /// The same filter and feature for each phase.
     #[must_use]
-    pub fn new(design: &Design, phase: PhaseFeature) -> Self {
+    pub fn new(design: &LowPassDesign, phase: PhaseFeature) -> Self {
         Self { filters: [design.filter(); 3], phases: [phase; 3], last: [None; 3] }
     }
 

@@ -4,7 +4,7 @@
 //! lower where the highest term neither stands out of the scatter (F test) nor helps to predict a plateau that was left out.
 
 use super::cubic::Cubic;
-use super::family::{CurveAtDepth, Family};
+use super::family::{CurveAtDepth, CurveFamily};
 use super::plateaus::{Plateau, SAME, plateaus};
 use crate::estimators::regression::{
     Coefficient, Column, FTest, Intercept, Refusal, RefusalKind, Regression, f_upper_tail, fit_weighted,
@@ -91,11 +91,11 @@ impl FeedCurves {
     /// The curves of a speed, where they make a family.
     ///
     /// # Errors
-    /// See [`Family::new`].
-    pub fn family(&self, speed_rpm: f64) -> Result<Family, Refusal> {
+    /// See [`CurveFamily::new`].
+    pub fn family(&self, speed_rpm: f64) -> Result<CurveFamily, Refusal> {
         let near = |curve: &&CurveLearned| (curve.speed_rpm / speed_rpm - 1.0).abs() <= SAME;
         let at = |curve: &CurveLearned| CurveAtDepth { depth_mm: curve.depth_mm, curve: curve.curve, sd: curve.sd };
-        Family::new(self.curves.iter().filter(near).map(at).collect())
+        CurveFamily::new(self.curves.iter().filter(near).map(at).collect())
     }
 
     /// The speeds for which there are curves, in order.

@@ -7,13 +7,13 @@
 
 /// What a current sums up to over some samples; times are in samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Sums {
+pub(super) struct CurrentSums {
     pub(super) samples: f64,
     pub(super) absolute: f64,
     pub(super) square: f64,
 }
 
-impl Sums {
+impl CurrentSums {
     fn plus(self, other: Self) -> Self {
         Self {
             samples: self.samples + other.samples,
@@ -42,20 +42,20 @@ pub(super) struct Splitter {
     /// Sign of the half period in progress; 0 before the first passage.
     side: f64,
     /// Everything since the last passage that counted.
-    open: Sums,
+    open: CurrentSums,
     /// The same up to the first and the last passage since then that does not count yet.
-    candidates: Option<(Sums, Sums)>,
+    candidates: Option<(CurrentSums, CurrentSums)>,
     /// Has the half period in progress begun at a passage?
     whole: bool,
 }
 
 impl Splitter {
     pub(super) fn new() -> Self {
-        Self { last: None, side: 0.0, open: Sums::default(), candidates: None, whole: false }
+        Self { last: None, side: 0.0, open: CurrentSums::default(), candidates: None, whole: false }
     }
 
     /// Takes a sample; a half period when one has ended. `threshold` is positive, in the unit of the current.
-    pub(super) fn push(&mut self, sample: f64, threshold: f64) -> Option<Sums> {
+    pub(super) fn push(&mut self, sample: f64, threshold: f64) -> Option<CurrentSums> {
         let last = self.last.replace(sample)?;
         if last * sample < 0.0 || (last == 0.0 && sample != 0.0) {
             self.pass(last, sample);
@@ -83,7 +83,7 @@ impl Splitter {
     }
 
     /// The current has gone beyond the threshold on the other side.
-    fn turn(&mut self, side: f64) -> Option<Sums> {
+    fn turn(&mut self, side: f64) -> Option<CurrentSums> {
         self.side = side;
         let (first, last) = self.candidates.take()?;
         let ended = first.plus(last).times(0.5);
@@ -93,14 +93,18 @@ impl Splitter {
 }
 
 /// Trapezoid between two samples of one sign.
-fn panel(last: f64, sample: f64) -> Sums {
-    Sums { samples: 1.0, absolute: 0.5 * (last.abs() + sample.abs()), square: 0.5 * (last * last + sample * sample) }
+fn panel(last: f64, sample: f64) -> CurrentSums {
+    CurrentSums {
+        samples: 1.0,
+        absolute: 0.5 * (last.abs() + sample.abs()),
+        square: 0.5 * (last * last + sample * sample),
+    }
 }
 
 /// From zero over a `share` of a sample with this slope, and the correction for the slope where the trapezoids begin.
-fn triangle(share: f64, slope: f64) -> Sums {
+fn triangle(share: f64, slope: f64) -> CurrentSums {
     let end = share * slope;
-    Sums {
+    CurrentSums {
         samples: share,
         absolute: 0.5 * share * end + slope / 12.0,
         square: share * end * end / 3.0 + slope * end / 6.0,
@@ -112,7 +116,7 @@ mod tests {
     use super::*;
     use std::f64::consts::{PI, TAU};
 
-    fn halves(hz: f64, seconds: f64, current: impl Fn(f64) -> f64) -> Vec<Sums> {
+    fn halves(hz: f64, seconds: f64, current: impl Fn(f64) -> f64) -> Vec<CurrentSums> {
         let mut splitter = Splitter::new();
         (0..(seconds * 1000.0) as i64)
             .filter_map(|n| splitter.push(current(TAU * hz * n as f64 / 1000.0), 0.5))

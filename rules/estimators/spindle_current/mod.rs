@@ -23,9 +23,9 @@ mod half_periods;
 mod plateaus;
 mod words;
 
-pub use butterworth::{Design, LowPass};
+pub use butterworth::{LowPass, LowPassDesign};
 pub use cubic::{Cubic, Inversion};
-pub use family::{CurveAtDepth, Family, Inferred};
-pub use feature::{Feature, FeatureKind, PhaseFeature, Span, ThreePhase};
+pub use family::{CurveAtDepth, CurveFamily, Inferred};
+pub use feature::{Feature, FeatureKind, PhaseFeature, ThreePhase, WindowSpan};
 pub use feed_curve::{CurveLearned, FeedCurves, Scatter, identify_feed_curve};
 pub use plateaus::Plateau;

@@ -1,7 +1,7 @@
 //! Stretches of constant speed, depth and feed in a recording, and the level of the feature in each.
 
 use crate::estimators::power_separation::settled_from;
-use crate::estimators::regression::{Level, Plausible, Refusal, RefusalKind, level, without_pulses};
+use crate::estimators::regression::{Plausible, Refusal, RefusalKind, SteadyLevel, level, without_pulses};
 use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
@@ -29,7 +29,7 @@ pub struct Plateau {
     /// Tool in use, where the recording says.
     pub tool: Option<String>,
     /// Level of the feature.
-    pub level: Level,
+    pub level: SteadyLevel,
 }
 
 /// One row in the cut.

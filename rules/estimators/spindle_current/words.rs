@@ -1,6 +1,6 @@
 //! Feed curves as text and as a script.
 
-use super::family::Family;
+use super::family::CurveFamily;
 use super::feed_curve::{CurveLearned, FeedCurves, Scatter};
 use super::plateaus::SAME;
 use std::fmt::{self, Write as _};
@@ -28,7 +28,7 @@ impl FeedCurves {
 
     /// The curves of a speed as the map that the script holds.
     #[must_use]
-    pub fn map(&self, speed_rpm: f64, family: &Family) -> String {
+    pub fn map(&self, speed_rpm: f64, family: &CurveFamily) -> String {
         let mut rows = String::new();
         for it in family.curves() {
             let [c0, c1, c2, c3] = it.curve.coefficients;

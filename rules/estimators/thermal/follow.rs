@@ -7,7 +7,7 @@
 //! [`FollowSettings::total_um`]: beyond that the law is not corrected any more but has to be identified again.
 
 use super::law::ThermalLaw;
-use super::predictor::{Comparison, Prediction, Predictor};
+use super::predictor::{PredictedAndMeasured, Predictor, ThermalPrediction};
 use adapters::Absence;
 use serde::{Deserialize, Serialize};
 
@@ -41,16 +41,16 @@ pub struct Corrected {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Correction {
     /// Measured, predicted and residual before the correction.
-    pub compared: Comparison,
+    pub compared: PredictedAndMeasured,
     /// Change of the prediction, um.
     pub change_um: f64,
     /// What held the change back, if something did.
-    pub held: Option<Held>,
+    pub held: Option<HoldReason>,
 }
 
 /// Why a reading did not correct the law, or not in full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Held {
+pub enum HoldReason {
     /// There is no reading.
     NoReading,
     /// The temperatures lie outside those of identification.
@@ -63,7 +63,7 @@ pub enum Held {
     Total,
 }
 
-impl Held {
+impl HoldReason {
     /// The word used in JSON and events.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -79,14 +79,14 @@ impl Held {
 
 /// A predictor that readings correct.
 #[derive(Debug, Clone)]
-pub struct Follower {
+pub struct ThermalFollower {
     predictor: Predictor,
     identified: ThermalLaw,
     readings: u64,
     settings: FollowSettings,
 }
 
-impl Follower {
+impl ThermalFollower {
     /// Goes on with a law that readings may have corrected before, for temperatures that arrive in the order of `sensors`.
     ///
     /// # Errors
@@ -120,15 +120,15 @@ impl Follower {
     }
 
     /// Takes a reading of the error that belongs to `prediction`, the last one of the predictor.
-    pub fn take(&mut self, prediction: &Prediction, measured_um: Result<f64, Absence>) -> Correction {
+    pub fn take(&mut self, prediction: &ThermalPrediction, measured_um: Result<f64, Absence>) -> Correction {
         let compared = prediction.beside(measured_um);
         let nothing = |held| Correction { compared, change_um: 0.0, held: Some(held) };
-        let Ok(residual) = compared.residual_um else { return nothing(Held::NoReading) };
+        let Ok(residual) = compared.residual_um else { return nothing(HoldReason::NoReading) };
         if !prediction.is_inside_range() {
-            return nothing(Held::Outside);
+            return nothing(HoldReason::Outside);
         }
         if self.predictor.unsettled() > SETTLED {
-            return nothing(Held::Unsettled);
+            return nothing(HoldReason::Unsettled);
         }
         let point = self.predictor.point.clone();
         let law = self.predictor.law();
@@ -140,8 +140,8 @@ impl Follower {
         let change_um =
             (moved_um + step_um).clamp(-total_um.max(moved_um.abs()), total_um.max(moved_um.abs())) - moved_um;
         let held = match () {
-            () if (change_um - step_um).abs() > 1e-9 => Some(Held::Total),
-            () if (step_um - full_um).abs() > 1e-9 => Some(Held::Step),
+            () if (change_um - step_um).abs() > 1e-9 => Some(HoldReason::Total),
+            () if (step_um - full_um).abs() > 1e-9 => Some(HoldReason::Step),
             () => None,
         };
         let share = if through > 0.0 { change_um / through } else { 0.0 };
@@ -185,12 +185,12 @@ fn correct(law: &mut ThermalLaw, gain: &[f64], product: &[f64], residual_um: f64
 
 #[cfg(test)]
 mod tests {
-    use super::super::law::{Path, Term};
+    use super::super::law::{Path, ThermalTerm};
     use super::*;
     use adapters::clock::SECOND_NS;
 
     fn law() -> ThermalLaw {
-        let term = Term {
+        let term = ThermalTerm {
             sensor: "bearing_temperature_c".to_owned(),
             path: Path::Direct,
             um_per_k: 2.0,
@@ -210,14 +210,14 @@ mod tests {
         }
     }
 
-    fn follower(step_um: f64, total_um: f64) -> Follower {
+    fn follower(step_um: f64, total_um: f64) -> ThermalFollower {
         let corrected = Corrected { identified: law(), law: law(), readings: 0 };
         let settings = FollowSettings { step_um, total_um };
-        Follower::new(corrected, &["bearing_temperature_c"], settings).expect("a law")
+        ThermalFollower::new(corrected, &["bearing_temperature_c"], settings).expect("a law")
     }
 
     /// Readings of a machine whose error is `scale` times the law plus `shift_um`, at temperatures that go up and down.
-    fn read(follower: &mut Follower, readings: i64, scale: f64, shift_um: f64) -> f64 {
+    fn read(follower: &mut ThermalFollower, readings: i64, scale: f64, shift_um: f64) -> f64 {
         let mut last = 0.0;
         for k in 0..readings {
             let temperature_c = 35.0 + 10.0 * (k as f64 * 0.9).sin();
@@ -243,7 +243,7 @@ mod tests {
         exact.law_sd_max_um = 0.03;
         let corrected = Corrected { identified: exact.clone(), law: exact, readings: 0 };
         let settings = FollowSettings { step_um: 3.0, total_um: 40.0 };
-        let mut follower = Follower::new(corrected, &["bearing_temperature_c"], settings).expect("a law");
+        let mut follower = ThermalFollower::new(corrected, &["bearing_temperature_c"], settings).expect("a law");
         let last = read(&mut follower, 20, 1.0, 12.0);
         assert!(last.abs() < 1.0 && follower.readings() == 20, "{last} {}", follower.readings());
     }
@@ -253,7 +253,7 @@ mod tests {
         let mut follower = follower(2.0, 40.0);
         let prediction = follower.predictor().predict(0, &[Ok(30.0)]).expect("there");
         let correction = follower.take(&prediction, Ok(prediction.error_um.value + 500.0));
-        assert_eq!((correction.held, correction.change_um.round()), (Some(Held::Step), 2.0));
+        assert_eq!((correction.held, correction.change_um.round()), (Some(HoldReason::Step), 2.0));
         let after = follower.predictor().predict(SECOND_NS, &[Ok(30.0)]).expect("there");
         assert!((after.error_um.value - prediction.error_um.value - 2.0).abs() < 1e-9);
     }
@@ -266,7 +266,7 @@ mod tests {
             follower.predictor().predict(60 * 600 * SECOND_NS, &[Ok(35.0)]).expect("there").error_um.value - 30.0;
         assert!(moved < 7.0, "{moved}");
         let outside = follower.predictor().predict(70 * 600 * SECOND_NS, &[Ok(80.0)]).expect("there");
-        assert_eq!(follower.take(&outside, Ok(0.0)).held, Some(Held::Outside));
-        assert_eq!(follower.take(&outside, Err(Absence::NotRecorded)).held, Some(Held::NoReading));
+        assert_eq!(follower.take(&outside, Ok(0.0)).held, Some(HoldReason::Outside));
+        assert_eq!(follower.take(&outside, Err(Absence::NotRecorded)).held, Some(HoldReason::NoReading));
     }
 }

@@ -21,7 +21,7 @@ pub enum Path {
 /// One term of a law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Term {
+pub struct ThermalTerm {
     /// Channel of the sensor.
     pub sensor: String,
     /// Directly or late.
@@ -56,7 +56,7 @@ pub struct ThermalLaw {
     #[serde(default)]
     pub lag_spread_k: f64,
     /// The terms.
-    pub terms: Vec<Term>,
+    pub terms: Vec<ThermalTerm>,
     /// Covariance of intercept and terms, in their order, row by row.
     pub covariance: Vec<Vec<f64>>,
 }

@@ -17,14 +17,14 @@ use crate::estimators::regression::{Column, Intercept, Refusal, Regression, fit}
 
 /// Memory and share of white noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct ThermalNoise {
     /// Time after which the slow process has forgotten, s; 0 for white noise alone.
     pub(super) memory_s: f64,
     /// Share of the variance that is white.
     pub(super) white: f64,
 }
 
-impl Noise {
+impl ThermalNoise {
     pub(super) const WHITE: Self = Self { memory_s: 0.0, white: 1.0 };
 }
 
@@ -34,12 +34,12 @@ const MEMORIES_MAX: i32 = 24;
 const WHITE_SHARES: [f64; 5] = [0.01, 0.1, 0.3, 0.6, 0.85];
 
 /// Every noise that is weighed for these rows: from the spacing of the rows to the length of the longest run.
-pub(super) fn grid(course: &Course) -> Vec<Noise> {
+pub(super) fn grid(course: &Course) -> Vec<ThermalNoise> {
     let (shortest, longest) = (course.period_s(), course.longest_s());
     let memories = (0..MEMORIES_MAX).map(|step| shortest * MEMORY_STEP.powi(step));
     let memories = memories.take_while(|memory_s| *memory_s <= longest);
-    let slow = memories.flat_map(|memory_s| WHITE_SHARES.map(|white| Noise { memory_s, white }));
-    std::iter::once(Noise::WHITE).chain(slow).collect()
+    let slow = memories.flat_map(|memory_s| WHITE_SHARES.map(|white| ThermalNoise { memory_s, white }));
+    std::iter::once(ThermalNoise::WHITE).chain(slow).collect()
 }
 
 /// The filter for one noise and one course of times.
@@ -52,7 +52,7 @@ pub(super) struct Whitener {
 }
 
 impl Whitener {
-    pub(super) fn new(course: &Course, noise: Noise) -> Self {
+    pub(super) fn new(course: &Course, noise: ThermalNoise) -> Self {
         let rows = course.rows();
         let mut filter = Self {
             decay: Vec::with_capacity(rows),
@@ -91,7 +91,7 @@ impl Whitener {
 
 /// One regression under one noise.
 pub(super) struct Weighed {
-    pub(super) noise: Noise,
+    pub(super) noise: ThermalNoise,
     pub(super) regression: Regression,
     /// Restricted log likelihood; that of the mean is left out where designs are compared.
     pub(super) restricted: f64,
@@ -102,7 +102,7 @@ pub(super) struct Weighed {
 }
 
 /// Regresses y on the columns (the constant is one of them) under one noise.
-pub(super) fn weigh(course: &Course, columns: &[Column], y: &[f64], noise: Noise) -> Result<Weighed, Refusal> {
+pub(super) fn weigh(course: &Course, columns: &[Column], y: &[f64], noise: ThermalNoise) -> Result<Weighed, Refusal> {
     let filter = Whitener::new(course, noise);
     let white: Vec<Column> = columns.iter().map(|c| Column::new(c.name.as_str(), filter.whiten(&c.values))).collect();
     let target = Column::new(super::quantities::THERMAL_ERROR, filter.whiten(y));
@@ -182,7 +182,7 @@ pub(super) fn average(course: &Course, columns: &[Column], y: &[f64]) -> Result<
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// Adds `scale X'VX`.
-fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], noise: Noise, scale: f64) {
+fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], noise: ThermalNoise, scale: f64) {
     for (j, column) in columns.iter().enumerate() {
         let spread = spread(course, &column.values, noise);
         for (i, other) in columns.iter().enumerate() {
@@ -192,7 +192,7 @@ fn add_spread(middle: &mut [Vec<f64>], course: &Course, columns: &[Column], nois
 }
 
 /// `V x`, by one pass forwards and one backwards.
-fn spread(course: &Course, x: &[f64], noise: Noise) -> Vec<f64> {
+fn spread(course: &Course, x: &[f64], noise: ThermalNoise) -> Vec<f64> {
     let slow = 1.0 - noise.white;
     let decay = |row: usize| course.since_s(row).filter(|_| slow > 0.0).map_or(0.0, |s| (-s / noise.memory_s).exp());
     let mut sum: Vec<f64> = x.iter().map(|x| noise.white * x).collect();
@@ -231,7 +231,7 @@ mod tests {
     fn the_filter_is_the_inverse_root_of_the_covariance() {
         // x' V^-1 x by the filter against the dense matrix, and the determinant.
         let course = course(25);
-        let noise = Noise { memory_s: 240.0, white: 0.2 };
+        let noise = ThermalNoise { memory_s: 240.0, white: 0.2 };
         let filter = Whitener::new(&course, noise);
         let entry = |i: usize, k: usize| {
             let dt = (course.clock_s()[i] - course.clock_s()[k]).abs();
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn the_spread_is_the_covariance_times_the_column() {
         let course = course(25);
-        let noise = Noise { memory_s: 240.0, white: 0.2 };
+        let noise = ThermalNoise { memory_s: 240.0, white: 0.2 };
         let x: Vec<f64> = (0..25).map(|row| f64::from(row % 7)).collect();
         for (i, got) in spread(&course, &x, noise).into_iter().enumerate() {
             let dt = |k: usize| (course.clock_s()[i] - course.clock_s()[k]).abs();
@@ -265,6 +265,6 @@ mod tests {
     fn white_noise_changes_nothing() {
         let course = course(12);
         let column: Vec<f64> = (0..12).map(f64::from).collect();
-        assert_eq!(Whitener::new(&course, Noise::WHITE).whiten(&column), column);
+        assert_eq!(Whitener::new(&course, ThermalNoise::WHITE).whiten(&column), column);
     }
 }

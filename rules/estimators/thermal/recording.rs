@@ -13,7 +13,7 @@ const ABSENT_MAX: f64 = 0.2;
 
 /// Rows to learn from, and what was left out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Collected {
+pub struct ThermalRows {
     /// The rows.
     pub course: Course,
     /// What was left out and why.
@@ -38,7 +38,7 @@ fn is_temperature(name: &str) -> bool {
 ///
 /// # Errors
 /// A [`Refusal`] where the error or every temperature is missing, or was recorded under the name of another unit.
-pub fn collect(recording: &Recording) -> Result<Collected, Refusal> {
+pub fn collect(recording: &Recording) -> Result<ThermalRows, Refusal> {
     let error = recording.numbers(THERMAL_ERROR).ok_or_else(|| no_error(recording))?;
     let with_error: Vec<usize> = (0..recording.rows()).filter(|row| error.get(*row).is_some()).collect();
     let temperatures: Vec<(&str, &Numbers)> = recording
@@ -70,7 +70,7 @@ pub fn collect(recording: &Recording) -> Result<Collected, Refusal> {
         rows: recording.rows() - rows.len(),
         sensors: out.iter().map(|(name, _)| (*name).to_owned()).collect(),
     };
-    Ok(Collected { course: Course::new(clock_s, runs, recording.pauses_known(), of(error), sensors), left_out })
+    Ok(ThermalRows { course: Course::new(clock_s, runs, recording.pauses_known(), of(error), sensors), left_out })
 }
 
 fn no_error(recording: &Recording) -> Refusal {

@@ -1,6 +1,6 @@
 //! What was learned, in words and tables.
 
-use super::learn::{Candidate, ThermalLearned};
+use super::learn::{CandidateLaw, ThermalLearned};
 use super::regression::ThermalCoefficient;
 use super::selection::{GradeChoice, Selection, SensorVerdict};
 use std::fmt;
@@ -72,7 +72,7 @@ impl fmt::Display for GradeChoice {
     }
 }
 
-impl fmt::Display for Candidate {
+impl fmt::Display for CandidateLaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "coefficient                        value    95 % interval             all together")?;
         self.fit.coefficients.iter().try_for_each(|coefficient| writeln!(f, "{coefficient}"))?;

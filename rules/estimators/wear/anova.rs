@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// One row of the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Source {
+pub struct AnovaRow {
     /// What explains: `model`, a term, `residual`, `lack of fit`, `pure error`, `total`.
     pub source: String,
     /// Sum of squares, W^2.
@@ -28,7 +28,7 @@ pub struct Source {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Anova {
     /// Rows: the model, each term as if it came last, residual, lack of fit where cuts were repeated, total.
-    pub sources: Vec<Source>,
+    pub sources: Vec<AnovaRow>,
     /// Share explained.
     pub r2: f64,
     /// The same, for the number of terms.
@@ -55,20 +55,20 @@ pub(super) fn anova(cuts: &[Cut], regression: &Regression) -> Anova {
     Anova { sources, r2, adjusted_r2, predicted_r2 }
 }
 
-fn plain(source: &str, (sum_of_squares, degrees_of_freedom): (f64, f64)) -> Source {
+fn plain(source: &str, (sum_of_squares, degrees_of_freedom): (f64, f64)) -> AnovaRow {
     let mean_square = sum_of_squares / degrees_of_freedom;
-    Source { source: source.to_owned(), sum_of_squares, degrees_of_freedom, mean_square, f: None, p: None }
+    AnovaRow { source: source.to_owned(), sum_of_squares, degrees_of_freedom, mean_square, f: None, p: None }
 }
 
-fn tested(source: &str, squares: f64, df: f64, (rest, rest_df): (f64, f64)) -> Source {
+fn tested(source: &str, squares: f64, df: f64, (rest, rest_df): (f64, f64)) -> AnovaRow {
     let row = plain(source, (squares, df));
     // A perfect fit leaves nothing to compare with.
     let f = (rest > 0.0).then(|| row.mean_square / (rest / rest_df)).filter(|f| f.is_finite());
-    Source { f, p: f.map(|f| f_upper_tail(f, df, rest_df)), ..row }
+    AnovaRow { f, p: f.map(|f| f_upper_tail(f, df, rest_df)), ..row }
 }
 
 /// The residual split by repeated cuts: what repeats vary among themselves, and what the surface misses.
-fn lack_of_fit(cuts: &[Cut], regression: &Regression) -> Vec<Source> {
+fn lack_of_fit(cuts: &[Cut], regression: &Regression) -> Vec<AnovaRow> {
     let (mut pure, mut repeats) = (0.0, 0.0);
     let mut seen = vec![false; cuts.len()];
     for at in 0..cuts.len() {

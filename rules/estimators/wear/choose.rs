@@ -1,18 +1,18 @@
 //! Which model of a library is for this cut: the exact edge before its tool, then the operation, the work material, any.
 
-use super::record::{Key, WearRecord};
+use super::record::{WearKey, WearRecord};
 use super::tool_name::tool_of;
 
 /// A model, and what speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice<'a, R> {
+pub struct ChosenModel<'a, R> {
     /// The model.
     pub record: &'a R,
     /// Of what it names most: `edge`, `tool`, `operation`, `work material`, `machine`, `any`.
     pub by: &'static str,
 }
 
-impl Key {
+impl WearKey {
     /// How well a model with this key fits a cut; `None` when it names something else than the cut. An empty text of the model
     /// fits everything; a model of a tool fits all edges of it.
     #[must_use]
@@ -35,12 +35,12 @@ impl Key {
 }
 
 /// The best model for a cut; of equals the last, which is the newest. `key` reads what a model is for.
-pub fn choose<'a, R>(models: &'a [R], cut: &Key, key: impl Fn(&R) -> &WearRecord) -> Option<Choice<'a, R>> {
+pub fn choose<'a, R>(models: &'a [R], cut: &WearKey, key: impl Fn(&R) -> &WearRecord) -> Option<ChosenModel<'a, R>> {
     let fitting = models.iter().filter_map(|model| Some((key(model).key.fits(cut)?, model)));
     let (rank, record) = fitting.max_by_key(|(rank, _)| *rank)?;
     let words = ["any", "machine", "work material", "operation", "tool", "edge"];
     let highest = usize::try_from(u8::BITS - rank.leading_zeros()).unwrap_or(0);
-    Some(Choice { record, by: words.get(highest).copied().unwrap_or("any") })
+    Some(ChosenModel { record, by: words.get(highest).copied().unwrap_or("any") })
 }
 
 #[cfg(test)]
@@ -49,9 +49,9 @@ mod tests {
     use super::super::surface::published;
     use super::*;
 
-    fn key(texts: [&str; 4]) -> Key {
+    fn key(texts: [&str; 4]) -> WearKey {
         let [machine, tool, work_material, operation] = texts.map(str::to_owned);
-        Key { machine, tool, work_material, operation }
+        WearKey { machine, tool, work_material, operation }
     }
 
     fn record(texts: [&str; 4]) -> WearRecord {

@@ -1,7 +1,7 @@
 //! Coded variables: each factor from -1 to 1 over the recorded range, so that coefficients compare and columns are
 //! nearly orthogonal. The patent codes `a = (VB - 0.195) / 0.13` in the same way.
 
-use super::conditions::{Conditions, Cut, FACTORS, Factor};
+use super::conditions::{ConditionFactor, Cut, CutConditions, FACTORS};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +44,7 @@ impl Range {
 
     /// The factors whose value lies outside what was recorded.
     #[must_use]
-    pub fn outside(&self, conditions: &Conditions) -> Vec<&'static Factor> {
+    pub fn outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
         let beyond = |at: &usize| {
             let value = conditions.vector()[*at];
             let margin = MARGIN * self.width(*at).max(MARGIN * self.greatest[*at].abs());
@@ -75,7 +75,7 @@ impl Coding {
 
     /// The coded variables; 0 where the factor was held.
     #[must_use]
-    pub fn code(&self, conditions: &Conditions) -> [f64; 4] {
+    pub fn code(&self, conditions: &CutConditions) -> [f64; 4] {
         let values = conditions.vector();
         let coded = |at: usize| (values[at] - self.centre[at]) / self.half[at];
         std::array::from_fn(|at| if self.half[at] > 0.0 { coded(at) } else { 0.0 })
@@ -83,8 +83,8 @@ impl Coding {
 
     /// The conditions of coded variables.
     #[must_use]
-    pub fn decode(&self, coded: [f64; 4]) -> Conditions {
-        Conditions::of(std::array::from_fn(|at| self.centre[at] + coded[at] * self.half[at]))
+    pub fn decode(&self, coded: [f64; 4]) -> CutConditions {
+        CutConditions::of(std::array::from_fn(|at| self.centre[at] + coded[at] * self.half[at]))
     }
 }
 
@@ -94,11 +94,11 @@ impl Coding {
 /// The factors that are constant.
 pub(super) fn check_varied(range: &Range, held: &[&str]) -> Result<(), Refusal> {
     let constant = |at: &usize| !range.varies(*at) && !held.contains(&FACTORS[*at].name);
-    let still: Vec<&Factor> = (0..FACTORS.len()).filter(constant).map(|at| &FACTORS[at]).collect();
+    let still: Vec<&ConditionFactor> = (0..FACTORS.len()).filter(constant).map(|at| &FACTORS[at]).collect();
     if still.is_empty() {
         return Ok(());
     }
-    let each = |it: &&Factor| format!("{} is the same in every cut", it.name);
+    let each = |it: &&ConditionFactor| format!("{} is the same in every cut", it.name);
     let what = still.iter().map(each).collect::<Vec<_>>().join(", ");
     let names: Vec<&str> = still.iter().map(|it| it.name).collect();
     let next = format!(
@@ -115,7 +115,7 @@ mod tests {
 
     fn cuts() -> Vec<Cut> {
         [[0.065, 90.0, 0.1, 0.5], [0.325, 150.0, 0.2, 1.5]]
-            .map(|it| Cut { conditions: Conditions::of(it), cutting_power_w: 1.0 })
+            .map(|it| Cut { conditions: CutConditions::of(it), cutting_power_w: 1.0 })
             .to_vec()
     }
 
@@ -123,7 +123,7 @@ mod tests {
     fn the_published_coding_of_the_wear() {
         let coding = Coding::of(&Range::of(&cuts()));
         assert!((coding.centre[0] - 0.195).abs() < 1e-12 && (coding.half[0] - 0.13).abs() < 1e-12);
-        let coded = coding.code(&Conditions::of([0.3, 120.0, 0.1, 1.5]));
+        let coded = coding.code(&CutConditions::of([0.3, 120.0, 0.1, 1.5]));
         assert!((coded[0] - 0.807_692).abs() < 1e-6 && coded[1].abs() < 1e-12);
         assert!((coding.decode(coded).flank_wear_mm - 0.3).abs() < 1e-12);
     }
@@ -131,9 +131,9 @@ mod tests {
     #[test]
     fn what_lies_outside_is_named() {
         let range = Range::of(&cuts());
-        let outside = range.outside(&Conditions::of([0.3, 170.0, 0.15, 0.2]));
+        let outside = range.outside(&CutConditions::of([0.3, 170.0, 0.15, 0.2]));
         assert_eq!(outside.iter().map(|it| it.symbol).collect::<Vec<_>>(), ["vc", "ap"]);
-        assert!(range.outside(&Conditions::of([0.33, 90.0, 0.1, 0.5])).is_empty(), "a margin of 5 %");
+        assert!(range.outside(&CutConditions::of([0.33, 90.0, 0.1, 0.5])).is_empty(), "a margin of 5 %");
     }
 
     #[test]

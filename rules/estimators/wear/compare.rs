@@ -29,18 +29,18 @@ pub struct FormErrors {
 
 /// Both forms, and which one to take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
+pub struct FormComparison {
     /// Surface, then physical form.
     pub forms: [FormErrors; 2],
     /// The form with the better evidence.
     pub recommended: &'static str,
 }
 
-type Fit<'a> = &'a dyn Fn(&[Cut]) -> Option<WearModel>;
+type FitFunction<'a> = &'a dyn Fn(&[Cut]) -> Option<WearModel>;
 
 /// Compares the two forms by cross-validation.
 #[must_use]
-pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> Comparison {
+pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> FormComparison {
     let surface = |cuts: &[Cut]| largest(cuts, options);
     let physical = |cuts: &[Cut]| fit_physical(cuts, &options.held).ok().map(|fit| WearModel::Physical(fit.physical));
     let forms = [errors("surface", cuts, &surface), errors("physical", cuts, &physical)];
@@ -49,7 +49,7 @@ pub fn compare(cuts: &[Cut], options: &SurfaceOptions) -> Comparison {
         (Some(_), None) => "surface",
         _ => "physical",
     };
-    Comparison { forms, recommended }
+    FormComparison { forms, recommended }
 }
 
 /// The surface of the highest order that these cuts carry.
@@ -60,7 +60,7 @@ fn largest(cuts: &[Cut], options: &SurfaceOptions) -> Option<WearModel> {
     fitted.map(|fit| WearModel::Surface(fit.surface))
 }
 
-fn errors(form: &'static str, cuts: &[Cut], fit: Fit<'_>) -> FormErrors {
+fn errors(form: &'static str, cuts: &[Cut], fit: FitFunction<'_>) -> FormErrors {
     let one_by_one: Vec<Vec<usize>> = (0..cuts.len()).map(|at| vec![at]).collect();
     FormErrors {
         form,
@@ -98,7 +98,7 @@ fn edges(cuts: &[Cut]) -> Vec<Vec<usize>> {
 
 /// Root mean square error over the groups, each predicted by a fit of the cuts outside it; `None` where no fit was possible
 /// for more than a tenth of them.
-fn left_out(cuts: &[Cut], groups: &[Vec<usize>], fit: Fit<'_>) -> Option<f64> {
+fn left_out(cuts: &[Cut], groups: &[Vec<usize>], fit: FitFunction<'_>) -> Option<f64> {
     let (mut squares, mut count, mut failed) = (0.0, 0, 0);
     for group in groups {
         let rest: Vec<Cut> = (0..cuts.len()).filter(|at| !group.contains(at)).map(|at| cuts[at]).collect();
@@ -115,23 +115,23 @@ fn left_out(cuts: &[Cut], groups: &[Vec<usize>], fit: Fit<'_>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::conditions::Conditions;
-    use super::super::design::{Levels, plan};
+    use super::super::conditions::CutConditions;
+    use super::super::design::{FactorLevels, plan};
     use super::super::orthogonal_array::Array;
     use super::*;
 
     /// Kienzle with an edge force and a worn flank: neither form exactly.
     fn cuts() -> Vec<Cut> {
         let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.0, 1.25]];
-        let factors: Vec<Levels> =
-            FACTORS.iter().zip(levels).map(|(factor, values)| Levels { factor, values }).collect();
+        let factors: Vec<FactorLevels> =
+            FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
         let design = plan(Array::L27, &factors, 1).expect("a design");
         let cut = |(index, values): (usize, &Vec<f64>)| {
             let [wear, speed, feed, depth] = [values[0], values[1], values[2], values[3]];
             let force_n = (1700.0 * feed.powf(0.74) * (speed / 150.0).powf(-0.08) + 22.0 + 300.0 * wear) * depth;
             let noise = [8.0, -11.0, 3.0, -5.0, 9.0, -4.0, 0.5][index % 7];
             Cut {
-                conditions: Conditions::of([wear, speed, feed, depth]),
+                conditions: CutConditions::of([wear, speed, feed, depth]),
                 cutting_power_w: force_n * speed / 60.0 + noise,
             }
         };

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// One of the four conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factor {
+pub struct ConditionFactor {
     /// Column in a recording; ends in the unit.
     pub name: &'static str,
     /// Symbol in formulas.
@@ -24,8 +24,8 @@ pub struct Factor {
 }
 
 /// Flank wear, cutting speed, feed, depth of cut: the order of all vectors of conditions.
-pub const FACTORS: [Factor; 4] = [
-    Factor {
+pub const FACTORS: [ConditionFactor; 4] = [
+    ConditionFactor {
         name: "flank_wear_mm",
         symbol: "VB",
         letter: 'a',
@@ -35,7 +35,7 @@ pub const FACTORS: [Factor; 4] = [
         zh: "后刀面磨损量",
         mistaken: ("um", 1e-3),
     },
-    Factor {
+    ConditionFactor {
         name: "cutting_speed_m_min",
         symbol: "vc",
         letter: 'b',
@@ -45,7 +45,7 @@ pub const FACTORS: [Factor; 4] = [
         zh: "切削速度",
         mistaken: ("mm/min", 1e-3),
     },
-    Factor {
+    ConditionFactor {
         name: "feed_per_rev_mm",
         symbol: "f",
         letter: 'c',
@@ -55,7 +55,7 @@ pub const FACTORS: [Factor; 4] = [
         zh: "每转进给量",
         mistaken: ("um/rev, or a feed in mm/min", 1e-3),
     },
-    Factor {
+    ConditionFactor {
         name: "depth_of_cut_mm",
         symbol: "ap",
         letter: 'd',
@@ -78,7 +78,7 @@ const ENERGY_J_MM3: (f64, f64) = (0.02, 60.0);
 
 /// The conditions of one cut, in the units of [`FACTORS`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conditions {
+pub struct CutConditions {
     /// VB, mm.
     pub flank_wear_mm: f64,
     /// vc, m/min.
@@ -89,7 +89,7 @@ pub struct Conditions {
     pub depth_of_cut_mm: f64,
 }
 
-impl Conditions {
+impl CutConditions {
     /// In the order of [`FACTORS`].
     #[must_use]
     pub fn vector(&self) -> [f64; 4] {
@@ -122,7 +122,7 @@ impl Conditions {
     }
 }
 
-impl Factor {
+impl ConditionFactor {
     /// What is wrong with a value, and in which unit it probably is.
     #[must_use]
     pub fn problem(&self, value: f64) -> Option<String> {
@@ -146,7 +146,7 @@ impl Factor {
     }
 }
 
-impl fmt::Display for Conditions {
+impl fmt::Display for CutConditions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { flank_wear_mm, cutting_speed_m_min, feed_per_rev_mm, depth_of_cut_mm } = self;
         write!(
@@ -174,7 +174,7 @@ pub fn cutting_speed_m_min(diameter_mm: f64, spindle_speed_rpm: f64) -> Result<f
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     /// Conditions.
-    pub conditions: Conditions,
+    pub conditions: CutConditions,
     /// Power that removes material, W.
     pub cutting_power_w: f64,
 }
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn units_that_were_mistaken_are_named() {
-        let cut = |power, wear| Cut { conditions: Conditions::of([wear, 200.0, 0.15, 1.0]), cutting_power_w: power };
+        let cut = |power, wear| Cut { conditions: CutConditions::of([wear, 200.0, 0.15, 1.0]), cutting_power_w: power };
         assert!(cut(790.0, 195.0).conditions.problems()[0].contains("is it in um?"));
         assert!(unit_trouble(&[cut(0.79, 0.2)]).is_some_and(|text| text.contains("kW")));
         assert!(unit_trouble(&[cut(790_000.0, 0.2)]).is_some_and(|text| text.contains("mW")));

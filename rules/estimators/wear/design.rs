@@ -1,8 +1,8 @@
 //! A design of experiments: which cuts to make so that a wear model can be fitted, as a work list in random order.
 
-use super::conditions::{FACTORS, Factor, WEAR};
+use super::conditions::{ConditionFactor, FACTORS, WEAR};
 use super::orthogonal_array::Array;
-use super::term::{Term, second_order};
+use super::term::{WearTerm, second_order};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -14,9 +14,9 @@ const CHOICES_MAX: usize = 20_000;
 
 /// The levels of one factor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Levels {
+pub struct FactorLevels {
     /// Which factor.
-    pub factor: &'static Factor,
+    pub factor: &'static ConditionFactor,
     /// The values, in the unit of the factor, increasing.
     pub values: Vec<f64>,
 }
@@ -45,11 +45,11 @@ pub struct Alias {
 
 /// The work list.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Design {
+pub struct ExperimentDesign {
     /// The array.
     pub array: Array,
     /// The factors with their levels.
-    pub factors: Vec<Levels>,
+    pub factors: Vec<FactorLevels>,
     /// Column of the array for each factor, from 1; chosen for the least aliasing.
     pub columns: Vec<usize>,
     /// The cuts in the order in which to make them.
@@ -64,7 +64,7 @@ pub struct Design {
 ///
 /// # Errors
 /// Everything that is wrong with the factors, and what to give instead.
-pub fn plan(array: Array, factors: &[Levels], seed: u64) -> Result<Design, Vec<String>> {
+pub fn plan(array: Array, factors: &[FactorLevels], seed: u64) -> Result<ExperimentDesign, Vec<String>> {
     let problems = problems(array, factors);
     if !problems.is_empty() {
         return Err(problems);
@@ -80,7 +80,7 @@ pub fn plan(array: Array, factors: &[Levels], seed: u64) -> Result<Design, Vec<S
     cuts.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
     let aliases = aliases(factors, &columns, &runs);
     let warnings = warnings(array, factors, &aliases);
-    Ok(Design {
+    Ok(ExperimentDesign {
         array,
         factors: factors.to_vec(),
         columns: columns.iter().map(|column| column + 1).collect(),
@@ -90,13 +90,13 @@ pub fn plan(array: Array, factors: &[Levels], seed: u64) -> Result<Design, Vec<S
     })
 }
 
-fn problems(array: Array, factors: &[Levels]) -> Vec<String> {
+fn problems(array: Array, factors: &[FactorLevels]) -> Vec<String> {
     let mut problems = Vec::new();
     if factors.len() < 2 {
         problems.push("a design needs at least two factors: give --levels NAME=LOW,MIDDLE,HIGH for each".to_owned());
     }
     let mut free = array.levels();
-    for Levels { factor, values } in factors {
+    for FactorLevels { factor, values } in factors {
         let name = factor.name;
         problems.extend(values.iter().filter_map(|value| factor.problem(*value)));
         if values.windows(2).any(|pair| pair[1] <= pair[0]) {
@@ -124,7 +124,7 @@ fn column_text(array: Array) -> String {
 }
 
 /// The columns with the least aliasing: first of the single factors with anything else, then of the rest.
-fn choose(array: Array, factors: &[Levels], runs: &[Vec<u8>]) -> Vec<usize> {
+fn choose(array: Array, factors: &[FactorLevels], runs: &[Vec<u8>]) -> Vec<usize> {
     let levels = array.levels();
     let mut choices = vec![Vec::new()];
     for factor in factors {
@@ -159,7 +159,7 @@ fn single_factor(name: &str) -> bool {
 }
 
 /// Correlated pairs of second-order terms, on levels coded from -1 to 1.
-fn aliases(factors: &[Levels], columns: &[usize], runs: &[Vec<u8>]) -> Vec<Alias> {
+fn aliases(factors: &[FactorLevels], columns: &[usize], runs: &[Vec<u8>]) -> Vec<Alias> {
     let coded = |run: &Vec<u8>| -> Vec<f64> {
         columns
             .iter()
@@ -168,11 +168,11 @@ fn aliases(factors: &[Levels], columns: &[usize], runs: &[Vec<u8>]) -> Vec<Alias
             .collect()
     };
     let points: Vec<Vec<f64>> = runs.iter().map(coded).collect();
-    let curved = |term: &Term| {
-        let too_few = |(power, it): (&u8, &Levels)| *power == 2 && it.values.len() < 3;
+    let curved = |term: &WearTerm| {
+        let too_few = |(power, it): (&u8, &FactorLevels)| *power == 2 && it.values.len() < 3;
         !term.powers().iter().zip(factors).any(too_few)
     };
-    let terms: Vec<Term> = second_order(factors.len()).into_iter().skip(1).filter(curved).collect();
+    let terms: Vec<WearTerm> = second_order(factors.len()).into_iter().skip(1).filter(curved).collect();
     let centred: Vec<Vec<f64>> =
         terms.iter().map(|term| centre(points.iter().map(|it| term.value(it)).collect())).collect();
     let symbols: Vec<&str> = factors.iter().map(|it| it.factor.symbol).collect();
@@ -201,7 +201,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     if size > 0.0 { dot(a, b) / size } else { 0.0 }
 }
 
-fn warnings(array: Array, factors: &[Levels], aliases: &[Alias]) -> Vec<String> {
+fn warnings(array: Array, factors: &[FactorLevels], aliases: &[Alias]) -> Vec<String> {
     let mut warnings = Vec::new();
     let flat: Vec<&str> = factors.iter().filter(|it| it.values.len() < 3).map(|it| it.factor.symbol).collect();
     if !flat.is_empty() {
@@ -232,9 +232,9 @@ fn warnings(array: Array, factors: &[Levels], aliases: &[Alias]) -> Vec<String> 
 mod tests {
     use super::*;
 
-    fn four() -> Vec<Levels> {
+    fn four() -> Vec<FactorLevels> {
         let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.5, 1.0, 1.5]];
-        FACTORS.iter().zip(levels).map(|(factor, values)| Levels { factor, values }).collect()
+        FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect()
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::anova::{Anova, anova};
 use super::coding::{Coding, Range, check_varied};
 use super::conditions::{CUTTING_POWER, Cut, FACTORS, unit_trouble};
 use super::surface::Surface;
-use super::term::{Term, second_order};
+use super::term::{WearTerm, second_order};
 use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, Regression, fit};
 use serde::Serialize;
 
@@ -113,9 +113,9 @@ pub(super) fn check_cuts(cuts: &[Cut]) -> Result<(), Refusal> {
 }
 
 /// The terms to begin with: those that the values of the factors can show.
-fn candidates(cuts: &[Cut], range: &Range, order: Order) -> Vec<Term> {
+fn candidates(cuts: &[Cut], range: &Range, order: Order) -> Vec<WearTerm> {
     let levels: Vec<usize> = (0..FACTORS.len()).map(|at| distinct(cuts, at)).collect();
-    let shows = |term: &Term| {
+    let shows = |term: &WearTerm| {
         let each = term.powers().iter().enumerate();
         let varied = each.clone().all(|(at, power)| *power == 0 || range.varies(at));
         let curved = each.clone().all(|(at, power)| *power < 2 || levels[at] >= 3);
@@ -139,13 +139,13 @@ fn distinct(cuts: &[Cut], factor: usize) -> usize {
 }
 
 /// Names of the terms in the symbols of the factors.
-pub(super) fn name(term: &Term) -> String {
+pub(super) fn name(term: &WearTerm) -> String {
     term.name(&FACTORS.map(|factor| factor.symbol))
 }
 
-fn regress(cuts: &[Cut], coding: &Coding, terms: &[Term]) -> Result<Regression, Refusal> {
+fn regress(cuts: &[Cut], coding: &Coding, terms: &[WearTerm]) -> Result<Regression, Refusal> {
     let points: Vec<[f64; 4]> = cuts.iter().map(|cut| coding.code(&cut.conditions)).collect();
-    let column = |term: &Term| Column::new(name(term), points.iter().map(|point| term.value(point)).collect());
+    let column = |term: &WearTerm| Column::new(name(term), points.iter().map(|point| term.value(point)).collect());
     let columns: Vec<Column> = terms.iter().skip(1).map(column).collect();
     let y = Column::new(CUTTING_POWER, cuts.iter().map(|cut| cut.cutting_power_w).collect());
     fit(&y, &columns, Intercept::Fitted).map_err(|refusal| match refusal.kind {
@@ -166,7 +166,7 @@ fn regress(cuts: &[Cut], coding: &Coding, terms: &[Term]) -> Result<Regression, 
 }
 
 /// The term to drop next: the least significant one that may go.
-fn weakest(terms: &[Term], regression: &Regression, options: &SurfaceOptions) -> Option<usize> {
+fn weakest(terms: &[WearTerm], regression: &Regression, options: &SurfaceOptions) -> Option<usize> {
     let free = |at: &usize| !options.hierarchical || !terms.iter().any(|other| other.contains(&terms[*at]));
     let p = |at: usize| regression.coefficients[at].p;
     // One term besides the constant always stays.
@@ -174,7 +174,7 @@ fn weakest(terms: &[Term], regression: &Regression, options: &SurfaceOptions) ->
     (p(at) > options.p_out && terms.len() > 2).then_some(at)
 }
 
-fn surface(terms: &[Term], coding: Coding, range: Range, regression: &Regression) -> Surface {
+fn surface(terms: &[WearTerm], coding: Coding, range: Range, regression: &Regression) -> Surface {
     let count = terms.len();
     Surface {
         coding,

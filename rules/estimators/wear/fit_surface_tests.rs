@@ -1,7 +1,7 @@
 //! Surfaces come back from their own values, and what cannot be fitted is refused.
 
-use super::super::conditions::Conditions;
-use super::super::design::{Levels, plan};
+use super::super::conditions::CutConditions;
+use super::super::design::{FactorLevels, plan};
 use super::super::orthogonal_array::Array;
 use super::super::surface::published_over;
 use super::*;
@@ -15,10 +15,11 @@ fn coding() -> Coding {
 /// The published surface at the 27 points of the design, with noise of this size.
 pub(super) fn cuts(noise: f64) -> Vec<Cut> {
     let levels = [vec![0.065, 0.195, 0.325], vec![90.0, 120.0, 150.0], vec![0.1, 0.15, 0.2], vec![0.75, 1.0, 1.25]];
-    let factors: Vec<Levels> = FACTORS.iter().zip(levels).map(|(factor, values)| Levels { factor, values }).collect();
+    let factors: Vec<FactorLevels> =
+        FACTORS.iter().zip(levels).map(|(factor, values)| FactorLevels { factor, values }).collect();
     let surface = published_over(coding());
     let cut = |(index, values): (usize, &Vec<f64>)| {
-        let conditions = Conditions::of([values[0], values[1], values[2], values[3]]);
+        let conditions = CutConditions::of([values[0], values[1], values[2], values[3]]);
         let cutting_power_w = surface.predict(&conditions).power_w + noise * NOISE[index % NOISE.len()];
         Cut { conditions, cutting_power_w }
     };

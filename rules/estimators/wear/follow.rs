@@ -14,23 +14,23 @@
 //! Source: R. E. Kalman 1960, extended to the logarithm by its slope at the estimate. What happened between two parts is chosen
 //! among a few possibilities by likelihood: nothing, another hardness, a new edge that nobody announced.
 
-use super::followed::{Edge, Group, Measured, WearNews};
+use super::followed::{CuttingEdge, EdgeMeasurement, OperationGroup, WearNews};
 use super::gaussian::Gaussian;
 use super::outlook::{Known, Outlook};
 use super::prior::*;
 use super::tool_name::edge_of;
-use super::work::{Reference, Work, WorkKey};
+use super::work::{EdgeWork, WorkKey, WorkReference};
 use serde::{Deserialize, Serialize};
 
 /// Follows the edges of one machine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Follower {
+pub struct WearFollower {
     joint: Gaussian,
     hardness: usize,
     level: usize,
-    edges: Vec<Edge>,
-    groups: Vec<Group>,
+    edges: Vec<CuttingEdge>,
+    groups: Vec<OperationGroup>,
     program: String,
     work_material: String,
     last_s: f64,
@@ -39,7 +39,7 @@ pub struct Follower {
     edges_named: bool,
 }
 
-impl Default for Follower {
+impl Default for WearFollower {
     fn default() -> Self {
         let mut joint = Gaussian::default();
         let hardness = joint.add(0.0, HARDNESS_SD.powi(2));
@@ -59,7 +59,7 @@ impl Default for Follower {
     }
 }
 
-impl Follower {
+impl WearFollower {
     /// Do its numbers belong together? It may come from a file.
     #[must_use]
     pub fn is_sound(&self) -> bool {
@@ -71,15 +71,15 @@ impl Follower {
     }
 
     /// Takes the work of one part, which ended at `end_s`.
-    pub fn part(&mut self, works: &[Work], end_s: f64) -> Vec<WearNews> {
-        let works: Vec<&Work> =
+    pub fn part(&mut self, works: &[EdgeWork], end_s: f64) -> Vec<WearNews> {
+        let works: Vec<&EdgeWork> =
             works.iter().filter(|work| work.seconds >= LEAST_S && work.excess().is_some()).collect();
         let Some(first) = works.first() else { return Vec::new() };
         self.parts += 1;
         self.material(&first.key, end_s);
         let mut news = Vec::new();
         let wearing = self.grow(&works);
-        let measured: Vec<Measured> =
+        let measured: Vec<EdgeMeasurement> =
             works.iter().filter(|work| leads(work, &works)).filter_map(|work| self.measured(work)).collect();
         self.between(&measured, &mut news);
         for one in &measured {
@@ -103,7 +103,7 @@ impl Follower {
     }
 
     /// Lets the edges of this part wear by what has slid along them; which they are.
-    fn grow(&mut self, works: &[&Work]) -> Vec<usize> {
+    fn grow(&mut self, works: &[&EdgeWork]) -> Vec<usize> {
         let mut wearing: Vec<(usize, f64)> = Vec::new();
         for work in works {
             let Some(at) = self.edge(work) else { continue };
@@ -129,7 +129,7 @@ impl Follower {
     }
 
     /// The edge of this work; a new one where it has another name than before.
-    fn edge(&mut self, work: &Work) -> Option<usize> {
+    fn edge(&mut self, work: &EdgeWork) -> Option<usize> {
         self.edges_named |= edge_of(&work.edge).is_some();
         let found = self.edges.iter().position(|edge| edge.tool == work.key.tool);
         let at = match found {
@@ -144,14 +144,14 @@ impl Follower {
         Some(at)
     }
 
-    fn first_edge(&mut self, work: &Work) -> Option<usize> {
+    fn first_edge(&mut self, work: &EdgeWork) -> Option<usize> {
         if self.edges.len() >= TOOLS_MAX {
             return None;
         }
-        let (mean, sd) = if work.key.reference == Reference::Model { UNKNOWN_MODEL_MM } else { UNKNOWN_MM };
+        let (mean, sd) = if work.key.reference == WorkReference::Model { UNKNOWN_MODEL_MM } else { UNKNOWN_MM };
         let wear = self.joint.add(mean, sd * sd);
         let rate = self.joint.add(RATE.0, RATE.1 * RATE.1);
-        self.edges.push(Edge {
+        self.edges.push(CuttingEdge {
             tool: work.key.tool.clone(),
             name: work.edge.clone(),
             number: 1,
@@ -184,21 +184,21 @@ impl Follower {
         self.joint.reset(edge.rate, mean, sd * sd);
     }
 
-    fn measured(&mut self, work: &Work) -> Option<Measured> {
+    fn measured(&mut self, work: &EdgeWork) -> Option<EdgeMeasurement> {
         let edge = self.edges.iter().position(|edge| edge.tool == work.key.tool)?;
         let excess = work.excess()?;
         let group = self.group(work, excess);
         let group_path = &mut self.groups[group].path_mm;
-        if work.key.reference == Reference::Feed && (work.path_mm / *group_path - 1.0).abs() > SAME_PATH {
+        if work.key.reference == WorkReference::Feed && (work.path_mm / *group_path - 1.0).abs() > SAME_PATH {
             // What is longer from now on is learned slowly, what was cut short is left out.
             *group_path += 0.2 * (work.path_mm - *group_path);
             return None;
         }
         self.groups[group].used = self.parts;
-        Some(Measured {
+        Some(EdgeMeasurement {
             group: self.groups[group].at,
             edge,
-            level: work.key.reference == Reference::Typical,
+            level: work.key.reference == WorkReference::Typical,
             excess,
             rise: work.rise_per_mm(),
             half_m: 0.5 * work.slide_m,
@@ -206,30 +206,30 @@ impl Follower {
         })
     }
 
-    fn group(&mut self, work: &Work, excess: f64) -> usize {
+    fn group(&mut self, work: &EdgeWork, excess: f64) -> usize {
         if let Some(at) = self.groups.iter().position(|group| group.key == work.key) {
             return at;
         }
         let (mean, sd) = match work.key.reference {
-            Reference::Model => (0.0, work.reference_doubt().max(MODEL_SD_LEAST)),
-            Reference::Typical => (0.0, OPERATION_SD),
-            Reference::Feed => (excess, LEVEL_SD),
+            WorkReference::Model => (0.0, work.reference_doubt().max(MODEL_SD_LEAST)),
+            WorkReference::Typical => (0.0, OPERATION_SD),
+            WorkReference::Feed => (excess, LEVEL_SD),
         };
         let (key, path_mm, used) = (work.key.clone(), work.path_mm, self.parts);
         if self.groups.len() < GROUPS_MAX {
             let at = self.joint.add(mean, sd * sd);
-            self.groups.push(Group { key, at, path_mm, used });
+            self.groups.push(OperationGroup { key, at, path_mm, used });
             return self.groups.len() - 1;
         }
         let oldest = (0..self.groups.len()).min_by_key(|at| self.groups[*at].used).unwrap_or(0);
         let at = self.groups[oldest].at;
         self.joint.reset(at, mean, sd * sd);
-        self.groups[oldest] = Group { key, at, path_mm, used };
+        self.groups[oldest] = OperationGroup { key, at, path_mm, used };
         oldest
     }
 
     /// What happened between the parts: the likeliest of nothing, another hardness, and a new edge of one tool.
-    fn between(&mut self, measured: &[Measured], news: &mut Vec<WearNews>) {
+    fn between(&mut self, measured: &[EdgeMeasurement], news: &mut Vec<WearNews>) {
         let nothing = self.likelihood(measured);
         let mut harder = self.clone();
         harder.joint.reset(harder.hardness, 0.0, HARDNESS_SD.powi(2));
@@ -257,7 +257,7 @@ impl Follower {
     }
 
     /// Logarithm of how likely the measurements are, one after the other; nothing that leaves one of them odd explains them.
-    fn likelihood(&self, measured: &[Measured]) -> f64 {
+    fn likelihood(&self, measured: &[EdgeMeasurement]) -> f64 {
         let mut trial = self.clone();
         let mut sum = 0.0;
         for one in measured {
@@ -272,7 +272,7 @@ impl Follower {
     }
 
     /// The slope over the states, and how far the measurement lies above the estimate. The mean of a part is that of its middle.
-    fn expected(&self, one: &Measured) -> (Vec<(usize, f64)>, f64) {
+    fn expected(&self, one: &EdgeMeasurement) -> (Vec<(usize, f64)>, f64) {
         let edge = &self.edges[one.edge];
         let wear = (self.joint.mean(edge.wear) - one.half_m * self.joint.mean(edge.rate)).max(0.0);
         let slope = one.rise / (1.0 + one.rise * wear);
@@ -286,11 +286,11 @@ impl Follower {
         (gradient, one.excess - expected)
     }
 
-    fn is_odd(&self, gradient: &[(usize, f64)], above: f64, one: &Measured) -> bool {
+    fn is_odd(&self, gradient: &[(usize, f64)], above: f64, one: &EdgeMeasurement) -> bool {
         above.abs() > OUTLIER_SD * self.joint.variance_of(gradient, one.variance).sqrt()
     }
 
-    fn take(&mut self, one: &Measured) {
+    fn take(&mut self, one: &EdgeMeasurement) {
         let (gradient, above) = self.expected(one);
         let odd = self.is_odd(&gradient, above, one);
         let edge = &mut self.edges[one.edge];
@@ -343,7 +343,7 @@ impl Follower {
 
     /// How the edge of this name stands after its last part; `None` before the first one.
     #[must_use]
-    pub fn outlook(&self, edge: &str) -> Option<(Reference, Outlook)> {
+    pub fn outlook(&self, edge: &str) -> Option<(WorkReference, Outlook)> {
         let at = self.edges.iter().position(|known| known.name == edge)?;
         Some((self.edges[at].reference, self.outlook_at(at)?))
     }
@@ -357,7 +357,7 @@ impl Follower {
 
 /// Is this what most of its operation is compared with? The rest of the operation are entries, exits and corners that the model does
 /// not cover; their mixture differs from part to part.
-fn leads(work: &Work, works: &[&Work]) -> bool {
+fn leads(work: &EdgeWork, works: &[&EdgeWork]) -> bool {
     works
         .iter()
         .filter(|other| other.key.is_of_the_same_operation(&work.key))

@@ -1,22 +1,22 @@
 use super::*;
 
 /// A part that takes this share more than the reference.
-fn work(tool: &str, edge: &str, program: &str, ratio: f64) -> Work {
+fn work(tool: &str, edge: &str, program: &str, ratio: f64) -> EdgeWork {
     let key = WorkKey {
-        reference: Reference::Typical,
+        reference: WorkReference::Typical,
         tool: tool.to_owned(),
         program: program.to_owned(),
         operation: String::new(),
         work_material: String::new(),
     };
-    let mut work = Work::new(key, edge.to_owned(), 0.3);
+    let mut work = EdgeWork::new(key, edge.to_owned(), 0.3);
     (work.seconds, work.path_mm, work.slide_m) = (100.0, 200.0, 300.0);
     (work.energy_j, work.expected_j) = ((1e5 * ratio, 500.0), (1e5, 0.6e5));
     work
 }
 
 /// Parts of an edge that wears by 0.01 mm each, and of a second tool that does not; hardness by part.
-fn parts(follower: &mut Follower, edge: &str, count: u32, hardness: &dyn Fn(u32) -> f64) -> Vec<WearNews> {
+fn parts(follower: &mut WearFollower, edge: &str, count: u32, hardness: &dyn Fn(u32) -> f64) -> Vec<WearNews> {
     let mut news = Vec::new();
     for part in 1..=count {
         let wear = 0.01 * f64::from(part);
@@ -28,13 +28,13 @@ fn parts(follower: &mut Follower, edge: &str, count: u32, hardness: &dyn Fn(u32)
     news
 }
 
-fn outlook(follower: &Follower, edge: &str) -> Outlook {
+fn outlook(follower: &WearFollower, edge: &str) -> Outlook {
     follower.outlook(edge).expect("followed").1
 }
 
 #[test]
 fn the_wear_of_a_known_new_edge_is_followed_without_a_model() {
-    let mut follower = Follower::default();
+    let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 20, &|_| 1.0);
     parts(&mut follower, "T1-2", 20, &|_| 1.0);
     let found = outlook(&follower, "T1-2");
@@ -46,7 +46,7 @@ fn the_wear_of_a_known_new_edge_is_followed_without_a_model() {
 
 #[test]
 fn a_harder_lot_is_no_wear() {
-    let mut follower = Follower::default();
+    let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 20, &|_| 1.0);
     parts(&mut follower, "T1-2", 12, &|part| if part > 6 { 1.1 } else { 1.0 });
     let found = outlook(&follower, "T1-2");
@@ -55,9 +55,9 @@ fn a_harder_lot_is_no_wear() {
 
 #[test]
 fn a_chipped_edge_is_believed_after_three_parts_and_one_odd_part_is_not() {
-    let mut follower = Follower::default();
+    let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 8, &|_| 1.0);
-    let part = |follower: &mut Follower, ratio: f64| {
+    let part = |follower: &mut WearFollower, ratio: f64| {
         follower.part(&[work("T1", "T1", "O1", ratio), work("T2", "T2", "O1", 0.8)], 4000.0);
         outlook(follower, "T1").worn_probability
     };
@@ -69,7 +69,7 @@ fn a_chipped_edge_is_believed_after_three_parts_and_one_odd_part_is_not() {
 
 #[test]
 fn a_new_edge_that_nobody_announced_is_noticed_and_told() {
-    let mut follower = Follower::default();
+    let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 28, &|_| 1.0);
     let before = outlook(&follower, "T1").wear_mm;
     let news = parts(&mut follower, "T1", 3, &|_| 1.0);
@@ -80,10 +80,10 @@ fn a_new_edge_that_nobody_announced_is_noticed_and_told() {
 
 #[test]
 fn the_state_is_stored_and_nothing_odd_gets_in() {
-    let mut follower = Follower::default();
+    let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 5, &|_| 1.0);
     let text = serde_json::to_string(&follower).expect("JSON");
-    let back: Follower = serde_json::from_str(&text).expect("JSON");
+    let back: WearFollower = serde_json::from_str(&text).expect("JSON");
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
     assert!(back.is_sound() && near(outlook(&back, "T1").wear_mm, outlook(&follower, "T1").wear_mm));
     let mut nothing = work("T1", "T1", "O1", f64::NAN);

@@ -1,6 +1,6 @@
 //! What the filter keeps of edges and operations, and what it tells.
 
-use super::work::{Reference, WorkKey};
+use super::work::{WorkKey, WorkReference};
 use serde::{Deserialize, Serialize};
 
 /// Something to tell once.
@@ -25,7 +25,7 @@ pub enum WearNews {
 
 /// The edge of a tool that is in use. `wear` and `rate` are numbers of states.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Edge {
+pub(super) struct CuttingEdge {
     pub(super) tool: String,
     /// As the controller names it.
     pub(super) name: String,
@@ -37,7 +37,7 @@ pub(super) struct Edge {
     pub(super) parts: u32,
     pub(super) part_m: f64,
     pub(super) criterion_mm: f64,
-    pub(super) reference: Reference,
+    pub(super) reference: WorkReference,
     pub(super) blind: bool,
     /// Measurements in a row that no wear of before explains.
     pub(super) odd: u32,
@@ -46,7 +46,7 @@ pub(super) struct Edge {
 
 /// An operation of a tool in a program; `at` is the number of its constant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Group {
+pub(super) struct OperationGroup {
     pub(super) key: WorkKey,
     pub(super) at: usize,
     pub(super) path_mm: f64,
@@ -54,7 +54,7 @@ pub(super) struct Group {
 }
 
 /// A measurement, with the states that it depends on.
-pub(super) struct Measured {
+pub(super) struct EdgeMeasurement {
     pub(super) group: usize,
     pub(super) edge: usize,
     pub(super) level: bool,

@@ -1,6 +1,6 @@
 //! From a recording or a table to cuts: one row per cut, its conditions and its mean cutting power.
 
-use super::conditions::{CUTTING_POWER, Conditions, Cut, FACTORS};
+use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS};
 use crate::estimators::balance;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use adapters::Recording;
@@ -20,7 +20,7 @@ const GROUPS: [&str; 5] = ["run", "pass", "part", "tool", "operation"];
 
 /// Where the numbers stand in the recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Columns {
+pub struct CutColumns {
     /// Columns of VB, vc, f, ap, in the order of [`FACTORS`].
     pub conditions: [String; 4],
     /// Column of the cutting power.
@@ -32,7 +32,7 @@ pub struct Columns {
     pub each_row: bool,
 }
 
-impl Default for Columns {
+impl Default for CutColumns {
     fn default() -> Self {
         Self {
             conditions: FACTORS.map(|factor| factor.name.to_owned()),
@@ -45,7 +45,7 @@ impl Default for Columns {
 
 /// The cuts of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gathered {
+pub struct GatheredCuts {
     /// The cuts, in the order of the recording.
     pub cuts: Vec<Cut>,
     /// Rows behind them.
@@ -58,7 +58,7 @@ pub struct Gathered {
 ///
 /// # Errors
 /// Which columns are missing and where they come from; no row with a value in all of them.
-pub fn gather(recording: &Recording, columns: &Columns) -> Result<Gathered, Refusal> {
+pub fn gather(recording: &Recording, columns: &CutColumns) -> Result<GatheredCuts, Refusal> {
     let recording = with_derived(recording.clone());
     let missing: Vec<String> =
         columns.conditions.iter().filter(|name| recording.numbers(name).is_none()).map(|name| absent(name)).collect();
@@ -71,7 +71,7 @@ pub fn gather(recording: &Recording, columns: &Columns) -> Result<Gathered, Refu
         return Err(Refusal::new(RefusalKind::Missing, what, next));
     }
     let factors: Vec<&Numbers> = columns.conditions.iter().filter_map(|name| recording.numbers(name)).collect();
-    let rows = Rows { recording: &recording, factors, power: power.unwrap_or_default() };
+    let rows = RecordingRows { recording: &recording, factors, power: power.unwrap_or_default() };
     rows.gather(columns.each_row)
 }
 
@@ -87,7 +87,7 @@ fn absent(name: &str) -> String {
     format!("there is no column {name} ({source})")
 }
 
-fn cutting_power(recording: &Recording, columns: &Columns) -> Result<Numbers, String> {
+fn cutting_power(recording: &Recording, columns: &CutColumns) -> Result<Numbers, String> {
     if let Some(power) = recording.numbers(&columns.power) {
         return Ok(power.clone());
     }
@@ -110,13 +110,13 @@ fn cutting_power(recording: &Recording, columns: &Columns) -> Result<Numbers, St
     }
 }
 
-struct Rows<'a> {
+struct RecordingRows<'a> {
     recording: &'a Recording,
     factors: Vec<&'a Numbers>,
     power: Numbers,
 }
 
-impl Rows<'_> {
+impl RecordingRows<'_> {
     fn cut(&self, row: usize) -> Option<Cut> {
         let engaged = self.recording.numbers("engaged").and_then(|engaged| engaged.get(row));
         if engaged.is_some_and(|engaged| engaged < 0.5) {
@@ -128,7 +128,7 @@ impl Rows<'_> {
         }
         // Without speed or feed nothing is removed, whatever the recording says of the engagement.
         let removes = values[1] > 0.0 && values[2] > 0.0;
-        removes.then_some(Cut { conditions: Conditions::of(values), cutting_power_w: self.power.get(row)? })
+        removes.then_some(Cut { conditions: CutConditions::of(values), cutting_power_w: self.power.get(row)? })
     }
 
     fn same_group(&self, a: usize, b: usize) -> bool {
@@ -136,14 +136,14 @@ impl Rows<'_> {
         GROUPS.iter().all(same)
     }
 
-    fn gather(&self, each_row: bool) -> Result<Gathered, Refusal> {
+    fn gather(&self, each_row: bool) -> Result<GatheredCuts, Refusal> {
         let groups = settled(self.groups(each_row));
         let rows: usize = groups.iter().map(|group| group.members.len()).sum();
         if groups.is_empty() {
             return Err(self.no_row());
         }
         let cuts = self.merged(groups, each_row).iter().map(|group| mean(&group.members)).collect();
-        Ok(Gathered { cuts, rows, left_out: self.recording.rows() - rows })
+        Ok(GatheredCuts { cuts, rows, left_out: self.recording.rows() - rows })
     }
 
     /// Why there is no cut: how many rows have a value in each column, and which column is absent where the others are there.
@@ -175,8 +175,8 @@ impl Rows<'_> {
     }
 
     /// Consecutive rows of the same conditions.
-    fn groups(&self, each_row: bool) -> Vec<Group> {
-        let mut groups: Vec<Group> = Vec::new();
+    fn groups(&self, each_row: bool) -> Vec<CutRows> {
+        let mut groups: Vec<CutRows> = Vec::new();
         for row in 0..self.recording.rows() {
             let Some(cut) = self.cut(row) else { continue };
             match groups.last_mut() {
@@ -184,15 +184,15 @@ impl Rows<'_> {
                     group.last_row = row;
                     group.members.push(cut);
                 }
-                _ => groups.push(Group { last_row: row, members: vec![cut] }),
+                _ => groups.push(CutRows { last_row: row, members: vec![cut] }),
             }
         }
         groups
     }
 
     /// Neighbours that only a transition stood between are one cut.
-    fn merged(&self, groups: Vec<Group>, each_row: bool) -> Vec<Group> {
-        let mut merged: Vec<Group> = Vec::new();
+    fn merged(&self, groups: Vec<CutRows>, each_row: bool) -> Vec<CutRows> {
+        let mut merged: Vec<CutRows> = Vec::new();
         for group in groups {
             match merged.last_mut() {
                 Some(before)
@@ -211,19 +211,19 @@ impl Rows<'_> {
 }
 
 /// Consecutive rows of one cut.
-struct Group {
+struct CutRows {
     last_row: usize,
     members: Vec<Cut>,
 }
 
-impl Group {
+impl CutRows {
     fn takes(&self, cut: &Cut) -> bool {
         self.members.first().is_some_and(|first| alike(&first.conditions, &cut.conditions))
     }
 }
 
 /// Without transitions: groups much shorter than is usual in this recording.
-fn settled(mut groups: Vec<Group>) -> Vec<Group> {
+fn settled(mut groups: Vec<CutRows>) -> Vec<CutRows> {
     let mut lengths: Vec<usize> = groups.iter().map(|group| group.members.len()).collect();
     lengths.sort_unstable();
     let usual = lengths.get(lengths.len() * 3 / 4).copied().unwrap_or(0);
@@ -231,7 +231,7 @@ fn settled(mut groups: Vec<Group>) -> Vec<Group> {
     groups
 }
 
-fn alike(a: &Conditions, b: &Conditions) -> bool {
+fn alike(a: &CutConditions, b: &CutConditions) -> bool {
     let close = |x: f64, y: f64| (x - y).abs() <= SAME_SHARE * x.abs();
     (a.flank_wear_mm - b.flank_wear_mm).abs() <= SAME_WEAR_MM
         && (a.depth_of_cut_mm - b.depth_of_cut_mm).abs() <= SAME_MM
@@ -243,7 +243,7 @@ fn mean(cuts: &[Cut]) -> Cut {
     let count = cuts.len() as f64;
     let mean = |read: &dyn Fn(&Cut) -> f64| cuts.iter().map(read).sum::<f64>() / count;
     let conditions = std::array::from_fn(|at| mean(&|cut: &Cut| cut.conditions.vector()[at]));
-    Cut { conditions: Conditions::of(conditions), cutting_power_w: mean(&|cut| cut.cutting_power_w) }
+    Cut { conditions: CutConditions::of(conditions), cutting_power_w: mean(&|cut| cut.cutting_power_w) }
 }
 
 #[cfg(test)]
@@ -274,22 +274,22 @@ mod tests {
         recording.set_column("cutting_power_w", Cells::Numbers(power));
         recording.set_column("run", Cells::Words(Words::from_iter(["1", "1", "1", "2", "2", "2"])));
         recording.set_column("engaged", Cells::Numbers(Numbers::full(vec![1.0, 1.0, 1.0, 1.0, 1.0, 0.0])));
-        let gathered = gather(&recording, &Columns::default()).expect("cuts");
+        let gathered = gather(&recording, &CutColumns::default()).expect("cuts");
         let powers: Vec<f64> = gathered.cuts.iter().map(|cut| cut.cutting_power_w).collect();
         assert_eq!((powers, gathered.rows, gathered.left_out), (vec![790.0, 905.0], 5, 1));
         assert!((gathered.cuts[0].conditions.cutting_speed_m_min - 198.5).abs() < 0.1);
         assert!((gathered.cuts[0].conditions.feed_per_rev_mm - 0.153).abs() < 1e-9);
-        let each = gather(&recording, &Columns { each_row: true, ..Columns::default() }).expect("cuts");
+        let each = gather(&recording, &CutColumns { each_row: true, ..CutColumns::default() }).expect("cuts");
         assert_eq!(each.cuts.len(), 5);
     }
 
     #[test]
     fn the_cutting_power_is_separated_where_it_has_no_column() {
         let columns = [&CONDITIONS[..], &[("spindle_power_w", 1460.0), ("no_load_power_w", 500.0)]].concat();
-        let known = Columns { load_loss: Some((0.1807, 4e-5)), ..Columns::default() };
+        let known = CutColumns { load_loss: Some((0.1807, 4e-5)), ..CutColumns::default() };
         let gathered = gather(&recording(3, &columns), &known).expect("a cut");
         assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
-        let told = gather(&recording(3, &columns), &Columns::default()).expect_err("refused").to_string();
+        let told = gather(&recording(3, &columns), &CutColumns::default()).expect_err("refused").to_string();
         assert!(told.contains("--load-loss"), "{told}");
     }
 
@@ -299,7 +299,7 @@ mod tests {
         let wear = |row: usize| 0.1 + if row < 50 { 0.0 } else { 0.1 } + 5e-5 * row as f64;
         recording.set_column("flank_wear_mm", Cells::Numbers(Numbers::full((0..100).map(wear).collect())));
         recording.set_column("cutting_power_w", Cells::Numbers(Numbers::full(vec![800.0; 100])));
-        let gathered = gather(&recording, &Columns::default()).expect("cuts");
+        let gathered = gather(&recording, &CutColumns::default()).expect("cuts");
         assert_eq!(gathered.cuts.len(), 2, "another edge is another cut: {gathered:?}");
     }
 
@@ -310,7 +310,7 @@ mod tests {
         recording.set_column("cutting_power_w", Cells::Numbers(power));
         let wear = [None, Some(0.1), Some(0.1), Some(0.1)].into_iter().collect::<Numbers>();
         recording.set_column("flank_wear_mm", Cells::Numbers(wear));
-        let told = gather(&recording, &Columns::default()).expect_err("refused").to_string();
+        let told = gather(&recording, &CutColumns::default()).expect_err("refused").to_string();
         for part in ["of 4 rows", "flank_wear_mm in 3", "cutting power in 1", "3 rows lack cutting power alone"] {
             assert!(told.contains(part), "{part}: {told}");
         }
@@ -318,8 +318,9 @@ mod tests {
 
     #[test]
     fn missing_columns_are_told_at_once() {
-        let told =
-            gather(&recording(3, &[("cutting_power_kw", 0.8)]), &Columns::default()).expect_err("refused").to_string();
+        let told = gather(&recording(3, &[("cutting_power_kw", 0.8)]), &CutColumns::default())
+            .expect_err("refused")
+            .to_string();
         for part in ["flank_wear_mm (read under", "depth_of_cut_mm (no controller", "cutting_power_kw is in kW"] {
             assert!(told.contains(part), "{part}: {told}");
         }

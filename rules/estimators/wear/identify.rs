@@ -1,11 +1,11 @@
 //! Everything that is learned from a set of cuts: both forms, which one to take, and where the wear can be seen.
 
-use super::compare::{Comparison, compare};
-use super::conditions::{Conditions, Cut, FACTORS};
+use super::compare::{FormComparison, compare};
+use super::conditions::{Cut, CutConditions, FACTORS};
 use super::fit_surface::{SurfaceFit, SurfaceOptions, fit_surface};
 use super::model::WearModel;
 use super::physical::{PhysicalFit, fit_physical};
-use super::threshold::{Threshold, threshold};
+use super::threshold::{PowerLimit, threshold};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -29,7 +29,7 @@ impl Default for WearOptions {
 
 /// The limit at one place of the design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub struct DesignPoint {
     /// Cutting speed, m/min.
     pub cutting_speed_m_min: f64,
     /// Feed, mm/rev.
@@ -38,7 +38,7 @@ pub struct Place {
     pub depth_of_cut_mm: f64,
     /// The limit there.
     #[serde(flatten)]
-    pub threshold: Threshold,
+    pub threshold: PowerLimit,
 }
 
 /// What was learned.
@@ -51,7 +51,7 @@ pub struct LearnedWear {
     /// The physical form, or why there is none.
     pub physical: Result<PhysicalFit, Refusal>,
     /// Both on cuts that they have not seen.
-    pub comparison: Comparison,
+    pub comparison: FormComparison,
     /// The form taken.
     pub model: WearModel,
     /// Share of the variance that it explains.
@@ -59,7 +59,7 @@ pub struct LearnedWear {
     /// The criterion, mm.
     pub criterion_mm: f64,
     /// The limit at the middle and at the corners of speed, feed and depth.
-    pub places: Vec<Place>,
+    pub places: Vec<DesignPoint>,
 }
 
 /// Fits both forms and compares them.
@@ -98,7 +98,7 @@ fn chosen(
 }
 
 /// The middle, then every corner of the factors that were changed.
-fn places(model: &WearModel, criterion_mm: f64) -> Vec<Place> {
+fn places(model: &WearModel, criterion_mm: f64) -> Vec<DesignPoint> {
     let range = model.range();
     let side = |at: usize, high: bool| if high { range.greatest[at] } else { range.least[at] };
     let mut points = vec![[1, 2, 3].map(|at| 0.5 * (range.least[at] + range.greatest[at]))];
@@ -107,9 +107,9 @@ fn places(model: &WearModel, criterion_mm: f64) -> Vec<Place> {
     }
     points.dedup();
     let place = |[speed, feed, depth]: [f64; 3]| {
-        let cut = Conditions::of([criterion_mm, speed, feed, depth]);
+        let cut = CutConditions::of([criterion_mm, speed, feed, depth]);
         let threshold = threshold(model, &cut, criterion_mm).ok()?;
-        Some(Place { cutting_speed_m_min: speed, feed_per_rev_mm: feed, depth_of_cut_mm: depth, threshold })
+        Some(DesignPoint { cutting_speed_m_min: speed, feed_per_rev_mm: feed, depth_of_cut_mm: depth, threshold })
     };
     points.into_iter().filter_map(place).collect()
 }

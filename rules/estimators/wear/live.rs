@@ -4,14 +4,14 @@
 //! next part. Beside it stands the limit `[Pc]` of the cut of the moment, where a model was learned.
 
 use super::choose::choose;
-use super::conditions::Conditions;
-use super::follow::Follower;
+use super::conditions::CutConditions;
+use super::follow::WearFollower;
 use super::followed::WearNews;
 use super::outlook::Outlook;
-use super::record::{Key, WearRecord};
-use super::threshold::{Observability, Threshold, threshold};
+use super::record::{WearKey, WearRecord};
+use super::threshold::{Observability, PowerLimit, threshold};
 use super::tool_name::tool_of;
-use super::work::{CutMoment, Expected, Reference, Work, WorkKey};
+use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
@@ -37,13 +37,13 @@ const TYPICAL_RISE_PER_MM: f64 = 0.59;
 /// News that wait to be fetched.
 const NEWS_MAX: usize = 32;
 
-struct Channels {
+struct WearChannels {
     texts: [ChannelId; 4],
     part_count: ChannelId,
     numbers: [ChannelId; 6],
 }
 
-impl Channels {
+impl WearChannels {
     fn new() -> Self {
         let of = |name| ChannelId::of(name).expect("the name stands in the table, which a test checks");
         Self {
@@ -58,9 +58,9 @@ impl Channels {
 /// What is remembered when the box starts again.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Memory {
-    follower: Follower,
-    works: Vec<Work>,
+struct SavedWear {
+    follower: WearFollower,
+    works: Vec<EdgeWork>,
     part_count: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ struct Memory {
 pub struct ModelInUse {
     /// The model.
     pub record: Arc<WearRecord>,
-    /// What of its key spoke for it: see [`super::Choice`].
+    /// What of its key spoke for it: see [`super::ChosenModel`].
     pub by: &'static str,
 }
 
@@ -77,12 +77,12 @@ pub struct ModelInUse {
 pub struct WearEstimator {
     machine: String,
     models: Vec<Arc<WearRecord>>,
-    channels: Channels,
+    channels: WearChannels,
     texts: [String; 3],
     model: Option<ModelInUse>,
-    memory: Memory,
+    memory: SavedWear,
     last_ns: Option<TimeNs>,
-    limit: Option<Result<Threshold, String>>,
+    limit: Option<Result<PowerLimit, String>>,
     limit_ns: Option<TimeNs>,
     news: Vec<WearNews>,
 }
@@ -92,10 +92,10 @@ impl Default for WearEstimator {
         Self {
             machine: String::new(),
             models: Vec::new(),
-            channels: Channels::new(),
+            channels: WearChannels::new(),
             texts: Default::default(),
             model: None,
-            memory: Memory::default(),
+            memory: SavedWear::default(),
             last_ns: None,
             limit: None,
             limit_ns: None,
@@ -125,13 +125,13 @@ impl WearEstimator {
 
     /// The limit of the last moment of cutting, or why there is none.
     #[must_use]
-    pub fn limit(&self) -> Option<&Result<Threshold, String>> {
+    pub fn limit(&self) -> Option<&Result<PowerLimit, String>> {
         self.limit.as_ref()
     }
 
     /// How the edge in use stands after its last part.
     #[must_use]
-    pub fn outlook(&self) -> Option<(Reference, Outlook)> {
+    pub fn outlook(&self) -> Option<(WorkReference, Outlook)> {
         self.memory.follower.outlook(&self.texts[0])
     }
 
@@ -143,7 +143,7 @@ impl WearEstimator {
 
     /// Goes on where a snapshot was taken; false when it is none of this version.
     pub fn restore(&mut self, snapshot: serde_json::Value) -> bool {
-        let memory = serde_json::from_value(snapshot).ok().filter(|memory: &Memory| memory.follower.is_sound());
+        let memory = serde_json::from_value(snapshot).ok().filter(|memory: &SavedWear| memory.follower.is_sound());
         let known = memory.is_some();
         self.memory = memory.unwrap_or_default();
         known
@@ -197,7 +197,7 @@ impl WearEstimator {
 
     fn choose(&mut self) {
         let [tool, work_material, operation] = self.texts.clone();
-        let cut = Key { machine: self.machine.clone(), tool, work_material, operation };
+        let cut = WearKey { machine: self.machine.clone(), tool, work_material, operation };
         let found = choose(&self.models, &cut, |model| model);
         let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
         let same = self.model.as_ref().map(|it| &it.record) == model.as_ref().map(|it| &it.record);
@@ -221,9 +221,9 @@ impl WearEstimator {
         }
     }
 
-    fn work(&mut self, expected: Expected, program: &str, criterion_mm: f64) -> Option<&mut Work> {
+    fn work(&mut self, expected: ExpectedPower, program: &str, criterion_mm: f64) -> Option<&mut EdgeWork> {
         let [edge, material, operation] = &self.texts;
-        let same = |work: &Work| {
+        let same = |work: &EdgeWork| {
             let key = &work.key;
             key.reference == expected.reference
                 && work.edge == *edge
@@ -241,7 +241,7 @@ impl WearEstimator {
                 work_material: material.clone(),
             };
             (works.len() < WORKS_MAX).then(|| {
-                works.push(Work::new(key, edge.clone(), criterion_mm));
+                works.push(EdgeWork::new(key, edge.clone(), criterion_mm));
                 works.len() - 1
             })
         })?;
@@ -280,7 +280,7 @@ impl WearEstimator {
         if !soon || self.limit.is_none() {
             self.limit_ns = Some(at_ns);
             let found = moment.conditions().ok_or_else(|| NoEstimate::CutUnknown.to_string());
-            self.limit = Some(found.and_then(|cut: Conditions| {
+            self.limit = Some(found.and_then(|cut: CutConditions| {
                 threshold(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
             }));
         }
@@ -295,8 +295,8 @@ impl WearEstimator {
     }
 }
 
-fn filled(reference: Reference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
-    let learned = reference == Reference::Model;
+fn filled(reference: WorkReference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
+    let learned = reference == WorkReference::Model;
     let wear = Estimate { value: outlook.wear_mm, sd: outlook.wear_sd_mm };
     let growth = Estimate {
         value: 100.0 * TYPICAL_RISE_PER_MM * outlook.wear_mm,
@@ -313,6 +313,6 @@ fn filled(reference: Reference, outlook: &Outlook) -> (Estimated, Estimated, Est
 mod tests {
     #[test]
     fn every_channel_stands_in_the_table() {
-        let _found = super::Channels::new();
+        let _found = super::WearChannels::new();
     }
 }

@@ -53,29 +53,31 @@ mod threshold;
 mod tool_name;
 mod work;
 
-pub use anova::{Anova, Source};
-pub use choose::{Choice, choose};
+pub use anova::{Anova, AnovaRow};
+pub use choose::{ChosenModel, choose};
 pub use coding::{Coding, Range};
-pub use compare::{Comparison, FormErrors, compare};
-pub use conditions::{CUTTING_POWER, Conditions, Cut, FACTORS, Factor, WEAR, cutting_speed_m_min, unit_trouble};
-pub use design::{Alias, Design, Levels, PlannedCut, plan};
+pub use compare::{FormComparison, FormErrors, compare};
+pub use conditions::{
+    CUTTING_POWER, ConditionFactor, Cut, CutConditions, FACTORS, WEAR, cutting_speed_m_min, unit_trouble,
+};
+pub use design::{Alias, ExperimentDesign, FactorLevels, PlannedCut, plan};
 pub use fit_surface::{Dropped, Order, SurfaceFit, SurfaceOptions, fit_surface};
-pub use follow::Follower;
+pub use follow::WearFollower;
 pub use followed::WearNews;
-pub use gather::{Columns, Gathered, gather};
-pub use identify::{LearnedWear, Place, WearOptions, identify_tool_wear};
+pub use gather::{CutColumns, GatheredCuts, gather};
+pub use identify::{DesignPoint, LearnedWear, WearOptions, identify_tool_wear};
 pub use live::{ModelInUse, WearEstimator};
 pub use model::WearModel;
 pub use orthogonal_array::Array;
 pub use outlook::{OBSERVED_SHARE, Outlook};
-pub use physical::{Fitted, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
+pub use physical::{FittedNumber, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
 pub use predicted::Predicted;
-pub use record::{Key, WearRecord};
+pub use record::{WearKey, WearRecord};
 pub use short::{SHORT_FORM, SHORT_LENGTH};
 pub use surface::{Surface, published, published_over};
-pub use term::{Term, second_order};
+pub use term::{WearTerm, second_order};
 pub use threshold::{
-    OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, Threshold, WearEstimate, estimate_wear, threshold,
+    OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, PowerLimit, WearEstimate, estimate_wear, threshold,
 };
 pub use tool_name::{edge_of, tool_of};
-pub use work::{CutMoment, Reference, Work, WorkKey};
+pub use work::{CutMoment, EdgeWork, WorkKey, WorkReference};

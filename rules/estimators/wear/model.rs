@@ -1,7 +1,7 @@
 //! A wear model: either form, and what both can be asked.
 
 use super::coding::Range;
-use super::conditions::{Conditions, Factor};
+use super::conditions::{ConditionFactor, CutConditions};
 use super::physical::Physical;
 use super::predicted::Predicted;
 use super::surface::Surface;
@@ -29,7 +29,7 @@ impl WearModel {
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &Conditions) -> Predicted {
+    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
         match self {
             Self::Surface(surface) => surface.predict(conditions),
             Self::Physical(physical) => physical.predict(conditions),
@@ -38,7 +38,7 @@ impl WearModel {
 
     /// Change of power per millimetre of flank wear, W/mm.
     #[must_use]
-    pub fn wear_slope_w_per_mm(&self, conditions: &Conditions) -> f64 {
+    pub fn wear_slope_w_per_mm(&self, conditions: &CutConditions) -> f64 {
         match self {
             Self::Surface(surface) => surface.wear_slope_w_per_mm(conditions),
             Self::Physical(physical) => physical.wear_slope_w_per_mm(conditions),
@@ -56,7 +56,7 @@ impl WearModel {
 
     /// The factors in which these conditions lie outside what the model was fitted on.
     #[must_use]
-    pub fn outside(&self, conditions: &Conditions) -> Vec<&'static Factor> {
+    pub fn outside(&self, conditions: &CutConditions) -> Vec<&'static ConditionFactor> {
         self.range().outside(conditions)
     }
 

@@ -8,7 +8,7 @@
 //! Golub and Pereyra 1973; a step that makes it worse is halved); standard errors from the Jacobian at the end.
 
 use super::coding::{Range, check_varied};
-use super::conditions::{CUTTING_POWER, Conditions, Cut, FACTORS, WEAR};
+use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS, WEAR};
 use super::fit_surface::check_cuts;
 use super::predicted::Predicted;
 use crate::estimators::regression::{CONFIDENCE, Column, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile};
@@ -46,29 +46,29 @@ pub struct Physical {
 }
 
 impl Physical {
-    fn ratios(&self, conditions: &Conditions) -> [f64; 3] {
+    fn ratios(&self, conditions: &CutConditions) -> [f64; 3] {
         let values = conditions.vector();
         std::array::from_fn(|at| values[at + 1] / self.reference[at])
     }
 
-    fn sharp_w(&self, conditions: &Conditions) -> f64 {
+    fn sharp_w(&self, conditions: &CutConditions) -> f64 {
         self.cutting_power_w * power_law(&self.ratios(conditions), &self.exponents)
     }
 
     /// Power at these conditions, W.
     #[must_use]
-    pub fn power_w(&self, conditions: &Conditions) -> f64 {
+    pub fn power_w(&self, conditions: &CutConditions) -> f64 {
         self.sharp_w(conditions) + self.wear_w_min_m_mm2 * friction(conditions)
     }
 
     /// Change of power per millimetre of flank wear, W/mm.
     #[must_use]
-    pub fn wear_slope_w_per_mm(&self, conditions: &Conditions) -> f64 {
+    pub fn wear_slope_w_per_mm(&self, conditions: &CutConditions) -> f64 {
         self.wear_w_min_m_mm2 * conditions.cutting_speed_m_min * conditions.depth_of_cut_mm
     }
 
     /// Derivatives with respect to P0, the exponents and W.
-    fn gradient(&self, conditions: &Conditions) -> [f64; 5] {
+    fn gradient(&self, conditions: &CutConditions) -> [f64; 5] {
         let law = power_law(&self.ratios(conditions), &self.exponents);
         let by = self.ratios(conditions).map(|ratio| self.cutting_power_w * law * ratio.ln());
         [law, by[0], by[1], by[2], friction(conditions)]
@@ -76,7 +76,7 @@ impl Physical {
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &Conditions) -> Predicted {
+    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
         let gradient = self.gradient(conditions);
         let row = |i: usize| self.covariance[i].iter().zip(&gradient).map(|(entry, x)| entry * x).sum::<f64>();
         let variance: f64 = (0..self.covariance.len()).map(|i| gradient[i] * row(i)).sum();
@@ -94,7 +94,7 @@ fn power_law(ratios: &[f64; 3], exponents: &[f64; 3]) -> f64 {
 }
 
 /// VB vc ap.
-fn friction(conditions: &Conditions) -> f64 {
+fn friction(conditions: &CutConditions) -> f64 {
     conditions.flank_wear_mm * conditions.cutting_speed_m_min * conditions.depth_of_cut_mm
 }
 
@@ -104,7 +104,7 @@ pub struct PhysicalFit {
     /// The form.
     pub physical: Physical,
     /// Its five numbers (those that were fitted) as the last linearisation gives them: values, errors, intervals.
-    pub coefficients: Vec<Fitted>,
+    pub coefficients: Vec<FittedNumber>,
     /// Share of the variance explained.
     pub r2: f64,
     /// The same, for the number of coefficients.
@@ -119,7 +119,7 @@ pub struct PhysicalFit {
 
 /// One number with its uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fitted {
+pub struct FittedNumber {
     /// Name, ending in the unit.
     pub name: &'static str,
     /// The value.
@@ -147,7 +147,7 @@ pub fn fit_physical(cuts: &[Cut], held: &[String]) -> Result<PhysicalFit, Refusa
         );
     }
     let free: Vec<usize> = (0..5).filter(|at| !(1..=3).contains(at) || range.varies(*at)).collect();
-    let mut work = Work { cuts, free, physical: begin(cuts, range) };
+    let mut work = PhysicalRegression { cuts, free, physical: begin(cuts, range) };
     work.solve_linear()?;
     let (last, steps) = work.iterate()?;
     Ok(work.finish(&last, steps))
@@ -169,14 +169,14 @@ fn begin(cuts: &[Cut], range: Range) -> Physical {
     }
 }
 
-struct Work<'a> {
+struct PhysicalRegression<'a> {
     cuts: &'a [Cut],
     /// Which of the five numbers are fitted.
     free: Vec<usize>,
     physical: Physical,
 }
 
-impl Work<'_> {
+impl PhysicalRegression<'_> {
     fn residuals(&self, physical: &Physical) -> Vec<f64> {
         self.cuts.iter().map(|cut| cut.cutting_power_w - physical.power_w(&cut.conditions)).collect()
     }
@@ -195,7 +195,7 @@ impl Work<'_> {
     /// P0 and W of these exponents.
     fn linear(&self, exponents: [f64; 3]) -> Result<Physical, Refusal> {
         let mut physical = Physical { exponents, cutting_power_w: 1.0, ..self.physical.clone() };
-        let column = |name: &str, law: &dyn Fn(&Conditions) -> f64| {
+        let column = |name: &str, law: &dyn Fn(&CutConditions) -> f64| {
             Column::new(name, self.cuts.iter().map(|cut| law(&cut.conditions)).collect())
         };
         let sharp = column(PHYSICAL_NAMES[0], &|it| physical.sharp_w(it));
@@ -310,7 +310,7 @@ impl Work<'_> {
     }
 
     /// The numbers with their errors; the values of the last linearisation itself are 0 by then.
-    fn coefficients(&self, last: &Regression) -> Vec<Fitted> {
+    fn coefficients(&self, last: &Regression) -> Vec<FittedNumber> {
         let [x, y, z] = self.physical.exponents;
         let values = [self.physical.cutting_power_w, x, y, z, self.physical.wear_w_min_m_mm2];
         let t = t_quantile(0.5 + 0.5 * CONFIDENCE, last.degrees_of_freedom);
@@ -318,7 +318,7 @@ impl Work<'_> {
             let standard_error = self.physical.covariance[*at][*at].max(0.0).sqrt();
             let half = t * standard_error;
             let interval = (values[*at] - half, values[*at] + half);
-            Fitted { name: PHYSICAL_NAMES[*at], value: values[*at], standard_error, interval }
+            FittedNumber { name: PHYSICAL_NAMES[*at], value: values[*at], standard_error, interval }
         };
         self.free.iter().map(one).collect()
     }

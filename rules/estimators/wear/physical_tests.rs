@@ -7,22 +7,23 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 
-fn truth(conditions: &Conditions) -> f64 {
+fn truth(conditions: &CutConditions) -> f64 {
     let [wear, speed, feed, depth] = conditions.vector();
     16.0 * speed.powf(0.85) * feed.powf(0.75) * depth + 5.2 * wear * speed * depth
 }
 
 /// The 27 points of the design.
-fn points() -> Vec<Conditions> {
+fn points() -> Vec<CutConditions> {
     let levels = [[0.0, 0.15, 0.3], [90.0, 120.0, 150.0], [0.1, 0.15, 0.2], [0.75, 1.0, 1.25]];
     let runs = super::super::orthogonal_array::Array::L27.runs();
     let at = |run: &Vec<u8>| [run[0], run[1], run[4], run[8]].map(usize::from);
-    runs.iter().map(|run| Conditions::of(std::array::from_fn(|factor| levels[factor][at(run)[factor]]))).collect()
+    runs.iter().map(|run| CutConditions::of(std::array::from_fn(|factor| levels[factor][at(run)[factor]]))).collect()
 }
 
 fn cuts(sd_w: f64, seed: u64) -> Vec<Cut> {
     let (mut rng, noise) = (Pcg64Mcg::seed_from_u64(seed), Normal::new(0.0, sd_w.max(1e-12)).expect("a distribution"));
-    let cut = |conditions: Conditions| Cut { conditions, cutting_power_w: truth(&conditions) + noise.sample(&mut rng) };
+    let cut =
+        |conditions: CutConditions| Cut { conditions, cutting_power_w: truth(&conditions) + noise.sample(&mut rng) };
     points().into_iter().map(cut).collect()
 }
 
@@ -33,7 +34,7 @@ fn the_five_numbers_come_back() {
         assert!((exponent - expected).abs() < 1e-6, "{found:?}");
     }
     assert!((found.wear_w_min_m_mm2 - 5.2).abs() < 1e-6);
-    let reference = Conditions::of([0.0, found.reference[0], found.reference[1], found.reference[2]]);
+    let reference = CutConditions::of([0.0, found.reference[0], found.reference[1], found.reference[2]]);
     assert!((found.cutting_power_w - truth(&reference)).abs() < 1e-5);
 }
 
@@ -55,8 +56,8 @@ fn far_outside_it_stays_sensible_where_the_surface_does_not() {
     let physical = fit_physical(&cuts(10.0, 3), &[]).expect("a fit").physical;
     let surface = super::super::fit_surface::fit_surface(&cuts(10.0, 3), &Default::default()).expect("a fit").surface;
     let far = [[0.3, 60.0, 0.05, 0.4], [0.3, 220.0, 0.3, 2.0], [0.1, 60.0, 0.3, 2.0], [0.1, 220.0, 0.05, 0.4]]
-        .map(Conditions::of);
-    let rms = |power_w: &dyn Fn(&Conditions) -> f64| {
+        .map(CutConditions::of);
+    let rms = |power_w: &dyn Fn(&CutConditions) -> f64| {
         (far.iter().map(|it| (power_w(it) / truth(it) - 1.0).powi(2)).sum::<f64>() / far.len() as f64).sqrt()
     };
     let (physical, surface) = (rms(&|it| physical.power_w(it)), rms(&|it| surface.predict(it).power_w));

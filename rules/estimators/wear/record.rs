@@ -8,7 +8,7 @@ const SCHEMA: &str = "wear/1";
 
 /// What a model is for. The library finds a model by these four texts.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Default)]
-pub struct Key {
+pub struct WearKey {
     /// Name of the machine.
     pub machine: String,
     /// Tool, as the controller or the recipe names it.
@@ -26,7 +26,7 @@ pub struct WearRecord {
     pub schema: String,
     /// What it is for.
     #[serde(flatten)]
-    pub key: Key,
+    pub key: WearKey,
     /// Flank wear at which the edge is worn, mm.
     pub criterion_mm: f64,
     /// Where the cuts came from.
@@ -42,7 +42,7 @@ pub struct WearRecord {
 impl WearRecord {
     /// A record of this version.
     #[must_use]
-    pub fn new(key: Key, criterion_mm: f64, (origin, cuts, r2): (String, usize, f64), model: WearModel) -> Self {
+    pub fn new(key: WearKey, criterion_mm: f64, (origin, cuts, r2): (String, usize, f64), model: WearModel) -> Self {
         Self { schema: SCHEMA.to_owned(), key, criterion_mm, origin, cuts, r2, model }
     }
 
@@ -75,9 +75,9 @@ mod tests {
     use super::super::surface::published;
     use super::*;
 
-    fn key(texts: [&str; 4]) -> Key {
+    fn key(texts: [&str; 4]) -> WearKey {
         let [machine, tool, work_material, operation] = texts.map(str::to_owned);
-        Key { machine, tool, work_material, operation }
+        WearKey { machine, tool, work_material, operation }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! What was learned, for the reader.
 
-use super::anova::{Anova, Source};
+use super::anova::{Anova, AnovaRow};
 use super::fit_surface::SurfaceFit;
-use super::identify::{LearnedWear, Place};
+use super::identify::{DesignPoint, LearnedWear};
 use super::physical::PhysicalFit;
 use crate::estimators::regression::Refusal;
 use std::fmt::{self, Write as _};
@@ -38,7 +38,7 @@ fn told<T>(fit: &Result<T, Refusal>, text: fn(&T) -> String) -> String {
     fit.as_ref().map_or_else(|refusal| format!("  cannot be fitted: {refusal}\n"), text)
 }
 
-fn line(place: &Place) -> String {
+fn line(place: &DesignPoint) -> String {
     let limit = &place.threshold;
     let half = limit.wear_half_interval_mm.map_or("-".to_owned(), |half| format!("± {half:.3}"));
     let power = format!("{:.0} ± {:.0}", limit.power_w, limit.interval_w.1 - limit.power_w);
@@ -58,7 +58,7 @@ fn line(place: &Place) -> String {
 }
 
 /// Where, or over how many parts, the wear can be seen.
-fn seen(limit: &super::Threshold) -> String {
+fn seen(limit: &super::PowerLimit) -> String {
     match limit.parts_to_observe {
         Some(parts) if parts > 1 => format!("observable over {parts} parts"),
         _ => limit.observability.word().to_owned(),
@@ -92,7 +92,7 @@ fn table(anova: &Anova) -> String {
         "  {:<12} {:>14} {:>5} {:>14} {:>9} {:>9}\n",
         "source", "sum of squares", "df", "mean square", "F", "p"
     );
-    for Source { source, sum_of_squares, degrees_of_freedom, mean_square, f, p } in &anova.sources {
+    for AnovaRow { source, sum_of_squares, degrees_of_freedom, mean_square, f, p } in &anova.sources {
         let f = f.map_or(String::new(), |f| format!("{f:.2}"));
         let p = p.map_or(String::new(), |p| if p < 1e-4 { "<0.0001".to_owned() } else { format!("{p:.4}") });
         let _written = writeln!(

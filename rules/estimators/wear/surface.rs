@@ -1,9 +1,9 @@
 //! The response surface: `P = b0 + sum bi xi + sum bij xi xj + sum bii xi^2` over coded variables.
 
 use super::coding::{Coding, Range};
-use super::conditions::{Conditions, FACTORS, WEAR};
+use super::conditions::{CutConditions, FACTORS, WEAR};
 use super::predicted::Predicted;
-use super::term::Term;
+use super::term::WearTerm;
 use serde::{Deserialize, Serialize};
 
 /// A fitted or published surface. One coefficient per term.
@@ -12,7 +12,7 @@ pub struct Surface {
     /// From conditions to coded variables.
     pub coding: Coding,
     /// The terms, the constant first.
-    pub terms: Vec<Term>,
+    pub terms: Vec<WearTerm>,
     /// Coefficients, W.
     pub coefficients_w: Vec<f64>,
     /// Covariance of the coefficients, W^2; empty where none is known.
@@ -34,7 +34,7 @@ impl Surface {
 
     /// Power and its uncertainty.
     #[must_use]
-    pub fn predict(&self, conditions: &Conditions) -> Predicted {
+    pub fn predict(&self, conditions: &CutConditions) -> Predicted {
         let coded = self.coding.code(conditions);
         let values: Vec<f64> = self.terms.iter().map(|term| term.value(&coded)).collect();
         let row = |i: usize| self.covariance_w2[i].iter().zip(&values).map(|(entry, x)| entry * x).sum::<f64>();
@@ -49,7 +49,7 @@ impl Surface {
 
     /// Change of power per millimetre of flank wear, W/mm.
     #[must_use]
-    pub fn wear_slope_w_per_mm(&self, conditions: &Conditions) -> f64 {
+    pub fn wear_slope_w_per_mm(&self, conditions: &CutConditions) -> f64 {
         let coded = self.coding.code(conditions);
         let slope: f64 =
             self.terms.iter().zip(&self.coefficients_w).map(|(term, b)| b * term.slope(WEAR, &coded)).sum();
@@ -61,7 +61,7 @@ impl Surface {
     pub fn formula(&self) -> String {
         let letters: Vec<String> = FACTORS.iter().map(|factor| factor.letter.to_string()).collect();
         let symbols: Vec<&str> = letters.iter().map(String::as_str).collect();
-        let part = |(index, (term, b)): (usize, (&Term, &f64))| {
+        let part = |(index, (term, b)): (usize, (&WearTerm, &f64))| {
             let sign = match (index, *b < 0.0) {
                 (0, false) => "",
                 (0, true) => "-",
@@ -87,7 +87,7 @@ pub fn published() -> Surface {
 /// The same over a coding of one's own; the cube from -1 to 1 is the range.
 #[must_use]
 pub fn published_over(coding: Coding) -> Surface {
-    let term = |powers: [u8; 4]| Term::new(powers.to_vec());
+    let term = |powers: [u8; 4]| WearTerm::new(powers.to_vec());
     let printed: [([u8; 4], f64); 9] = [
         ([0, 0, 0, 0], 1035.63),
         ([1, 0, 0, 0], 83.5),

@@ -2,9 +2,9 @@
 
 /// A product of powers, one power per variable, together at most two.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-pub struct Term(Vec<u8>);
+pub struct WearTerm(Vec<u8>);
 
-impl Term {
+impl WearTerm {
     /// The term of these powers.
     #[must_use]
     pub fn new(powers: Vec<u8>) -> Self {
@@ -63,13 +63,13 @@ impl Term {
 
 /// Every term up to the second order: the constant, the variables, their products, their squares.
 #[must_use]
-pub fn second_order(variables: usize) -> Vec<Term> {
+pub fn second_order(variables: usize) -> Vec<WearTerm> {
     let unit = |i: usize| (0..variables).map(|j| u8::from(i == j)).collect::<Vec<u8>>();
-    let sum = |i: usize, j: usize| Term(unit(i).iter().zip(unit(j)).map(|(a, b)| a + b).collect());
-    let singles = (0..variables).map(|i| Term(unit(i)));
+    let sum = |i: usize, j: usize| WearTerm(unit(i).iter().zip(unit(j)).map(|(a, b)| a + b).collect());
+    let singles = (0..variables).map(|i| WearTerm(unit(i)));
     let products = (0..variables).flat_map(|i| (i + 1..variables).map(move |j| (i, j)));
     let squares = (0..variables).map(|i| (i, i));
-    [Term(vec![0; variables])]
+    [WearTerm(vec![0; variables])]
         .into_iter()
         .chain(singles)
         .chain(products.chain(squares).map(|(i, j)| sum(i, j)))

@@ -1,6 +1,6 @@
 //! Live: the power at which the edge is worn, and the wear that a measured power means.
 
-use super::conditions::{Conditions, Factor, WEAR};
+use super::conditions::{ConditionFactor, CutConditions, WEAR};
 use super::model::WearModel;
 use super::predicted::Predicted;
 use crate::estimators::regression::{Refusal, RefusalKind};
@@ -19,7 +19,7 @@ pub const POOLED_PARTS_MAX: u32 = 30;
 pub enum Observability {
     /// The interval of a single estimate is narrow against the criterion.
     Observable,
-    /// Of a single part it is not, of the mean over [`Threshold::parts_to_observe`] parts it is.
+    /// Of a single part it is not, of the mean over [`PowerLimit::parts_to_observe`] parts it is.
     ObservableOverParts,
     /// It is not: an alarm would be chance. Observe at another cut of the part.
     NotObservableHere,
@@ -39,7 +39,7 @@ impl Observability {
 
 /// The power limit `[Pc]` of one cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Threshold {
+pub struct PowerLimit {
     /// Criterion of the flank wear, mm.
     pub criterion_mm: f64,
     /// `[Pc]`, W.
@@ -75,11 +75,11 @@ pub struct WearEstimate {
     pub extrapolated: Vec<&'static str>,
 }
 
-fn names(outside: Vec<&'static Factor>) -> Vec<&'static str> {
+fn names(outside: Vec<&'static ConditionFactor>) -> Vec<&'static str> {
     outside.into_iter().map(|factor| factor.name).collect()
 }
 
-fn check(conditions: &Conditions) -> Result<(), Refusal> {
+fn check(conditions: &CutConditions) -> Result<(), Refusal> {
     match conditions.problems().into_iter().next() {
         None => Ok(()),
         Some(problem) => Err(Refusal::new(RefusalKind::OutOfRange, problem, "look at the sources of this cut")),
@@ -90,7 +90,7 @@ fn check(conditions: &Conditions) -> Result<(), Refusal> {
 ///
 /// # Errors
 /// Conditions that cannot be, or a limit that is no positive finite power (far outside of what was fitted).
-pub fn threshold(model: &WearModel, cut: &Conditions, criterion_mm: f64) -> Result<Threshold, Refusal> {
+pub fn threshold(model: &WearModel, cut: &CutConditions, criterion_mm: f64) -> Result<PowerLimit, Refusal> {
     let worn = cut.with_wear(criterion_mm);
     check(&worn)?;
     let predicted = model.predict(&worn);
@@ -103,7 +103,7 @@ pub fn threshold(model: &WearModel, cut: &Conditions, criterion_mm: f64) -> Resu
     let slope_w_per_mm = model.wear_slope_w_per_mm(&worn);
     let wear_half_interval_mm = (slope_w_per_mm > 0.0).then(|| half / slope_w_per_mm).filter(|it| it.is_finite());
     let parts_to_observe = parts_to_observe(&predicted, slope_w_per_mm, criterion_mm);
-    Ok(Threshold {
+    Ok(PowerLimit {
         criterion_mm,
         power_w,
         sd_w,
@@ -135,7 +135,7 @@ fn observability(half_mm: Option<f64>, criterion_mm: f64) -> Observability {
     }
 }
 
-fn not_a_power(power_w: f64, outside: &[&'static Factor]) -> Refusal {
+fn not_a_power(power_w: f64, outside: &[&'static ConditionFactor]) -> Refusal {
     let where_: Vec<&str> = outside.iter().map(|factor| factor.name).collect();
     let what =
         format!("the model gives {power_w:.0} W, which is no cutting power; outside its range: {}", where_.join(", "));
@@ -150,7 +150,7 @@ fn not_a_power(power_w: f64, outside: &[&'static Factor]) -> Refusal {
 /// more than the uncertainty (the cut is another than stated); one that no believable wear gives.
 pub fn estimate_wear(
     model: &WearModel,
-    cut: &Conditions,
+    cut: &CutConditions,
     (power_w, power_sd_w): (f64, f64),
     criterion_mm: f64,
 ) -> Result<WearEstimate, Refusal> {
@@ -182,7 +182,7 @@ pub fn estimate_wear(
 }
 
 /// Both forms are at most quadratic in the wear: Newton from the middle of the range, on the rising branch.
-fn invert(model: &WearModel, cut: &Conditions, power_w: f64) -> Result<f64, Refusal> {
+fn invert(model: &WearModel, cut: &CutConditions, power_w: f64) -> Result<f64, Refusal> {
     let range = model.range();
     let mut wear_mm = 0.5 * (range.least[WEAR] + range.greatest[WEAR]);
     for _ in 0..60 {
@@ -223,8 +223,8 @@ mod tests {
         WearModel::Surface(published_over(Coding { centre: [0.195, 120.0, 0.15, 1.0], half: [0.13, 30.0, 0.05, 0.25] }))
     }
 
-    fn cut(coded: [f64; 3]) -> Conditions {
-        Conditions::of([0.0, 120.0 + 30.0 * coded[0], 0.15 + 0.05 * coded[1], 1.0 + 0.25 * coded[2]])
+    fn cut(coded: [f64; 3]) -> CutConditions {
+        CutConditions::of([0.0, 120.0 + 30.0 * coded[0], 0.15 + 0.05 * coded[1], 1.0 + 0.25 * coded[2]])
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! numbers (Kienzle's law for steel), of which only the ratios between cuts of one operation matter; without depth or diameter the
 //! feed alone. Whatever the reference leaves over is a constant of the operation, which the filter learns.
 
-use super::conditions::{Conditions, cutting_speed_m_min};
+use super::conditions::{CutConditions, cutting_speed_m_min};
 use super::prior::ANY_MATERIAL_SD;
 use super::record::WearRecord;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ const SPEED_M_S: f64 = 2.5;
 /// What the work is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reference {
+pub enum WorkReference {
     /// The learned model.
     Model,
     /// Typical numbers for this depth, feed and speed.
@@ -52,8 +52,8 @@ pub struct CutMoment {
 
 /// What a sharp edge takes in this moment, W, and what each millimetre of wear adds, W/mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Expected {
-    pub(super) reference: Reference,
+pub(super) struct ExpectedPower {
+    pub(super) reference: WorkReference,
     pub(super) sharp_w: f64,
     pub(super) wear_w_per_mm: f64,
     /// Standard deviation of the reference, as a share of the power.
@@ -68,19 +68,19 @@ impl CutMoment {
     }
 
     /// Speed, feed per revolution and depth, where all are known.
-    pub(super) fn conditions(&self) -> Option<Conditions> {
+    pub(super) fn conditions(&self) -> Option<CutConditions> {
         let turns = self.speed_rpm?.abs();
         let speed = cutting_speed_m_min(self.diameter_mm?, turns).ok()?;
-        let cut = Conditions::of([0.0, speed, self.feed_mm_min? / turns.max(1.0), self.depth_mm?]);
+        let cut = CutConditions::of([0.0, speed, self.feed_mm_min? / turns.max(1.0), self.depth_mm?]);
         cut.problems().is_empty().then_some(cut)
     }
 
-    pub(super) fn expected(&self, model: Option<&WearRecord>) -> Expected {
+    pub(super) fn expected(&self, model: Option<&WearRecord>) -> ExpectedPower {
         let of_model = || self.of_model(model?);
         of_model().or_else(|| self.typical()).unwrap_or_else(|| self.of_feed())
     }
 
-    fn of_model(&self, record: &WearRecord) -> Option<Expected> {
+    fn of_model(&self, record: &WearRecord) -> Option<ExpectedPower> {
         let sharp = self.conditions()?;
         let worn = sharp.with_wear(record.criterion_mm);
         if !record.model.outside(&worn).is_empty() {
@@ -92,10 +92,15 @@ impl CutMoment {
         let stands = at_none.power_w > 0.0 && wear_w_per_mm > 0.0;
         let of_material = if record.key.work_material.is_empty() { ANY_MATERIAL_SD } else { 0.0 };
         let doubt = of_material.hypot(at_worn.observation_sd_w() / at_none.power_w);
-        stands.then_some(Expected { reference: Reference::Model, sharp_w: at_none.power_w, wear_w_per_mm, doubt })
+        stands.then_some(ExpectedPower {
+            reference: WorkReference::Model,
+            sharp_w: at_none.power_w,
+            wear_w_per_mm,
+            doubt,
+        })
     }
 
-    fn typical(&self) -> Option<Expected> {
+    fn typical(&self) -> Option<ExpectedPower> {
         let cut = self.conditions()?;
         let (depth, speed_m_s) = (cut.depth_of_cut_mm, cut.cutting_speed_m_min / 60.0);
         let (chip_mm, engaged) = match self.milling.filter(|(width, teeth)| *width > 0.0 && *teeth > 0.0) {
@@ -111,15 +116,20 @@ impl CutMoment {
             Some((width, _)) => specific * depth * width * self.feed_mm_min? / 60_000.0,
         };
         let wear_w_per_mm = FLANK_FORCE_N_MM2 * depth * engaged * speed_m_s;
-        (sharp_w > 0.0).then_some(Expected { reference: Reference::Typical, sharp_w, wear_w_per_mm, doubt: 0.0 })
+        (sharp_w > 0.0).then_some(ExpectedPower {
+            reference: WorkReference::Typical,
+            sharp_w,
+            wear_w_per_mm,
+            doubt: 0.0,
+        })
     }
 
-    fn of_feed(&self) -> Expected {
+    fn of_feed(&self) -> ExpectedPower {
         let per_turn = self.feed_mm_min.zip(self.speed_rpm).map(|(feed, turns)| feed / turns.abs().max(1.0));
         let chip_mm = per_turn.unwrap_or(FEED_MM).clamp(0.01, 2.0);
         let sharp_w = self.feed_mm_min.unwrap_or(1.0).max(0.0).powf(1.0 - CHIP_EXPONENT);
         let rise = FLANK_FORCE_N_MM2 / (SPECIFIC_FORCE_N_MM2 * chip_mm.powf(1.0 - CHIP_EXPONENT));
-        Expected { reference: Reference::Feed, sharp_w, wear_w_per_mm: rise * sharp_w, doubt: 0.0 }
+        ExpectedPower { reference: WorkReference::Feed, sharp_w, wear_w_per_mm: rise * sharp_w, doubt: 0.0 }
     }
 }
 
@@ -127,7 +137,7 @@ impl CutMoment {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct WorkKey {
     /// What it is compared with.
-    pub reference: Reference,
+    pub reference: WorkReference,
     /// Tool, without its edge.
     pub tool: String,
     /// NC program.
@@ -149,7 +159,7 @@ impl WorkKey {
 
 /// The work of one edge in one part, with one reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Work {
+pub struct EdgeWork {
     /// Whose.
     pub key: WorkKey,
     /// The edge, as the controller names it.
@@ -170,7 +180,7 @@ pub struct Work {
     pub doubt_j: f64,
 }
 
-impl Work {
+impl EdgeWork {
     /// Nothing yet.
     #[must_use]
     pub fn new(key: WorkKey, edge: String, criterion_mm: f64) -> Self {
@@ -187,7 +197,7 @@ impl Work {
         }
     }
 
-    pub(super) fn add(&mut self, moment: &CutMoment, expected: &Expected, step_s: f64) {
+    pub(super) fn add(&mut self, moment: &CutMoment, expected: &ExpectedPower, step_s: f64) {
         self.seconds += step_s;
         self.path_mm += moment.feed_mm_min.unwrap_or(0.0) / 60.0 * step_s;
         self.slide_m += moment.speed_m_s() * step_s;

@@ -4,7 +4,7 @@ use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{
     ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
-use crate::physics::{Columns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -101,19 +101,19 @@ impl Effect for HardnessBatch {
         &["lot", "lots", "step", "stretch", "stretches"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<Form> {
+    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
         if cut(scene).is_none() {
             return Vec::new();
         }
         let mut forms = word_forms(scene, "lot", "lot", GAINS.len() + 1);
         if forms.len() > 2 {
-            forms.push(Form { name: "lots", ..Form::plain() });
+            forms.push(EffectForm { name: "lots", ..EffectForm::plain() });
         }
         forms.extend(steps_between_lots(scene));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &Form) -> Option<Columns> {
+    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
         if form.name == "lots" {
             return every_lot(scene);
         }
@@ -137,10 +137,10 @@ impl Effect for HardnessBatch {
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];
 
 /// Steps at the start of a run; where the lots are recorded, only of a run that begins one.
-fn steps_between_lots(scene: &Scene) -> Vec<Form> {
+fn steps_between_lots(scene: &Scene) -> Vec<EffectForm> {
     let mut steps = step_forms(scene, "step");
     let Some(lots) = scene.words("lot").filter(|lots| lots.words().len() > 1) else { return steps };
-    let begins_a_lot = |form: &Form| {
+    let begins_a_lot = |form: &EffectForm| {
         let run = form.place.as_ref().and_then(|(_, run)| run_named(scene, run));
         run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
     };
@@ -152,16 +152,16 @@ fn steps_between_lots(scene: &Scene) -> Vec<Form> {
 
 /// The form for an odd lot nobody wrote down: the runs from `first` to `last`, one of `e^ln_choices` stretches.
 #[must_use]
-pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> Form {
+pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> EffectForm {
     let place = Some(("run".to_owned(), stretch_of_runs(scene, first, last)));
-    Form { name: "stretch", place, ln_choices, ..Form::default() }
+    EffectForm { name: "stretch", place, ln_choices, ..EffectForm::default() }
 }
 
 /// The form for lots nobody wrote down: these runs begin the second and the further ones.
 #[must_use]
-pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> Form {
+pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> EffectForm {
     let names: Vec<&str> = starts.iter().map(|run| scene.run_names()[*run].as_str()).collect();
-    Form { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..Form::default() }
+    EffectForm { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..EffectForm::default() }
 }
 
 /// Lots beyond which no gains of their own are fitted.
@@ -170,7 +170,7 @@ pub const LOTS_MAX: usize = GAINS.len() + 1;
 /// Between the runs that begin a lot.
 const LOT_TO_LOT: &str = ", ";
 
-fn from_start_to_start(scene: &Scene, starts: &str) -> Option<Columns> {
+fn from_start_to_start(scene: &Scene, starts: &str) -> Option<ParameterColumns> {
     let row = |name: &str| Some(scene.runs()[run_named(scene, name)?].start);
     let mut rows: Vec<usize> = starts.split(LOT_TO_LOT).map(row).collect::<Option<_>>()?;
     rows.push(scene.rows());
@@ -181,7 +181,7 @@ fn from_start_to_start(scene: &Scene, starts: &str) -> Option<Columns> {
     GAINS.iter().zip(rows.windows(2)).map(gain).collect()
 }
 
-fn every_lot(scene: &Scene) -> Option<Columns> {
+fn every_lot(scene: &Scene) -> Option<ParameterColumns> {
     let lots = scene.words("lot")?;
     let column = |(gain, lot): (&&'static str, &String)| {
         let here = where_word(scene, "lot", lot)?;

@@ -3,7 +3,7 @@
 use super::scan::{calls, position};
 use super::{Declared, Per, SettingValue};
 use crate::script::compile::ScriptFile;
-use crate::script::problem::{self, Problem, spoken};
+use crate::script::problem::{self, ScriptProblem, spoken};
 use adapters::channel::nearest;
 use rhai::{Array, Dynamic, Engine, Expr, ImmutableString, Map, Position, Stmt};
 use std::ops::Range;
@@ -18,7 +18,7 @@ const EXAMPLE: &str =
 
 /// A declaration and where it stands.
 #[derive(Debug, Clone)]
-pub(in crate::script) struct Found {
+pub(in crate::script) struct FoundDeclaration {
     pub(in crate::script) declared: Declared,
     span: Range<usize>,
     /// The constant that it alone is the value of.
@@ -29,11 +29,11 @@ pub(in crate::script) struct Found {
 ///
 /// # Errors
 /// Everything that is wrong with them.
-pub(in crate::script) fn find(file: &ScriptFile, engine: &Engine) -> Result<Vec<Found>, Vec<Problem>> {
-    let (mut found, mut problems): (Vec<Found>, Vec<Problem>) = (Vec::new(), Vec::new());
+pub(in crate::script) fn find(file: &ScriptFile, engine: &Engine) -> Result<Vec<FoundDeclaration>, Vec<ScriptProblem>> {
+    let (mut found, mut problems): (Vec<FoundDeclaration>, Vec<ScriptProblem>) = (Vec::new(), Vec::new());
     for call in calls(&file.text, "setting") {
         let at = position(&file.text, call.span.start);
-        let wrong = |what: String, next: String| Problem::new(&file.name, at, what, next);
+        let wrong = |what: String, next: String| ScriptProblem::new(&file.name, at, what, next);
         let read = read(&file.text[call.span.clone()], engine).and_then(|mut declared| {
             if found.iter().any(|known| known.declared.name == declared.name) {
                 let what = format!("the setting {} is declared twice", declared.name);
@@ -45,21 +45,25 @@ pub(in crate::script) fn find(file: &ScriptFile, engine: &Engine) -> Result<Vec<
         match read {
             Ok(declared) => {
                 let constant = constant(&file.text, &call.span);
-                found.push(Found { declared, span: call.span, constant });
+                found.push(FoundDeclaration { declared, span: call.span, constant });
             }
             Err((what, next)) => problems.push(wrong(what, next)),
         }
     }
     if found.len() > SETTINGS_MAX {
         let what = format!("{} settings; a script has at most {SETTINGS_MAX}", found.len());
-        problems.push(Problem::new(&file.name, Position::NONE, what, "split it into several files"));
+        problems.push(ScriptProblem::new(&file.name, Position::NONE, what, "split it into several files"));
     }
     if problems.is_empty() { Ok(found) } else { Err(problems) }
 }
 
 /// The text with these values, each in the place of its declaration. Lines and columns of everything else stay; `None` stands
 /// for a value that is looked up when the script runs.
-pub(in crate::script) fn with_values(text: &str, found: &[Found], values: &[Option<SettingValue>]) -> String {
+pub(in crate::script) fn with_values(
+    text: &str,
+    found: &[FoundDeclaration],
+    values: &[Option<SettingValue>],
+) -> String {
     let mut filled = String::with_capacity(text.len());
     let mut from = 0;
     for (index, (it, value)) in found.iter().zip(values).enumerate() {

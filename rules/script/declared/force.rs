@@ -1,6 +1,6 @@
 //! The values in force for one script: which stand in its text, and which are looked up by tool and operation.
 
-use super::{Declared, Found, Place, SettingValue, SettingValues};
+use super::{DeclarationPlace, Declared, FoundDeclaration, SettingValue, SettingValues};
 use adapters::{ChannelId, Sample};
 use rhai::Dynamic;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ pub(in crate::script) struct Force {
     /// The value of each declaration as it stands in the text; `None` where it is looked up.
     pub(in crate::script) texts: Vec<Option<SettingValue>>,
     /// What is looked up.
-    pub(in crate::script) live: Live,
+    pub(in crate::script) live: LiveValues,
     /// Is anything else than the default in force?
     pub(in crate::script) chosen: bool,
 }
@@ -20,14 +20,14 @@ pub(in crate::script) struct Force {
 impl Force {
     /// The values of this file for these declarations. One that the declaration does not allow is left out: it is a problem of
     /// the file.
-    pub(in crate::script) fn of(found: &[Found], values: &SettingValues) -> Self {
+    pub(in crate::script) fn of(found: &[FoundDeclaration], values: &SettingValues) -> Self {
         let mut force = Self::default();
         for (index, it) in found.iter().enumerate() {
             let declared = &it.declared;
-            let allowed = |place: &Place| allowed(declared, values, place);
-            let machine = allowed(&Place::Machine).unwrap_or_else(|| declared.default.clone());
+            let allowed = |place: &DeclarationPlace| allowed(declared, values, place);
+            let machine = allowed(&DeclarationPlace::Machine).unwrap_or_else(|| declared.default.clone());
             let places = values.places(declared.section()).into_iter();
-            let special: Vec<(Place, SettingValue)> = places
+            let special: Vec<(DeclarationPlace, SettingValue)> = places
                 .filter(|place| place.per().is_some_and(|per| declared.per.contains(&per)))
                 .filter_map(|place| Some((allowed(&place)?, place)))
                 .map(|(value, place)| (place, value))
@@ -40,41 +40,46 @@ impl Force {
     }
 
     /// The values of the machine, or of one place, all of them in the text.
-    pub(in crate::script) fn fixed(found: &[Found], values: &SettingValues, place: &Place) -> Self {
-        let text = |it: &Found| {
+    pub(in crate::script) fn fixed(
+        found: &[FoundDeclaration],
+        values: &SettingValues,
+        place: &DeclarationPlace,
+    ) -> Self {
+        let text = |it: &FoundDeclaration| {
             let declared = &it.declared;
-            let own = allowed(declared, values, place).or_else(|| allowed(declared, values, &Place::Machine));
+            let own =
+                allowed(declared, values, place).or_else(|| allowed(declared, values, &DeclarationPlace::Machine));
             own.unwrap_or_else(|| declared.default.clone())
         };
         let texts: Vec<Option<SettingValue>> = found.iter().map(|it| Some(text(it))).collect();
         let chosen = found.iter().zip(&texts).any(|(it, value)| value.as_ref() != Some(&it.declared.default));
-        Self { texts, live: Live::default(), chosen }
+        Self { texts, live: LiveValues::default(), chosen }
     }
 }
 
 /// The value that the file has for this place, where the declaration allows it.
-fn allowed(declared: &Declared, values: &SettingValues, place: &Place) -> Option<SettingValue> {
+fn allowed(declared: &Declared, values: &SettingValues, place: &DeclarationPlace) -> Option<SettingValue> {
     let value = values.of(declared.section(), &declared.name, place)?;
     declared.refuse(value).is_none().then(|| value.clone())
 }
 
 /// Values that depend on the tool or the operation.
 #[derive(Debug, Clone, Default)]
-pub(in crate::script) struct Live {
+pub(in crate::script) struct LiveValues {
     /// Value of the machine for every declaration; unit where it stands in the text.
     machine: Vec<Dynamic>,
-    special: BTreeMap<Place, Vec<(usize, Dynamic)>>,
+    special: BTreeMap<DeclarationPlace, Vec<(usize, Dynamic)>>,
     /// Constants whose value is looked up, with the number of their declaration.
     pub(in crate::script) constants: Vec<(String, usize)>,
 }
 
-impl Live {
+impl LiveValues {
     fn add(
         &mut self,
         index: usize,
         constant: Option<&str>,
         machine: &SettingValue,
-        special: Vec<(Place, SettingValue)>,
+        special: Vec<(DeclarationPlace, SettingValue)>,
     ) {
         self.machine.push(if special.is_empty() { Dynamic::UNIT } else { dynamic(machine) });
         if let Some(constant) = constant.filter(|_| !special.is_empty()) {
@@ -93,8 +98,10 @@ impl Live {
     /// The values for this tool and this operation; the operation goes before the tool.
     fn values(&self, tool: Option<&str>, operation: Option<&str>) -> Arc<[Dynamic]> {
         let mut values = self.machine.clone();
-        let places =
-            [tool.map(|tool| Place::Tool(tool.to_owned())), operation.map(|it| Place::Operation(it.to_owned()))];
+        let places = [
+            tool.map(|tool| DeclarationPlace::Tool(tool.to_owned())),
+            operation.map(|it| DeclarationPlace::Operation(it.to_owned())),
+        ];
         for (index, value) in places.iter().flatten().filter_map(|place| self.special.get(place)).flatten() {
             values[*index] = value.clone();
         }
@@ -119,7 +126,7 @@ pub(in crate::script) struct Now {
 
 impl Now {
     /// The values for this sample.
-    pub(in crate::script) fn step(&mut self, live: &Live, sample: &Sample) -> Arc<[Dynamic]> {
+    pub(in crate::script) fn step(&mut self, live: &LiveValues, sample: &Sample) -> Arc<[Dynamic]> {
         let text = |name: &str| ChannelId::of(name).and_then(|id| sample.text(id));
         let (tool, operation) = (text("tool"), text("operation"));
         match &self.values {

@@ -27,9 +27,9 @@ mod force;
 pub(super) mod scan;
 mod values;
 
-pub(super) use find::{Found, find, with_values};
-pub(super) use force::{Force, Live, Now};
-pub use values::{Place, SETTINGS_TEXT_MAX, SettingValues};
+pub(super) use find::{FoundDeclaration, find, with_values};
+pub(super) use force::{Force, LiveValues, Now};
+pub use values::{DeclarationPlace, SETTINGS_TEXT_MAX, SettingValues};
 
 use adapters::channel::nearest;
 use std::fmt;

@@ -1,7 +1,7 @@
 //! The file with the values of settings, checked against what the scripts declare.
 
 use super::{Declared, Per, SettingValue};
-use crate::script::problem::Problem;
+use crate::script::problem::ScriptProblem;
 use crate::script::shipped;
 use adapters::channel::nearest;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ const VALUES_MAX: usize = 4096;
 
 /// What a value is for.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Place {
+pub enum DeclarationPlace {
     /// The machine, wherever nothing more special has a value.
     Machine,
     /// One tool, as the channel `tool` names it.
@@ -24,7 +24,7 @@ pub enum Place {
     Operation(String),
 }
 
-impl Place {
+impl DeclarationPlace {
     /// What it is a place of; `None` for the machine.
     #[must_use]
     pub fn per(&self) -> Option<Per> {
@@ -45,7 +45,7 @@ impl Place {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for DeclarationPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Machine => f.write_str("this machine"),
@@ -57,19 +57,19 @@ impl fmt::Display for Place {
 
 /// A value, and where it is written.
 #[derive(Debug, Clone, PartialEq)]
-struct Chosen {
+struct DeclaredValue {
     value: SettingValue,
     line: usize,
     column: usize,
 }
 
-type Key = (String, String, Place);
+type DeclarationKey = (String, String, DeclarationPlace);
 
 /// Every value of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SettingValues {
     file: String,
-    chosen: BTreeMap<Key, Chosen>,
+    chosen: BTreeMap<DeclarationKey, DeclaredValue>,
 }
 
 impl SettingValues {
@@ -77,8 +77,8 @@ impl SettingValues {
     ///
     /// # Errors
     /// Everything that is no value of a setting, each with line and column.
-    pub fn parse(file: &str, text: &str) -> Result<Self, Vec<Problem>> {
-        let mut reader = Reader { file, text, problems: Vec::new(), chosen: BTreeMap::new() };
+    pub fn parse(file: &str, text: &str) -> Result<Self, Vec<ScriptProblem>> {
+        let mut reader = DeclarationReader { file, text, problems: Vec::new(), chosen: BTreeMap::new() };
         reader.read();
         match reader.problems.is_empty() {
             true => Ok(Self { file: file.to_owned(), chosen: reader.chosen }),
@@ -94,33 +94,33 @@ impl SettingValues {
 
     /// The value of a setting in this place, where the file has one.
     #[must_use]
-    pub fn of(&self, section: &str, name: &str, place: &Place) -> Option<&SettingValue> {
+    pub fn of(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<&SettingValue> {
         self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| &chosen.value)
     }
 
     /// The line on which a value stands, from 1.
     #[must_use]
-    pub fn line(&self, section: &str, name: &str, place: &Place) -> Option<usize> {
+    pub fn line(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<usize> {
         self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| chosen.line)
     }
 
     /// Every value: section, name, place, value.
-    pub fn all(&self) -> impl Iterator<Item = (&str, &str, &Place, &SettingValue)> {
+    pub fn all(&self) -> impl Iterator<Item = (&str, &str, &DeclarationPlace, &SettingValue)> {
         self.chosen.iter().map(|((section, name, place), chosen)| (&**section, &**name, place, &chosen.value))
     }
 
     /// The places of one section that have values of their own, besides the machine.
     #[must_use]
-    pub fn places(&self, section: &str) -> Vec<Place> {
-        let of = |key: &&Key| key.0 == section && key.2 != Place::Machine;
+    pub fn places(&self, section: &str) -> Vec<DeclarationPlace> {
+        let of = |key: &&DeclarationKey| key.0 == section && key.2 != DeclarationPlace::Machine;
         self.chosen.keys().filter(of).map(|key| key.2.clone()).collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     /// Puts a value into a place; `None` takes it out.
-    pub fn put(&mut self, section: &str, name: &str, place: &Place, value: Option<SettingValue>) {
+    pub fn put(&mut self, section: &str, name: &str, place: &DeclarationPlace, value: Option<SettingValue>) {
         let key = (section.to_owned(), name.to_owned(), place.clone());
         match value {
-            Some(value) => drop(self.chosen.insert(key, Chosen { value, line: 0, column: 0 })),
+            Some(value) => drop(self.chosen.insert(key, DeclaredValue { value, line: 0, column: 0 })),
             None => drop(self.chosen.remove(&key)),
         }
     }
@@ -142,20 +142,21 @@ impl SettingValues {
         text
     }
 
-    fn sorted(&self) -> Vec<(Key, Chosen)> {
-        let mut rows: Vec<(Key, Chosen)> = self.chosen.iter().map(|(key, it)| (key.clone(), it.clone())).collect();
+    fn sorted(&self) -> Vec<(DeclarationKey, DeclaredValue)> {
+        let mut rows: Vec<(DeclarationKey, DeclaredValue)> =
+            self.chosen.iter().map(|(key, it)| (key.clone(), it.clone())).collect();
         rows.sort_by(|(a, _), (b, _)| (&a.0, &a.2, &a.1).cmp(&(&b.0, &b.2, &b.1)));
         rows
     }
 
     /// Everything of the file that does not fit what is declared. `scripts` are all files, also those without settings.
     #[must_use]
-    pub fn check(&self, declared: &[&Declared], scripts: &[&str]) -> Vec<Problem> {
+    pub fn check(&self, declared: &[&Declared], scripts: &[&str]) -> Vec<ScriptProblem> {
         let mut problems = Vec::new();
         for ((section, name, place), chosen) in &self.chosen {
             if let Some((what, next)) = wrong((section, name, place), &chosen.value, declared, scripts) {
                 let (line, column) = (Some(chosen.line), Some(chosen.column));
-                problems.push(Problem { file: self.file.clone(), line, column, what, next });
+                problems.push(ScriptProblem { file: self.file.clone(), line, column, what, next });
             }
         }
         problems.sort_by_key(|problem| problem.line);
@@ -164,7 +165,7 @@ impl SettingValues {
 }
 
 fn wrong(
-    (section, name, place): (&str, &str, &Place),
+    (section, name, place): (&str, &str, &DeclarationPlace),
     value: &SettingValue,
     declared: &[&Declared],
     scripts: &[&str],
@@ -195,18 +196,18 @@ fn wrong(
     found.refuse(value)
 }
 
-struct Reader<'t> {
+struct DeclarationReader<'t> {
     file: &'t str,
     text: &'t str,
-    problems: Vec<Problem>,
-    chosen: BTreeMap<Key, Chosen>,
+    problems: Vec<ScriptProblem>,
+    chosen: BTreeMap<DeclarationKey, DeclaredValue>,
 }
 
-impl Reader<'_> {
+impl DeclarationReader<'_> {
     fn wrong(&mut self, at: usize, what: impl Into<String>, next: &str) {
         let (line, column) = self.place(at);
         let (file, what, next) = (self.file.to_owned(), what.into(), next.to_owned());
-        self.problems.push(Problem { file, line: Some(line), column: Some(column), what, next });
+        self.problems.push(ScriptProblem { file, line: Some(line), column: Some(column), what, next });
     }
 
     fn place(&self, at: usize) -> (usize, usize) {
@@ -258,7 +259,7 @@ impl Reader<'_> {
             let per = Per::ALL.into_iter().find(|per| per.word() == key.get_ref().as_ref());
             match (per, value.get_ref().as_table()) {
                 (Some(per), Some(names)) => self.names(section, per, names),
-                _ => self.value(section, key.get_ref(), Place::Machine, (key.span().start, value.get_ref())),
+                _ => self.value(section, key.get_ref(), DeclarationPlace::Machine, (key.span().start, value.get_ref())),
             }
         }
     }
@@ -273,15 +274,15 @@ impl Reader<'_> {
             let name = name.get_ref().to_string();
             for (key, value) in values.iter() {
                 let place = match per {
-                    Per::Tool => Place::Tool(name.clone()),
-                    Per::Operation => Place::Operation(name.clone()),
+                    Per::Tool => DeclarationPlace::Tool(name.clone()),
+                    Per::Operation => DeclarationPlace::Operation(name.clone()),
                 };
                 self.value(section, key.get_ref(), place, (key.span().start, value.get_ref()));
             }
         }
     }
 
-    fn value(&mut self, section: &str, name: &str, place: Place, (at, value): (usize, &DeValue<'_>)) {
+    fn value(&mut self, section: &str, name: &str, place: DeclarationPlace, (at, value): (usize, &DeValue<'_>)) {
         let number = match value {
             DeValue::Float(number) => number.as_str().replace('_', "").parse::<f64>().ok(),
             DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix()).ok().map(|it| it as f64),
@@ -300,6 +301,6 @@ impl Reader<'_> {
             }
         };
         let (line, column) = self.place(at);
-        self.chosen.insert((section.to_owned(), name.to_owned(), place), Chosen { value, line, column });
+        self.chosen.insert((section.to_owned(), name.to_owned(), place), DeclaredValue { value, line, column });
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Method;
 use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::script::collect::Outcome;
+use crate::script::collect::ScriptResult;
 use crate::script::problem::spoken;
 use rhai::{Array, Dynamic, Map};
 
@@ -27,7 +27,7 @@ pub struct Arguments<'a> {
 impl<'a> Arguments<'a> {
     /// Reads what the script handed over. Something that is neither number, text, array of numbers nor array of rows is a
     /// mistake in the script.
-    pub(super) fn read(method: &'a Method, values: &[&mut Dynamic]) -> Outcome<Self> {
+    pub(super) fn read(method: &'a Method, values: &[&mut Dynamic]) -> ScriptResult<Self> {
         let read = values.iter().zip(method.parameters).map(|(value, parameter)| {
             let said =
                 || format!("{}: {} needs {}, not {}", method.name, parameter.name, parameter.unit, spoken(value));
@@ -136,7 +136,7 @@ fn row(value: &Dynamic) -> Option<Vec<f64>> {
 
 /// What a method answers.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Answer {
+pub enum MethodResult {
     /// A number in the unit of the method's name.
     Number(f64),
     /// Yes or no.
@@ -145,7 +145,7 @@ pub enum Answer {
     Map(Vec<(&'static str, f64)>),
 }
 
-impl Answer {
+impl MethodResult {
     /// The answer, where every number in it is one.
     pub(super) fn checked(self) -> Result<Self, Refusal> {
         let finite = match &self {

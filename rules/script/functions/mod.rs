@@ -10,9 +10,9 @@ mod spindle_current;
 mod thermal;
 mod wear;
 
-pub use arguments::{Answer, Arguments};
+pub use arguments::{Arguments, MethodResult};
 
-use super::collect::Outcome;
+use super::collect::ScriptResult;
 use super::engine::Shared;
 use crate::estimators::regression::Refusal;
 use rhai::{Dynamic, Engine, ImmutableString, NativeCallContext};
@@ -20,15 +20,15 @@ use std::any::TypeId;
 
 /// What a method takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Parameter {
+pub struct MethodParameter {
     /// Name; ends in the unit where the unit has a short form.
     pub name: &'static str,
     /// Unit symbol; `1` for pure numbers; `[W]` for an array, `[[rpm, W]]` for an array of rows.
     pub unit: &'static str,
 }
 
-const fn takes(name: &'static str, unit: &'static str) -> Parameter {
-    Parameter { name, unit }
+const fn takes(name: &'static str, unit: &'static str) -> MethodParameter {
+    MethodParameter { name, unit }
 }
 
 /// A method that a script can call.
@@ -36,14 +36,14 @@ pub struct Method {
     /// Name in scripts; ends in the unit of the answer where it is a number with one.
     pub name: &'static str,
     /// What it takes, in order.
-    pub parameters: &'static [Parameter],
+    pub parameters: &'static [MethodParameter],
     /// Unit of the answer; for a map its keys with their units.
     pub returns: &'static str,
     /// What it does, in English.
     pub en: &'static str,
     /// What it does, in Chinese.
     pub zh: &'static str,
-    run: fn(&Arguments<'_>) -> Result<Answer, Refusal>,
+    run: fn(&Arguments<'_>) -> Result<MethodResult, Refusal>,
 }
 
 impl Method {
@@ -86,10 +86,10 @@ pub(super) fn register(engine: &mut Engine, shared: &Shared) {
     engine.register_fn("why", move |name: ImmutableString| to.lock().why(&name));
 }
 
-fn call(method: &Method, values: &mut [&mut Dynamic], to: &Shared) -> Outcome<Dynamic> {
+fn call(method: &Method, values: &mut [&mut Dynamic], to: &Shared) -> ScriptResult<Dynamic> {
     let arguments = Arguments::read(method, values)?;
     let answer = arguments.missing().map_or_else(|| (method.run)(&arguments), Err);
-    match answer.and_then(Answer::checked) {
+    match answer.and_then(MethodResult::checked) {
         Ok(answer) => Ok(answer.into_dynamic()),
         Err(refusal) => {
             to.lock().refused(method.name, &refusal.to_string());

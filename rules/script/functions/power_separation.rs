@@ -1,6 +1,6 @@
 //! Power separation: no-load power at a speed, cutting power and load loss.
 
-use super::{Answer, Arguments, Method, Parameter, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use crate::estimators::{balance, lagrange, noise_gain, triple};
 
@@ -9,7 +9,7 @@ const GAIN_MAX: f64 = 3.0 + 1e-9;
 
 pub(super) static SUBJECT: Subject = Subject { en: "Power separation", zh: "功率分离", methods: METHODS };
 
-const BALANCE: &[Parameter] = &[
+const BALANCE: &[MethodParameter] = &[
     takes("spindle_power_w", "W"),
     takes("no_load_power_w", "W"),
     takes("load_loss_linear", "1"),
@@ -17,7 +17,7 @@ const BALANCE: &[Parameter] = &[
 ];
 
 /// `identify no-load --out` writes such pairs.
-const TABLE: Parameter = takes("no_load_table", "[[rpm, W]]");
+const TABLE: MethodParameter = takes("no_load_table", "[[rpm, W]]");
 
 static METHODS: &[Method] = &[
     Method {
@@ -28,7 +28,7 @@ static METHODS: &[Method] = &[
         zh: "由相邻三个已知转速二次插值空载功率",
         run: |given| {
             let (powers_w, weights) = interpolation(given)?;
-            Ok(Answer::Number(weights.iter().zip(powers_w).map(|(weight, power_w)| weight * power_w).sum()))
+            Ok(MethodResult::Number(weights.iter().zip(powers_w).map(|(weight, power_w)| weight * power_w).sum()))
         },
     },
     Method {
@@ -37,7 +37,7 @@ static METHODS: &[Method] = &[
         returns: "1",
         en: "By how much that interpolation amplifies the noise of the known powers; 1 at a known speed",
         zh: "插值的噪声放大倍数",
-        run: |given| interpolation(given).map(|(_, weights)| Answer::Number(noise_gain(&weights))),
+        run: |given| interpolation(given).map(|(_, weights)| MethodResult::Number(noise_gain(&weights))),
     },
     Method {
         name: "separated_cutting_power_w",
@@ -45,7 +45,7 @@ static METHODS: &[Method] = &[
         returns: "W",
         en: "Cutting power Pc of Pi = Pu + (1 + a0) Pc + a1 Pc^2; negative below no-load power; no value where no cutting power gives this power",
         zh: "由总功率、空载功率和附加载荷损耗系数求切削功率",
-        run: |given| split(given).map(|split| Answer::Number(split.cutting_power_w)),
+        run: |given| split(given).map(|split| MethodResult::Number(split.cutting_power_w)),
     },
     Method {
         name: "separated_load_loss_w",
@@ -53,7 +53,7 @@ static METHODS: &[Method] = &[
         returns: "W",
         en: "Additional load loss Pad = a0 Pc + a1 Pc^2 that belongs to this cutting power",
         zh: "附加载荷损耗功率",
-        run: |given| split(given).map(|split| Answer::Number(split.load_loss_w)),
+        run: |given| split(given).map(|split| MethodResult::Number(split.load_loss_w)),
     },
 ];
 

@@ -1,16 +1,16 @@
 //! Constant load by the spindle current: curves of a feature over feed, by depth of cut.
 
-use super::{Answer, Arguments, Method, Parameter, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::Refusal;
-use crate::estimators::spindle_current::{Cubic, CurveAtDepth, Family};
+use crate::estimators::spindle_current::{Cubic, CurveAtDepth, CurveFamily};
 
 pub(super) static SUBJECT: Subject = Subject { en: "Constant load", zh: "恒负荷进给", methods: METHODS };
 
 /// `identify feed-curve --out` writes them.
-const CURVES: Parameter = takes("curves", "[[depth mm, least feed, greatest feed, c0, c1, c2, c3, sd]]");
-const FEED: Parameter = takes("feed", "that of the curves");
-const FEATURE: Parameter = takes("feature", "that of the curves");
-const DEPTH: Parameter = takes("depth_mm", "mm");
+const CURVES: MethodParameter = takes("curves", "[[depth mm, least feed, greatest feed, c0, c1, c2, c3, sd]]");
+const FEED: MethodParameter = takes("feed", "that of the curves");
+const FEATURE: MethodParameter = takes("feature", "that of the curves");
+const DEPTH: MethodParameter = takes("depth_mm", "mm");
 
 static METHODS: &[Method] = &[
     Method {
@@ -19,7 +19,7 @@ static METHODS: &[Method] = &[
         returns: "mm",
         en: "Equivalent depth of cut at which this feed gives this feature; no value outside the curves, as in the air. Wear and hard material look like depth",
         zh: "由进给和特征值反求等效背吃刀量",
-        run: |given| Ok(Answer::Number(family(given)?.depth(given.number(1), given.number(2), 0.0)?.depth_mm)),
+        run: |given| Ok(MethodResult::Number(family(given)?.depth(given.number(1), given.number(2), 0.0)?.depth_mm)),
     },
     Method {
         name: "feed_curve_depth_sd_mm",
@@ -27,7 +27,9 @@ static METHODS: &[Method] = &[
         returns: "mm",
         en: "One standard deviation of that depth, from that of the feature and of the curves",
         zh: "等效背吃刀量的标准不确定度",
-        run: |given| Ok(Answer::Number(family(given)?.depth(given.number(1), given.number(2), given.number(3))?.sd_mm)),
+        run: |given| {
+            Ok(MethodResult::Number(family(given)?.depth(given.number(1), given.number(2), given.number(3))?.sd_mm))
+        },
     },
     Method {
         name: "feed_curve_feed",
@@ -35,7 +37,7 @@ static METHODS: &[Method] = &[
         returns: "unit of feed of the curves",
         en: "Feed at which a cut of this depth gives the wanted feature; no value below what the spindle takes at the least feed, or beyond the curves",
         zh: "给定背吃刀量下达到目标特征值的进给",
-        run: |given| Ok(Answer::Number(family(given)?.feed(given.number(1), given.number(2))?.feed)),
+        run: |given| Ok(MethodResult::Number(family(given)?.feed(given.number(1), given.number(2))?.feed)),
     },
     Method {
         name: "feed_curve_feature",
@@ -45,18 +47,18 @@ static METHODS: &[Method] = &[
         zh: "给定背吃刀量和进给下的特征值",
         run: |given| {
             let curve = family(given)?.curve(given.number(1))?;
-            within(&curve, given.number(2)).map(|()| Answer::Number(curve.at(given.number(2))))
+            within(&curve, given.number(2)).map(|()| MethodResult::Number(curve.at(given.number(2))))
         },
     },
 ];
 
-fn family(given: &Arguments<'_>) -> Result<Family, Refusal> {
+fn family(given: &Arguments<'_>) -> Result<CurveFamily, Refusal> {
     let at = |[depth_mm, feed_min, feed_max, c0, c1, c2, c3, sd]: [f64; 8]| CurveAtDepth {
         depth_mm,
         curve: Cubic { coefficients: [c0, c1, c2, c3], feed_min, feed_max },
         sd,
     };
-    Family::new(given.rows_of::<8>(0)?.into_iter().map(at).collect())
+    CurveFamily::new(given.rows_of::<8>(0)?.into_iter().map(at).collect())
 }
 
 fn within(curve: &Cubic, feed: f64) -> Result<(), Refusal> {

@@ -1,6 +1,6 @@
 //! Thermal error: prediction from temperatures, the lag of a structure, and increments of a compensation.
 
-use super::{Answer, Arguments, Method, Parameter, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use crate::estimators::thermal::first_order;
 
@@ -9,13 +9,13 @@ pub(super) static SUBJECT: Subject = Subject { en: "Thermal error", zh: "热误�
 /// A temperature above this was meant in kelvin.
 const KELVIN_FROM_C: f64 = 200.0;
 
-const PREDICTION: &[Parameter] =
+const PREDICTION: &[MethodParameter] =
     &[takes("temperatures_c", "[°C]"), takes("coefficients_um_per_k", "[um/K]"), takes("intercept_um", "um")];
 
-const DEVIATION: &[Parameter] =
+const DEVIATION: &[MethodParameter] =
     &[takes("temperatures_c", "[°C]"), takes("covariance_by_rows", "[um2]"), takes("residual_sd_um", "um")];
 
-const LAG: &[Parameter] = &[
+const LAG: &[MethodParameter] = &[
     takes("state_c", "°C"),
     takes("temperature_before_c", "°C"),
     takes("temperature_c", "°C"),
@@ -23,7 +23,7 @@ const LAG: &[Parameter] = &[
     takes("tau_s", "s"),
 ];
 
-const WANTED: &[Parameter] = &[
+const WANTED: &[MethodParameter] = &[
     takes("value_um", "um"),
     takes("error_um", "um"),
     takes("limit_um", "um"),
@@ -32,7 +32,7 @@ const WANTED: &[Parameter] = &[
     takes("dt_s", "s"),
 ];
 
-const PULSES: &[Parameter] = &[takes("value_um", "um"), takes("sent_um", "um"), takes("pulse_um", "um")];
+const PULSES: &[MethodParameter] = &[takes("value_um", "um"), takes("sent_um", "um"), takes("pulse_um", "um")];
 
 static METHODS: &[Method] = &[
     Method {
@@ -41,7 +41,7 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Thermal error E = intercept + sum of coefficient times temperature; a lagged sensor takes its state from first_order_c",
         zh: "由各测温点温度线性预测热误差",
-        run: |given| predicted(given).map(Answer::Number),
+        run: |given| predicted(given).map(MethodResult::Number),
     },
     Method {
         name: "predicted_thermal_error_sd_um",
@@ -49,7 +49,7 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Standard deviation of that prediction, from the covariance of intercept and coefficients, row by row, and the residual",
         zh: "热误差预测的标准不确定度",
-        run: |given| deviation(given).map(Answer::Number),
+        run: |given| deviation(given).map(MethodResult::Number),
     },
     Method {
         name: "temperature_outside_k",
@@ -57,7 +57,7 @@ static METHODS: &[Method] = &[
         returns: "K",
         en: "By how much the worst temperature lies outside its range of identification; 0 inside",
         zh: "温度超出辨识范围的最大值",
-        run: |given| outside(given).map(Answer::Number),
+        run: |given| outside(given).map(MethodResult::Number),
     },
     Method {
         name: "first_order_c",
@@ -65,7 +65,7 @@ static METHODS: &[Method] = &[
         returns: "°C",
         en: "State of a structure that follows its temperature late, dw/dt = (T - w) / tau, dt_s later; keep it in memory",
         zh: "一阶滞后温度状态",
-        run: |given| late(given).map(Answer::Number),
+        run: |given| late(given).map(MethodResult::Number),
     },
     Method {
         name: "thermal_compensation_um",
@@ -73,7 +73,7 @@ static METHODS: &[Method] = &[
         returns: "um",
         en: "Next compensation value: against the error, within the limit, followed outside the dead band, at most slew times dt",
         zh: "热误差补偿量（限幅、死区、限速）",
-        run: |given| compensation(given).map(Answer::Number),
+        run: |given| compensation(given).map(MethodResult::Number),
     },
     Method {
         name: "thermal_compensation_pulses",
@@ -81,7 +81,7 @@ static METHODS: &[Method] = &[
         returns: "1",
         en: "Whole pulses that bring what was sent to the value; what is less than a pulse is carried",
         zh: "补偿脉冲增量（小数部分保留）",
-        run: |given| pulses(given).map(Answer::Number),
+        run: |given| pulses(given).map(MethodResult::Number),
     },
 ];
 
@@ -173,7 +173,7 @@ mod tests {
         let handed: Vec<&mut Dynamic> = values.iter_mut().collect();
         let arguments = Arguments::read(method, &handed).expect("arguments of the right kind");
         (method.run)(&arguments).map(|answer| match answer {
-            Answer::Number(number) => number,
+            MethodResult::Number(number) => number,
             other => panic!("a number, not {other:?}"),
         })
     }

@@ -1,15 +1,15 @@
 //! Tool wear: the limit of the cutting power, the wear that a power means, the cutting speed.
 
-use super::{Answer, Arguments, Method, Parameter, Subject, takes};
+use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::{Refusal, RefusalKind};
 use crate::estimators::wear::{
-    Conditions, Observability, Physical, WearEstimate, WearModel, cutting_speed_m_min, estimate_wear, threshold,
+    CutConditions, Observability, Physical, WearEstimate, WearModel, cutting_speed_m_min, estimate_wear, threshold,
 };
 
 pub(super) static SUBJECT: Subject = Subject { en: "Tool wear", zh: "刀具磨损", methods: METHODS };
 
-const MODEL: Parameter = takes("model", "[16 numbers]");
-const CUT: [Parameter; 3] =
+const MODEL: MethodParameter = takes("model", "[16 numbers]");
+const CUT: [MethodParameter; 3] =
     [takes("cutting_speed_m_min", "m/min"), takes("feed_per_rev_mm", "mm/rev"), takes("depth_of_cut_mm", "mm")];
 
 static METHODS: &[Method] = &[
@@ -21,7 +21,7 @@ static METHODS: &[Method] = &[
         zh: "由直径和转速求切削速度",
         run: |given| {
             let speed = cutting_speed_m_min(given.number(0), given.number(1));
-            speed.map(Answer::Number).map_err(|what| Refusal::new(RefusalKind::OutOfRange, what, ""))
+            speed.map(MethodResult::Number).map_err(|what| Refusal::new(RefusalKind::OutOfRange, what, ""))
         },
     },
     Method {
@@ -35,7 +35,7 @@ static METHODS: &[Method] = &[
             let (model, cut, criterion_mm) = (model(given)?, conditions(given, 1), given.number(4));
             let limit = threshold(&model, &cut, criterion_mm)?;
             stands(&limit.extrapolated, limit.observability)?;
-            Ok(Answer::Number(limit.power_w))
+            Ok(MethodResult::Number(limit.power_w))
         },
     },
     Method {
@@ -47,7 +47,7 @@ static METHODS: &[Method] = &[
         run: |given| {
             let found = estimate(given, 1, 0.0, 2, 5)?;
             stands(&found.extrapolated, found.observability)?;
-            Ok(Answer::Number(found.flank_wear_mm))
+            Ok(MethodResult::Number(found.flank_wear_mm))
         },
     },
     Method {
@@ -68,7 +68,7 @@ static METHODS: &[Method] = &[
         run: |given| {
             let found = estimate(given, 1, given.number(2), 3, 6)?;
             let flag = |yes: bool| f64::from(u8::from(yes));
-            Ok(Answer::Map(vec![
+            Ok(MethodResult::Map(vec![
                 ("flank_wear_mm", found.flank_wear_mm),
                 ("flank_wear_sd_mm", found.sd_mm),
                 ("observable", flag(found.observability == Observability::Observable)),
@@ -83,8 +83,8 @@ fn model(given: &Arguments<'_>) -> Result<WearModel, Refusal> {
 }
 
 /// Speed, feed and depth from this place on.
-fn conditions(given: &Arguments<'_>, at: usize) -> Conditions {
-    Conditions::of([0.0, given.number(at), given.number(at + 1), given.number(at + 2)])
+fn conditions(given: &Arguments<'_>, at: usize) -> CutConditions {
+    CutConditions::of([0.0, given.number(at), given.number(at + 1), given.number(at + 2)])
 }
 
 fn estimate(

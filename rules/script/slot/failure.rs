@@ -1,9 +1,9 @@
 //! A run that failed or was stopped, and who is in charge then.
 
-use super::{Condition, Outputs, Previous, Slot};
+use super::{Outputs, Previous, ScriptCondition, Slot};
 use crate::script::compile::{ScriptFile, compile};
 use crate::script::compiled::Script;
-use crate::script::decision::{Level, SCRIPT_STOPPED};
+use crate::script::decision::{AlarmLevel, SCRIPT_STOPPED};
 use crate::script::script_memory::ScriptMemory;
 use crate::script::shipped::shipped;
 use crate::script::timers::AlarmText;
@@ -30,13 +30,15 @@ impl Slot {
         let zh = format!("脚本已停止：{problem}");
         let replaced = previous.is_some();
         if let Some(Previous { script, script_memory }) = previous {
-            *self =
-                Self { condition: Condition::Reverted(problem.clone()), ..Self::fresh(script, None, script_memory) };
+            *self = Self {
+                condition: ScriptCondition::Reverted(problem.clone()),
+                ..Self::fresh(script, None, script_memory)
+            };
         } else {
-            self.condition = Condition::Suspended(Some(problem.clone()));
+            self.condition = ScriptCondition::Suspended(Some(problem.clone()));
         }
         outputs.alarms.retain(|alarm| *alarm.script != *self.script.file || *alarm.name != *SCRIPT_STOPPED);
-        let text = AlarmText { level: Level::Critical, en: en.into(), zh: zh.into() };
+        let text = AlarmText { level: AlarmLevel::Critical, en: en.into(), zh: zh.into() };
         self.begin_alarm(SCRIPT_STOPPED, &text, at_ns, outputs);
         outputs.decision.problems.push(problem);
         replaced

@@ -3,7 +3,7 @@
 mod alarms;
 mod failure;
 
-use super::collect::{Collected, Outcome};
+use super::collect::{RunOutput, ScriptResult};
 use super::compiled::Script;
 use super::deadline::{LATE_MAX, is_late};
 use super::decision::{Alarm, Decision, Note, OffsetProposal, OverrideRequest, Published, SCRIPT_STOPPED, StopRequest};
@@ -11,10 +11,10 @@ use super::declared::Now;
 use super::engine::Shared;
 use super::events::Event;
 use super::notes::NoteLimit;
-use super::problem::{self, Problem};
-use super::running::Running;
+use super::problem::{self, ScriptProblem};
+use super::running::RunningScript;
 use super::script_memory::ScriptMemory;
-use super::status::{Condition, ScriptStatus};
+use super::status::{ScriptCondition, ScriptStatus};
 use super::timers::{AlarmText, Timers};
 use super::variables::{fill, has_absent, scope_of, why_absent};
 use super::vocabulary::View;
@@ -57,10 +57,10 @@ pub(super) struct Slot {
     previous: Option<Previous>,
     scope: Scope<'static>,
     base: usize,
-    running: Running,
+    running: RunningScript,
     timers: Timers,
     now: Now,
-    condition: Condition,
+    condition: ScriptCondition,
     request: Option<OverrideRequest>,
     reason: (ImmutableString, Arc<str>),
     stops: Vec<StopRequest>,
@@ -99,13 +99,13 @@ impl Slot {
         Self {
             base: scope.len(),
             scope,
-            running: Running::new(),
+            running: RunningScript::new(),
             values: vec![None; script.channels.len()],
             script,
             previous,
             timers: script_memory.timers,
             now: Now::default(),
-            condition: Condition::Running,
+            condition: ScriptCondition::Running,
             request: None,
             reason: (ImmutableString::new(), Arc::from("")),
             stops: Vec::new(),
@@ -178,7 +178,7 @@ impl Slot {
 
     /// May an alarm of this name stand on after a set was installed?
     pub(super) fn keeps(&self, name: &str) -> bool {
-        name != SCRIPT_STOPPED || !matches!(self.condition, Condition::Running | Condition::Waiting(_))
+        name != SCRIPT_STOPPED || !matches!(self.condition, ScriptCondition::Running | ScriptCondition::Waiting(_))
     }
 
     /// Runs the handlers of what has happened, and the script when it is due. True when an older version has come into
@@ -218,7 +218,7 @@ impl Slot {
     }
 
     /// All of it within the operations of one run.
-    fn run(&mut self, engine: &Engine, events: &[Event], due: bool) -> Outcome<()> {
+    fn run(&mut self, engine: &Engine, events: &[Event], due: bool) -> ScriptResult<()> {
         let script = Arc::clone(&self.script);
         self.running.begin(engine, &script.ast);
         for event in events {
@@ -260,14 +260,14 @@ impl Slot {
         std::mem::swap(&mut collected.timers, &mut self.timers);
     }
 
-    fn any_absent(&self, collected: &Collected) -> bool {
+    fn any_absent(&self, collected: &RunOutput) -> bool {
         collected.refusals().next().is_some() || has_absent(&self.scope, &self.script)
     }
 
-    fn succeed(&mut self, collected: &mut Collected, due: bool, outputs: &mut Outputs<'_>) {
+    fn succeed(&mut self, collected: &mut RunOutput, due: bool, outputs: &mut Outputs<'_>) {
         self.late = 0;
-        if matches!(self.condition, Condition::Waiting(_)) {
-            self.condition = Condition::Running;
+        if matches!(self.condition, ScriptCondition::Waiting(_)) {
+            self.condition = ScriptCondition::Running;
         }
         self.good_since_ns.get_or_insert(collected.now_ns);
         if due {
@@ -285,7 +285,7 @@ impl Slot {
         }
     }
 
-    fn ask(&mut self, collected: &mut Collected) {
+    fn ask(&mut self, collected: &mut RunOutput) {
         self.propose(collected);
         let Some((pct, reason)) = collected.request.take() else {
             self.request = None;
@@ -298,7 +298,7 @@ impl Slot {
         self.request = Some(OverrideRequest { pct, reason, script, version: self.script.version });
     }
 
-    fn propose(&mut self, collected: &mut Collected) {
+    fn propose(&mut self, collected: &mut RunOutput) {
         let Script { file, version, .. } = &*self.script;
         self.offsets.clear();
         self.offsets.extend(collected.offsets.drain(..).map(|(axis, (offset_um, reason))| OffsetProposal {
@@ -311,7 +311,7 @@ impl Slot {
     }
 
     /// A handler asks for one tick, the body for as long as it goes on asking.
-    fn ask_to_stop(&mut self, collected: &mut Collected, due: bool) {
+    fn ask_to_stop(&mut self, collected: &mut RunOutput, due: bool) {
         let Script { file, version, .. } = &*self.script;
         if due {
             self.stops.clear();
@@ -323,7 +323,7 @@ impl Slot {
         }
     }
 
-    fn publish(&mut self, collected: &mut Collected) {
+    fn publish(&mut self, collected: &mut RunOutput) {
         for (name, value) in collected.published.drain(..) {
             if let Some(at) = self.script.channels.iter().position(|(known, _)| **known == *name) {
                 self.values[at] = value;
@@ -331,22 +331,22 @@ impl Slot {
         }
     }
 
-    fn told(&self, error: &EvalAltResult) -> Problem {
+    fn told(&self, error: &EvalAltResult) -> ScriptProblem {
         problem::of_run_behind(&self.script.file, error, self.script.body.lines)
     }
 
     /// The script worked on a value that is not there: it asks for nothing, publishes nothing and tries again; alarms stay
     /// as they are.
-    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &Collected, foreign: &[Option<f64>]) {
+    fn wait(&mut self, error: &EvalAltResult, view: &View<'_>, collected: &RunOutput, foreign: &[Option<f64>]) {
         self.withdraw();
         self.values.fill(None);
-        if self.condition != Condition::Running {
+        if self.condition != ScriptCondition::Running {
             return;
         }
         let mut problem = self.told(error);
         let absent: Vec<String> = why_absent(&self.script, view, foreign).chain(collected.refusals()).collect();
         problem.what = absent.join(", ");
-        self.condition = Condition::Waiting(problem);
+        self.condition = ScriptCondition::Waiting(problem);
     }
 
     pub(super) fn status(&self) -> ScriptStatus {

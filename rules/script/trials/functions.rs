@@ -1,8 +1,8 @@
 //! What a trial can call.
 
-use super::stage::{Stage, Theatre};
+use super::stage::{Theatre, TrialContext};
 use crate::script::callable::{Function, function};
-use crate::script::collect::Outcome;
+use crate::script::collect::ScriptResult;
 use crate::script::decision::{Axis, Stop};
 use rhai::{Dynamic, Engine, ImmutableString, Map};
 
@@ -47,8 +47,8 @@ pub const TRIAL_FUNCTIONS: &[Function] = &[
     function("expect_note(part)", "A note with these words was written", "期望写入包含此文字的记录"),
 ];
 
-type Text = ImmutableString;
-type Expected = Result<(), String>;
+type TrialText = ImmutableString;
+type Expectation = Result<(), String>;
 
 /// Makes them callable.
 pub(super) fn register(engine: &mut Engine, theatre: &Theatre) {
@@ -59,7 +59,7 @@ pub(super) fn register(engine: &mut Engine, theatre: &Theatre) {
     numbers(engine, theatre);
     settings(engine, theatre);
     let on = theatre.clone();
-    engine.register_fn("expect_note", move |part: Text| {
+    engine.register_fn("expect_note", move |part: TrialText| {
         expect(&on, |stage| {
             let said: Vec<&str> = stage.notes().iter().map(|note| &**note).collect();
             let found = said.iter().any(|note| note.contains(part.as_str()));
@@ -70,22 +70,22 @@ pub(super) fn register(engine: &mut Engine, theatre: &Theatre) {
 
 fn time(engine: &mut Engine, theatre: &Theatre) {
     let on = theatre.clone();
-    engine.register_fn("given", move |values: Map| -> Outcome<()> {
+    engine.register_fn("given", move |values: Map| -> ScriptResult<()> {
         let mut stage = on.lock();
         values.iter().try_for_each(|(name, value)| stage.give(name, value).map_err(Into::into))
     });
     let on = theatre.clone();
-    engine.register_fn("after_s", move |seconds: Dynamic| -> Outcome<()> {
+    engine.register_fn("after_s", move |seconds: Dynamic| -> ScriptResult<()> {
         on.lock().pass(number(&seconds)).map_err(Into::into)
     });
     let on = theatre.clone();
-    engine.register_fn("pace_s", move |seconds: Dynamic| -> Outcome<()> {
+    engine.register_fn("pace_s", move |seconds: Dynamic| -> ScriptResult<()> {
         on.lock().pace(number(&seconds)).map_err(Into::into)
     });
 }
 
 fn overrides(engine: &mut Engine, theatre: &Theatre) {
-    let asked = |stage: &Stage| match &stage.decision().request {
+    let asked = |stage: &TrialContext| match &stage.decision().request {
         Some(request) => format!("{:.1} % is asked for ({})", request.pct, request.reason),
         None => format!("none is asked for{}", stage.waiting()),
     };
@@ -109,19 +109,19 @@ fn overrides(engine: &mut Engine, theatre: &Theatre) {
 }
 
 fn alarms(engine: &mut Engine, theatre: &Theatre) {
-    let standing = |stage: &Stage| {
+    let standing = |stage: &TrialContext| {
         let names: Vec<&str> = stage.alarms().iter().map(|alarm| &*alarm.name).collect();
         format!("standing: {}{}", list(&names), stage.waiting())
     };
-    let stands = |stage: &Stage, name: &str| stage.alarms().iter().any(|alarm| *alarm.name == *name);
+    let stands = |stage: &TrialContext, name: &str| stage.alarms().iter().any(|alarm| *alarm.name == *name);
     let on = theatre.clone();
-    engine.register_fn("expect_alarm", move |name: Text| {
+    engine.register_fn("expect_alarm", move |name: TrialText| {
         expect(&on, |stage| {
             stands(stage, &name).then_some(()).ok_or_else(|| format!("expected the alarm {name}; {}", standing(stage)))
         })
     });
     let on = theatre.clone();
-    engine.register_fn("expect_no_alarm", move |name: Text| {
+    engine.register_fn("expect_no_alarm", move |name: TrialText| {
         expect(&on, |stage| {
             (!stands(stage, &name))
                 .then_some(())
@@ -158,32 +158,37 @@ fn stops(engine: &mut Engine, theatre: &Theatre) {
 
 fn numbers(engine: &mut Engine, theatre: &Theatre) {
     let on = theatre.clone();
-    engine.register_fn("expect_offset_um", move |axis: Text, least: Dynamic, greatest: Dynamic| {
+    engine.register_fn("expect_offset_um", move |axis: TrialText, least: Dynamic, greatest: Dynamic| {
         let what = format!("the offset of {axis}");
         expect(&on, |stage| within(&what, stage.offset_um(axis_of(&axis)?), (&least, &greatest), stage))
     });
     let on = theatre.clone();
-    engine.register_fn("expect_no_offset", move |axis: Text| {
+    engine.register_fn("expect_no_offset", move |axis: TrialText| {
         expect(&on, |stage| match stage.offset_um(axis_of(&axis)?) {
             None => Ok(()),
             Some(offset_um) => Err(format!("expected no offset of {axis}; {offset_um:.1} um is proposed")),
         })
     });
     let on = theatre.clone();
-    engine.register_fn("expect_published", move |name: Text, least: Dynamic, greatest: Dynamic| {
+    engine.register_fn("expect_published", move |name: TrialText, least: Dynamic, greatest: Dynamic| {
         expect(&on, |stage| within(&name, stage.published(&name)?, (&least, &greatest), stage))
     });
 }
 
 fn settings(engine: &mut Engine, theatre: &Theatre) {
     let on = theatre.clone();
-    engine.register_fn("expect_setting", move |name: Text, least: Dynamic, greatest: Dynamic| {
+    engine.register_fn("expect_setting", move |name: TrialText, least: Dynamic, greatest: Dynamic| {
         let what = format!("the setting {name}");
         expect(&on, |stage| within(&what, stage.setting(&name), (&least, &greatest), stage))
     });
 }
 
-fn within(what: &str, value: Option<f64>, (least, greatest): (&Dynamic, &Dynamic), stage: &Stage) -> Expected {
+fn within(
+    what: &str,
+    value: Option<f64>,
+    (least, greatest): (&Dynamic, &Dynamic),
+    stage: &TrialContext,
+) -> Expectation {
     let (least, greatest) = (number(least), number(greatest));
     match value {
         Some(value) if value >= least && value <= greatest => Ok(()),
@@ -197,7 +202,7 @@ fn axis_of(axis: &str) -> Result<Axis, String> {
 }
 
 /// Counts what is met, and says when something was not.
-fn expect(on: &Theatre, check: impl FnOnce(&Stage) -> Expected) -> Outcome<()> {
+fn expect(on: &Theatre, check: impl FnOnce(&TrialContext) -> Expectation) -> ScriptResult<()> {
     let mut stage = on.lock();
     let outcome = check(&stage);
     match outcome {

@@ -26,12 +26,12 @@ pub use functions::TRIAL_FUNCTIONS;
 
 use super::compile::variant;
 use super::compiled::{Script, ScriptSet};
-use super::declared::{Place, SettingValues};
+use super::declared::{DeclarationPlace, SettingValues};
 use super::engine::{OPERATIONS_MAX, Shared, engine};
-use super::problem::{self, Problem};
-use super::running::Running;
+use super::problem::{self, ScriptProblem};
+use super::running::RunningScript;
 use rhai::{AST, Engine, Position, Scope};
-use stage::{Stage, Theatre};
+use stage::{Theatre, TrialContext};
 use std::sync::Arc;
 
 /// Tools and operations with values of their own whose trials are run; more of them take the same path through the script.
@@ -63,7 +63,7 @@ pub struct TrialResult {
     /// How much time passed in it, s.
     pub passed_s: f64,
     /// What was not as expected; `None`: it passed.
-    pub problem: Option<Problem>,
+    pub problem: Option<ScriptProblem>,
 }
 
 /// Every trial of every script, in the order of files and lines: with the values of the settings that are in force, and where
@@ -78,36 +78,37 @@ pub fn trials(set: &ScriptSet) -> Vec<TrialResult> {
 ///
 /// # Errors
 /// What the trials found.
-pub fn prove(set: ScriptSet) -> Result<ScriptSet, Vec<Problem>> {
-    let problems: Vec<Problem> = trials(&set).into_iter().filter_map(|result| result.problem).collect();
+pub fn prove(set: ScriptSet) -> Result<ScriptSet, Vec<ScriptProblem>> {
+    let problems: Vec<ScriptProblem> = trials(&set).into_iter().filter_map(|result| result.problem).collect();
     if problems.is_empty() { Ok(set) } else { Err(problems) }
 }
 
 /// A script with other values of its settings, and which they are.
-type Variant = (Option<String>, Arc<Script>);
+type ScriptVariant = (Option<String>, Arc<Script>);
 
-fn variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<Variant> {
+fn variants(set: &ScriptSet, script: &Arc<Script>) -> Vec<ScriptVariant> {
     let section = script.file.strip_suffix(".rhai").unwrap_or(&script.file);
-    let own = |place: &Place| {
+    let own = |place: &DeclarationPlace| {
         let all = set.values.all().filter(|(its, _, at, _)| *its == section && *at == place);
         all.map(|(_, name, _, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
     };
     let places = set.values.places(section);
-    if own(&Place::Machine).is_empty() && places.is_empty() {
+    if own(&DeclarationPlace::Machine).is_empty() && places.is_empty() {
         return vec![(None, script.clone())];
     }
-    let machine = format!("with {} in force", own(&Place::Machine));
+    let machine = format!("with {} in force", own(&DeclarationPlace::Machine));
     let mut wanted = vec![
-        ("with the defaults".to_owned(), SettingValues::default(), Place::Machine),
-        (machine, (*set.values).clone(), Place::Machine),
+        ("with the defaults".to_owned(), SettingValues::default(), DeclarationPlace::Machine),
+        (machine, (*set.values).clone(), DeclarationPlace::Machine),
     ];
-    let special = |place: &Place| (format!("with {} for {place}", own(place)), (*set.values).clone(), place.clone());
+    let special =
+        |place: &DeclarationPlace| (format!("with {} for {place}", own(place)), (*set.values).clone(), place.clone());
     wanted.extend(places.iter().take(PLACES_MAX).map(special));
-    let ready = |(told, values, place): &(String, SettingValues, Place)| {
+    let ready = |(told, values, place): &(String, SettingValues, DeclarationPlace)| {
         // It has compiled with these values already; a set without texts is tried as it is.
         variant(set, script, values, place).ok().map(|script| (Some(told.clone()), script))
     };
-    let found: Vec<Variant> = wanted.iter().filter_map(ready).collect();
+    let found: Vec<ScriptVariant> = wanted.iter().filter_map(ready).collect();
     if found.is_empty() { vec![(None, script.clone())] } else { found }
 }
 
@@ -137,12 +138,12 @@ fn of_variant(script: &Arc<Script>, with: Option<&str>) -> Vec<TrialResult> {
 }
 
 fn perform(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Trial) -> TrialResult {
-    theatre.open(Stage::new(script));
+    theatre.open(TrialContext::new(script));
     let mut scope = Scope::new();
     for (name, value) in &script.constants {
         scope.push_constant_dynamic(name.clone(), value.clone());
     }
-    let outcome = Running::new().run_within(engine, &mut scope, &trial.ast, &script.ast);
+    let outcome = RunningScript::new().run_within(engine, &mut scope, &trial.ast, &script.ast);
     let stage = theatre.close();
     let name = trial.name.trim_start_matches(PREFIX).replace('_', " ");
     let problem = match outcome {
@@ -151,7 +152,7 @@ fn perform(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Tri
         }
         Ok(()) if stage.met == 0 => {
             let next = "end it with what must have come of it, such as expect_no_override()";
-            Some(Problem::new(&script.file, trial.at, "it expects nothing", next))
+            Some(ScriptProblem::new(&script.file, trial.at, "it expects nothing", next))
         }
         Ok(()) => None,
     };
@@ -160,7 +161,7 @@ fn perform(engine: &Engine, theatre: &Theatre, script: &Arc<Script>, trial: &Tri
     TrialResult { file: script.file.clone(), name, line, met: stage.met, passed_s: stage.passed_s(), problem }
 }
 
-fn told(mut problem: Problem, name: &str) -> Problem {
+fn told(mut problem: ScriptProblem, name: &str) -> ScriptProblem {
     problem.what = format!("trial \"{name}\": {}", problem.what);
     if problem.next.is_empty() {
         "mend the script, or the trial where it asks for the wrong thing".clone_into(&mut problem.next);

@@ -2,7 +2,7 @@
 //! decides does not matter; it must come to an end and must not fail.
 
 use super::TrialResult;
-use super::stage::Stage;
+use super::stage::TrialContext;
 use crate::estimators::State;
 use crate::script::compiled::Script;
 use rhai::{Dynamic, ImmutableString};
@@ -16,14 +16,14 @@ pub(super) fn run(script: &Arc<Script>) -> Option<TrialResult> {
     if script.passive && script.handlers.is_empty() {
         return None;
     }
-    let mut stage = Stage::new(script);
+    let mut stage = TrialContext::new(script);
     let failed = through(&mut stage, script).is_err();
     let problem = stage.failure.clone().filter(|_| failed)?;
     let (file, name) = (script.file.clone(), "it runs, although no trial is written".to_owned());
     Some(TrialResult { file, name, line: 1, met: 0, passed_s: stage.passed_s(), problem: Some(problem) })
 }
 
-fn through(stage: &mut Stage, script: &Script) -> Result<(), String> {
+fn through(stage: &mut TrialContext, script: &Script) -> Result<(), String> {
     stage.pass(EACH_S)?;
     stage.give_all(script);
     for (turn, state) in State::ALL.into_iter().enumerate() {

@@ -3,9 +3,9 @@
 use crate::estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use crate::script::compiled::{Script, ScriptSet};
 use crate::script::decision::{Alarm, Axis, Decision, Stop};
-use crate::script::problem::Problem;
+use crate::script::problem::ScriptProblem;
 use crate::script::settings::merge;
-use crate::script::status::Condition;
+use crate::script::status::ScriptCondition;
 use crate::script::vocabulary::words;
 use crate::script::{Host, WordKind};
 use adapters::channel::nearest;
@@ -25,24 +25,24 @@ const SD_SHARE: f64 = 0.02;
 
 /// Where the functions of a trial find the stage.
 #[derive(Clone, Default)]
-pub(super) struct Theatre(Arc<Mutex<Stage>>);
+pub(super) struct Theatre(Arc<Mutex<TrialContext>>);
 
 impl Theatre {
-    pub(super) fn lock(&self) -> MutexGuard<'_, Stage> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, TrialContext> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn open(&self, stage: Stage) {
+    pub(super) fn open(&self, stage: TrialContext) {
         *self.lock() = stage;
     }
 
-    pub(super) fn close(&self) -> Stage {
+    pub(super) fn close(&self) -> TrialContext {
         std::mem::take(&mut *self.lock())
     }
 }
 
 /// See the [module](self).
-pub(super) struct Stage {
+pub(super) struct TrialContext {
     host: Host,
     sample: Sample,
     estimates: Estimates,
@@ -55,10 +55,10 @@ pub(super) struct Stage {
     /// Expectations met.
     pub(super) met: usize,
     /// The script failed; where and why.
-    pub(super) failure: Option<Problem>,
+    pub(super) failure: Option<ScriptProblem>,
 }
 
-impl Default for Stage {
+impl Default for TrialContext {
     fn default() -> Self {
         Self {
             host: Host::new(),
@@ -75,7 +75,7 @@ impl Default for Stage {
     }
 }
 
-impl Stage {
+impl TrialContext {
     /// The script alone, with empty memory.
     pub(super) fn new(script: &Arc<Script>) -> Self {
         let mut stage = Self::default();
@@ -250,7 +250,7 @@ impl Stage {
     pub(super) fn waiting(&self) -> String {
         let status = self.host.status();
         match status.scripts.first().map(|script| &script.condition) {
-            Some(Condition::Waiting(problem)) => format!("; the script waits: {}", problem.what),
+            Some(ScriptCondition::Waiting(problem)) => format!("; the script waits: {}", problem.what),
             _ => String::new(),
         }
     }

@@ -35,11 +35,11 @@ pub(super) fn mirror(gram: &mut Array2<f64>) {
 }
 
 /// A Cholesky factor.
-pub(super) struct Factor {
+pub(super) struct CholeskyFactor {
     lower: Array2<f64>,
 }
 
-impl Factor {
+impl CholeskyFactor {
     /// Of a symmetric matrix; what keeps it from being positive definite is lifted by a growing share of its diagonal.
     pub(super) fn of(matrix: &Array2<f64>) -> Self {
         let mut lift = 0.0;
@@ -131,7 +131,7 @@ pub(super) fn schur(gram: &Array2<f64>, out: &[usize], ridge: &[f64]) -> (Array2
     for (index, ridge) in ridge.iter().enumerate() {
         inner[[index, index]] += ridge;
     }
-    let factor = Factor::of(&inner);
+    let factor = CholeskyFactor::of(&inner);
     let mut reach = gram.select(Axis(0), out);
     factor.forward(&mut reach);
     let mut left = gram.clone();
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn what_is_solved_gives_the_right_hand_side() {
         let b = Array1::from(vec![1.0, -2.0, 3.0, 0.5, 4.0]);
-        let x = Factor::of(&gram()).solve(&b);
+        let x = CholeskyFactor::of(&gram()).solve(&b);
         assert!((gram().dot(&x) - b).iter().all(|e| e.abs() < 1e-9));
     }
 
@@ -255,7 +255,7 @@ mod tests {
         let inner = block(&gram(), &[0, 1], &[0, 1]);
         assert!((ln - (inner[[0, 0]] * inner[[1, 1]] - inner[[0, 1]] * inner[[1, 0]]).ln()).abs() < 1e-9);
         let b = Array1::from(vec![gram()[[0, 4]], gram()[[1, 4]]]);
-        let x = Factor::of(&inner).solve(&b);
+        let x = CholeskyFactor::of(&inner).solve(&b);
         assert!((left[[4, 4]] - (gram()[[4, 4]] - b.dot(&x))).abs() < 1e-9);
     }
 
@@ -264,11 +264,11 @@ mod tests {
         let b = vec![1.0, -2.0, 3.0, 0.5, 4.0];
         let lambda = 0.03;
         let inner = Array2::eye(5) + gram() * lambda;
-        let x = Factor::of(&inner).solve(&Array1::from(b.clone()));
+        let x = CholeskyFactor::of(&inner).solve(&Array1::from(b.clone()));
         let resolved = Tridiagonal::of(gram(), b.clone()).resolve(lambda);
-        assert!((resolved.ln_determinant - Factor::of(&inner).ln_determinant()).abs() < 1e-9);
+        assert!((resolved.ln_determinant - CholeskyFactor::of(&inner).ln_determinant()).abs() < 1e-9);
         assert!((resolved.square - lambda * x.dot(&Array1::from(b))).abs() < 1e-9);
         assert!((resolved.first - x[0]).abs() < 1e-9);
-        assert!((resolved.first_variance - Factor::of(&inner).inverse_diagonal()[0]).abs() < 1e-9);
+        assert!((resolved.first_variance - CholeskyFactor::of(&inner).inverse_diagonal()[0]).abs() < 1e-9);
     }
 }

@@ -4,7 +4,7 @@
 //! departures from it with a smaller prior deviation. What a kind needs (its sign, the channels it works through, whether
 //! its form may be widened) is asked of its [`Family`], never of a list of names.
 
-use super::inputs::Inputs;
+use super::inputs::RecordingInputs;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -204,20 +204,20 @@ impl Variant {
 
 /// Every variant, and the columns of all of them.
 #[derive(Default)]
-pub(super) struct Bank {
+pub(super) struct VariantBank {
     pub(super) variants: Vec<Variant>,
     pub(super) columns: Vec<Vec<f64>>,
 }
 
 /// A variant that is being made.
 pub(super) struct Making<'b> {
-    bank: &'b mut Bank,
+    bank: &'b mut VariantBank,
     variant: Variant,
     /// Do columns keep the size they are given?
     sized: bool,
 }
 
-impl Bank {
+impl VariantBank {
     /// Begins a variant of a family.
     pub(super) fn of(&mut self, family: Family, label: impl ToString) -> Making<'_> {
         let ln_rarity = family.ln_rarity;
@@ -296,7 +296,7 @@ impl Making<'_> {
 
     /// Adds the variant with these columns and relative deviations; columns that never act are left out, and with the
     /// first of them the whole variant.
-    pub(super) fn columns(self, inputs: &Inputs<'_>, columns: impl IntoIterator<Item = (Vec<f64>, f64)>) {
+    pub(super) fn columns(self, inputs: &RecordingInputs<'_>, columns: impl IntoIterator<Item = (Vec<f64>, f64)>) {
         let Self { bank, mut variant, sized } = self;
         let start = bank.columns.len();
         for (index, (mut column, relative)) in columns.into_iter().enumerate() {
@@ -328,7 +328,7 @@ impl Making<'_> {
     }
 
     /// The same of one column.
-    pub(super) fn column(self, inputs: &Inputs<'_>, column: Vec<f64>) {
+    pub(super) fn column(self, inputs: &RecordingInputs<'_>, column: Vec<f64>) {
         self.columns(inputs, [(column, 1.0)]);
     }
 }

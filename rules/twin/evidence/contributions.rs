@@ -3,7 +3,7 @@
 use super::bank::Since;
 use super::follow::Follower;
 use super::judge::{Judge, Named, UNKNOWN};
-use super::noise::Noise;
+use super::noise::NoiseModel;
 use super::posterior::Explanation;
 use crate::statistics::rms;
 use std::ops::Range;
@@ -78,7 +78,7 @@ impl Judge<'_> {
         &self,
         rows: &[usize],
         states: &[&(String, &[f64], f64)],
-        (noise, deviation): (Noise, f64),
+        (noise, deviation): (NoiseModel, f64),
         after: &mut [f64],
         all: &mut [Named],
     ) {

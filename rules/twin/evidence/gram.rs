@@ -5,9 +5,9 @@
 //! summed unit by unit (`inner.rs`): leaving a unit out is a difference.
 
 use super::algebra::{add_gram, mirror};
-use super::bank::Bank;
-use super::inputs::Inputs;
-use super::noise::Noise;
+use super::bank::VariantBank;
+use super::inputs::RecordingInputs;
+use super::noise::NoiseModel;
 use crate::statistics::{count, rms};
 use ndarray::{Array2, ShapeBuilder};
 use std::ops::Range;
@@ -17,7 +17,7 @@ const ROWS_OF_A_FORM: f64 = 3000.0;
 
 /// What is compared: the recorded output less the refitted simulation, its tangents and the bank, over the fitted rows.
 pub(super) struct Comparison<'a> {
-    pub(super) bank: &'a Bank,
+    pub(super) bank: &'a VariantBank,
     /// Fitted rows in order.
     pub(super) rows: Vec<usize>,
     /// Stretches of unbroken noise, as places in `rows`.
@@ -40,12 +40,12 @@ pub(super) struct Comparison<'a> {
 
 /// The same whitened for one noise.
 pub(super) struct Gram {
-    pub(super) noise: Noise,
+    pub(super) noise: NoiseModel,
     pub(super) whole: Array2<f64>,
 }
 
 /// What a comparison is made from, besides the bank.
-pub(super) struct Compared<'a> {
+pub(super) struct ComparisonInput<'a> {
     pub(super) tangents: &'a [Vec<f64>],
     /// Recorded output with outliers cut.
     pub(super) recorded: &'a [f64],
@@ -55,7 +55,7 @@ pub(super) struct Compared<'a> {
 
 impl<'a> Comparison<'a> {
     /// Compares over the fitted rows.
-    pub(super) fn new(inputs: &Inputs<'_>, bank: &'a Bank, of: &Compared<'_>) -> Self {
+    pub(super) fn new(inputs: &RecordingInputs<'_>, bank: &'a VariantBank, of: &ComparisonInput<'_>) -> Self {
         let rows: Vec<usize> = inputs.taken(false).collect();
         let mut blocks: Vec<Range<usize>> = Vec::new();
         for at in 0..rows.len() {
@@ -108,14 +108,14 @@ impl<'a> Comparison<'a> {
     }
 
     /// A full-length column whitened over the fitted rows.
-    pub(super) fn whitened(&self, column: &[f64], noise: Noise) -> Vec<f64> {
+    pub(super) fn whitened(&self, column: &[f64], noise: NoiseModel) -> Vec<f64> {
         let mut white: Vec<f64> = self.rows.iter().zip(&self.scale).map(|(row, scale)| column[*row] / scale).collect();
         noise.whiten(&mut white, &self.blocks);
         white
     }
 
     /// Every column whitened, one after the other: those before the bank, these of the bank, the output.
-    pub(super) fn whole(&self, noise: Noise, takes: impl Fn(usize) -> bool) -> Array2<f64> {
+    pub(super) fn whole(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Array2<f64> {
         let of_bank = self.bank.columns.iter().enumerate().filter(|(index, _)| takes(*index)).map(|(_, c)| c);
         let columns: Vec<&Vec<f64>> = self.fixed.iter().chain(of_bank).chain([&self.output]).collect();
         let mut tall = Array2::zeros((self.rows.len(), columns.len()).f());
@@ -127,12 +127,12 @@ impl<'a> Comparison<'a> {
     }
 
     /// The Gram matrix for this noise.
-    pub(super) fn gram(&self, noise: Noise) -> Gram {
+    pub(super) fn gram(&self, noise: NoiseModel) -> Gram {
         self.gram_of(noise, |_| true)
     }
 
     /// The same of some columns of the bank only.
-    pub(super) fn gram_of(&self, noise: Noise, takes: impl Fn(usize) -> bool) -> Gram {
+    pub(super) fn gram_of(&self, noise: NoiseModel, takes: impl Fn(usize) -> bool) -> Gram {
         let tall = self.whole(noise, takes);
         let size = tall.ncols();
         let mut whole = Array2::zeros((size, size));
@@ -149,7 +149,7 @@ fn unit(column: &[f64], rows: &[usize]) -> Vec<f64> {
 }
 
 /// A level of each run with fitted rows; none where a recording has too many or too few of them to tell.
-fn run_levels(inputs: &Inputs<'_>) -> Vec<Vec<f64>> {
+fn run_levels(inputs: &RecordingInputs<'_>) -> Vec<Vec<f64>> {
     let runs = inputs.scene.runs();
     let fitted: Vec<usize> = (0..runs.len()).filter(|run| runs[*run].clone().any(|row| inputs.fitted[row])).collect();
     if !(2..=30).contains(&fitted.len()) {

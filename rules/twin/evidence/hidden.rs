@@ -4,7 +4,7 @@
 //! that has a memory). The evidence of a sequence is the sum over all paths; rows that are held out follow the state from
 //! earlier rows only.
 
-use super::inputs::Inputs;
+use super::inputs::RecordingInputs;
 use crate::statistics::{count, median, robust_deviation};
 
 /// Steps between the levels that are tried, in deviations of the residual.
@@ -34,7 +34,7 @@ pub(super) struct Sequence {
 }
 
 struct Chain<'a> {
-    inputs: &'a Inputs<'a>,
+    inputs: &'a RecordingInputs<'a>,
     /// Innovations of the residual.
     innovations: Vec<f64>,
     /// Memory from the row before; zero at the start of a block.
@@ -43,7 +43,7 @@ struct Chain<'a> {
 
 /// Two levels with what they are and how noisy.
 #[derive(Debug, Clone, Copy)]
-struct Levels {
+struct TwoLevels {
     low: f64,
     step: f64,
     deviation: f64,
@@ -51,7 +51,7 @@ struct Levels {
 }
 
 /// The likeliest sequence in a residual whose noise has this memory from row to row; `None` where nothing switches.
-pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], phi: f64) -> Option<Sequence> {
+pub(super) fn sequence(inputs: &RecordingInputs<'_>, residual: &[f64], scale: &[f64], phi: f64) -> Option<Sequence> {
     let phi = phi.min(PHI_MAX);
     let x = inputs.column(|row| if inputs.comparable[row] { residual[row] / scale[row] } else { 0.0 });
     let starts = |row: usize| row == 0 || inputs.block[row] != inputs.block[row - 1];
@@ -60,13 +60,13 @@ pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], phi
     let chain = Chain { inputs, innovations, memory };
     let deviation = inputs.deviation_of(&x, false);
     let middle = median(inputs.taken(false).map(|row| x[row]).collect())?;
-    let mut best: Option<(f64, Vec<f64>, Levels, usize)> = None;
+    let mut best: Option<(f64, Vec<f64>, TwoLevels, usize)> = None;
     for size in STEPS {
         for sign in [1.0, -1.0] {
             let step = sign * size * deviation;
             let low = if size > 1.5 { middle } else { middle - 0.5 * step };
             let spread = robust_deviation(inputs.taken(false).map(|row| chain.innovations[row]))? + 1e-12;
-            let fitted = chain.fit(Levels { low, step, deviation: spread, change: 0.01 });
+            let fitted = chain.fit(TwoLevels { low, step, deviation: spread, change: 0.01 });
             if let Some(fitted) = fitted
                 && best.as_ref().is_none_or(|best| fitted.0 > best.0)
             {
@@ -85,7 +85,7 @@ pub(super) fn sequence(inputs: &Inputs<'_>, residual: &[f64], scale: &[f64], phi
 
 impl Chain<'_> {
     /// Log likelihoods of a row for (now, before) = (off, off), (off, on), (on, off), (on, on).
-    fn likelihoods(&self, row: usize, levels: Levels) -> [f64; 4] {
+    fn likelihoods(&self, row: usize, levels: TwoLevels) -> [f64; 4] {
         let memory = self.memory[row];
         let z = self.innovations[row] - levels.low * (1.0 - memory);
         let of = |shift: f64| -0.5 * ((z - shift) / levels.deviation).clamp(-FARTHEST, FARTHEST).powi(2);
@@ -94,7 +94,7 @@ impl Chain<'_> {
     }
 
     /// Levels and the likeliest path, in turns.
-    fn fit(&self, start: Levels) -> Option<(f64, Vec<f64>, Levels, usize)> {
+    fn fit(&self, start: TwoLevels) -> Option<(f64, Vec<f64>, TwoLevels, usize)> {
         let mut levels = start;
         let mut on = Vec::new();
         let mut changes = 0;
@@ -120,7 +120,7 @@ impl Chain<'_> {
     }
 
     /// The likelihood of a row on a given path, four times.
-    fn likelihoods_on(&self, row: usize, on: &[f64], levels: Levels) -> [f64; 4] {
+    fn likelihoods_on(&self, row: usize, on: &[f64], levels: TwoLevels) -> [f64; 4] {
         let before = row.checked_sub(1).is_some_and(|before| on[before] > 0.5);
         let all = self.likelihoods(row, levels);
         let own = all[2 * usize::from(on[row] > 0.5) + usize::from(before)];
@@ -138,7 +138,7 @@ impl Chain<'_> {
     }
 
     /// The likeliest path through the fitted rows (Viterbi).
-    fn path(&self, levels: Levels) -> Vec<f64> {
+    fn path(&self, levels: TwoLevels) -> Vec<f64> {
         let (turn, stay) = (levels.change.ln(), (1.0 - levels.change).ln());
         let rows = self.inputs.rows;
         let mut from = vec![[0_u8, 1]; rows];
@@ -160,7 +160,7 @@ impl Chain<'_> {
     }
 
     /// Levels and noise by least squares along a path.
-    fn levels(&self, on: &[f64], old: Levels) -> Levels {
+    fn levels(&self, on: &[f64], old: TwoLevels) -> TwoLevels {
         let limit = 6.0 * old.deviation + old.step.abs();
         let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let of = |row: usize| {
@@ -183,11 +183,11 @@ impl Chain<'_> {
             self.innovations[row] - a * low - b * step
         });
         let deviation = robust_deviation(left).unwrap_or(old.deviation) + 1e-12;
-        Levels { low, step, deviation, change: old.change }
+        TwoLevels { low, step, deviation, change: old.change }
     }
 
     /// Logarithm of the sum over all paths, less that of this path.
-    fn evidence(&self, on: &[f64], levels: Levels) -> f64 {
+    fn evidence(&self, on: &[f64], levels: TwoLevels) -> f64 {
         let (stay, turn) = (1.0 - levels.change, levels.change);
         let (mut off_share, mut on_share) = (0.5, 0.5);
         let mut ln = 0.0;
@@ -206,7 +206,7 @@ impl Chain<'_> {
     }
 
     /// Held-out rows follow the state from earlier rows only.
-    fn follow(&self, on: &mut [f64], levels: Levels) {
+    fn follow(&self, on: &mut [f64], levels: TwoLevels) {
         let fitted: Vec<f64> = self.inputs.taken(false).map(|row| on[row]).collect();
         let usual = crate::statistics::mean(&fitted);
         let (stay, turn) = (1.0 - levels.change, levels.change);

@@ -3,12 +3,12 @@
 //! It is asked in the metric of the noise and paired over stretches, so that slow noise, which nothing predicts, does not
 //! drown what is there. Only fitted units are asked; those that are held out stay out of it.
 
-use super::algebra::{Factor, add_gram, mirror};
+use super::algebra::{CholeskyFactor, add_gram, mirror};
 use super::follow::Follower;
 use super::gram::Comparison;
-use super::inputs::Inputs;
+use super::inputs::RecordingInputs;
 use super::marginal::SIZES;
-use super::posterior::Setting;
+use super::posterior::NoiseSetting;
 use crate::statistics::count;
 use ndarray::{Array1, Array2, Axis, ShapeBuilder, s};
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ const NEVER: f64 = 1e-9;
 /// The columns of one hypothesis, whitened, with their inner products in every part.
 pub(super) struct Inner<'a> {
     comparison: &'a Comparison<'a>,
-    inputs: &'a Inputs<'a>,
+    inputs: &'a RecordingInputs<'a>,
     tall: Array2<f64>,
     parts: Vec<Vec<usize>>,
     grams: Vec<Array2<f64>>,
@@ -39,9 +39,9 @@ pub(super) struct Inner<'a> {
 impl<'a> Inner<'a> {
     /// Prepares a hypothesis.
     pub(super) fn new(
-        inputs: &'a Inputs<'a>,
+        inputs: &'a RecordingInputs<'a>,
         comparison: &'a Comparison<'a>,
-        setting: &Setting,
+        setting: &NoiseSetting,
         members: &[(usize, usize)],
     ) -> Self {
         let (fixed, output) = comparison.fixed_and_output();
@@ -125,7 +125,7 @@ impl<'a> Inner<'a> {
         let mut inner = super::algebra::block(gram, &all, &all);
         all.iter().enumerate().for_each(|(at, index)| inner[[at, at]] += self.ridge[*index]);
         let right = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        let solved = Factor::of(&inner).solve(&right);
+        let solved = CholeskyFactor::of(&inner).solve(&right);
         let mut w = Array1::zeros(last);
         all.iter().zip(&solved).for_each(|(index, x)| w[*index] = *x);
         w
@@ -133,7 +133,7 @@ impl<'a> Inner<'a> {
 }
 
 /// Places of the rows of each part: the fitted units in turn.
-fn parts(inputs: &Inputs<'_>, comparison: &Comparison<'_>) -> Vec<Vec<usize>> {
+fn parts(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>) -> Vec<Vec<usize>> {
     let mut number: BTreeMap<usize, usize> = BTreeMap::new();
     let mut parts: Vec<Vec<usize>> = Vec::new();
     for (at, row) in comparison.rows.iter().enumerate() {

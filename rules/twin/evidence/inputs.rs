@@ -13,7 +13,7 @@ const UNKNOWN_PAUSE_S: f64 = 60.0;
 const GAP_PERIODS: f64 = 6.0;
 
 /// The inputs of a recording; columns are full length, absent inputs are `None`.
-pub(super) struct Inputs<'a> {
+pub(super) struct RecordingInputs<'a> {
     pub(super) scene: &'a Scene,
     /// Number of rows.
     pub(super) rows: usize,
@@ -74,7 +74,7 @@ pub(super) struct Inputs<'a> {
     pub(super) is_axis: bool,
 }
 
-impl<'a> Inputs<'a> {
+impl<'a> RecordingInputs<'a> {
     /// The inputs of a scene whose load and simulated output are set.
     pub(super) fn new(scene: &'a Scene, units: &[Unit], held: &BTreeSet<usize>, comparable: Vec<bool>) -> Self {
         let rows = scene.rows();

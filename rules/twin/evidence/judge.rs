@@ -3,10 +3,10 @@
 use super::decision::THRESHOLDS;
 use super::gram::Comparison;
 use super::inner::Inner;
-use super::inputs::Inputs;
+use super::inputs::RecordingInputs;
 use super::naming::Naming;
-use super::posterior::{Explanation, Group, Setting, grouped};
-use super::second::Second;
+use super::posterior::{Explanation, Group, NoiseSetting, grouped};
+use super::second::SecondStage;
 use crate::statistics::count;
 use crate::twin::diagnosis::Verdict;
 use std::collections::BTreeMap;
@@ -18,10 +18,10 @@ const GROUPS: usize = 8;
 
 /// Everything a judgement reads.
 pub(super) struct Judge<'a> {
-    pub(super) inputs: &'a Inputs<'a>,
+    pub(super) inputs: &'a RecordingInputs<'a>,
     pub(super) comparison: &'a Comparison<'a>,
-    pub(super) second: &'a Second,
-    pub(super) settings: &'a [Setting],
+    pub(super) second: &'a SecondStage,
+    pub(super) settings: &'a [NoiseSetting],
     pub(super) naming: &'a Naming<'a>,
     /// The recorded output with outliers cut.
     pub(super) recorded: &'a [f64],
@@ -35,7 +35,7 @@ pub(super) struct Judge<'a> {
 
 /// The answer.
 #[derive(Debug)]
-pub(super) struct Answer {
+pub(super) struct EvidenceAnswer {
     pub(super) verdict: Verdict,
     /// Names, the most important first.
     pub(super) names: Vec<String>,
@@ -58,7 +58,7 @@ pub(super) type Named = (String, Vec<f64>);
 
 impl Judge<'_> {
     /// The answer.
-    pub(super) fn answer(&self, all: &[Explanation]) -> Answer {
+    pub(super) fn answer(&self, all: &[Explanation]) -> EvidenceAnswer {
         let groups = grouped(all);
         let nothing = groups.iter().find(|group| group.names.is_empty()).map_or(-60.0, |group| group.ln);
         let debug = self.debug(&groups);
@@ -149,8 +149,8 @@ impl Judge<'_> {
         less
     }
 
-    fn nothing(&self, debug: String) -> Answer {
-        Answer {
+    fn nothing(&self, debug: String) -> EvidenceAnswer {
+        EvidenceAnswer {
             verdict: Verdict::NoMismatch,
             names: Vec::new(),
             alternatives: Vec::new(),
@@ -163,7 +163,7 @@ impl Judge<'_> {
     }
 
     /// Verdict and names of a group that holds.
-    fn named(&self, best: &Explanation, groups: &[Group<'_>], information: f64, debug: String) -> Answer {
+    fn named(&self, best: &Explanation, groups: &[Group<'_>], information: f64, debug: String) -> EvidenceAnswer {
         let ln = groups.iter().find(|group| *group.names == best.names).map_or(best.ln, |group| group.ln);
         let (after, contributions) = self.contributions(best);
         let remaining: Vec<Named> = contributions.iter().map(|(name, x)| (name.clone(), self.remaining(x))).collect();
@@ -184,7 +184,7 @@ impl Judge<'_> {
         }
         let names: Vec<String> = kept.iter().map(|(name, _)| name.clone()).filter(|name| name != UNKNOWN).collect();
         let unknown = share.get(UNKNOWN).copied().unwrap_or(0.0);
-        let mut answer = Answer {
+        let mut answer = EvidenceAnswer {
             verdict: Verdict::Unexplained,
             names,
             alternatives: Vec::new(),
@@ -203,7 +203,7 @@ impl Judge<'_> {
     }
 
     /// Explained or ambiguous, and what stands beside the names.
-    fn judge_names(&self, answer: &mut Answer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
+    fn judge_names(&self, answer: &mut EvidenceAnswer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
         let mass = |name: &str| {
             let of = |g: &&Group<'_>| g.names.iter().any(|n| n.as_deref() == Some(name));
             groups.iter().filter(of).map(|g| g.ln.exp()).sum::<f64>()
@@ -246,7 +246,7 @@ impl Judge<'_> {
     }
 
     /// Names whose law costs little in the place of a member.
-    fn class(&self, answer: &Answer, best: &Explanation) -> Vec<(String, String)> {
+    fn class(&self, answer: &EvidenceAnswer, best: &Explanation) -> Vec<(String, String)> {
         let (comparison, gram) = self.first;
         let variance = self.settings[best.noise].saturated.variance;
         let nats = 0.5 * comparison.tempering / variance;
@@ -292,7 +292,7 @@ impl Judge<'_> {
     }
 }
 
-impl Answer {
+impl EvidenceAnswer {
     /// Something real that no name explains; names that come near stand beside it.
     fn leave_unnamed(&mut self, groups: &[Group<'_>], ln: f64) {
         self.verdict = Verdict::Unexplained;

@@ -5,10 +5,10 @@
 //!
 //! `ln E = -(kappa n / 2) ln((q - sum lambda b^2 / (1 + lambda g)) / q) - 1/2 sum ln(1 + lambda g) + ln 2 Phi(sign w0 / sd) + ln p(s)`
 
-use super::algebra::{Factor, Resolved, Tridiagonal, block, schur};
+use super::algebra::{CholeskyFactor, Resolved, Tridiagonal, block, schur};
 use super::bank::Variant;
 use super::gram::{Comparison, Gram};
-use super::noise::Noise;
+use super::noise::NoiseModel;
 use crate::statistics::{count, normal_share};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis, s};
@@ -43,7 +43,7 @@ pub(super) struct Ground {
 }
 
 /// What a hypothesis takes out of it: `gram - reach reach'` is left.
-pub(super) struct State<'g> {
+pub(super) struct MarginalState<'g> {
     ground: &'g Ground,
     reach: Array2<f64>,
     /// Sum of squares left of the output.
@@ -52,9 +52,9 @@ pub(super) struct State<'g> {
 
 impl Ground {
     /// Nothing taken out yet.
-    pub(super) fn state(&self) -> State<'_> {
+    pub(super) fn state(&self) -> MarginalState<'_> {
         let size = self.gram.nrows();
-        State {
+        MarginalState {
             ground: self,
             reach: Array2::zeros((size, 0)),
             left: self.gram[[size - 1, size - 1]].max(f64::MIN_POSITIVE),
@@ -76,7 +76,7 @@ impl Ground {
     }
 }
 
-impl State<'_> {
+impl MarginalState<'_> {
     /// The entry that is left.
     fn at(&self, row: usize, column: usize) -> f64 {
         self.ground.gram[[row, column]] - self.reach.row(row).dot(&self.reach.row(column))
@@ -85,7 +85,7 @@ impl State<'_> {
 
 /// What a variant adds to a state.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Gain {
+pub(super) struct EvidenceGain {
     /// Number of the most likely size.
     pub(super) size: usize,
     /// Logarithm of the evidence it brings, all sizes summed.
@@ -110,7 +110,7 @@ impl Comparison<'_> {
             let ridge = |index: usize| if index < self.tangents { flat } else { own };
             let mut inner = block(&gram.whole, &all, &all);
             all.iter().enumerate().for_each(|(at, index)| inner[[at, at]] += ridge(*index));
-            let factor = Factor::of(&inner);
+            let factor = CholeskyFactor::of(&inner);
             let w = factor.solve(&y);
             let q = (gram.whole[[last, last]] - w.dot(&y)).max(1e-12 * gram.whole[[last, last]]);
             let kept: f64 = factor.inverse_diagonal().iter().zip(&all).map(|(x, index)| x * ridge(*index)).sum();
@@ -125,7 +125,7 @@ impl Comparison<'_> {
     }
 
     /// Likelihood of a residual by itself in a noise.
-    pub(super) fn likelihood_of(&self, residual: &[f64], noise: Noise) -> f64 {
+    pub(super) fn likelihood_of(&self, residual: &[f64], noise: NoiseModel) -> f64 {
         let white = self.whitened(residual, noise);
         let rows = count(white.len());
         let square: f64 = white.iter().map(|x| x * x).sum();
@@ -176,7 +176,7 @@ impl Comparison<'_> {
         let mut inner = block(gram, &fixed, &fixed);
         let flat = self.flat(gram, FLAT);
         fixed.iter().for_each(|index| inner[[*index, *index]] += flat);
-        Factor::of(&inner).ln_determinant()
+        CholeskyFactor::of(&inner).ln_determinant()
     }
 
     /// Ridges of the tangents and of the levels of the runs.
@@ -187,7 +187,7 @@ impl Comparison<'_> {
     }
 
     /// What a variant adds to a state.
-    pub(super) fn gain(&self, state: &State<'_>, variant: usize) -> Gain {
+    pub(super) fn gain(&self, state: &MarginalState<'_>, variant: usize) -> EvidenceGain {
         let of = &self.bank.variants[variant];
         let along = self.along(state, variant);
         let mut best = (0, f64::NEG_INFINITY);
@@ -201,16 +201,16 @@ impl Comparison<'_> {
                 best = (index, all[index]);
             }
         }
-        Gain { size: best.0, ln: ln_sum(all) }
+        EvidenceGain { size: best.0, ln: ln_sum(all) }
     }
 
     /// Prior variance of a size over that of the noise.
-    fn lambda(&self, state: &State<'_>, size: f64) -> f64 {
+    fn lambda(&self, state: &MarginalState<'_>, size: f64) -> f64 {
         (size * self.deviation).powi(2) / state.ground.variance
     }
 
     /// The block of a variant that is left, with the output, ready for every size.
-    fn along(&self, state: &State<'_>, variant: usize) -> Tridiagonal {
+    fn along(&self, state: &MarginalState<'_>, variant: usize) -> Tridiagonal {
         let d = &self.bank.variants[variant].relative;
         let size = d.len();
         let Some(first) = state.ground.starts[variant] else {
@@ -228,14 +228,14 @@ impl Comparison<'_> {
         Tridiagonal::of(inner, b)
     }
 
-    fn ln_evidence(&self, state: &State<'_>, resolved: &Resolved) -> f64 {
+    fn ln_evidence(&self, state: &MarginalState<'_>, resolved: &Resolved) -> f64 {
         let rows = self.tempering * count(self.rows.len());
         let left = (state.left - resolved.square).max(1e-6 * state.left);
         -0.5 * rows * (left / state.left).ln() - 0.5 * resolved.ln_determinant
     }
 
     /// Twice the probability that the law has its sign.
-    fn ln_sign(&self, state: &State<'_>, of: &Variant, size: f64, resolved: &Resolved) -> f64 {
+    fn ln_sign(&self, state: &MarginalState<'_>, of: &Variant, size: f64, resolved: &Resolved) -> f64 {
         if of.sign() == 0.0 {
             return 0.0;
         }
@@ -246,13 +246,13 @@ impl Comparison<'_> {
     }
 
     /// The evidence that a variant of exactly this size adds, its sign apart.
-    pub(super) fn gain_at(&self, state: &State<'_>, variant: usize, size: usize) -> f64 {
+    pub(super) fn gain_at(&self, state: &MarginalState<'_>, variant: usize, size: usize) -> f64 {
         let resolved = self.along(state, variant).resolve(self.lambda(state, SIZES[size]));
         self.ln_evidence(state, &resolved) + SIZE_PRIORS[size].ln()
     }
 
     /// The state once a variant of this size has been taken out as well.
-    pub(super) fn with<'g>(&self, state: &State<'g>, variant: usize, size: usize) -> State<'g> {
+    pub(super) fn with<'g>(&self, state: &MarginalState<'g>, variant: usize, size: usize) -> MarginalState<'g> {
         let ground = state.ground;
         let of = &self.bank.variants[variant];
         let own = of.relative.len();
@@ -265,14 +265,14 @@ impl Comparison<'_> {
         for (index, d) in of.relative.iter().enumerate() {
             inner[[index, index]] += ground.variance / (SIZES[size] * self.deviation * d).powi(2);
         }
-        Factor::of(&inner).forward(&mut reach);
+        CholeskyFactor::of(&inner).forward(&mut reach);
         let last = reach.column(reach.ncols() - 1);
         let left = (state.left - last.dot(&last)).max(1e-9 * state.left);
         let known = state.reach.ncols();
         let mut joined = Array2::zeros((reach.ncols(), known + own));
         joined.slice_mut(s![.., ..known]).assign(&state.reach);
         joined.slice_mut(s![.., known..]).assign(&reach.t());
-        State { ground, reach: joined, left }
+        MarginalState { ground, reach: joined, left }
     }
 
     /// The part of a ground that holds these members only.
@@ -281,7 +281,7 @@ impl Comparison<'_> {
     }
 
     /// Posterior means: coefficients of the tangents and of each member.
-    pub(super) fn solve(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> Solved {
+    pub(super) fn solve(&self, gram: &Array2<f64>, variance: f64, members: &[(usize, usize)]) -> PosteriorMeans {
         let last = gram.nrows() - 1;
         let mut all: Vec<usize> = (0..self.first()).collect();
         let mut ridge = self.fixed_ridge(gram, variance);
@@ -293,7 +293,7 @@ impl Comparison<'_> {
         let mut inner = block(gram, &all, &all);
         ridge.iter().enumerate().for_each(|(at, ridge)| inner[[at, at]] += ridge);
         let y = Array1::from_iter(all.iter().map(|index| gram[[*index, last]]));
-        let w = Factor::of(&inner).solve(&y);
+        let w = CholeskyFactor::of(&inner).solve(&y);
         let tangents = w.slice(s![..self.tangents]).to_vec();
         let mut at = self.first();
         let mut of_members = Vec::new();
@@ -302,13 +302,13 @@ impl Comparison<'_> {
             of_members.push(w.slice(s![at..at + size]).to_vec());
             at += size;
         }
-        Solved { tangents, members: of_members }
+        PosteriorMeans { tangents, members: of_members }
     }
 }
 
 /// Posterior means of a hypothesis.
 #[derive(Debug, Clone)]
-pub(super) struct Solved {
+pub(super) struct PosteriorMeans {
     pub(super) tangents: Vec<f64>,
     pub(super) members: Vec<Vec<f64>>,
 }

@@ -37,18 +37,18 @@ use super::diagnosis::Diagnosis;
 use super::model::Model;
 use super::verdicts::cannot_tell;
 use adapters::Recording;
-use bank::{Bank, Drawn, Family, Owner};
+use bank::{Drawn, Family, Owner, VariantBank};
 use baseline::{Baseline, refit};
-use gram::{Compared, Comparison};
-use inputs::Inputs;
-use judge::{Answer, Judge};
+use gram::{Comparison, ComparisonInput};
+use inputs::RecordingInputs;
+use judge::{EvidenceAnswer, Judge};
 use naming::Naming;
-use noise::Noise;
+use noise::NoiseModel;
 use outliers::{Outliers, outliers};
-use posterior::{Setting, explanations};
-use search::{Found, Search, priors};
-use second::Second;
-use settings::{Settings, settings};
+use posterior::{NoiseSetting, explanations};
+use search::{SetEvidence, SetSearch, priors};
+use second::SecondStage;
+use settings::{NoiseSettings, settings};
 
 /// Sets that are followed in the first and in the second stage.
 const BEAMS: (usize, usize) = (5, 6);
@@ -72,12 +72,12 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
     let Some(baseline) = refit(&mut scene, &parts, &fitted) else {
         return Ok(cannot_tell(&case, "a model that can be fitted to this recording".to_owned()));
     };
-    let inputs = Inputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
+    let inputs = RecordingInputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
     let bank = families::bank(&inputs, model);
     let outliers = outliers(&inputs, &bank, &baseline.tangents);
     let answer = answer(&inputs, &bank, &baseline, &outliers);
     let ordinary = outliers.ordinary;
-    Ok(told::Told { case: &mut case, inputs: &inputs, baseline: &baseline, answer, ordinary }.diagnosis())
+    Ok(told::EvidenceReport { case: &mut case, inputs: &inputs, baseline: &baseline, answer, ordinary }.diagnosis())
 }
 
 /// Rows with a recorded output, every input of the model and finite tangents.
@@ -88,31 +88,37 @@ fn comparable(scene: &crate::physics::Scene, baseline: &Baseline) -> Vec<bool> {
 }
 
 /// Both stages, the names and the decision.
-fn answer(inputs: &Inputs<'_>, bank: &Bank, baseline: &Baseline, outliers: &Outliers) -> Answer {
-    let compared = Compared { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
+fn answer(
+    inputs: &RecordingInputs<'_>,
+    bank: &VariantBank,
+    baseline: &Baseline,
+    outliers: &Outliers,
+) -> EvidenceAnswer {
+    let compared =
+        ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(inputs, bank, &compared);
     let noises = settings(inputs, &first, &outliers.left);
     let own = priors(bank);
     let (found, prepared) = first_stage(&first, &noises, &own);
-    let mut second = Second::of(inputs, bank, &own, &found);
+    let mut second = SecondStage::of(inputs, bank, &own, &found);
     let comparison = Comparison::new(inputs, bank, &compared);
     add_sequences(inputs, &comparison, &prepared, &found, outliers, &noises, &mut second);
     let wide = Comparison::new(inputs, &second.bank, &compared);
-    let settings: Vec<Setting> = noises
+    let settings: Vec<NoiseSetting> = noises
         .likely
         .iter()
         .map(|noise| {
             let known = prepared.iter().find(|setting| setting.gram.noise == *noise);
             let saturated = known.map_or_else(|| noises.saturated(*noise), |known| known.saturated);
-            Setting::new(&wide, wide.gram(*noise), saturated)
+            NoiseSetting::new(&wide, wide.gram(*noise), saturated)
         })
         .collect();
-    let search = Search { comparison: &wide, priors: &second.priors, beam: BEAMS.1 };
-    let mut found = Found::new();
+    let search = SetSearch { comparison: &wide, priors: &second.priors, beam: BEAMS.1 };
+    let mut found = SetEvidence::new();
     for setting in settings.iter().filter(|setting| noises.leading.contains(&setting.gram.noise)) {
         merge(&mut found, search.run(&setting.ground, setting.ln));
     }
-    let plain = first.gram(Noise::WHITE);
+    let plain = first.gram(NoiseModel::WHITE);
     let metric = &prepared[0].gram;
     let naming = Naming::new(&first, &[metric, &plain]);
     let all = explanations(&search, &settings, &found, &second, &naming);
@@ -131,20 +137,20 @@ fn answer(inputs: &Inputs<'_>, bank: &Bank, baseline: &Baseline, outliers: &Outl
 }
 
 /// The search among forms as they are, for the leading noises.
-fn first_stage(first: &Comparison<'_>, noises: &Settings, priors: &[f64]) -> (Found, Vec<Setting>) {
-    let mut found = Found::new();
+fn first_stage(first: &Comparison<'_>, noises: &NoiseSettings, priors: &[f64]) -> (SetEvidence, Vec<NoiseSetting>) {
+    let mut found = SetEvidence::new();
     let mut prepared = Vec::new();
     for noise in &noises.leading {
         let gram = first.gram(*noise);
-        let setting = Setting::new(first, gram, noises.saturated(*noise));
-        let search = Search { comparison: first, priors, beam: BEAMS.0 };
+        let setting = NoiseSetting::new(first, gram, noises.saturated(*noise));
+        let search = SetSearch { comparison: first, priors, beam: BEAMS.0 };
         merge(&mut found, search.run(&setting.ground, setting.ln));
         prepared.push(setting);
     }
     (found, prepared)
 }
 
-fn merge(into: &mut Found, from: Found) {
+fn merge(into: &mut SetEvidence, from: SetEvidence) {
     for (members, ln) in from {
         let known = into.entry(members).or_insert(f64::NEG_INFINITY);
         *known = known.max(ln);
@@ -153,20 +159,20 @@ fn merge(into: &mut Found, from: Found) {
 
 /// Hidden sequences in what the empty and the leading sets leave.
 fn add_sequences(
-    inputs: &Inputs<'_>,
+    inputs: &RecordingInputs<'_>,
     first: &Comparison<'_>,
-    prepared: &[Setting],
-    found: &Found,
+    prepared: &[NoiseSetting],
+    found: &SetEvidence,
     outliers: &Outliers,
-    noises: &Settings,
-    second: &mut Second,
+    noises: &NoiseSettings,
+    second: &mut SecondStage,
 ) {
     let mut sets: Vec<(&Vec<(usize, usize)>, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
     sets.sort_by(|a, b| b.1.total_cmp(&a.1));
     let empty = Vec::new();
     let leading = sets.iter().map(|(members, _)| *members).filter(|members| !members.is_empty()).take(2);
     let mut known: Vec<Vec<f64>> = Vec::new();
-    let noise = noises.leading.last().copied().unwrap_or(Noise::WHITE);
+    let noise = noises.leading.last().copied().unwrap_or(NoiseModel::WHITE);
     for members in std::iter::once(&empty).chain(leading) {
         let setting = &prepared[0];
         let solved = first.solve(&setting.gram.whole, setting.saturated.variance, members);
@@ -201,12 +207,12 @@ const SWITCH_NATS: f64 = 30.0;
 /// Is a sequence likelier than noise that may be as slow as it likes? What switches has edges, slow noise has none; the
 /// memory of the noise is bounded everywhere else, so that levels stay levels, and a wandering meter would pass for one.
 fn is_more_than_slow_noise(
-    inputs: &Inputs<'_>,
+    inputs: &RecordingInputs<'_>,
     first: &Comparison<'_>,
     left: &[f64],
     sequence: &hidden::Sequence,
 ) -> bool {
-    let grid = Noise::grid(f64::INFINITY, inputs.period_s);
+    let grid = NoiseModel::grid(f64::INFINITY, inputs.period_s);
     let (mut slow, mut switching) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     for noise in grid {
         slow = slow.max(first.likelihood_of(left, noise));
@@ -219,7 +225,7 @@ fn is_more_than_slow_noise(
     switching - slow > SWITCH_NATS
 }
 
-fn is_same(inputs: &Inputs<'_>, a: &[f64], b: &[f64]) -> bool {
+fn is_same(inputs: &RecordingInputs<'_>, a: &[f64], b: &[f64]) -> bool {
     let rows: Vec<usize> = inputs.taken(false).collect();
     let equal = rows.iter().filter(|row| (a[**row] - b[**row]).abs() < 0.5).count();
     let share = crate::statistics::count(equal) / crate::statistics::count(rows.len().max(1));
@@ -237,7 +243,7 @@ const EVENT_ROWS: f64 = 4.0;
 const EVENT_AS_CONSUMER: f64 = -6.0;
 
 /// A sequence as a consumer, as an event in the cut, and as a regime of the coolant.
-fn add_sequence(inputs: &Inputs<'_>, second: &mut Second, sequence: hidden::Sequence, number: usize) {
+fn add_sequence(inputs: &RecordingInputs<'_>, second: &mut SecondStage, sequence: hidden::Sequence, number: usize) {
     let label = format!("hidden, {} changes, {:.0} nats", sequence.changes, sequence.ln);
     let named = |kind: &'static str| Owner::Named(Family::of(kind).wide());
     let all = crate::statistics::count(inputs.taken(false).count().max(1));

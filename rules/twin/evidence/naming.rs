@@ -5,8 +5,8 @@
 //! then each gets the part that the regression gives it. The metric is that of the noise, or the plain one: the first
 //! alone loses levels, the second alone small effects that change fast.
 
-use super::algebra::{Factor, block, schur};
-use super::bank::{Bank, Variant};
+use super::algebra::{CholeskyFactor, block, schur};
+use super::bank::{Variant, VariantBank};
 use super::decision::THRESHOLDS;
 use super::gram::{Comparison, Gram};
 use crate::statistics::count;
@@ -34,7 +34,7 @@ pub(super) struct Claim {
 
 /// Projects curves on named laws.
 pub(super) struct Naming<'a> {
-    bank: &'a Bank,
+    bank: &'a VariantBank,
     first: usize,
     /// Gram matrices with the baseline projected out: in the metric of the noise, and in the plain one.
     metrics: Vec<Array2<f64>>,
@@ -43,7 +43,7 @@ pub(super) struct Naming<'a> {
 }
 
 /// A regression of a curve on one or two laws.
-struct Regression {
+struct CurveRegression {
     share: f64,
     coefficients: Vec<f64>,
 }
@@ -193,7 +193,13 @@ impl<'a> Naming<'a> {
     }
 
     /// The curve on some laws; `None` where one of them has the wrong sign.
-    fn regress(&self, metric: &Array2<f64>, along: &Array1<f64>, square: f64, laws: &[usize]) -> Option<Regression> {
+    fn regress(
+        &self,
+        metric: &Array2<f64>,
+        along: &Array1<f64>,
+        square: f64,
+        laws: &[usize],
+    ) -> Option<CurveRegression> {
         let all: Vec<usize> = laws.iter().flat_map(|law| self.law(*law)).collect();
         let relative = laws.iter().flat_map(|law| &self.bank.variants[*law].relative[..self.law(*law).len()]);
         let mut inner = block(metric, &all, &all);
@@ -202,7 +208,7 @@ impl<'a> Naming<'a> {
             inner[[at, at]] += own * RIDGE / (relative * relative) + 1e-12;
         }
         let right = Array1::from_iter(all.iter().map(|index| along[*index]));
-        let w = Factor::of(&inner).solve(&right);
+        let w = CholeskyFactor::of(&inner).solve(&right);
         let mut at = 0;
         for law in laws {
             let variant: &Variant = &self.bank.variants[*law];
@@ -212,7 +218,7 @@ impl<'a> Naming<'a> {
             at += self.law(*law).len();
         }
         let share = right.dot(&w) / square - PRICE * count(all.len() - 1);
-        Some(Regression { share, coefficients: w.to_vec() })
+        Some(CurveRegression { share, coefficients: w.to_vec() })
     }
 
     /// What it costs in nats to put each named kind in the place of a contribution, given its inner products with every
@@ -249,7 +255,7 @@ impl<'a> Naming<'a> {
         let trace: f64 = inner.diag().sum();
         fixed.iter().for_each(|index| inner[[*index, *index]] += 1e-9 * trace / count(fixed.len().max(1)));
         let right = Array1::from_iter(fixed.iter().map(|index| along[*index]));
-        let w = Factor::of(&inner).solve(&right);
+        let w = CholeskyFactor::of(&inner).solve(&right);
         let square = white.dot(&white) - right.dot(&w);
         for (index, w) in fixed.iter().zip(&w) {
             let column = gram.whole.column(*index);

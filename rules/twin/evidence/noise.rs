@@ -15,7 +15,7 @@ const MEMORY_MAX: f64 = 120.0;
 
 /// One setting of the noise, of unit variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noise {
+pub(super) struct NoiseModel {
     /// Share of the variance that has a memory.
     pub(super) share: f64,
     /// Correlation of the share with a memory from one row to the next.
@@ -25,7 +25,7 @@ pub(super) struct Noise {
     variance: f64,
 }
 
-impl Noise {
+impl NoiseModel {
     /// Noise without memory.
     pub(super) const WHITE: Self = Self { share: 0.0, phi: 0.0, theta: 0.0, variance: 1.0 };
 
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn the_innovations_of_an_impulse_follow_the_recursion() {
-        let noise = Noise::of(0.7, 0.8);
+        let noise = NoiseModel::of(0.7, 0.8);
         let mut column = vec![0.0, 1.0, 0.0];
         noise.whiten(&mut column, std::slice::from_ref(&(0..3)));
         let deviation = noise.variance.sqrt();
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn no_memory_is_longer_than_a_quarter_of_a_block() {
-        let grid = Noise::grid(60.0, 1.0);
+        let grid = NoiseModel::grid(60.0, 1.0);
         assert!(grid.iter().all(|noise| noise.phi <= (-1.0_f64 / 15.0).exp()));
         assert!(grid.len() > 8);
     }

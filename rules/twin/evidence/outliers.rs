@@ -2,9 +2,9 @@
 //!
 //! Only isolated outliers are cut: plain cutting by size would delete real effects at edges and in short events.
 
-use super::algebra::{Factor, add_gram, mirror};
-use super::bank::Bank;
-use super::inputs::Inputs;
+use super::algebra::{CholeskyFactor, add_gram, mirror};
+use super::bank::VariantBank;
+use super::inputs::RecordingInputs;
 use crate::statistics::{count, median, quantile, rms, robust_deviation};
 use ndarray::{Array1, Array2, ShapeBuilder};
 
@@ -33,7 +33,7 @@ pub(super) struct Outliers {
 }
 
 /// Judges every row.
-pub(super) fn outliers(inputs: &Inputs<'_>, bank: &Bank, tangents: &[Vec<f64>]) -> Outliers {
+pub(super) fn outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {
     let recorded = inputs.scene.recorded();
     let residual = inputs.column(|row| recorded[row] - inputs.simulated[row]);
     let (left, ordinary) = wide_residual(inputs, bank, tangents, &residual);
@@ -54,7 +54,12 @@ pub(super) fn outliers(inputs: &Inputs<'_>, bank: &Bank, tangents: &[Vec<f64>]) 
 }
 
 /// What a ridge of smooth curves and edges leaves of the residual, and the ordinary deviation of it.
-fn wide_residual(inputs: &Inputs<'_>, bank: &Bank, tangents: &[Vec<f64>], residual: &[f64]) -> (Vec<f64>, f64) {
+fn wide_residual(
+    inputs: &RecordingInputs<'_>,
+    bank: &VariantBank,
+    tangents: &[Vec<f64>],
+    residual: &[f64],
+) -> (Vec<f64>, f64) {
     let columns = wide_columns(bank, tangents);
     let all: Vec<usize> = inputs.taken(false).collect();
     let rows: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(ROWS_MAX).max(1)).collect();
@@ -79,7 +84,7 @@ fn wide_residual(inputs: &Inputs<'_>, bank: &Bank, tangents: &[Vec<f64>], residu
             let own = if index < tangents.len() { 1e-8 } else { 1.0 };
             inner[[index, index]] += own * (ordinary / (0.1 * spread)).powi(2) + 1e-9 * count(rows.len());
         }
-        w = Factor::of(&inner).solve(&tall.t().dot(&wanted));
+        w = CholeskyFactor::of(&inner).solve(&tall.t().dot(&wanted));
         let fitted = tall.dot(&w);
         let left: Vec<f64> = output.iter().zip(&fitted).map(|(y, f)| y - f).collect();
         ordinary = robust_deviation(left.iter().copied()).unwrap_or(0.0) + 1e-12;
@@ -95,7 +100,7 @@ fn wide_residual(inputs: &Inputs<'_>, bank: &Bank, tangents: &[Vec<f64>], residu
 }
 
 /// Tangents, smooth curves and everything that acts at edges.
-fn wide_columns<'a>(bank: &'a Bank, tangents: &'a [Vec<f64>]) -> Vec<&'a Vec<f64>> {
+fn wide_columns<'a>(bank: &'a VariantBank, tangents: &'a [Vec<f64>]) -> Vec<&'a Vec<f64>> {
     let curves = bank.variants.iter().filter(|variant| {
         variant.drawn().is_some_and(|drawn| drawn.shape == "bumps" && ["1", "cut", "direction"].contains(&drawn.times))
     });
@@ -105,7 +110,7 @@ fn wide_columns<'a>(bank: &'a Bank, tangents: &'a [Vec<f64>]) -> Vec<&'a Vec<f64
 }
 
 /// Noise of each row relative to the ordinary one, by fifths of the simulated size and by the engagement.
-fn scales(inputs: &Inputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64> {
+fn scales(inputs: &RecordingInputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64> {
     let size = |row: usize| inputs.simulated[row].abs();
     let edge = |share: f64| quantile(inputs.taken(false).map(size), share).unwrap_or(0.0);
     let edges = [0.2, 0.4, 0.6, 0.8].map(edge);
@@ -125,7 +130,7 @@ fn scales(inputs: &Inputs<'_>, left: &[f64], ordinary: f64) -> Vec<f64> {
     inputs.column(|row| of_class[class(row)])
 }
 
-fn running_median(inputs: &Inputs<'_>, values: &[f64]) -> Vec<f64> {
+fn running_median(inputs: &RecordingInputs<'_>, values: &[f64]) -> Vec<f64> {
     inputs.column(|row| {
         let near = row.saturating_sub(NEIGHBOURS)..(row + NEIGHBOURS + 1).min(inputs.rows);
         median(near.map(|at| if inputs.comparable[at] { values[at] } else { 0.0 }).collect()).unwrap_or(0.0)

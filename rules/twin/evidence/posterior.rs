@@ -3,8 +3,8 @@
 use super::gram::{Comparison, Gram};
 use super::marginal::{Ground, Saturated, ln_sum};
 use super::naming::{Claim, Naming};
-use super::search::{Found, Members, Search};
-use super::second::Second;
+use super::search::{Members, SetEvidence, SetSearch};
+use super::second::SecondStage;
 use std::collections::BTreeMap;
 
 /// Sets that are evaluated for every noise, and those whose curves are offered names.
@@ -26,14 +26,14 @@ pub(super) struct Explanation {
 }
 
 /// A noise with its Gram matrix and the state that every hypothesis starts from.
-pub(super) struct Setting {
+pub(super) struct NoiseSetting {
     pub(super) gram: Gram,
     pub(super) saturated: Saturated,
     pub(super) ground: Ground,
     pub(super) ln: f64,
 }
 
-impl Setting {
+impl NoiseSetting {
     /// Prepares a noise.
     pub(super) fn new(comparison: &Comparison<'_>, gram: Gram, saturated: Saturated) -> Self {
         let (ground, ln) = comparison.baseline(&gram, saturated);
@@ -43,10 +43,10 @@ impl Setting {
 
 /// Every explanation, the likeliest first.
 pub(super) fn explanations(
-    search: &Search<'_>,
-    settings: &[Setting],
-    found: &Found,
-    second: &Second,
+    search: &SetSearch<'_>,
+    settings: &[NoiseSetting],
+    found: &SetEvidence,
+    second: &SecondStage,
     naming: &Naming<'_>,
 ) -> Vec<Explanation> {
     let mut sets: Vec<(&Members, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
@@ -89,9 +89,9 @@ pub(super) fn explanations(
 /// The claims on the nameless members of a set: each by itself, then those that are left together.
 fn claims(
     comparison: &Comparison<'_>,
-    setting: &Setting,
+    setting: &NoiseSetting,
     explanation: &Explanation,
-    second: &Second,
+    second: &SecondStage,
     naming: &Naming<'_>,
 ) -> Vec<Option<Claim>> {
     let variant = |member: usize| &second.bank.variants[explanation.members[member].0];
@@ -131,7 +131,7 @@ fn claims(
 }
 
 /// The names of a set.
-pub(super) fn names(second: &Second, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
+pub(super) fn names(second: &SecondStage, explanation: &Explanation, naming: &Naming<'_>) -> Vec<Option<String>> {
     let mut names: Vec<Option<String>> = Vec::new();
     for ((variant, _), claim) in explanation.members.iter().zip(&explanation.claims) {
         match (second.bank.variants[*variant].kind(), claim) {

@@ -1,8 +1,8 @@
 //! The search: sets of variants by their evidence, a few at a time, up to three together.
 
-use super::bank::Bank;
+use super::bank::VariantBank;
 use super::gram::Comparison;
-use super::marginal::{Ground, State};
+use super::marginal::{Ground, MarginalState};
 use std::collections::BTreeMap;
 
 /// Prior of a named kind, shared by its variants, and of a nameless curve.
@@ -19,10 +19,10 @@ const FOLLOWED_WITHIN: f64 = 25.0;
 /// Members: variant and size of each, in rising order.
 pub(super) type Members = Vec<(usize, usize)>;
 /// Sets with the logarithm of their evidence and prior.
-pub(super) type Found = BTreeMap<Members, f64>;
+pub(super) type SetEvidence = BTreeMap<Members, f64>;
 
 /// Searches among variants with these priors.
-pub(super) struct Search<'a> {
+pub(super) struct SetSearch<'a> {
     pub(super) comparison: &'a Comparison<'a>,
     /// Logarithm of the prior of each variant.
     pub(super) priors: &'a [f64],
@@ -30,7 +30,7 @@ pub(super) struct Search<'a> {
     pub(super) beam: usize,
 }
 
-struct Candidate {
+struct CandidateSet {
     ln: f64,
     members: Members,
     parent: usize,
@@ -38,16 +38,16 @@ struct Candidate {
 }
 
 /// The prior of every variant of a bank: of its kind, of the variant in it.
-pub(super) fn priors(bank: &Bank) -> Vec<f64> {
+pub(super) fn priors(bank: &VariantBank) -> Vec<f64> {
     let of = |variant: &super::bank::Variant| if variant.kind().is_some() { NAMED } else { NAMELESS };
     bank.variants.iter().zip(bank.shares()).map(|(v, share)| of(v) + v.ln_prior - share.ln()).collect()
 }
 
-impl Search<'_> {
+impl SetSearch<'_> {
     /// Every set worth keeping, the empty one among them.
-    pub(super) fn run(&self, ground: &Ground, ln: f64) -> Found {
-        let mut found = Found::from([(Vec::new(), ln)]);
-        let mut level: Vec<(Members, State<'_>, f64)> = vec![(Vec::new(), ground.state(), ln)];
+    pub(super) fn run(&self, ground: &Ground, ln: f64) -> SetEvidence {
+        let mut found = SetEvidence::from([(Vec::new(), ln)]);
+        let mut level: Vec<(Members, MarginalState<'_>, f64)> = vec![(Vec::new(), ground.state(), ln)];
         for depth in 0..DEPTH {
             let candidates = self.extended(&level);
             let Some(best) = candidates.first().map(|candidate| candidate.ln) else { break };
@@ -69,9 +69,9 @@ impl Search<'_> {
     }
 
     /// Every set of a level with one more member, the likeliest first, each once.
-    fn extended(&self, level: &[(Members, State<'_>, f64)]) -> Vec<Candidate> {
+    fn extended(&self, level: &[(Members, MarginalState<'_>, f64)]) -> Vec<CandidateSet> {
         let variants = &self.comparison.bank.variants;
-        let mut best: BTreeMap<Vec<usize>, Candidate> = BTreeMap::new();
+        let mut best: BTreeMap<Vec<usize>, CandidateSet> = BTreeMap::new();
         for (parent, (members, state, ln)) in level.iter().enumerate() {
             for variant in 0..variants.len() {
                 if !self.may_join(members, variant) {
@@ -85,11 +85,11 @@ impl Search<'_> {
                 let key = joined.iter().map(|(variant, _)| *variant).collect();
                 let better = best.get(&key).is_none_or(|known| ln > known.ln);
                 if better {
-                    best.insert(key, Candidate { ln, members: joined, parent, added: (variant, gain.size) });
+                    best.insert(key, CandidateSet { ln, members: joined, parent, added: (variant, gain.size) });
                 }
             }
         }
-        let mut all: Vec<Candidate> = best.into_values().collect();
+        let mut all: Vec<CandidateSet> = best.into_values().collect();
         all.sort_by(|a, b| b.ln.total_cmp(&a.ln));
         all
     }
@@ -105,7 +105,7 @@ impl Search<'_> {
     }
 
     /// Keeps the likeliest few sets of every signature; what is followed further.
-    fn keep(&self, candidates: Vec<Candidate>, best: f64, found: &mut Found) -> Vec<Candidate> {
+    fn keep(&self, candidates: Vec<CandidateSet>, best: f64, found: &mut SetEvidence) -> Vec<CandidateSet> {
         let mut seen: BTreeMap<Vec<String>, usize> = BTreeMap::new();
         let mut followed = Vec::new();
         for candidate in candidates {
@@ -142,7 +142,7 @@ impl Search<'_> {
         for _ in 0..passes {
             for turn in 0..current.len() {
                 let mut sum = ln;
-                let mut state: Option<State<'_>> = None;
+                let mut state: Option<MarginalState<'_>> = None;
                 for (_, (variant, size)) in current.iter().enumerate().filter(|(other, _)| *other != turn) {
                     let here = state.as_ref().unwrap_or(&start);
                     sum += self.comparison.gain_at(here, *variant, *size) + self.priors[*variant];

@@ -3,9 +3,9 @@
 //! A law of a textbook is never quite the law of a machine. So each leading named variant gets departures `law * z` and
 //! `law * (z^2 - 1)` over speed, cut, depth, feed, time, velocity and temperature, all together with a small deviation.
 
-use super::bank::{Bank, Family, Owner, Variant};
-use super::inputs::Inputs;
-use super::search::{Found, NAMED, NAMELESS};
+use super::bank::{Family, Owner, Variant, VariantBank};
+use super::inputs::RecordingInputs;
+use super::search::{NAMED, NAMELESS, SetEvidence};
 use crate::statistics::{count, rms};
 use std::collections::BTreeMap;
 
@@ -21,19 +21,19 @@ const DEPARTURE: f64 = 0.15;
 const FARTHEST: f64 = 2.5;
 
 /// The bank of the second stage.
-pub(super) struct Second {
-    pub(super) bank: Bank,
+pub(super) struct SecondStage {
+    pub(super) bank: VariantBank,
     /// Logarithm of the prior of each variant.
     pub(super) priors: Vec<f64>,
     /// The variant of the first stage that each comes from; `None` of a hidden sequence.
     pub(super) source: Vec<Option<usize>>,
 }
 
-impl Second {
+impl SecondStage {
     /// The leading variants of the first stage, widened.
-    pub(super) fn of(inputs: &Inputs<'_>, bank: &Bank, priors: &[f64], found: &Found) -> Self {
+    pub(super) fn of(inputs: &RecordingInputs<'_>, bank: &VariantBank, priors: &[f64], found: &SetEvidence) -> Self {
         let departures = departures(inputs);
-        let mut second = Self { bank: Bank::default(), priors: Vec::new(), source: Vec::new() };
+        let mut second = Self { bank: VariantBank::default(), priors: Vec::new(), source: Vec::new() };
         for index in leading(bank, found) {
             let variant = &bank.variants[index];
             let start = second.bank.columns.len();
@@ -58,7 +58,7 @@ impl Second {
     }
 
     /// Adds a hidden sequence with its own evidence as prior.
-    pub(super) fn add(&mut self, inputs: &Inputs<'_>, owner: Owner, label: String, column: Vec<f64>, ln: f64) {
+    pub(super) fn add(&mut self, inputs: &RecordingInputs<'_>, owner: Owner, label: String, column: Vec<f64>, ln: f64) {
         let before = self.bank.variants.len();
         let prior = if matches!(owner, Owner::Named(_)) { NAMED } else { NAMELESS };
         match owner {
@@ -77,7 +77,7 @@ fn widens(variant: &Variant) -> bool {
 }
 
 /// The variants that lead, the best first.
-fn leading(bank: &Bank, found: &Found) -> Vec<usize> {
+fn leading(bank: &VariantBank, found: &SetEvidence) -> Vec<usize> {
     let mut sets: Vec<(&Vec<(usize, usize)>, f64)> = found.iter().map(|(members, ln)| (members, *ln)).collect();
     sets.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut lead: BTreeMap<usize, f64> = BTreeMap::new();
@@ -104,7 +104,7 @@ fn leading(bank: &Bank, found: &Found) -> Vec<usize> {
 }
 
 /// What a law may depart by: each channel standardised, and its square.
-fn departures(inputs: &Inputs<'_>) -> Vec<Vec<f64>> {
+fn departures(inputs: &RecordingInputs<'_>) -> Vec<Vec<f64>> {
     let velocity = if inputs.speed.is_none() { inputs.velocity.as_ref() } else { None };
     let time = Some(&inputs.clock_s);
     let cut = inputs.cut.as_ref();

@@ -1,9 +1,9 @@
 //! Which settings of the noise are likely: those that the empty or the saturated model makes likely are summed out.
 
 use super::gram::{Comparison, Gram};
-use super::inputs::Inputs;
+use super::inputs::RecordingInputs;
 use super::marginal::Saturated;
-use super::noise::Noise;
+use super::noise::NoiseModel;
 
 /// Nameless curves that stand for everything that may be there.
 const CURVES_MAX: usize = 16;
@@ -15,18 +15,18 @@ const PRESELECTED: usize = 7;
 const OF_EACH: usize = 2;
 
 /// The likely settings of the noise.
-pub(super) struct Settings {
+pub(super) struct NoiseSettings {
     /// Likely settings, four at most.
-    pub(super) likely: Vec<Noise>,
+    pub(super) likely: Vec<NoiseModel>,
     /// The likeliest under the empty and under the saturated model.
-    pub(super) leading: Vec<Noise>,
+    pub(super) leading: Vec<NoiseModel>,
     /// The saturated model of each setting that was compared.
-    known: Vec<(Noise, Saturated)>,
+    known: Vec<(NoiseModel, Saturated)>,
 }
 
-impl Settings {
+impl NoiseSettings {
     /// The saturated model of a likely setting.
-    pub(super) fn saturated(&self, noise: Noise) -> Saturated {
+    pub(super) fn saturated(&self, noise: NoiseModel) -> Saturated {
         let of = self.known.iter().find(|(known, _)| *known == noise).or(self.known.first());
         of.map_or(Saturated { variance: 1.0, ln_likelihood: 0.0 }, |(_, saturated)| *saturated)
     }
@@ -34,7 +34,7 @@ impl Settings {
 
 /// Compares the settings of the grid: all of them by two residuals, the better ones in full. `wide` is what a wide smooth
 /// model leaves.
-pub(super) fn settings(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Settings {
+pub(super) fn settings(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> NoiseSettings {
     let takes = standing_columns(comparison);
     let mut empty = Vec::new();
     let mut full = Vec::new();
@@ -46,8 +46,8 @@ pub(super) fn settings(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &
         full.push((saturated.ln_likelihood, noise));
         known.push((noise, saturated));
     }
-    let mut likely: Vec<Noise> = Vec::new();
-    let mut leading: Vec<Noise> = Vec::new();
+    let mut likely: Vec<NoiseModel> = Vec::new();
+    let mut leading: Vec<NoiseModel> = Vec::new();
     for all in [&mut empty, &mut full] {
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = all[0];
@@ -60,16 +60,16 @@ pub(super) fn settings(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &
             }
         }
     }
-    Settings { likely, leading, known }
+    NoiseSettings { likely, leading, known }
 }
 
 /// The settings that make one of two residuals likely: that of the baseline, and that of a wide smooth model.
-fn preselected(inputs: &Inputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Vec<Noise> {
-    let grid = Noise::grid(inputs.median_block(), inputs.period_s);
-    let mut chosen = vec![Noise::WHITE];
+fn preselected(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>, wide: &[f64]) -> Vec<NoiseModel> {
+    let grid = NoiseModel::grid(inputs.median_block(), inputs.period_s);
+    let mut chosen = vec![NoiseModel::WHITE];
     let base = inputs.column(|row| inputs.scene.recorded()[row] - inputs.simulated[row]);
     for residual in [base.as_slice(), wide] {
-        let mut ranked: Vec<(f64, Noise)> =
+        let mut ranked: Vec<(f64, NoiseModel)> =
             grid.iter().map(|noise| (comparison.likelihood_of(residual, *noise), *noise)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, noise) in ranked.into_iter().take(PRESELECTED) {

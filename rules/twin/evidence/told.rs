@@ -4,13 +4,13 @@
 //! baseline, so that its parameters mean what the catalogue says and the extended model can be simulated.
 
 use super::baseline::Baseline;
-use super::inputs::Inputs;
-use super::judge::{Answer, UNKNOWN, sum_of};
+use super::inputs::RecordingInputs;
+use super::judge::{EvidenceAnswer, UNKNOWN, sum_of};
 use crate::physics::{Effect, effect};
 use crate::statistics::{count, rms};
 use crate::twin::diagnose::Case;
 use crate::twin::diagnosis::{
-    Alternative, Diagnosis, Estimate, Experiment, Fits, Missing, Quality, Rows, Shift, Verdict,
+    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, Verdict,
 };
 use crate::twin::estimate::estimates;
 use crate::twin::fit::{Fit, fit};
@@ -28,16 +28,16 @@ const START: Arma = Arma { phi: 0.4, theta: 0.0 };
 const SWEEP_MINUTES: f64 = 10.0;
 
 /// Everything that is told.
-pub(super) struct Told<'a, 'm> {
+pub(super) struct EvidenceReport<'a, 'm> {
     pub(super) case: &'a mut Case<'m>,
-    pub(super) inputs: &'a Inputs<'a>,
+    pub(super) inputs: &'a RecordingInputs<'a>,
     pub(super) baseline: &'a Baseline,
-    pub(super) answer: Answer,
+    pub(super) answer: EvidenceAnswer,
     /// Deviation of the ordinary noise.
     pub(super) ordinary: f64,
 }
 
-impl Told<'_, '_> {
+impl EvidenceReport<'_, '_> {
     /// The diagnosis.
     pub(super) fn diagnosis(mut self) -> Diagnosis {
         let fits = self.fits();
@@ -141,7 +141,7 @@ impl Told<'_, '_> {
         let mut all = Vec::new();
         for (at, name) in names.iter().enumerate() {
             let place = places.get(at).copied().flatten();
-            let parameters: Vec<Estimate> = match (place, fit) {
+            let parameters: Vec<ParameterEstimate> = match (place, fit) {
                 (Some(place), Some(fit)) => estimates(self.case, fit, place),
                 _ => self.curve_size(name),
             };
@@ -162,11 +162,11 @@ impl Told<'_, '_> {
     }
 
     /// The size of a curve that has no law: its root mean square where it acts.
-    fn curve_size(&self, name: &str) -> Vec<Estimate> {
+    fn curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
         let Some((_, x)) = self.answer.contributions.iter().find(|(known, _)| known == name) else { return Vec::new() };
         let value = rms(x);
         let unit = unit_of(&self.case.model.output).to_owned();
-        vec![Estimate { name: "rms".to_owned(), value, low: 0.8 * value, high: 1.2 * value, unit }]
+        vec![ParameterEstimate { name: "rms".to_owned(), value, low: 0.8 * value, high: 1.2 * value, unit }]
     }
 
     /// Share of a contribution's square that the baseline can imitate.
@@ -259,7 +259,7 @@ impl Told<'_, '_> {
 /// A candidate with these values of its linear parameters, within what is possible.
 fn with_values(
     effect: &'static dyn Effect,
-    form: &crate::physics::Form,
+    form: &crate::physics::EffectForm,
     names: &[&'static str],
     values: &[f64],
 ) -> Part {

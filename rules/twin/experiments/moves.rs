@@ -56,14 +56,14 @@ pub fn same(a: &str, b: &str) -> bool {
     a == b || GROUPS.iter().any(|group| group.contains(&a) && group.contains(&b))
 }
 
-type Told = (&'static str, &'static str);
+type MoveText = (&'static str, &'static str);
 
-const OVERNIGHT: Told = ("measure displacement and shop temperature overnight", "整夜测量位移和环境温度");
-const NEW_INSERT: Told = ("change the insert, then repeat the same cut", "更换刀片，重复相同切削");
-const OLD_LOT: Told = ("clamp a piece of the old lot, same insert", "装夹旧批次材料，使用同一刀片");
-const REVERSED: Told = ("cut this pass in the opposite direction", "反向走刀");
-const ORDINARY: Told = ("carry out what the report asks for, then run this", "先完成报告中要求的操作，再运行此段");
-const DRIVE_OFF: Told = ("switch the drive off and let the spindle coast down", "断开驱动，让主轴自由停车");
+const OVERNIGHT: MoveText = ("measure displacement and shop temperature overnight", "整夜测量位移和环境温度");
+const NEW_INSERT: MoveText = ("change the insert, then repeat the same cut", "更换刀片，重复相同切削");
+const OLD_LOT: MoveText = ("clamp a piece of the old lot, same insert", "装夹旧批次材料，使用同一刀片");
+const REVERSED: MoveText = ("cut this pass in the opposite direction", "反向走刀");
+const ORDINARY: MoveText = ("carry out what the report asks for, then run this", "先完成报告中要求的操作，再运行此段");
+const DRIVE_OFF: MoveText = ("switch the drive off and let the spindle coast down", "断开驱动，让主轴自由停车");
 
 fn plain(operation: &'static str, seconds: f64, commands: &[(&str, f64)]) -> Move {
     let commands = commands.iter().map(|(name, value)| ((*name).to_owned(), rounded(*value))).collect();
@@ -110,7 +110,7 @@ fn with(mut a: Move, channel: &str, value: f64) -> Move {
     a
 }
 
-fn told(mut a: Move, instruction: Told) -> Move {
+fn told(mut a: Move, instruction: MoveText) -> Move {
     a.instruction = instruction;
     a
 }

@@ -14,7 +14,7 @@ const TRIMMED: usize = 3;
 
 /// One second of settled work.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Second {
+pub struct SettledSecond {
     /// When, s.
     pub at_s: f64,
     /// Simulated output.
@@ -26,12 +26,12 @@ pub struct Second {
 /// Seconds that do not make a block yet, by regime and work.
 #[derive(Debug, Clone, Default)]
 pub struct Gathering {
-    open: BTreeMap<(Regime, usize), Vec<Second>>,
+    open: BTreeMap<(Regime, usize), Vec<SettledSecond>>,
 }
 
 impl Gathering {
     /// Takes a second; gives the block that it completes.
-    pub fn add(&mut self, regime: Regime, work: usize, second: Second) -> Option<WorkBlock> {
+    pub fn add(&mut self, regime: Regime, work: usize, second: SettledSecond) -> Option<WorkBlock> {
         let open = self.open.entry((regime, work)).or_default();
         open.retain(|kept| second.at_s - kept.at_s <= OLDEST_S);
         open.push(second);

@@ -53,7 +53,7 @@ impl Healthy {
 
 /// A change of level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Onset {
+pub struct LevelChange {
     /// Most likely time, s.
     pub at_s: f64,
     /// Begin of its 95 % interval, s.
@@ -83,7 +83,7 @@ pub struct Point {
 
 /// A possible onset, and the evidence for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Candidate {
+struct CandidateOnset {
     /// The block before began here; the change may lie within it.
     low_s: f64,
     /// The first block after the change.
@@ -108,7 +108,7 @@ struct Candidate {
 #[derive(Debug, Clone)]
 pub struct Chart {
     healthy: Healthy,
-    candidates: VecDeque<Candidate>,
+    candidates: VecDeque<CandidateOnset>,
     /// The block that waits for its successor.
     waiting: Option<Point>,
     before: f64,
@@ -139,7 +139,7 @@ impl Chart {
     }
 
     /// Takes a block; gives the change that it completes. A block is judged when its successor is there.
-    pub fn step(&mut self, point: Point) -> Option<Onset> {
+    pub fn step(&mut self, point: Point) -> Option<LevelChange> {
         let waiting = self.waiting.replace(point)?;
         let deviation = self.without_disturbance(waiting.deviation, point.deviation);
         self.before = deviation;
@@ -166,7 +166,7 @@ impl Chart {
             candidate.signature = 1.0 - noise.phi - noise.theta * candidate.signature;
             candidate.add(innovation, &point);
         }
-        let mut fresh = Candidate {
+        let mut fresh = CandidateOnset {
             low_s: self.last_from_s.unwrap_or(point.from_s),
             from_s: point.from_s,
             to_s: point.to_s,
@@ -187,19 +187,19 @@ impl Chart {
     }
 
     /// Logarithm of the likelihood ratio that the level has changed by more than the band at this onset.
-    fn evidence(&self, candidate: &Candidate) -> f64 {
+    fn evidence(&self, candidate: &CandidateOnset) -> f64 {
         let size = candidate.sum / candidate.weight * self.healthy.sd;
         (size.abs() - self.healthy.band).max(0.0).powi(2) / (2.0 * self.variance(candidate))
     }
 
     /// Variance of the size of a change: that of the noise, and that of the learned mean as far as it enters.
-    fn variance(&self, candidate: &Candidate) -> f64 {
+    fn variance(&self, candidate: &CandidateOnset) -> f64 {
         let Healthy { phi, theta, sd, mean_variance, .. } = self.healthy;
         let share = (1.0 - phi) / (1.0 + theta) * candidate.length / candidate.weight;
         sd * sd / candidate.weight + mean_variance * share * share
     }
 
-    fn change(&self) -> Option<Onset> {
+    fn change(&self) -> Option<LevelChange> {
         let long_enough = self.candidates.len().saturating_sub(BLOCKS_MIN - 1);
         let judged = || self.candidates.iter().take(long_enough);
         let evidence = judged().map(|candidate| self.evidence(candidate)).fold(0.0, f64::max);
@@ -210,7 +210,7 @@ impl Chart {
         }
         let least = found.likelihood() - INTERVAL;
         let within = || judged().filter(|candidate| candidate.likelihood() > least);
-        Some(Onset {
+        Some(LevelChange {
             at_s: found.from_s,
             low_s: within().map(|candidate| candidate.low_s).fold(f64::INFINITY, f64::min),
             high_s: within().map(|candidate| candidate.to_s).fold(f64::NEG_INFINITY, f64::max),
@@ -237,7 +237,7 @@ impl Chart {
     }
 }
 
-impl Candidate {
+impl CandidateOnset {
     /// Logarithm of the likelihood of a change here over that of none.
     fn likelihood(&self) -> f64 {
         self.sum * self.sum / (2.0 * self.weight)

@@ -60,14 +60,14 @@ impl fmt::Display for NoTwin {
 
 /// The comparison of one second, in the unit of the output.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Compared {
+pub struct ComparedSecond {
     /// What the model expects.
     pub expected: Result<f64, NoTwin>,
     /// Recorded minus expected.
     pub residual: Result<f64, NoTwin>,
 }
 
-impl Compared {
+impl ComparedSecond {
     /// Neither, for this reason.
     #[must_use]
     pub fn none(reason: NoTwin) -> Self {
@@ -107,21 +107,21 @@ impl Simulation {
     }
 
     /// Takes a second and compares it.
-    pub fn step(&mut self, row: Row) -> Compared {
+    pub fn step(&mut self, row: Row) -> ComparedSecond {
         let (off, no_output) = (row.off || row.no_output == Some(Absence::MachineOff), row.no_output);
         let recorded = row.number(&self.model.output);
         self.window.push(row);
         if off {
-            return Compared::none(NoTwin::MachineOff);
+            return ComparedSecond::none(NoTwin::MachineOff);
         }
         if self.memory == LookBack::Shift && self.window.span_s() < WARM_S {
-            return Compared::none(NoTwin::WarmingUp);
+            return ComparedSecond::none(NoTwin::WarmingUp);
         }
         let Some(expected) = self.expected() else {
-            return Compared::none(NoTwin::InputMissing);
+            return ComparedSecond::none(NoTwin::InputMissing);
         };
         let recorded = recorded.filter(|_| no_output.is_none()).ok_or(NoTwin::OutputMissing);
-        Compared { expected: Ok(expected), residual: recorded.map(|recorded| recorded - expected) }
+        ComparedSecond { expected: Ok(expected), residual: recorded.map(|recorded| recorded - expected) }
     }
 
     fn expected(&mut self) -> Option<f64> {

@@ -1,6 +1,6 @@
 //! How often a healthy machine is called different, and how soon a changed one is: counted over simulated weeks.
 
-use super::block::Second;
+use super::block::SettledSecond;
 use super::regime::Regime;
 use super::watch::{Mismatch, Notice, Watch};
 use rand::{Rng, SeedableRng};
@@ -28,14 +28,14 @@ enum Kind {
 const ALL: [Kind; 7] =
     [Kind::White, Kind::Slow, Kind::SlowAndWhite, Kind::HeavyAndPulses, Kind::Coarse, Kind::Lots, Kind::Wander];
 
-struct Noise {
+struct SimulatedNoise {
     kind: Kind,
     rng: Pcg64Mcg,
     slow: f64,
     left_s: u32,
 }
 
-impl Noise {
+impl SimulatedNoise {
     fn next(&mut self) -> f64 {
         let normal = |rng: &mut Pcg64Mcg| -> f64 { StandardNormal.sample(rng) };
         let white = normal(&mut self.rng);
@@ -70,14 +70,14 @@ impl Noise {
 
 /// A machine that idles, cuts with two tools and stands, minute after minute.
 struct Machine {
-    noise: Noise,
+    noise: SimulatedNoise,
     at_s: f64,
     watch: Watch,
 }
 
 impl Machine {
     fn new(kind: Kind, seed: u64) -> Self {
-        let noise = Noise { kind, rng: Pcg64Mcg::seed_from_u64(seed), slow: 0.0, left_s: 0 };
+        let noise = SimulatedNoise { kind, rng: Pcg64Mcg::seed_from_u64(seed), slow: 0.0, left_s: 0 };
         Self { noise, at_s: 0.0, watch: Watch::default() }
     }
 
@@ -96,7 +96,7 @@ impl Machine {
             let change = if regime == Regime::Cutting { shift } else { 0.0 };
             // Noise of a tenth of the output, so that the least band is a fifth of a deviation.
             let residual = 10.0 * (self.noise.next() + change);
-            let second = Second { at_s: self.at_s, expected: 100.0, residual };
+            let second = SettledSecond { at_s: self.at_s, expected: 100.0, residual };
             let notice = self.watch.step(Some((regime, work.to_owned())), speed, second);
             noticed.extend(notice.map(|notice| (self.at_s, notice)));
         }

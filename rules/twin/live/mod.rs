@@ -15,16 +15,16 @@ pub mod second;
 pub mod watch;
 pub mod window;
 
-pub use chart::Onset;
-pub use expected::{Compared, NoTwin};
+pub use chart::LevelChange;
+pub use expected::{ComparedSecond, NoTwin};
 pub use regime::Regime;
-pub use watch::{Mismatch, Notice, Stage};
+pub use watch::{Mismatch, Notice, RegimeStage};
 
 use super::model::Model;
 use crate::estimators::State;
 use adapters::Sample;
 use adapters::clock::{SECOND_NS, TimeNs};
-use block::Second;
+use block::SettledSecond;
 use expected::Simulation;
 use second::{Row, Seconds};
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,7 @@ pub struct Live {
     seconds: Seconds,
     simulation: Simulation,
     watch: Watch,
-    compared: Compared,
+    compared: ComparedSecond,
     last_ns: Option<TimeNs>,
 }
 
@@ -64,7 +64,7 @@ impl Live {
             seconds: Seconds::new(&model.output),
             simulation: Simulation::new(model, memory.minutes),
             watch: Watch::new(memory.watch),
-            compared: Compared::none(NoTwin::NotYet),
+            compared: ComparedSecond::none(NoTwin::NotYet),
             last_ns: None,
         }
     }
@@ -85,8 +85,8 @@ impl Live {
         let at_s = seconds(row.at_ns);
         self.compared = self.simulation.step(row);
         match self.compared {
-            Compared { expected: Ok(expected), residual: Ok(residual) } => {
-                self.watch.step(what, speed, Second { at_s, expected, residual })
+            ComparedSecond { expected: Ok(expected), residual: Ok(residual) } => {
+                self.watch.step(what, speed, SettledSecond { at_s, expected, residual })
             }
             _ => {
                 self.watch.skip();
@@ -97,12 +97,12 @@ impl Live {
 
     /// The newest complete second.
     #[must_use]
-    pub fn compared(&self) -> Compared {
+    pub fn compared(&self) -> ComparedSecond {
         self.compared
     }
 
     /// Every regime that has been seen, with its stage.
-    pub fn stages(&self) -> impl Iterator<Item = (Regime, Stage)> {
+    pub fn stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
         self.watch.stages()
     }
 

@@ -1,7 +1,7 @@
 //! Notices when machine and simulation begin to differ: learns what is usual, then holds every block against it.
 
-use super::block::{Gathering, Second};
-use super::chart::{Chart, Onset};
+use super::block::{Gathering, SettledSecond};
+use super::chart::{Chart, LevelChange};
 use super::learn::{Learned, Usual, WORK_BLOCKS, WorkBlock, learn};
 use super::regime::{Regime, Settling};
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ pub struct Mismatch {
     /// Where.
     pub regime: Regime,
     /// Since when; `None`: ever since the comparison began.
-    pub onset: Option<Onset>,
+    pub onset: Option<LevelChange>,
     /// Mean difference in the unit of the output.
     pub mean: f64,
     /// Mean simulated output in this regime.
@@ -52,7 +52,7 @@ impl Mismatch {
 
 /// What a regime is at.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Stage {
+pub enum RegimeStage {
     /// Learning: blocks so far, and blocks that are needed.
     Learning(usize, usize),
     /// Watching: differences up to this size, in the unit of the output, are usual.
@@ -89,7 +89,7 @@ struct Watched {
 /// See the [module](self).
 #[derive(Debug, Clone)]
 pub struct Watch {
-    settling: Settling<Second>,
+    settling: Settling<SettledSecond>,
     gathering: Gathering,
     works: Vec<String>,
     compared_s: f64,
@@ -131,7 +131,7 @@ impl Watch {
     }
 
     /// Every regime that has been seen, with its stage.
-    pub fn stages(&self) -> impl Iterator<Item = (Regime, Stage)> {
+    pub fn stages(&self) -> impl Iterator<Item = (Regime, RegimeStage)> {
         self.regimes.iter().map(|(regime, watched)| (*regime, watched.stage()))
     }
 
@@ -141,7 +141,7 @@ impl Watch {
     }
 
     /// Takes a second with what the machine does and its speed.
-    pub fn step(&mut self, what: Option<(Regime, String)>, speed: f64, second: Second) -> Option<Notice> {
+    pub fn step(&mut self, what: Option<(Regime, String)>, speed: f64, second: SettledSecond) -> Option<Notice> {
         self.compared_s += 1.0;
         let (regime, work, second) = self.settling.add(what, speed, second)?;
         let work = self.number_of(work);
@@ -167,11 +167,11 @@ impl Watched {
         Self { blocks: memory.blocks, learned: memory.learned, chart, differing: memory.differing }
     }
 
-    fn stage(&self) -> Stage {
+    fn stage(&self) -> RegimeStage {
         match (&self.differing, &self.learned) {
-            (Some(mismatch), _) => Stage::Differing(*mismatch),
-            (None, Some(learned)) => Stage::Watching(learned.healthy.band),
-            (None, None) => Stage::Learning(self.blocks.len(), LEARN_BLOCKS),
+            (Some(mismatch), _) => RegimeStage::Differing(*mismatch),
+            (None, Some(learned)) => RegimeStage::Watching(learned.healthy.band),
+            (None, None) => RegimeStage::Learning(self.blocks.len(), LEARN_BLOCKS),
         }
     }
 
@@ -229,7 +229,7 @@ impl Watched {
         None
     }
 
-    fn begin(&mut self, regime: Regime, onset: Onset) -> Notice {
+    fn begin(&mut self, regime: Regime, onset: LevelChange) -> Notice {
         let mismatch = Mismatch { regime, onset: Some(onset), mean: onset.mean, expected: onset.expected };
         self.differing = Some(mismatch);
         Notice::Begins(mismatch)

@@ -4,7 +4,7 @@ use super::ToolWearArguments;
 use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::diagnosis::put;
 use clap::Args;
-use rules::estimators::wear::{Array, Design, FACTORS, Factor, Levels, plan};
+use rules::estimators::wear::{Array, ConditionFactor, ExperimentDesign, FACTORS, FactorLevels, plan};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ pub(super) struct DesignArguments {
     design: Option<Array>,
     /// Levels of one factor, as in --levels VB=0.065,0.195,0.325 --levels vc=90,120,150 --levels f=0.1,0.15,0.2.
     #[arg(long, value_name = "FACTOR=A,B,C", value_parser = levels, requires = "design")]
-    levels: Vec<Levels>,
+    levels: Vec<FactorLevels>,
     /// Diameter of the work: adds the spindle speed of each cut.
     #[arg(long, value_name = "MM", requires = "design")]
     diameter_mm: Option<f64>,
@@ -31,15 +31,15 @@ fn array(text: &str) -> Result<Array, String> {
     Array::of(text).ok_or_else(|| format!("the arrays are {}", names()))
 }
 
-fn levels(text: &str) -> Result<Levels, String> {
+fn levels(text: &str) -> Result<FactorLevels, String> {
     let (name, values) = text.split_once('=').ok_or("write FACTOR=A,B,C, for example vc=90,120,150")?;
-    let factor = Factor::of(name.trim()).ok_or_else(|| {
+    let factor = ConditionFactor::of(name.trim()).ok_or_else(|| {
         let known = FACTORS.map(|factor| format!("{} ({}, {})", factor.symbol, factor.name, factor.en));
         format!("the factors are {}", known.join(", "))
     })?;
     let values: Result<Vec<f64>, _> = values.split(',').map(|value| value.trim().parse::<f64>()).collect();
     let values = values.map_err(|_| format!("{name}: write numbers with a point, separated by commas"))?;
-    Ok(Levels { factor, values })
+    Ok(FactorLevels { factor, values })
 }
 
 impl DesignArguments {
@@ -48,7 +48,7 @@ impl DesignArguments {
         self.design.is_some()
     }
 
-    fn speed_rpm(&self, design: &Design, values: &[f64]) -> Option<f64> {
+    fn speed_rpm(&self, design: &ExperimentDesign, values: &[f64]) -> Option<f64> {
         let diameter_mm = self.diameter_mm.filter(|diameter_mm| *diameter_mm > 0.0 && diameter_mm.is_finite())?;
         let at = design.factors.iter().position(|it| it.factor.symbol == "vc")?;
         Some(1000.0 * values[at] / (PI * diameter_mm))
@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
 }
 
 /// A table that comes back filled in: the columns that `identify tool-wear` reads, with the power still empty.
-fn csv(own: &DesignArguments, design: &Design) -> String {
+fn csv(own: &DesignArguments, design: &ExperimentDesign) -> String {
     let names: Vec<&str> = design.factors.iter().map(|it| it.factor.name).collect();
     let rpm = if own.diameter_mm.is_some() { ",spindle_programmed_rpm" } else { "" };
     let mut csv = format!("time_s,run,{}{rpm},cutting_power_w\n", names.join(","));
@@ -85,7 +85,7 @@ fn csv(own: &DesignArguments, design: &Design) -> String {
     csv
 }
 
-fn document(own: &DesignArguments, design: &Design) -> Value {
+fn document(own: &DesignArguments, design: &ExperimentDesign) -> Value {
     let cuts: Vec<Value> = design
         .cuts
         .iter()
@@ -110,7 +110,7 @@ fn document(own: &DesignArguments, design: &Design) -> Value {
             "cuts": cuts, "aliases": aliases, "warnings": design.warnings })
 }
 
-fn text(own: &DesignArguments, design: &Design) -> String {
+fn text(own: &DesignArguments, design: &ExperimentDesign) -> String {
     let columns: Vec<String> = design.columns.iter().map(ToString::to_string).collect();
     let mut text = format!("{}: {} cuts, columns {}\n\n", design.array, design.cuts.len(), columns.join(", "));
     let heads: Vec<String> =

@@ -4,7 +4,7 @@ use crate::cli::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
 use adapters::clock::{Clock, SystemClock};
 use clap::Args;
-use rules::estimators::wear::{Key, WearRecord};
+use rules::estimators::wear::{WearKey, WearRecord};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -40,9 +40,9 @@ fn cannot(error: &HistoryError) -> CannotRun {
 
 impl LibraryArguments {
     /// What the model is for.
-    pub(super) fn key(&self) -> Key {
+    pub(super) fn key(&self) -> WearKey {
         let Self { machine, tool, work_material, operation, .. } = self;
-        Key {
+        WearKey {
             machine: machine.clone(),
             tool: tool.clone(),
             work_material: work_material.clone(),
@@ -58,7 +58,7 @@ pub(super) fn store(arguments: &LibraryArguments, record: &WearRecord) -> Result
     Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), named(&record.key))))
 }
 
-fn named(key: &Key) -> String {
+fn named(key: &WearKey) -> String {
     let texts = [
         ("machine", &key.machine),
         ("tool", &key.tool),

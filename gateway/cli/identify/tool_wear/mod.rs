@@ -10,7 +10,7 @@ use adapters::Recording;
 use clap::{Args, ValueEnum};
 use rules::estimators::regression::{Refusal, RefusalKind};
 use rules::estimators::wear::{
-    Columns, FACTORS, Factor, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
+    ConditionFactor, CutColumns, FACTORS, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
 };
 use rules::operations::complete_recording;
 use serde_json::json;
@@ -86,7 +86,7 @@ enum OrderWord {
 
 fn pair(text: &str) -> Result<(String, String), String> {
     let (what, column) = text.split_once('=').ok_or("write WHAT=COLUMN, for example power=pc_w")?;
-    let known = what == "power" || Factor::of(what).is_some();
+    let known = what == "power" || ConditionFactor::of(what).is_some();
     if known {
         Ok((what.to_owned(), column.to_owned()))
     } else {
@@ -136,10 +136,10 @@ impl ToolWearArguments {
 }
 
 impl TableArguments {
-    fn columns(&self) -> Columns {
-        let mut columns = Columns { each_row: self.each_row, ..Columns::default() };
+    fn columns(&self) -> CutColumns {
+        let mut columns = CutColumns { each_row: self.each_row, ..CutColumns::default() };
         for (what, column) in &self.column {
-            match FACTORS.iter().position(|factor| Some(factor) == Factor::of(what)) {
+            match FACTORS.iter().position(|factor| Some(factor) == ConditionFactor::of(what)) {
                 Some(at) => columns.conditions[at].clone_from(column),
                 None => columns.power.clone_from(column),
             }
@@ -158,8 +158,11 @@ impl FitArguments {
             OrderWord::Interactions => Order::Interactions,
             OrderWord::Second => Order::Second,
         };
-        let held =
-            self.held.iter().map(|name| Factor::of(name).map_or(name.as_str(), |it| it.name).to_owned()).collect();
+        let held = self
+            .held
+            .iter()
+            .map(|name| ConditionFactor::of(name).map_or(name.as_str(), |it| it.name).to_owned())
+            .collect();
         let surface = SurfaceOptions { order, p_out: self.p_out, hierarchical: !self.no_hierarchy, held };
         WearOptions { surface, criterion_mm: self.criterion_mm, form: self.form.clone() }
     }

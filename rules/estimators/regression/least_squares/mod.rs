@@ -157,7 +157,7 @@ pub fn fit_weighted(
         .collect();
     let factored = factor(&design);
     let condition_number = condition(&factored, &names)?;
-    let work = Work { y: weigh(&y.values), design, names, factored, condition_number, intercept, roots };
+    let work = LeastSquaresWork { y: weigh(&y.values), design, names, factored, condition_number, intercept, roots };
     Ok(work.regression())
 }
 
@@ -223,7 +223,7 @@ fn condition(factored: &Factored, names: &[&str]) -> Result<f64, Refusal> {
     Err(Refusal::new(RefusalKind::Collinear, what, next))
 }
 
-struct Work<'a> {
+struct LeastSquaresWork<'a> {
     y: Vec<f64>,
     design: Vec<Vec<f64>>,
     names: Vec<&'a str>,
@@ -233,7 +233,7 @@ struct Work<'a> {
     roots: Vec<f64>,
 }
 
-impl Work<'_> {
+impl LeastSquaresWork<'_> {
     fn regression(self) -> Regression {
         let rows = self.y.len();
         let columns = self.design.len();

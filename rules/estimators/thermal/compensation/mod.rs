@@ -10,7 +10,7 @@
 //! the prediction is an extrapolation, nothing new is believed; bypass and a long absence lead back to zero at the slew
 //! limit. After a reference return the controller has forgotten every inserted pulse, and the value is sent anew.
 
-use super::predictor::Prediction;
+use super::predictor::ThermalPrediction;
 use serde::{Deserialize, Serialize};
 
 /// Limits of the compensation; every length in micrometres.
@@ -168,7 +168,7 @@ impl Compensator {
     }
 
     /// One step, `dt_s` after the one before.
-    pub fn step(&mut self, dt_s: f64, prediction: Option<&Prediction>, axis: AxisSituation) -> CompensationStep {
+    pub fn step(&mut self, dt_s: f64, prediction: Option<&ThermalPrediction>, axis: AxisSituation) -> CompensationStep {
         let dt_s = if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
         if axis.reference_return {
             // The controller takes the reference as it is: what was inserted before is gone.
@@ -187,7 +187,7 @@ impl Compensator {
     }
 
     /// Sets the target and tells whether the prediction is followed.
-    fn aim(&mut self, dt_s: f64, prediction: Option<&Prediction>, bypass: bool) -> Standing {
+    fn aim(&mut self, dt_s: f64, prediction: Option<&ThermalPrediction>, bypass: bool) -> Standing {
         if bypass {
             return self.go_home(Standing::Bypass);
         }

@@ -5,8 +5,8 @@ use crate::estimators::estimate::Estimate;
 use crate::estimators::thermal::predictor::Outside;
 use proptest::prelude::*;
 
-fn predicted(error_um: f64) -> Prediction {
-    Prediction { error_um: Estimate { value: error_um, sd: 1.0 }, law_sd_um: 0.1, outside: None }
+fn predicted(error_um: f64) -> ThermalPrediction {
+    ThermalPrediction { error_um: Estimate { value: error_um, sd: 1.0 }, law_sd_um: 0.1, outside: None }
 }
 
 fn settings() -> CompensationSettings {
@@ -57,7 +57,7 @@ fn without_a_prediction_the_value_stands_then_goes_home() {
     settle(&mut compensator, 20.0);
     let step = compensator.step(0.1, None, RUNNING);
     assert_eq!((step.increment_pulses, step.value_um, step.standing), (0, -20.0, Standing::NoPrediction));
-    let beyond = Prediction { outside: Some(Outside::Combination), ..predicted(90.0) };
+    let beyond = ThermalPrediction { outside: Some(Outside::Combination), ..predicted(90.0) };
     assert_eq!(compensator.step(0.1, Some(&beyond), RUNNING).standing, Standing::Extrapolated);
     assert_eq!(compensator.step(0.1, Some(&predicted(f64::NAN)), RUNNING).value_um, -20.0);
     let gone = compensator.step(700.0, None, RUNNING);

@@ -12,14 +12,14 @@ use super::course::Course;
 use super::cross_validation::{HeldOut, outside, squares, trained};
 use super::law::{Path, first_order};
 use super::quantities::THERMAL_ERROR;
-use super::regression::{Design, ROWS_MAX, Tau, ThermalFit, column, finish};
+use super::regression::{ROWS_MAX, RegressionDesign, Tau, ThermalFit, column, finish};
 use crate::estimators::regression::{Column, Intercept, Refusal, RefusalKind, fit};
 use crate::statistics::rms;
 use std::ops::Range;
 
 /// Which terms are late.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum LagForm {
     /// Every sensor.
     All,
     /// The first one as it is and late, the others as they are.
@@ -39,10 +39,10 @@ const ROUNDS: usize = 4;
 ///
 /// # Errors
 /// A [`Refusal`]: pauses that are not known, runs too short for any time constant, and all that stops a regression.
-pub(super) fn fit_lagged(course: &Course, sensors: &[usize], form: Form) -> Result<ThermalFit, Refusal> {
+pub(super) fn fit_lagged(course: &Course, sensors: &[usize], form: LagForm) -> Result<ThermalFit, Refusal> {
     course.check(sensors)?;
     known_pauses(course)?;
-    let law = Late { course, sensors, form };
+    let law = LaggedCourse { course, sensors, form };
     let mut tau_s = law.search()?;
     let mut fit = law.fit(tau_s)?;
     for _ in 0..ROUNDS {
@@ -83,17 +83,17 @@ pub(super) fn late(course: &Course, values: &[f64], tau_s: f64) -> Vec<f64> {
 /// A few time constants over the range that is tried.
 pub(super) fn some_taus(course: &Course) -> Result<Vec<f64>, Refusal> {
     known_pauses(course)?;
-    let all = Late { course, sensors: &[], form: Form::All }.taus()?;
+    let all = LaggedCourse { course, sensors: &[], form: LagForm::All }.taus()?;
     Ok(all.into_iter().skip(1).step_by(2).collect())
 }
 
-struct Late<'a> {
+struct LaggedCourse<'a> {
     course: &'a Course,
     sensors: &'a [usize],
-    form: Form,
+    form: LagForm,
 }
 
-impl Late<'_> {
+impl LaggedCourse<'_> {
     fn bounds(&self) -> (f64, f64) {
         (2.0 * self.course.period_s(), 0.5 * self.course.longest_s())
     }
@@ -109,7 +109,7 @@ impl Late<'_> {
         Ok((0..TAUS).map(|step| least * ratio.powi(i32::try_from(step).unwrap_or(0))).collect())
     }
 
-    /// Columns of the terms, in the order of [`Late::terms`].
+    /// Columns of the terms, in the order of [`LaggedCourse::terms`].
     fn columns(&self, tau_s: f64) -> Vec<Column> {
         let sensor = |at: &usize| &self.course.sensors()[*at];
         let direct = |at: &usize| column(sensor(at));
@@ -118,17 +118,17 @@ impl Late<'_> {
             Column::new(name, late(self.course, &sensor(at).values, tau_s))
         };
         match self.form {
-            Form::All => self.sensors.iter().map(state).collect(),
-            Form::FirstTwice => self.sensors.iter().map(direct).chain(self.sensors.first().map(state)).collect(),
+            LagForm::All => self.sensors.iter().map(state).collect(),
+            LagForm::FirstTwice => self.sensors.iter().map(direct).chain(self.sensors.first().map(state)).collect(),
         }
     }
 
     /// Sensor and path of every term.
     fn terms(&self) -> (Vec<usize>, Vec<Path>) {
         let mut sensors = self.sensors.to_vec();
-        let path = if self.form == Form::All { Path::Lagged } else { Path::Direct };
+        let path = if self.form == LagForm::All { Path::Lagged } else { Path::Direct };
         let mut paths = vec![path; sensors.len()];
-        if let (Form::FirstTwice, Some(first)) = (self.form, self.sensors.first()) {
+        if let (LagForm::FirstTwice, Some(first)) = (self.form, self.sensors.first()) {
             sensors.push(*first);
             paths.push(Path::Lagged);
         }
@@ -177,7 +177,14 @@ impl Late<'_> {
         let (sensors, paths) = self.terms();
         let tau = Tau { tau_s, spread_k: self.spread_k(tau_s), by_log_tau };
         let nuisance = vec![self.beginning(tau_s)];
-        finish(&Design { course: self.course, sensors: &sensors, paths: &paths, columns, nuisance, tau: Some(tau) })
+        finish(&RegressionDesign {
+            course: self.course,
+            sensors: &sensors,
+            paths: &paths,
+            columns,
+            nuisance,
+            tau: Some(tau),
+        })
     }
 
     /// Root mean square of what temperatures and states differ by.
@@ -209,10 +216,10 @@ fn narrow(least: f64, greatest: f64, of: impl Fn(f64) -> Result<f64, Refusal>) -
 pub(super) fn held_out_lagged(
     course: &Course,
     sensors: &[usize],
-    form: Form,
+    form: LagForm,
     rows_max: usize,
 ) -> Result<HeldOut, Refusal> {
-    let law = Late { course, sensors, form };
+    let law = LaggedCourse { course, sensors, form };
     let taus = law.taus()?;
     let mut error_um = Vec::new();
     let mut blocks = Vec::new();

@@ -23,7 +23,7 @@ fn check(seeds: u64) {
     let truth = [LAW.0, LAW.1[0].1, LAW.1[1].1, TAU_S];
     let (mut each, mut together) = ([0; 4], 0);
     for seed in 0..seeds {
-        let fitted = fit_lagged(&course(100 + seed, TAU_S), &[1, 5], Form::All).expect("a law");
+        let fitted = fit_lagged(&course(100 + seed, TAU_S), &[1, 5], LagForm::All).expect("a law");
         let holds = |(least, greatest): (f64, f64), truth: f64| least <= truth && truth <= greatest;
         for (at, truth) in truth.iter().enumerate() {
             each[at] += usize::from(holds(fitted.coefficients[at].own.interval, *truth));

@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::cross_validation::{HeldOut, held_out};
-use super::lagged::{Form, fit_lagged, held_out_lagged, late, some_taus};
+use super::lagged::{LagForm, fit_lagged, held_out_lagged, late, some_taus};
 use super::regression::{ThermalFit, column, fit_static};
 use super::selection::{Selection, SelectionSettings, select, select_late};
 use crate::estimators::regression::{Column, Refusal, RefusalKind};
@@ -19,7 +19,7 @@ const LIKELIHOOD_MIN: f64 = 8.13;
 
 /// A fitted law and how it predicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Candidate {
+pub struct CandidateLaw {
     /// Coefficients, memory, residuals.
     pub fit: ThermalFit,
     /// Error of blocks left out.
@@ -35,10 +35,10 @@ pub struct ThermalLearned {
     /// The sensors of the law to use, and why.
     pub selection: Selection,
     /// The law without lag.
-    pub without_lag: Candidate,
+    pub without_lag: CandidateLaw,
     /// The best law with lag, or why there is none.
     #[serde(serialize_with = "or_refused")]
-    pub with_lag: Result<Candidate, Refusal>,
+    pub with_lag: Result<CandidateLaw, Refusal>,
     /// Is the law with lag the one to use?
     pub lag_chosen: bool,
     /// Why.
@@ -52,7 +52,7 @@ pub struct ThermalLearned {
 }
 
 /// The candidate, or `{"refused": ...}`.
-fn or_refused<S: Serializer>(late: &Result<Candidate, Refusal>, to: S) -> Result<S::Ok, S::Error> {
+fn or_refused<S: Serializer>(late: &Result<CandidateLaw, Refusal>, to: S) -> Result<S::Ok, S::Error> {
     match late {
         Ok(candidate) => candidate.serialize(to),
         Err(refusal) => {
@@ -66,7 +66,7 @@ fn or_refused<S: Serializer>(late: &Result<Candidate, Refusal>, to: S) -> Result
 impl ThermalLearned {
     /// The law to use.
     #[must_use]
-    pub fn best(&self) -> &Candidate {
+    pub fn best(&self) -> &CandidateLaw {
         match &self.with_lag {
             Ok(late) if self.lag_chosen => late,
             _ => &self.without_lag,
@@ -111,10 +111,10 @@ pub fn learn(
 fn late_with_own_sensors(
     course: &Course,
     settings: SelectionSettings,
-    other: &Result<Candidate, Refusal>,
-) -> Option<(Selection, Candidate)> {
+    other: &Result<CandidateLaw, Refusal>,
+) -> Option<(Selection, CandidateLaw)> {
     let selection = select_late(course, settings, &some_taus(course).ok()?).ok()?;
-    let candidate = late_candidate(course, &selection.chosen, Form::All).ok()?;
+    let candidate = late_candidate(course, &selection.chosen, LagForm::All).ok()?;
     let better = other.as_ref().map_or(true, |other| candidate.held_out.beats(&other.held_out, GAIN_MIN));
     better.then_some((selection, candidate))
 }
@@ -134,12 +134,12 @@ fn given(course: &Course, settings: SelectionSettings, chosen: &[usize]) -> Resu
     super::selection::describe(course, everything, chosen.to_vec())
 }
 
-fn candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<Candidate, Refusal> {
+fn candidate(course: &Course, sensors: &[usize], fit: ThermalFit) -> Result<CandidateLaw, Refusal> {
     let columns: Vec<Column> = sensors.iter().map(|at| column(&course.sensors()[*at])).collect();
     let (short, columns) = course.condensed(&columns, ROWS_MAX);
     let held_out = held_out(&columns, short.error_um(), &short.blocks())?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(Candidate { fit: expecting(fit, &held_out), held_out, hysteresis_um })
+    Ok(CandidateLaw { fit: expecting(fit, &held_out), held_out, hysteresis_um })
 }
 
 /// What a law leaves of rows that it was not fitted to is what is to be expected of it later.
@@ -149,8 +149,8 @@ fn expecting(mut fit: ThermalFit, held_out: &HeldOut) -> ThermalFit {
 }
 
 /// A law whose every interval holds zero explains nothing.
-fn says_something(candidate: &Candidate) -> Result<(), Refusal> {
-    let away = |it: &super::law::Term| it.interval.0 * it.interval.1 > 0.0;
+fn says_something(candidate: &CandidateLaw) -> Result<(), Refusal> {
+    let away = |it: &super::law::ThermalTerm| it.interval.0 * it.interval.1 > 0.0;
     if candidate.fit.law.terms.iter().any(away) {
         return Ok(());
     }
@@ -162,21 +162,21 @@ fn says_something(candidate: &Candidate) -> Result<(), Refusal> {
 
 /// The late law that predicts best. The second form is not the first with a term more, and must be clearly better both in
 /// blocks left out and in likelihood.
-fn best_late(course: &Course, sensors: &[usize]) -> Result<Candidate, Refusal> {
-    let all = late_candidate(course, sensors, Form::All)?;
-    let Ok(twice) = late_candidate(course, sensors, Form::FirstTwice) else { return Ok(all) };
+fn best_late(course: &Course, sensors: &[usize]) -> Result<CandidateLaw, Refusal> {
+    let all = late_candidate(course, sensors, LagForm::All)?;
+    let Ok(twice) = late_candidate(course, sensors, LagForm::FirstTwice) else { return Ok(all) };
     let likelier = twice.fit.likelihood > all.fit.likelihood + LIKELIHOOD_MIN;
     Ok(if likelier && twice.held_out.beats(&all.held_out, GAIN_MIN) { twice } else { all })
 }
 
-fn late_candidate(course: &Course, sensors: &[usize], form: Form) -> Result<Candidate, Refusal> {
+fn late_candidate(course: &Course, sensors: &[usize], form: LagForm) -> Result<CandidateLaw, Refusal> {
     let held_out = held_out_lagged(course, sensors, form, ROWS_MAX)?;
     let fit = fit_lagged(course, sensors, form)?;
     let hysteresis_um = hysteresis_um(course, sensors, &fit.residuals_um);
-    Ok(Candidate { fit: expecting(fit, &held_out), held_out, hysteresis_um })
+    Ok(CandidateLaw { fit: expecting(fit, &held_out), held_out, hysteresis_um })
 }
 
-fn decide(plain: &Candidate, late: &Result<Candidate, Refusal>) -> (bool, String) {
+fn decide(plain: &CandidateLaw, late: &Result<CandidateLaw, Refusal>) -> (bool, String) {
     let late = match late {
         Ok(late) => late,
         Err(refusal) => return (false, format!("without lag, because a lag cannot be learned: {refusal}")),

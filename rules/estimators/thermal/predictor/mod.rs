@@ -77,7 +77,7 @@ pub enum Outside {
 
 /// A predicted thermal error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prediction {
+pub struct ThermalPrediction {
     /// The error, um, with the standard deviation of a single measurement around it.
     pub error_um: Estimate,
     /// Standard deviation of the law itself at this point, from the intervals of its coefficients, um.
@@ -86,7 +86,7 @@ pub struct Prediction {
     pub outside: Option<Outside>,
 }
 
-impl Prediction {
+impl ThermalPrediction {
     /// Do all temperatures lie within the range of identification?
     #[must_use]
     pub fn is_inside_range(&self) -> bool {
@@ -95,23 +95,23 @@ impl Prediction {
 
     /// Measured and residual beside this prediction.
     #[must_use]
-    pub fn beside(&self, measured_um: Result<f64, Absence>) -> Comparison {
+    pub fn beside(&self, measured_um: Result<f64, Absence>) -> PredictedAndMeasured {
         let measured_um =
             measured_um.and_then(|value| if value.is_finite() { Ok(value) } else { Err(Absence::OutOfRange) });
         let residual_um =
             measured_um.map(|measured| Estimate { value: measured - self.error_um.value, sd: self.error_um.sd });
         let contradicts = residual_um.is_ok_and(|it| it.value.abs() > CONTRADICTION_SD * it.sd);
-        Comparison { measured_um, predicted: *self, residual_um, contradicts }
+        PredictedAndMeasured { measured_um, predicted: *self, residual_um, contradicts }
     }
 }
 
 /// Measured, predicted and residual, side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Comparison {
+pub struct PredictedAndMeasured {
     /// The measured error, um, or why there is none.
     pub measured_um: Result<f64, Absence>,
     /// The prediction.
-    pub predicted: Prediction,
+    pub predicted: ThermalPrediction,
     /// Measured less predicted, um, with the deviation that is expected of it.
     pub residual_um: Result<Estimate, Absence>,
     /// The residual is greater than three of its deviations.
@@ -181,7 +181,11 @@ impl Predictor {
     ///
     /// # Errors
     /// [`NoPrediction`] where a sensor of the law gives no value; sensors that the law does not use may be missing.
-    pub fn predict(&mut self, at_ns: i64, temperatures_c: &[Result<f64, Absence>]) -> Result<Prediction, NoPrediction> {
+    pub fn predict(
+        &mut self,
+        at_ns: i64,
+        temperatures_c: &[Result<f64, Absence>],
+    ) -> Result<ThermalPrediction, NoPrediction> {
         if temperatures_c.len() < self.sensors {
             return Err(NoPrediction::TooFew);
         }
@@ -214,7 +218,7 @@ impl Predictor {
         self.last_ns = Some(self.last_ns.map_or(at_ns, |last_ns| last_ns.max(at_ns)));
     }
 
-    fn at(&self, point: &[f64], outside: Option<Outside>) -> Prediction {
+    fn at(&self, point: &[f64], outside: Option<Outside>) -> ThermalPrediction {
         let law_sd_um = self.law.law_sd_um(point);
         let lagged = self.law.terms.iter().filter(|term| term.path == Path::Lagged);
         let slope: f64 = lagged.map(|term| term.um_per_k.abs()).sum();
@@ -223,7 +227,7 @@ impl Predictor {
         let beyond = (law_sd_um / self.law.law_sd_max_um.max(f64::MIN_POSITIVE)).max(1.0);
         let sd = (beyond * self.law.residual_sd_um).hypot(start_sd_um);
         let together = beyond > LAW_SD_FACTOR;
-        Prediction {
+        ThermalPrediction {
             error_um: Estimate { value: self.law.error_um(point), sd },
             law_sd_um,
             outside: outside.or(together.then_some(Outside::Combination)),

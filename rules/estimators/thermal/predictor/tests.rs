@@ -1,12 +1,12 @@
 //! The law at work on thirteen points.
 
 use super::*;
-use crate::estimators::thermal::law::Term;
+use crate::estimators::thermal::law::ThermalTerm;
 
 const SECOND_NS: i64 = 1_000_000_000;
 
 fn law(points: usize, path: Path) -> ThermalLaw {
-    let term = |at: usize| Term {
+    let term = |at: usize| ThermalTerm {
         sensor: format!("temperature_{}_c", at + 1),
         path,
         um_per_k: 1.0 + at as f64,

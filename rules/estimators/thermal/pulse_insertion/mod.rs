@@ -17,7 +17,7 @@ const WAITING_MAX: i64 = 64;
 
 /// One edge that leaves the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Edge {
+pub struct SignalEdge {
     /// When, in nanoseconds.
     pub at_ns: u64,
     /// The levels from then on.
@@ -94,7 +94,12 @@ impl PulseInserter {
     ///
     /// # Errors
     /// [`InsertionFault`]; nothing more leaves after one until a new device takes its place.
-    pub fn advance(&mut self, at_ns: u64, lines: Lines, mut emit: impl FnMut(Edge)) -> Result<(), InsertionFault> {
+    pub fn advance(
+        &mut self,
+        at_ns: u64,
+        lines: Lines,
+        mut emit: impl FnMut(SignalEdge),
+    ) -> Result<(), InsertionFault> {
         if at_ns < self.now_ns {
             return Err(InsertionFault::TimeWentBack { before_ns: self.now_ns, at_ns });
         }
@@ -110,7 +115,7 @@ impl PulseInserter {
         Ok(())
     }
 
-    fn emit_before(&mut self, end_ns: u64, emit: &mut impl FnMut(Edge)) {
+    fn emit_before(&mut self, end_ns: u64, emit: &mut impl FnMut(SignalEdge)) {
         loop {
             let free_ns = self.last_edge_ns.map_or(0, |last| last.saturating_add(self.spacing_ns));
             let at_ns = self.now_ns.max(free_ns);
@@ -125,7 +130,7 @@ impl PulseInserter {
             self.out_edges += step;
             self.now_ns = at_ns;
             self.last_edge_ns = Some(at_ns);
-            emit(Edge { at_ns, lines: Lines::at(self.out_edges) });
+            emit(SignalEdge { at_ns, lines: Lines::at(self.out_edges) });
         }
     }
 

@@ -19,7 +19,7 @@ struct Controller {
 }
 
 impl Controller {
-    fn see(&mut self, edge: Edge) {
+    fn see(&mut self, edge: SignalEdge) {
         match self.decoder.see(edge.lines, edge.at_ns) {
             Ok(0) => self.still += 1,
             Ok(_) => {}

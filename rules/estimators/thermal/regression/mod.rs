@@ -4,7 +4,7 @@
 //! by least squares). What the source leaves out: its residuals are taken as independent, which they never are.
 
 use super::course::{Course, Sensor};
-use super::law::{Path, Term, ThermalLaw};
+use super::law::{Path, ThermalLaw, ThermalTerm};
 use super::noise::{self, Averaged};
 use super::quantities::{self, THERMAL_ERROR};
 use crate::estimators::regression::{
@@ -21,7 +21,7 @@ const CONFIDENCE: f64 = 0.95;
 
 /// How the residuals remember.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Memory {
+pub struct Autocorrelation {
     /// Time after which the slow part has forgotten, s.
     pub memory_s: f64,
     /// Share of the variance that is white.
@@ -49,7 +49,7 @@ pub struct ThermalFit {
     /// Coefficients with intervals that respect the memory of the residuals.
     pub coefficients: Vec<ThermalCoefficient>,
     /// How the residuals remember.
-    pub memory: Memory,
+    pub memory: Autocorrelation,
     /// Root mean square of the residuals, um.
     pub residual_rms_um: f64,
     /// Share of the variance explained.
@@ -76,7 +76,7 @@ pub fn fit_static(course: &Course, sensors: &[usize]) -> Result<ThermalFit, Refu
     course.check(sensors)?;
     let columns: Vec<Column> = sensors.iter().map(|at| column(&course.sensors()[*at])).collect();
     let paths = vec![Path::Direct; sensors.len()];
-    finish(&Design { course, sensors, paths: &paths, columns, nuisance: Vec::new(), tau: None })
+    finish(&RegressionDesign { course, sensors, paths: &paths, columns, nuisance: Vec::new(), tau: None })
 }
 
 /// A temperature as a column.
@@ -85,7 +85,7 @@ pub(super) fn column(sensor: &Sensor) -> Column {
 }
 
 /// Everything that a law is fitted with; `columns` stand for the sensors, `nuisance` is fitted along and not kept.
-pub(super) struct Design<'a> {
+pub(super) struct RegressionDesign<'a> {
     pub(super) course: &'a Course,
     pub(super) sensors: &'a [usize],
     pub(super) paths: &'a [Path],
@@ -108,7 +108,7 @@ impl Tau {
     }
 }
 
-impl Design<'_> {
+impl RegressionDesign<'_> {
     /// The constant, the terms, then what is not kept.
     fn all(&self) -> Vec<Column> {
         let ones = Column::new("intercept", vec![1.0; self.course.rows()]);
@@ -126,7 +126,7 @@ impl Design<'_> {
 ///
 /// # Errors
 /// As the regression.
-pub(super) fn finish(design: &Design<'_>) -> Result<ThermalFit, Refusal> {
+pub(super) fn finish(design: &RegressionDesign<'_>) -> Result<ThermalFit, Refusal> {
     let target = Column::new(THERMAL_ERROR, design.course.error_um().to_vec());
     let others: Vec<Column> = design.columns.iter().chain(&design.nuisance).cloned().collect();
     let plain = fit(&target, &others, Intercept::Fitted)?;
@@ -145,7 +145,7 @@ pub(super) fn finish(design: &Design<'_>) -> Result<ThermalFit, Refusal> {
     Ok(ThermalFit {
         law,
         coefficients,
-        memory: Memory {
+        memory: Autocorrelation {
             memory_s: averaged.memory_s,
             white_share: averaged.white,
             effective_rows: averaged.effective_rows,
@@ -160,7 +160,7 @@ pub(super) fn finish(design: &Design<'_>) -> Result<ThermalFit, Refusal> {
     })
 }
 
-fn coefficients(design: &Design<'_>, plain: &Regression, averaged: &Averaged) -> Vec<ThermalCoefficient> {
+fn coefficients(design: &RegressionDesign<'_>, plain: &Regression, averaged: &Averaged) -> Vec<ThermalCoefficient> {
     let df = averaged.degrees_of_freedom;
     let count = 1 + design.terms() + usize::from(design.tau.is_some());
     let own = t_quantile(0.5 + 0.5 * CONFIDENCE, df);
@@ -197,15 +197,20 @@ fn coefficients(design: &Design<'_>, plain: &Regression, averaged: &Averaged) ->
     all
 }
 
-fn name(design: &Design<'_>, term: usize) -> String {
+fn name(design: &RegressionDesign<'_>, term: usize) -> String {
     let sensor = &design.course.sensors()[design.sensors[term]].name;
     if design.paths[term] == Path::Lagged { format!("late({sensor})") } else { sensor.clone() }
 }
 
-fn law(design: &Design<'_>, averaged: &Averaged, all: &[ThermalCoefficient], residuals: &[f64]) -> ThermalLaw {
+fn law(
+    design: &RegressionDesign<'_>,
+    averaged: &Averaged,
+    all: &[ThermalCoefficient],
+    residuals: &[f64],
+) -> ThermalLaw {
     let size = 1 + design.terms();
     let covariance: Vec<Vec<f64>> = averaged.covariance[..size].iter().map(|row| row[..size].to_vec()).collect();
-    let term = |at: usize| Term {
+    let term = |at: usize| ThermalTerm {
         sensor: design.course.sensors()[design.sensors[at]].name.clone(),
         path: design.paths[at],
         um_per_k: averaged.values[at + 1],

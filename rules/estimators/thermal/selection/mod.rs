@@ -85,7 +85,7 @@ const BEAM: usize = 8;
 /// A [`Refusal`]: unusable rows (see [`Course::usable`]), or no sensor predicts the error better than its mean.
 pub fn select(course: &Course, settings: SelectionSettings) -> Result<Selection, Refusal> {
     let candidates = course.usable()?;
-    let search = Search::new(course, settings, candidates);
+    let search = SensorSelection::new(course, settings, candidates);
     let chosen = search.choose()?;
     search.selection(course, chosen)
 }
@@ -97,9 +97,9 @@ pub fn select(course: &Course, settings: SelectionSettings) -> Result<Selection,
 pub(super) fn select_late(course: &Course, settings: SelectionSettings, taus_s: &[f64]) -> Result<Selection, Refusal> {
     let candidates = course.usable()?;
     let settings = SelectionSettings { sensors_max: settings.sensors_max.min(LATE_MAX), ..settings };
-    let mut best: Option<(f64, Search, Vec<usize>)> = None;
+    let mut best: Option<(f64, SensorSelection, Vec<usize>)> = None;
     for tau_s in taus_s {
-        let search = Search::late(course, settings, candidates.clone(), *tau_s);
+        let search = SensorSelection::late(course, settings, candidates.clone(), *tau_s);
         let Ok(chosen) = search.choose() else { continue };
         let error = search.score(&chosen).map_or(f64::MAX, |it| it.rms_um);
         if best.as_ref().is_none_or(|(least, ..)| error < *least) {
@@ -118,11 +118,11 @@ pub(super) fn select_late(course: &Course, settings: SelectionSettings, taus_s: 
 /// As the regression of blocks left out.
 pub(super) fn describe(course: &Course, settings: SelectionSettings, chosen: Vec<usize>) -> Result<Selection, Refusal> {
     let candidates = (0..course.sensors().len()).collect();
-    Search::new(course, settings, candidates).selection(course, chosen)
+    SensorSelection::new(course, settings, candidates).selection(course, chosen)
 }
 
 /// A selection in progress; columns of all sensors, condensed.
-pub(super) struct Search {
+pub(super) struct SensorSelection {
     pub(super) settings: SelectionSettings,
     pub(super) candidates: Vec<usize>,
     columns: Vec<Column>,
@@ -130,7 +130,7 @@ pub(super) struct Search {
     blocks: Vec<Range<usize>>,
 }
 
-impl Search {
+impl SensorSelection {
     fn new(course: &Course, settings: SelectionSettings, candidates: Vec<usize>) -> Self {
         let (short, _) = course.condensed(&[], ROWS_MAX);
         let columns = short.sensors().iter().map(column).collect();

@@ -1,6 +1,6 @@
 //! Why a sensor is in or out, in words.
 
-use super::{Graded, Search, with};
+use super::{Graded, SensorSelection, with};
 use crate::estimators::regression::Refusal;
 use crate::estimators::thermal::course::Course;
 use crate::estimators::thermal::grey::Grades;
@@ -28,11 +28,16 @@ pub struct SensorVerdict {
     pub held_out_rms_um: Option<f64>,
 }
 
-pub(super) fn verdicts(search: &Search, course: &Course, chosen: &[usize], graded: &Graded) -> Vec<SensorVerdict> {
+pub(super) fn verdicts(
+    search: &SensorSelection,
+    course: &Course,
+    chosen: &[usize],
+    graded: &Graded,
+) -> Vec<SensorVerdict> {
     (0..course.sensors().len()).map(|at| verdict(search, course, chosen, graded, at)).collect()
 }
 
-fn verdict(search: &Search, course: &Course, chosen: &[usize], graded: &Graded, at: usize) -> SensorVerdict {
+fn verdict(search: &SensorSelection, course: &Course, chosen: &[usize], graded: &Graded, at: usize) -> SensorVerdict {
     let sensor = &course.sensors()[at];
     let is_chosen = chosen.contains(&at);
     let list = if is_chosen { chosen.to_vec() } else { with(chosen, at) };
@@ -64,7 +69,7 @@ fn without_place(refusal: Refusal) -> String {
     Refusal { place: String::new(), ..refusal }.to_string()
 }
 
-fn inside(search: &Search, chosen: &[usize], at: usize) -> String {
+fn inside(search: &SensorSelection, chosen: &[usize], at: usize) -> String {
     let others: Vec<usize> = chosen.iter().copied().filter(|other| *other != at).collect();
     let error = |list: &[usize]| search.score(list).map_or(f64::NAN, |it| it.rms_um);
     let without = error(&others);
@@ -73,7 +78,7 @@ fn inside(search: &Search, chosen: &[usize], at: usize) -> String {
 }
 
 fn outside(
-    search: &Search,
+    search: &SensorSelection,
     course: &Course,
     chosen: &[usize],
     at: usize,

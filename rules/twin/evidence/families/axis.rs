@@ -2,8 +2,8 @@
 
 use super::drive::{is_drive, pace};
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const VELOCITY: &[&str] = &["axis_velocity_mm_min", "z_axis_velocity_mm_min", "velocity_m_s", "velocity"];
 
@@ -13,7 +13,7 @@ const GRAVITY: Family = Family::of("gravity_axis").through(VELOCITY).wide();
 const ASYMMETRY: Family = Family::of("direction_asymmetry").contained().rare(-0.7);
 
 /// The families of feed axes beside a spindle.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(velocity) = &inputs.velocity else { return };
     if is_drive(inputs) || inputs.kind == OutputKind::Displacement {
         return;

@@ -2,8 +2,8 @@
 
 use crate::physics::{CATALOGUE, Effect};
 use crate::twin::designs::law_columns;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 use crate::twin::model::Model;
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ const FORMS_MAX: usize = 24;
 const FORMS_BESIDE: usize = 8;
 
 /// Variants of every kind that has none yet, or whose own do not cover the catalogue's.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     for effect in CATALOGUE {
         let own = bank.variants.iter().find_map(|variant| variant.family().filter(|f| f.kind == effect.doc().kind));
         let (family, most) = match own {
@@ -41,7 +41,7 @@ fn sign(effect: &dyn Effect) -> f64 {
 }
 
 /// The user's own hypotheses.
-pub(super) fn hypotheses(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
+pub(super) fn hypotheses(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut VariantBank) {
     for part in &model.hypotheses {
         let Some(columns) = law_columns(part, inputs.scene) else { continue };
         let family = Family { kind: Cow::Owned(part.label().to_owned()), ..Family::of("") };

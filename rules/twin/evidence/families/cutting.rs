@@ -2,8 +2,8 @@
 
 use super::wear::edge_load;
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family, Since};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, Since, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const LOAD_LOSS: Family = Family::of("load_loss").through(&["load"]);
 const EDGE_FORCE: Family = Family::of("edge_force").signed(1.0).beside_catalogue();
@@ -37,7 +37,7 @@ const FEW_RUNS: usize = 16;
 const SHIFTS: [usize; 5] = [1, 2, 4, 8, 15];
 
 /// The families of everything in the cut.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     if inputs.kind == OutputKind::Displacement {
         return;
     }
@@ -60,7 +60,7 @@ pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
     }
 }
 
-fn over_speed(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn over_speed(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     let Some(speed) = &inputs.cutting_speed else { return };
     let ln = inputs.column(|row| inputs.cutting(row) * speed[row].max(1.0).ln());
     let middle = inputs.mean_of(&ln, true);
@@ -78,7 +78,7 @@ fn over_speed(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
 }
 
 /// Levels of the cut, or of the whole output, that begin with a run or within a long one.
-fn steps(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn steps(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     if let Some(lots) = inputs.scene.words("lot")
         && (2..=12).contains(&lots.words().len())
     {
@@ -125,7 +125,7 @@ fn legendre(u: f64) -> [f64; 3] {
     [2.0 * u - 1.0, 6.0 * u * u - 6.0 * u + 1.0, 20.0 * u.powi(3) - 30.0 * u * u + 12.0 * u - 1.0]
 }
 
-fn through_a_pass(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn through_a_pass(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     let order =
         |u: &dyn Fn(usize) -> f64, k: usize| inputs.column(|row| cut[row] * inputs.cutting(row) * legendre(u(row))[k]);
     let along = |row: usize| inputs.progress[row];
@@ -150,7 +150,7 @@ fn through_a_pass(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
     }
 }
 
-fn thin_chips(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn thin_chips(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     if let Some(depth) = &inputs.depth {
         for radius in [0.4, 0.8, 1.2] {
             let below = inputs.taken(true).filter(|row| depth[*row] < radius).count();
@@ -170,7 +170,7 @@ fn thin_chips(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
 }
 
 /// The cut where a flag that is so many rows late or early would have it, less what is simulated.
-fn edges_of_the_flag(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn edges_of_the_flag(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     for shift in SHIFTS {
         for late in [true, false] {
             let at = |row: usize| {
@@ -190,7 +190,7 @@ fn edges_of_the_flag(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
 }
 
 /// The cut, outside of it as it was at its end (or will be at its start), twenty rows at most.
-fn last_in_cut(inputs: &Inputs<'_>, cut: &[f64], behind: bool) -> Vec<f64> {
+fn last_in_cut(inputs: &RecordingInputs<'_>, cut: &[f64], behind: bool) -> Vec<f64> {
     let mut held = vec![0.0; inputs.rows];
     let (mut last, mut since) = (0.0, usize::MAX);
     let mut take = |row: usize| {
@@ -210,7 +210,7 @@ fn last_in_cut(inputs: &Inputs<'_>, cut: &[f64], behind: bool) -> Vec<f64> {
 }
 
 /// Whatever is told by a word of the recording: an operation whose recipe is wrong, or that runs a consumer.
-fn recipes(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
+fn recipes(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut VariantBank) {
     for column in ["operation", "program"] {
         let Some(words) = inputs.scene.words(column).filter(|words| (3..=25).contains(&words.words().len())) else {
             continue;
@@ -243,7 +243,7 @@ fn recipes(inputs: &Inputs<'_>, cut: &[f64], bank: &mut Bank) {
 const DRY_MIN: f64 = 0.01;
 
 /// Is there cutting without coolant, so that its factor can be told from one of every cut?
-fn cuts_dry(inputs: &Inputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
+fn cuts_dry(inputs: &RecordingInputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
     let known = inputs.taken(false).filter(|row| coolant[*row].is_finite());
     let (dry, whole) = known.fold((0.0, 0.0), |(dry, whole), row| {
         (dry + (cut[row] * (1.0 - coolant[row])).powi(2), whole + cut[row].powi(2))
@@ -252,7 +252,7 @@ fn cuts_dry(inputs: &Inputs<'_>, cut: &[f64], coolant: &[f64]) -> bool {
 }
 
 /// Consumers that a word or a flag of the recording tells.
-fn consumers(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn consumers(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     for column in ["operation", "program"] {
         let Some(words) = inputs.scene.words(column).filter(|words| (3..=25).contains(&words.words().len())) else {
             continue;

@@ -1,8 +1,8 @@
 //! A drive on its own: friction of a slide or of a shaft whose velocity is recorded.
 
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const VELOCITY: &[&str] = &["velocity_m_s", "axis_velocity_mm_min", "velocity"];
 
@@ -17,7 +17,7 @@ const WINDAGE: Family = Family::of("windage").rare(-1.0);
 const GRAVITY: Family = Family::of("gravity_axis").wide();
 
 /// Is the output a force, torque or current of a drive whose velocity is recorded?
-pub(super) fn is_drive(inputs: &Inputs<'_>) -> bool {
+pub(super) fn is_drive(inputs: &RecordingInputs<'_>) -> bool {
     inputs.velocity.is_some()
         && inputs.kind != OutputKind::Displacement
         && (inputs.is_axis || inputs.speed.is_none())
@@ -25,7 +25,7 @@ pub(super) fn is_drive(inputs: &Inputs<'_>) -> bool {
 }
 
 /// The families of such a drive.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(velocity) = inputs.velocity.as_ref().filter(|_| is_drive(inputs)) else { return };
     let Some(pace) = pace(inputs, velocity) else { return };
     let moving = |row: usize| if pace[row].abs() > 0.005 { pace[row].signum() } else { 0.0 };
@@ -52,7 +52,7 @@ pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
 }
 
 /// Velocity as a share of what it exceeds in a hundredth of the rows only; `None` at rest.
-pub(super) fn pace(inputs: &Inputs<'_>, velocity: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn pace(inputs: &RecordingInputs<'_>, velocity: &[f64]) -> Option<Vec<f64>> {
     let top = crate::statistics::quantile(inputs.taken(false).map(|row| velocity[row].abs()), 0.99)?;
     (top > 0.0).then(|| velocity.iter().map(|v| v / top).collect())
 }

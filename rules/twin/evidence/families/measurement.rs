@@ -2,8 +2,8 @@
 //! clips.
 
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const DRIFT: Family = Family::of("zero_drift").through(&["time"]).wide();
 const VOLTAGE: Family = Family::of("supply_voltage").through(&["supply_voltage_v"]);
@@ -22,7 +22,7 @@ const SECONDS: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
 const DELAY_MAX_S: f64 = 6.5;
 
 /// The families of the meter.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     drift(inputs, bank);
     voltage(inputs, bank);
     if inputs.kind != OutputKind::Displacement {
@@ -38,7 +38,7 @@ pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
     }
 }
 
-fn drift(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn drift(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let span_s = inputs.span_s();
     let time = inputs.column(|row| (inputs.clock_s[row] - inputs.clock_s[0]) / span_s);
     let several = inputs.scene.runs().len() > 3;
@@ -63,7 +63,7 @@ fn drift(inputs: &Inputs<'_>, bank: &mut Bank) {
     bank.of(DRIFT, "line").columns(inputs, [(linear, 1.0), (bent, 0.6)]);
 }
 
-fn voltage(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn voltage(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(voltage) = &inputs.voltage else { return };
     if inputs.deviation_of(voltage, false) <= 0.0 {
         return;
@@ -76,7 +76,7 @@ fn voltage(inputs: &Inputs<'_>, bank: &mut Bank) {
 }
 
 /// A delay, a smoothing, and both: one causal kernel.
-fn delays(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn delays(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let mut taus: Vec<f64> = SAMPLES.iter().map(|k| k * inputs.period_s).chain(SECONDS).collect();
     taus.sort_by(f64::total_cmp);
     taus.dedup_by(|b, a| (*b - *a).abs() < 1e-6);

@@ -13,15 +13,15 @@ mod spindle;
 mod thermal;
 mod wear;
 
-use super::bank::Bank;
-use super::inputs::Inputs;
+use super::bank::VariantBank;
+use super::inputs::RecordingInputs;
 use crate::physics::effect;
 use crate::twin::designs::{shifts_time_in_vain, wanted};
 use crate::twin::model::Model;
 
 /// Every variant that this recording can tell anything about.
-pub(super) fn bank(inputs: &Inputs<'_>, model: &Model) -> Bank {
-    let mut bank = Bank::default();
+pub(super) fn bank(inputs: &RecordingInputs<'_>, model: &Model) -> VariantBank {
+    let mut bank = VariantBank::default();
     spindle::add(inputs, &mut bank);
     drive::add(inputs, &mut bank);
     axis::add(inputs, &mut bank);

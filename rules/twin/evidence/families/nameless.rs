@@ -5,8 +5,8 @@
 
 use super::drive::is_drive;
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Drawn};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Drawn, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 use crate::twin::model::Model;
 use adapters::channel::quantity::Quantity;
 
@@ -48,7 +48,7 @@ struct Channel {
 }
 
 /// Adds every nameless curve.
-pub(super) fn add(inputs: &Inputs<'_>, model: &Model, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, model: &Model, bank: &mut VariantBank) {
     let carriers = carriers(inputs);
     for channel in channels(inputs, model) {
         let cut_only = OF_THE_CUT.contains(&channel.name.as_str());
@@ -85,13 +85,19 @@ fn tells_in_cut(name: &str) -> bool {
     speeds.contains(&name) || ["tool_age", "torque"].contains(&name)
 }
 
-fn add_curve(inputs: &Inputs<'_>, bank: &mut Bank, drawn: Drawn, curve: &[Vec<f64>], carrier: &Carrier) {
+fn add_curve(
+    inputs: &RecordingInputs<'_>,
+    bank: &mut VariantBank,
+    drawn: Drawn,
+    curve: &[Vec<f64>],
+    carrier: &Carrier,
+) {
     let columns = curve.iter().map(|bump| (inputs.column(|row| bump[row] * carrier.values[row]), 1.0));
     bank.nameless(drawn).sized().columns(inputs, columns);
 }
 
 /// Every carrier at unit size where it acts.
-fn carriers(inputs: &Inputs<'_>) -> Vec<Carrier> {
+fn carriers(inputs: &RecordingInputs<'_>) -> Vec<Carrier> {
     let mut all = vec![Carrier { name: "1", values: vec![1.0; inputs.rows] }];
     if inputs.engaged.is_some() {
         all.push(Carrier { name: "engaged", values: inputs.column(|row| inputs.cutting(row)) });
@@ -116,7 +122,7 @@ fn carriers(inputs: &Inputs<'_>) -> Vec<Carrier> {
     all
 }
 
-fn channels(inputs: &Inputs<'_>, model: &Model) -> Vec<Channel> {
+fn channels(inputs: &RecordingInputs<'_>, model: &Model) -> Vec<Channel> {
     let scene = inputs.scene;
     let read: Vec<&str> = model.parts.iter().flat_map(|part| part.inputs()).collect();
     let is_input = |name: &str| {
@@ -151,7 +157,7 @@ fn channels(inputs: &Inputs<'_>, model: &Model) -> Vec<Channel> {
 }
 
 /// Gaussian bumps on knots between the quantiles and an even spacing; levels where a channel has three values or fewer.
-fn bumps(inputs: &Inputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Vec<Vec<f64>> {
+fn bumps(inputs: &RecordingInputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Vec<Vec<f64>> {
     let sorted = inputs.sorted(values, in_cut);
     let mut distinct = sorted.clone();
     distinct.dedup();
@@ -197,7 +203,7 @@ fn bumps(inputs: &Inputs<'_>, values: &[f64], in_cut: bool, wanted: usize) -> Ve
         .collect()
 }
 
-fn levels(inputs: &Inputs<'_>, carriers: &[Carrier], bank: &mut Bank) {
+fn levels(inputs: &RecordingInputs<'_>, carriers: &[Carrier], bank: &mut VariantBank) {
     for group in GROUPS {
         let Some(codes) = codes(inputs, group) else { continue };
         for carrier in carriers.iter().filter(|carrier| ["1", "cut"].contains(&carrier.name)) {
@@ -212,7 +218,7 @@ fn levels(inputs: &Inputs<'_>, carriers: &[Carrier], bank: &mut Bank) {
 }
 
 /// The member of a group that each row belongs to.
-fn codes(inputs: &Inputs<'_>, group: &str) -> Option<Vec<usize>> {
+fn codes(inputs: &RecordingInputs<'_>, group: &str) -> Option<Vec<usize>> {
     if group == "run" {
         return Some(inputs.run.clone());
     }
@@ -220,7 +226,7 @@ fn codes(inputs: &Inputs<'_>, group: &str) -> Option<Vec<usize>> {
     Some((0..inputs.rows).map(|row| words.code(row).map_or(usize::MAX, |code| code as usize)).collect())
 }
 
-fn waves(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn waves(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(position) = &inputs.position else { return };
     let sorted = inputs.sorted(position, false);
     let (Some(low), Some(high)) = (sorted.first(), sorted.last()) else { return };

@@ -1,8 +1,8 @@
 //! The spindle and its motor: friction, windage, inertia, warm-up, stages and losses.
 
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const SPEED: &[&str] = &["spindle_speed_rpm"];
 const SPEED_AND_TORQUE: &[&str] = &["spindle_speed_rpm", "torque"];
@@ -29,7 +29,7 @@ const BASE_SPEEDS: [f64; 6] = [750.0, 1100.0, 1500.0, 2000.0, 3000.0, 4500.0];
 const STAGES_MAX: usize = 40;
 
 struct Spindle<'a> {
-    inputs: &'a Inputs<'a>,
+    inputs: &'a RecordingInputs<'a>,
     rpm: &'a [f64],
     /// Share of the greatest speed.
     pace: Vec<f64>,
@@ -39,7 +39,7 @@ struct Spindle<'a> {
 }
 
 /// The families of an output that the spindle drives.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(rpm) = &inputs.speed else { return };
     if inputs.is_axis || inputs.kind == OutputKind::Displacement {
         return;
@@ -65,7 +65,7 @@ impl Spindle<'_> {
         self.inputs.column(law)
     }
 
-    fn friction(&self, bank: &mut Bank) {
+    fn friction(&self, bank: &mut VariantBank) {
         let power = |exponent: f64| self.as_output(|row| self.pace[row].powf(exponent));
         for exponent in [2.6, 2.8, 3.0] {
             bank.of(WINDAGE, exponent).column(self.inputs, power(exponent));
@@ -82,7 +82,7 @@ impl Spindle<'_> {
         }
     }
 
-    fn inertia(&self, bank: &mut Bank) {
+    fn inertia(&self, bank: &mut VariantBank) {
         let recorded = self.inputs.scene.column("spindle_acceleration_rpm_per_s").map(<[f64]>::to_vec);
         let rate = recorded.unwrap_or_else(|| self.inputs.rate(self.rpm));
         let whole = self.inputs.column(|row| if self.is_torque { rate[row] } else { self.pace[row] * rate[row] });
@@ -107,7 +107,7 @@ impl Spindle<'_> {
         all
     }
 
-    fn warming(&self, bank: &mut Bank) {
+    fn warming(&self, bank: &mut VariantBank) {
         for (label, warmth) in self.warmths() {
             let top = self.inputs.taken(false).map(|row| warmth[row]).fold(1e-9, f64::max);
             for exponent in [1.0, 5.0 / 3.0] {
@@ -123,7 +123,7 @@ impl Spindle<'_> {
         }
     }
 
-    fn stages(&self, bank: &mut Bank) {
+    fn stages(&self, bank: &mut VariantBank) {
         let turning = |row: usize| f64::from(u8::from(self.pace[row] > 0.01));
         for (label, low) in self.stage_columns() {
             let here = self.inputs.column(|row| low[row] * turning(row));
@@ -195,7 +195,7 @@ impl Spindle<'_> {
         kept
     }
 
-    fn motor(&self, bank: &mut Bank) {
+    fn motor(&self, bank: &mut VariantBank) {
         let Some(cut) = self.inputs.cut.as_ref().filter(|_| self.inputs.knows_cut) else { return };
         let torque: Vec<f64> = if self.is_torque {
             cut.clone()

@@ -3,8 +3,8 @@
 use super::drive::pace;
 use crate::physics::OutputKind;
 use crate::physics::state::first_order_behind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const SPINDLE: Family = Family::of("spindle_growth");
 const AMBIENT: Family = Family::of("ambient_drift").through(&["ambient_temperature_c"]);
@@ -12,7 +12,7 @@ const COOLANT: Family = Family::of("coolant_temperature").through(&["coolant_tem
 const SCREW: Family = Family::of("screw_growth");
 
 /// The families of a displacement.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     if inputs.kind != OutputKind::Displacement {
         return;
     }
@@ -23,11 +23,11 @@ pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
 }
 
 /// What is left of an initial state.
-fn fading(inputs: &Inputs<'_>, tau_s: f64) -> Vec<f64> {
+fn fading(inputs: &RecordingInputs<'_>, tau_s: f64) -> Vec<f64> {
     inputs.column(|row| (-(inputs.clock_s[row] - inputs.clock_s[0]) / tau_s.max(60.0)).exp())
 }
 
-fn spindle(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn spindle(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     if let Some(rpm) = &inputs.speed {
         let top = rpm.iter().fold(1.0_f64, |top, n| top.max(*n));
         for exponent in [1.5, 2.0] {
@@ -46,7 +46,13 @@ fn spindle(inputs: &Inputs<'_>, bank: &mut Bank) {
     }
 }
 
-fn behind(inputs: &Inputs<'_>, bank: &mut Bank, family: Family, temperature: Option<&[f64]>, taus_s: &[f64]) {
+fn behind(
+    inputs: &RecordingInputs<'_>,
+    bank: &mut VariantBank,
+    family: Family,
+    temperature: Option<&[f64]>,
+    taus_s: &[f64],
+) {
     let Some(temperature) = temperature else { return };
     let middle = inputs.mean_of(temperature, false);
     let over = inputs.column(|row| temperature[row] - middle);
@@ -56,7 +62,7 @@ fn behind(inputs: &Inputs<'_>, bank: &mut Bank, family: Family, temperature: Opt
     }
 }
 
-fn screw(inputs: &Inputs<'_>, bank: &mut Bank) {
+fn screw(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(pace) = inputs.velocity.as_ref().and_then(|velocity| pace(inputs, velocity)) else { return };
     let heat: Vec<f64> = pace.iter().map(|v| v.abs()).collect();
     for tau_s in [600.0, 1500.0, 3600.0] {

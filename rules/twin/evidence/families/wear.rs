@@ -1,8 +1,8 @@
 //! Flank wear: growth with the time of an edge in the cut, with a rate and a state of its own for every edge.
 
 use crate::physics::OutputKind;
-use crate::twin::evidence::bank::{Bank, Family};
-use crate::twin::evidence::inputs::Inputs;
+use crate::twin::evidence::bank::{Family, VariantBank};
+use crate::twin::evidence::inputs::RecordingInputs;
 
 const WEAR: Family = Family::of("flank_wear").signed(1.0).through(&["tool_age"]);
 
@@ -13,7 +13,7 @@ const RATE: f64 = 0.4;
 const STATE: f64 = 0.15;
 
 /// The family.
-pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
+pub(super) fn add(inputs: &RecordingInputs<'_>, bank: &mut VariantBank) {
     let Some(cut) = inputs.cut.as_ref().filter(|_| inputs.engaged.is_some()) else { return };
     if inputs.kind == OutputKind::Displacement {
         return;
@@ -30,7 +30,7 @@ pub(super) fn add(inputs: &Inputs<'_>, bank: &mut Bank) {
     }
 }
 
-fn add_over(inputs: &Inputs<'_>, bank: &mut Bank, label: &str, load: &[f64], top: f64, ln: f64) {
+fn add_over(inputs: &RecordingInputs<'_>, bank: &mut VariantBank, label: &str, load: &[f64], top: f64, ln: f64) {
     let age = inputs.column(|row| (inputs.edge_age_min[row] / top).max(0.0));
     let grown = |exponent: f64| inputs.column(|row| load[row] * age[row].powf(exponent));
     let beyond = |exponent: f64, law: &[f64]| {
@@ -52,7 +52,7 @@ fn add_over(inputs: &Inputs<'_>, bank: &mut Bank, label: &str, load: &[f64], top
 }
 
 /// Depth times cutting speed in the cut: what the flank of an edge rubs along, in a power; in a torque over the speed.
-pub(super) fn edge_load(inputs: &Inputs<'_>) -> Option<Vec<f64>> {
+pub(super) fn edge_load(inputs: &RecordingInputs<'_>) -> Option<Vec<f64>> {
     let (depth, speed) = (inputs.depth.as_ref()?, inputs.cutting_speed.as_ref()?);
     let engaged = inputs.engaged.as_ref();
     let power = inputs.column(|row| depth[row] * speed[row] * engaged.map_or(1.0, |engaged| engaged[row]));
