@@ -51,7 +51,7 @@ pub fn read(path: &Path) -> Result<SettingValues, Vec<ScriptProblem>> {
 
 /// One setting that is to have another value.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wish {
+pub struct NewSetting {
     /// Section: the name of the script without its ending.
     pub script: String,
     /// Name of the setting.
@@ -66,11 +66,11 @@ pub struct Wish {
 ///
 /// # Errors
 /// Why the value cannot be used; nothing has been changed then.
-pub fn set(data_dir: &Path, files: &[ScriptFile], wish: &Wish, by: &str) -> Result<String, Vec<ScriptProblem>> {
+pub fn set(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str) -> Result<String, Vec<ScriptProblem>> {
     let path = path(data_dir);
     let before = read(&path)?;
     let mut after = before.clone();
-    let Wish { script, name, place, value } = wish;
+    let NewSetting { script, name, place, value } = wanted;
     after.put(script, name, place, value.clone());
     // Read again, so that a message names the line on which the value would stand.
     let body = after.text();
@@ -224,23 +224,23 @@ mod tests {
     fn a_setting_is_tried_written_and_told_with_its_author() {
         let directory = tempfile::tempdir().expect("a directory");
         let files = [ScriptFile { name: "one.rhai".to_owned(), text: SCRIPT.to_owned() }];
-        let mut wish = Wish {
+        let mut wanted = NewSetting {
             script: "one".to_owned(),
             name: "x_w".to_owned(),
             place: DeclarationPlace::Machine,
             value: Some(SettingValue::Number(7.0)),
         };
-        assert_eq!(set(directory.path(), &files, &wish, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
+        assert_eq!(set(directory.path(), &files, &wanted, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
         let written = std::fs::read_to_string(path(directory.path())).expect("written");
         assert_eq!(author(&written), "Li", "{written}");
         assert_eq!(author(&written.replace("7.0", "8.0")), BY_HAND);
-        wish.place = DeclarationPlace::Tool("T 1".to_owned());
+        wanted.place = DeclarationPlace::Tool("T 1".to_owned());
         assert_eq!(
-            set(directory.path(), &files, &wish, "Wu").as_deref(),
+            set(directory.path(), &files, &wanted, "Wu").as_deref(),
             Ok("one.x_w for tool T 1: as the machine -> 7.0 W")
         );
-        wish.value = Some(SettingValue::Number(11.0));
-        let refused = set(directory.path(), &files, &wish, "Wu").expect_err("out of range");
+        wanted.value = Some(SettingValue::Number(11.0));
+        let refused = set(directory.path(), &files, &wanted, "Wu").expect_err("out of range");
         assert!(refused[0].what.contains("outside 0 to 10 W"), "{refused:?}");
         let values = read(&path(directory.path())).expect("readable");
         let declared = rules::script::declarations(&files).expect("readable");

@@ -1,5 +1,8 @@
-//! House rules as an ordinary test: what stands where, how long a file may be, where `unsafe` may stand, what the
-//! program may depend on.
+//! Rules of the code base as an ordinary test: what stands where, how long a file may be, where `unsafe` may stand, which
+//! names are refused, what the program may depend on.
+
+#[path = "tidy/names.rs"]
+mod names;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -80,13 +83,13 @@ fn none(found: Vec<String>, rule: &str) {
 }
 
 #[test]
-fn the_top_level_is_the_house() {
+fn the_top_level_has_four_rooms() {
     let names = fs::read_dir(root()).expect("readable").map(|entry| entry.expect("readable").file_name());
     let strange = names.map(|name| name.to_string_lossy().into_owned()).filter(|name| {
         let known = TOP_LEVEL.contains(&name.as_str()) || LEFT_BEHIND.contains(&name.as_str());
         !(known || name.starts_with('.') || name.starts_with("LICENSE-"))
     });
-    none(strange.collect(), "not part of the house");
+    none(strange.collect(), "not part of the top level");
     for name in TOP_LEVEL {
         assert!(root().join(name).exists(), "{name} is missing");
     }

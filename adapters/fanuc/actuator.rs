@@ -67,7 +67,7 @@ impl FanucActuator {
         (method != WriteMethod::None).then_some(actuator)
     }
 
-    fn wish(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
+    fn request(&mut self, wanted: OverridePct) -> Result<Write, SourceError> {
         let percent = i32::from(wanted.percent());
         let bytes = |area, at, values: Vec<i32>| {
             let count = u16::try_from(values.len()).unwrap_or(0);
@@ -80,7 +80,7 @@ impl FanucActuator {
             }
             WriteMethod::SecondOverride { area, at } if percent > 0 => bytes(area, at, vec![percent]),
             WriteMethod::SecondOverride { .. } => {
-                let what = "0 % cannot be asked for: 0 in this byte is no wish";
+                let what = "0 % cannot be asked for: 0 in this byte means no request";
                 return Err(self.refused(what, "Stop the feed with feed hold, on the machine"));
             }
             WriteMethod::Macro { variable } => Write::Macro { number: variable, mantissa: percent, places: 0 },
@@ -116,8 +116,8 @@ impl FanucActuator {
                 Write::Pmc { stretch: Stretch::bytes(area, at, 1), values: vec![0] }
             }
             // Where the ladder writes G012 in every scan this changes nothing; elsewhere it is where the dial was.
-            WriteMethod::Direct => self.wish(self.before.unwrap_or(OverridePct::FULL))?,
-            WriteMethod::Macro { .. } | WriteMethod::None => self.wish(OverridePct::FULL)?,
+            WriteMethod::Direct => self.request(self.before.unwrap_or(OverridePct::FULL))?,
+            WriteMethod::Macro { .. } | WriteMethod::None => self.request(OverridePct::FULL)?,
         };
         self.line.write(clock, &write)?;
         self.written = None;
@@ -238,7 +238,7 @@ impl Actuator for FanucActuator {
     }
 
     fn write_feed_override(&mut self, clock: &dyn Clock, wanted: OverridePct) -> Result<(), SourceError> {
-        let write = self.wish(wanted)?;
+        let write = self.request(wanted)?;
         self.line.write(clock, &write)?;
         self.written = Some((wanted, clock.now_ns()));
         Ok(())
@@ -289,7 +289,7 @@ impl Actuator for FanucActuator {
         }
     }
 
-    /// The mailbox says that nobody asks, the second override's byte that there is no wish; the others get 100 %.
+    /// The mailbox says that nobody asks, the second override's byte that there is no request; the others get 100 %.
     fn release(&mut self, clock: &dyn Clock) -> Result<(), SourceError> {
         let released = self.give_back(clock);
         let withdrawn = self.asking.as_mut().map_or(Ok(()), |asking| asking.withdraw(clock));

@@ -62,9 +62,9 @@ struct HncLayout {
 }
 
 /// What one poll has answered.
-struct Poll(HashMap<HncItem, HncItemResult>);
+struct HncPoll(HashMap<HncItem, HncItemResult>);
 
-impl Answers for Poll {
+impl Answers for HncPoll {
     fn of(&self, item: HncItem) -> HncItemResult {
         self.0.get(&item).cloned().unwrap_or(Err(HncItemError::NotOffered))
     }
@@ -155,7 +155,7 @@ impl HncSource {
         items
     }
 
-    fn readings(&self, poll: &Poll, stamp: Stamp, out: &mut Vec<Reading>) {
+    fn readings(&self, poll: &HncPoll, stamp: Stamp, out: &mut Vec<Reading>) {
         for channel in &self.channels {
             let value = self.value(channel.name(), poll);
             out.push(match value {
@@ -166,7 +166,7 @@ impl HncSource {
         }
     }
 
-    fn value(&self, name: &str, poll: &Poll) -> Result<HncValue, Absence> {
+    fn value(&self, name: &str, poll: &HncPoll) -> Result<HncValue, Absence> {
         match name {
             "mode" => return poll.mode().map(HncValue::text),
             "execution" => return poll.execution().map(HncValue::text),
@@ -187,7 +187,7 @@ impl HncSource {
         self.axis_value(name, poll)
     }
 
-    fn axis_value(&self, name: &str, poll: &Poll) -> Result<HncValue, Absence> {
+    fn axis_value(&self, name: &str, poll: &HncPoll) -> Result<HncValue, Absence> {
         let (letter, ending) = name.split_once('_').ok_or(Absence::NotSupported)?;
         let upper = letter.to_ascii_uppercase();
         let known = self.layout.axes.iter().find(|(letter, _)| upper.starts_with(*letter));
@@ -270,7 +270,7 @@ impl Source for HncSource {
         let results = self.line.read_each(&items)?;
         let answers: HashMap<HncItem, HncItemResult> = items.into_iter().zip(results).collect();
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
-        self.readings(&Poll(answers), stamp, out);
+        self.readings(&HncPoll(answers), stamp, out);
         self.take_samples(clock)
     }
 }

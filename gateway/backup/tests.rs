@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::files::replace;
-use crate::settings::{self, Wish};
+use crate::settings::{self, NewSetting};
 use rules::script::{DeclarationPlace, SettingValue, shipped};
 
 fn places(below: &Path) -> BackupPaths {
@@ -31,14 +31,14 @@ fn furnish(places: &BackupPaths) {
     for file in shipped() {
         replace(&places.scripts.join(&file.name), &file.text).expect("written");
     }
-    let wish = |place| Wish {
+    let wanted = |place| NewSetting {
         script: "constant_load".to_owned(),
         name: "target_w".to_owned(),
         place,
         value: Some(SettingValue::Number(1800.0)),
     };
     for place in [DeclarationPlace::Machine, DeclarationPlace::Tool("T3".to_owned())] {
-        settings::set(&places.data_dir, &shipped(), &wish(place), "Li").expect("set");
+        settings::set(&places.data_dir, &shipped(), &wanted(place), "Li").expect("set");
     }
     for (name, text) in [("persons.json", "secret"), ("annotations.jsonl", "{}\n"), ("wear.json", "{\"edges\":1}")] {
         replace(&places.data_dir.join(name), text).expect("written");

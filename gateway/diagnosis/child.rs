@@ -2,9 +2,9 @@
 //! at any moment, and whatever happens to it, the gateway goes on.
 //!
 //! The gateway writes one line, the [`DiagnosisJob`], and holds the pipe open: the child ends when the pipe does, so that nothing is left
-//! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`Said`].
+//! behind by a gateway that was killed. The child answers with a line for every stage and one with the outcome, each a [`ChildMessage`].
 
-use super::kept::Kept;
+use super::store::DiagnosisStore;
 use super::stretch;
 use crate::history;
 use adapters::clock::{SECOND_NS, TimeNs};
@@ -55,7 +55,7 @@ pub enum Stage {
 /// One line of the child.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Said {
+pub enum ChildMessage {
     /// It goes on, with so many rows of a second where that is known.
     Stage(Stage, usize),
     /// It is done: the row of the history (its time is for the tick to fill in) and what is missing.
@@ -87,7 +87,7 @@ pub fn start(job: &DiagnosisJob) -> std::io::Result<Child> {
 }
 
 /// Every line of the child until it ends or says the outcome.
-pub fn listen(output: impl Read, mut said: impl FnMut(Said)) {
+pub fn listen(output: impl Read, mut said: impl FnMut(ChildMessage)) {
     let mut lines = BufReader::new(output.take(LINE_MAX)).lines();
     while let Some(Ok(line)) = lines.next() {
         if let Ok(it) = serde_json::from_str(&line) {
@@ -110,18 +110,19 @@ pub fn run() -> std::io::Result<()> {
         let _until_it_is_gone = std::io::copy(&mut input, &mut std::io::sink());
         std::process::exit(2);
     })?;
-    let outcome = diagnose(&job).map_or_else(Said::Refused, |(row, missing)| Said::Finished(Box::new(row), missing));
+    let outcome = diagnose(&job)
+        .map_or_else(ChildMessage::Refused, |(row, missing)| ChildMessage::Finished(Box::new(row), missing));
     say(&outcome)
 }
 
-fn say(said: &Said) -> std::io::Result<()> {
+fn say(said: &ChildMessage) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}", serde_json::to_string(said)?)?;
     out.flush()
 }
 
 fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
-    let tell = |stage, rows| say(&Said::Stage(stage, rows)).map_err(|error| error.to_string());
+    let tell = |stage, rows| say(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
     let model = parse_model(&job.toml)
         .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
     tell(Stage::Reading, 0)?;
@@ -144,7 +145,7 @@ fn diagnose(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Str
         summary: found.summary.clone(),
         json: report::to_json(&found).to_string(),
     };
-    let kept = Kept::at(job.kept.clone());
+    let kept = DiagnosisStore::at(job.kept.clone());
     kept.keep(&row, &found, &recording).map_err(|error| format!("{}: {error}", kept.directory().display()))?;
     Ok((row, found.missing.iter().map(|missing| missing.effect.clone()).collect()))
 }

@@ -2,11 +2,10 @@
 //! diagnosis is stands in `rules::twin`.
 
 pub mod child;
-pub mod desk;
 pub mod execute;
+pub mod handle;
 mod history;
 mod join;
-pub mod kept;
 mod models;
 mod outputs;
 mod parquet;
@@ -14,6 +13,7 @@ mod recordings;
 pub mod simulation;
 pub mod status;
 pub mod steps;
+pub mod store;
 pub mod stretch;
 pub mod words;
 pub mod worker;

@@ -1,10 +1,10 @@
 //! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
 //! a process that has only the processor time that nobody else wants.
 
-use super::child::{self, DiagnosisJob, Said, Stage};
-use super::desk::Desk;
-use super::kept::{self, DiagnosisFile, Kept};
+use super::child::{self, ChildMessage, DiagnosisJob, Stage};
+use super::handle::DiagnosisHandle;
 use super::outputs;
+use super::store::{self, DiagnosisFile, DiagnosisStore};
 use crate::files::{LOOK_EVERY, Mark, Rest, mark};
 use crate::history::{self, Reader};
 use adapters::clock::TimeNs;
@@ -68,9 +68,9 @@ pub struct Finished {
 /// The worker, as the tick sees it. It ends when this is dropped.
 #[derive(Debug)]
 pub struct Worker {
-    desk: Desk,
+    diagnoses: DiagnosisHandle,
     reports: Receiver<WorkerReport>,
-    /// The thread ends when this goes, whoever still holds the desk.
+    /// The thread ends when this goes, whoever still holds the handle.
     _going_on: Arc<()>,
 }
 
@@ -84,7 +84,7 @@ pub struct WorkerPaths {
     /// Where the improved model of a diagnosis goes.
     pub improved: PathBuf,
     /// What is kept of diagnoses.
-    pub kept: Kept,
+    pub kept: DiagnosisStore,
 }
 
 /// Reads a model.
@@ -109,18 +109,18 @@ impl Worker {
         let (requests, asked) = sync_channel(1);
         let (send, reports) = sync_channel(8);
         let file = FileWatch { path: places.model.clone(), rest: Rest::new(), known };
-        let desk = Desk::new(requests, places.model.clone(), places.kept.clone());
+        let diagnoses = DiagnosisHandle::new(requests, places.model.clone(), places.kept.clone());
         let going_on = Arc::new(());
-        let (own, still) = (desk.clone(), Arc::downgrade(&going_on));
+        let (own, still) = (diagnoses.clone(), Arc::downgrade(&going_on));
         let body = move || work(file, &places, (&asked, &own), &send, &still);
         std::thread::Builder::new().name("twin".to_owned()).spawn(body)?;
-        Ok(Self { desk, reports, _going_on: going_on })
+        Ok(Self { diagnoses, reports, _going_on: going_on })
     }
 
     /// Where diagnoses are asked for.
     #[must_use]
-    pub fn desk(&self) -> &Desk {
-        &self.desk
+    pub fn diagnoses(&self) -> &DiagnosisHandle {
+        &self.diagnoses
     }
 
     /// What there is to tell since the last call.
@@ -132,13 +132,13 @@ impl Worker {
 fn work(
     mut file: FileWatch,
     places: &WorkerPaths,
-    (asked, desk): (&Receiver<DiagnosisRequest>, &Desk),
+    (asked, diagnoses): (&Receiver<DiagnosisRequest>, &DiagnosisHandle),
     send: &SyncSender<WorkerReport>,
     going_on: &Weak<()>,
 ) {
     while going_on.strong_count() > 0 {
         let report = match asked.recv_timeout(LOOK_EVERY) {
-            Ok(request) => Some(diagnose(request, places, desk)),
+            Ok(request) => Some(diagnose(request, places, diagnoses)),
             Err(RecvTimeoutError::Timeout) => file.look(),
             Err(RecvTimeoutError::Disconnected) => return,
         };
@@ -169,8 +169,8 @@ impl FileWatch {
     }
 }
 
-fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, desk: &Desk) -> WorkerReport {
-    wait_for_samples(&places.history, request.to_ns, desk);
+fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: &DiagnosisHandle) -> WorkerReport {
+    wait_for_samples(&places.history, request.to_ns, diagnoses);
     let DiagnosisRequest { toml, by, from_ns, to_ns } = request;
     let job = DiagnosisJob {
         toml,
@@ -179,8 +179,8 @@ fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, desk: &Desk) -> Wor
         to_ns,
         kept: places.kept.directory().to_owned(),
     };
-    let found = in_child(&job, desk);
-    desk.ended(found.as_ref().map(|(record, _)| kept::key(record)).map_err(Clone::clone));
+    let found = in_child(&job, diagnoses);
+    diagnoses.ended(found.as_ref().map(|(record, _)| store::key(record)).map_err(Clone::clone));
     match found {
         Ok((record, missing)) => WorkerReport::Diagnosed(Box::new(finished(by, places, record, missing))),
         Err(problem) => WorkerReport::NotDiagnosed(problem, by),
@@ -190,41 +190,43 @@ fn diagnose(request: DiagnosisRequest, places: &WorkerPaths, desk: &Desk) -> Wor
 /// Row of the history and what is missing.
 type FoundDiagnosis = (history::Diagnosis, Vec<String>);
 
-fn in_child(job: &DiagnosisJob, desk: &Desk) -> Result<FoundDiagnosis, String> {
-    let ended_by = |desk: &Desk| desk.cancelled().map(|by| format!("{by} has ended it"));
-    if let Some(ended) = ended_by(desk) {
+fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, String> {
+    let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled().map(|by| format!("{by} has ended it"));
+    if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);
     }
     let mut child = child::start(job).map_err(|error| format!("no process for the diagnosis: {error}"))?;
     let output = child.stdout.take();
-    desk.put_child(child);
+    diagnoses.put_child(child);
     let mut outcome = None;
     if let Some(output) = output {
         child::listen(output, |said| match said {
-            Said::Stage(stage, rows) => desk.reached(stage, rows),
-            Said::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
-            Said::Refused(problem) => outcome = Some(Err(problem)),
+            ChildMessage::Stage(stage, rows) => diagnoses.reached(stage, rows),
+            ChildMessage::Finished(record, missing) => outcome = Some(Ok((*record, missing))),
+            ChildMessage::Refused(problem) => outcome = Some(Err(problem)),
         });
     }
-    let status = desk.take_child().map(|mut child| child.wait());
+    let status = diagnoses.take_child().map(|mut child| child.wait());
     let broken = || {
         format!("its process broke off ({})", status.and_then(Result::ok).map_or(String::new(), |it| it.to_string()))
     };
-    ended_by(desk).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
+    ended_by(diagnoses).map_or_else(|| outcome.unwrap_or_else(|| Err(broken())), Err)
 }
 
 fn finished(by: Option<String>, places: &WorkerPaths, record: history::Diagnosis, missing: Vec<String>) -> Finished {
-    let model = places.kept.text(&kept::key(&record), DiagnosisFile::Model);
+    let model = places.kept.text(&store::key(&record), DiagnosisFile::Model);
     let written = model.map(|model| outputs::put(&places.improved, &model)).and_then(Result::ok);
     Finished { by, record, missing, improved: written.map(|()| places.improved.clone()) }
 }
 
 /// What was just measured may not be durable yet.
-fn wait_for_samples(history: &Path, to_ns: TimeNs, desk: &Desk) {
-    desk.reached(Stage::Waiting, 0);
+fn wait_for_samples(history: &Path, to_ns: TimeNs, diagnoses: &DiagnosisHandle) {
+    diagnoses.reached(Stage::Waiting, 0);
     let until = Instant::now() + WAIT_MAX;
     let newest_ns = || Reader::open(history).ok()?.span().ok()?.map(|(_, newest_ns)| newest_ns);
-    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns) && desk.cancelled().is_none() && Instant::now() < until
+    while newest_ns().is_none_or(|newest_ns| newest_ns < to_ns)
+        && diagnoses.cancelled().is_none()
+        && Instant::now() < until
     {
         std::thread::sleep(Duration::from_millis(200));
     }

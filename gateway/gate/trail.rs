@@ -117,12 +117,12 @@ impl Trail {
         self.follow(verdict.at_ns, &author);
         self.told = Some(told);
         let also = self.pace.may_tell(verdict.at_ns)?;
-        let wish = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
+        let wanted = request.map_or("nothing is asked for any more".to_owned(), |request| words(&request.reason));
         Some(Audit {
             outcome: outcome(verdict).to_owned(),
             asked: request.map(|request| request.pct),
             after: Some(percent(verdict.permitted)),
-            reason: format!("{wish}: {}{also}", verdict.reason()),
+            reason: format!("{wanted}: {}{also}", verdict.reason()),
             script: author.script,
             script_version: author.version,
             ..of("request", verdict.at_ns)

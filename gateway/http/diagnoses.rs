@@ -10,8 +10,8 @@ use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
 use crate::access::Role;
-use crate::diagnosis::desk::{Desk, DiagnosisRefusal, Run};
-use crate::diagnosis::kept::{DiagnosisFile, is_key};
+use crate::diagnosis::handle::{DiagnosisHandle, DiagnosisRefusal, Run};
+use crate::diagnosis::store::{DiagnosisFile, is_key};
 use adapters::clock::SECOND_NS;
 use axum::Json;
 use axum::extract::{Path, Query as Pairs, State};
@@ -53,9 +53,9 @@ struct Accepted {
 }
 
 impl ServerState {
-    fn desk(&self) -> Result<&Desk, ApiProblem> {
+    fn diagnoses(&self) -> Result<&DiagnosisHandle, ApiProblem> {
         let none = || ApiProblem::conflict("no simulation runs beside this machine", "name a model under [twin] model");
-        self.desk.as_ref().ok_or_else(none)
+        self.diagnoses.as_ref().ok_or_else(none)
     }
 }
 
@@ -65,7 +65,7 @@ fn refused(refusal: DiagnosisRefusal) -> ApiProblem {
 
 /// `GET /api/v1/diagnosis`
 async fn state(State(shared): State<ServerState>) -> Json<Value> {
-    let (run, about_s) = shared.desk.as_ref().map(Desk::run).unwrap_or_default();
+    let (run, about_s) = shared.diagnoses.as_ref().map(DiagnosisHandle::run).unwrap_or_default();
     let (mut told, by) = match run {
         Run::None => (json!({ "state": "none" }), None),
         Run::Running(it) => {
@@ -103,14 +103,14 @@ async fn begin(
         let what = "this is less than two minutes of history".to_owned();
         return Err(ApiProblem::request(what, "choose a longer time, best one with cuts of several kinds"));
     }
-    shared.desk()?.ask(Some(person.name), from_ns, to_ns).map_err(refused)?;
+    shared.diagnoses()?.ask(Some(person.name), from_ns, to_ns).map_err(refused)?;
     let words = format!("a diagnosis of {} to {}", crate::moment::utc(from_ns), crate::moment::utc(to_ns));
     Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "running" })), words))
 }
 
 /// `DELETE /api/v1/diagnosis`: ends the one under way.
 async fn cancel(State(shared): State<ServerState>, SignedIn(person): SignedIn) -> Result<Response, ApiProblem> {
-    shared.desk()?.cancel(&person.name).map_err(refused)?;
+    shared.diagnoses()?.cancel(&person.name).map_err(refused)?;
     Ok(told(Json(json!({ "schema": "diagnosis-run/1", "state": "cancelled" })), "the diagnosis is ended"))
 }
 
@@ -119,9 +119,9 @@ type DiagnosisQuery = Pairs<Vec<(String, String)>>;
 /// A file that was kept of a diagnosis.
 async fn kept(shared: ServerState, key: String, part: DiagnosisFile) -> Result<String, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("the files of diagnosis {key:?} (the newest 40 are kept)"));
-    let desk = shared.desk.clone().filter(|_| is_key(&key)).ok_or_else(gone)?;
+    let diagnoses = shared.diagnoses.clone().filter(|_| is_key(&key)).ok_or_else(gone)?;
     let wanted = key.clone();
-    let text = super::rules::aside(move || Ok(desk.kept().text(&wanted, part))).await?;
+    let text = super::rules::aside(move || Ok(diagnoses.kept().text(&wanted, part))).await?;
     text.ok_or_else(gone)
 }
 
@@ -171,7 +171,7 @@ async fn accept(
     SignedIn(_): SignedIn,
     JsonBody(Accepted { key }): JsonBody<Accepted>,
 ) -> Result<Response, ApiProblem> {
-    let desk = shared.desk()?.clone();
-    let done = super::rules::aside(move || desk.accept(&key).map_err(refused)).await?;
+    let diagnoses = shared.diagnoses()?.clone();
+    let done = super::rules::aside(move || diagnoses.accept(&key).map_err(refused)).await?;
     Ok(told(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
 }

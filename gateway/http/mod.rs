@@ -52,7 +52,7 @@ pub use vocabulary::{ESTIMATES, document as vocabulary, state as state_text};
 
 use crate::access::Access;
 use crate::control::OrderSender;
-use crate::diagnosis::desk::Desk;
+use crate::diagnosis::handle::DiagnosisHandle;
 use crate::status::Status;
 use ::rules::physics::explain::Language;
 use axum::Router;
@@ -102,7 +102,7 @@ pub struct ServerParts {
     /// Names by which browsers reach the box, besides its own addresses, in lower case.
     pub hosts: Vec<String>,
     /// Where diagnoses are asked for; `None` where no simulation runs beside the machine.
-    pub desk: Option<Desk>,
+    pub diagnoses: Option<DiagnosisHandle>,
     /// The configuration.
     pub configured: Configured,
 }
@@ -121,7 +121,7 @@ pub struct ServerState {
     access: Arc<Access>,
     post: OrderSender,
     hosts: Arc<[String]>,
-    desk: Option<Desk>,
+    diagnoses: Option<DiagnosisHandle>,
     configured: Configured,
     doctor: Arc<Semaphore>,
 }
@@ -130,7 +130,8 @@ impl ServerState {
     /// From these parts.
     #[must_use]
     pub fn new(parts: ServerParts) -> Self {
-        let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, desk, configured } = parts;
+        let ServerParts { live, history, scripts, data_dir, language, access, post, hosts, diagnoses, configured } =
+            parts;
         let readers = Arc::new(Semaphore::new(history::READERS_MAX));
         Self {
             live,
@@ -144,7 +145,7 @@ impl ServerState {
             access,
             post,
             hosts: hosts.into(),
-            desk,
+            diagnoses,
             configured,
             doctor: Arc::new(Semaphore::new(1)),
         }

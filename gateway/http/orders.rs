@@ -39,15 +39,15 @@ async fn arm(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
-    JsonBody(wish): JsonBody<Arm>,
+    JsonBody(wanted): JsonBody<Arm>,
 ) -> Result<Response, ApiProblem> {
     if !shared.access.rules().allow_arming {
         let hint = "arm at the box with `cnc-gateway arm --by NAME`, or write allow_arming = true under [http]";
         return Err(ApiProblem::forbidden("the gate cannot be armed from the page", hint));
     }
-    let again = shared.access.check(&person.name, &Token::typed(&wish.token), peer.from, "armed").await;
+    let again = shared.access.check(&person.name, &Token::typed(&wanted.token), peer.from, "armed").await;
     again.map_err(|error| wrong(&error))?;
-    let order = Order::Arm { by: signed(&person, &peer), for_s: wish.for_s };
+    let order = Order::Arm { by: signed(&person, &peer), for_s: wanted.for_s };
     answer(shared.post.order(order).await, "look at [gate] in the configuration, and at the problems of /api/v1/status")
 }
 
@@ -77,10 +77,10 @@ async fn acknowledge(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,
     SignedIn(person): SignedIn,
-    JsonBody(wish): JsonBody<Acknowledge>,
+    JsonBody(wanted): JsonBody<Acknowledge>,
 ) -> Result<Response, ApiProblem> {
     let by = signed(&person, &peer);
-    let order = match wish.code {
+    let order = match wanted.code {
         Some(code) => Order::AcknowledgeAlarm { by, code },
         None => Order::Acknowledge { by },
     };

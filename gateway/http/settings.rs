@@ -7,7 +7,7 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::{aside, on_disk};
 use crate::access::Role;
-use crate::settings::{self, Wish};
+use crate::settings::{self, NewSetting};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -43,7 +43,7 @@ struct SettingRequest {
 }
 
 impl SettingRequest {
-    fn wish(self) -> Result<Wish, ApiProblem> {
+    fn wanted(self) -> Result<NewSetting, ApiProblem> {
         let place = match (self.tool, self.operation) {
             (None, None) => DeclarationPlace::Machine,
             (Some(tool), None) => DeclarationPlace::Tool(tool),
@@ -57,7 +57,7 @@ impl SettingRequest {
             RequestedValue::Text(text) => SettingValue::Text(text),
         });
         let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
-        Ok(Wish { script, name: self.name, place, value })
+        Ok(NewSetting { script, name: self.name, place, value })
     }
 }
 
@@ -82,11 +82,11 @@ async fn change(
     SignedIn(person): SignedIn,
     JsonBody(asked): JsonBody<SettingRequest>,
 ) -> Result<Response, ApiProblem> {
-    let wish = asked.wish()?;
+    let wanted = asked.wanted()?;
     aside(move || {
         let files = on_disk(&shared)?;
         let words =
-            settings::set(&shared.data_dir, &files, &wish, &person.name).map_err(|problems| refused(&problems))?;
+            settings::set(&shared.data_dir, &files, &wanted, &person.name).map_err(|problems| refused(&problems))?;
         let declared = declarations(&files).map_err(|problems| refused(&problems))?;
         let answer = settings::document(declared.iter(), &super::rules::values(&shared));
         Ok(told(Json(answer), words))

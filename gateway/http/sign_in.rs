@@ -156,11 +156,12 @@ struct NewPerson {
 async fn add(
     State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
-    JsonBody(wish): JsonBody<NewPerson>,
+    JsonBody(wanted): JsonBody<NewPerson>,
 ) -> Result<Response, ApiProblem> {
-    let token = shared.access.change(|persons| persons.add(&wish.name, wish.role, &by.name)).await.map_err(trouble)?;
-    let body = json!({ "schema": "token/1", "name": wish.name.trim(), "role": wish.role, "token": token.text() });
-    Ok(told((StatusCode::CREATED, Json(body)), format!("{} is {}", wish.name.trim(), wish.role)))
+    let token =
+        shared.access.change(|persons| persons.add(&wanted.name, wanted.role, &by.name)).await.map_err(trouble)?;
+    let body = json!({ "schema": "token/1", "name": wanted.name.trim(), "role": wanted.role, "token": token.text() });
+    Ok(told((StatusCode::CREATED, Json(body)), format!("{} is {}", wanted.name.trim(), wanted.role)))
 }
 
 #[derive(Debug, Deserialize)]
@@ -174,11 +175,11 @@ async fn give_role(
     State(shared): State<ServerState>,
     SignedIn(by): SignedIn,
     Path(name): Path<String>,
-    JsonBody(wish): JsonBody<NewRole>,
+    JsonBody(wanted): JsonBody<NewRole>,
 ) -> Result<Response, ApiProblem> {
-    shared.access.change(|persons| persons.give_role(&name, wish.role, &by.name)).await.map_err(trouble)?;
-    let body = json!({ "schema": "person/1", "name": name, "role": wish.role });
-    Ok(told(Json(body), format!("{name} is {}", wish.role)))
+    shared.access.change(|persons| persons.give_role(&name, wanted.role, &by.name)).await.map_err(trouble)?;
+    let body = json!({ "schema": "person/1", "name": name, "role": wanted.role });
+    Ok(told(Json(body), format!("{name} is {}", wanted.role)))
 }
 
 /// `POST /api/v1/persons/{name}/token`: the token is in the answer, once; sessions with the one before end.

@@ -4,7 +4,7 @@ use super::ServerState;
 use super::history::{Answer, HistoryQuery, reading, trouble};
 use super::query::QueryKeys;
 use super::route::Route;
-use crate::diagnosis::kept::{self, DiagnosisFile, Kept};
+use crate::diagnosis::store::{self, DiagnosisFile, DiagnosisStore};
 use crate::history::{Diagnosis, RecordSpan};
 use adapters::clock::TimeNs;
 use axum::extract::{Query as Pairs, State};
@@ -21,7 +21,7 @@ pub(super) async fn twin(State(shared): State<ServerState>, Pairs(pairs): Histor
     let keys = QueryKeys::of(pairs, &["limit"])?;
     let limit = keys.number("limit", 1, 100)?.unwrap_or(DIAGNOSES_DEFAULT);
     let status = shared.status()?;
-    let kept = shared.desk.as_ref().map(|desk| desk.kept().clone());
+    let kept = shared.diagnoses.as_ref().map(|diagnoses| diagnoses.kept().clone());
     reading(shared, move |reader, _| {
         let found = reader.diagnoses(RecordSpan::newest(limit)).map_err(|error| trouble(&error))?;
         let diagnoses: Vec<Value> = found.iter().rev().map(|row| diagnosis(row, kept.as_ref())).collect();
@@ -32,9 +32,9 @@ pub(super) async fn twin(State(shared): State<ServerState>, Pairs(pairs): Histor
 
 /// Newest first; the whole diagnosis stands under `diagnosis` (`diagnosis/1`). What was kept of it - the report page, the model, the
 /// steps of the experiment - is told where it is still there.
-fn diagnosis(found: &Diagnosis, kept: Option<&Kept>) -> Value {
+fn diagnosis(found: &Diagnosis, kept: Option<&DiagnosisStore>) -> Value {
     let ms = |at_ns: TimeNs| at_ns.div_euclid(1_000_000);
-    let key = kept::key(found);
+    let key = store::key(found);
     let words = kept.and_then(|kept| kept.words(&key));
     let model = kept.is_some_and(|kept| kept.path(&key, DiagnosisFile::Model).exists());
     json!({

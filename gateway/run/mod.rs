@@ -31,7 +31,7 @@ use crate::backup::take_restored;
 use crate::cannot_run::CannotRun;
 use crate::config::{self, Config, GateMode};
 use crate::control::{self, OrderReceiver};
-use crate::diagnosis::desk::Desk;
+use crate::diagnosis::handle::DiagnosisHandle;
 use crate::gate::Gate;
 use crate::http::{Certificate, Configured, Published, Server, ServerParts, ServerState, bind, port_trouble};
 use crate::log::{self, Notice, Severity};
@@ -108,12 +108,12 @@ pub fn run(plan: RunPlan) -> Result<(), CannotRun> {
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::queue();
     let (ticker, live) = ticker(&plan, &run_flags, port, inbox, outputs.as_ref())?;
-    let desk = ticker.twin.as_ref().and_then(Twin::desk);
+    let channels = (report, post, ticker.twin.as_ref().and_then(Twin::diagnoses));
     let thread = std::thread::Builder::new()
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, (report, post, desk), outputs.as_ref()));
+    runtime.block_on(serve(&plan, (listener, certificate), live, &run_flags, channels, outputs.as_ref()));
     let ended = thread.join();
     runtime.shutdown_timeout(Duration::from_secs(1));
     ended.map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -304,7 +304,7 @@ async fn serve(
     (listener, certificate): (Option<TcpListener>, Option<Certificate>),
     live: watch::Receiver<Option<Published>>,
     run_flags: &Arc<RunFlags>,
-    (report, post, desk): (watch::Sender<Option<String>>, control::OrderSender, Option<Desk>),
+    (report, post, diagnoses): (watch::Sender<Option<String>>, control::OrderSender, Option<DiagnosisHandle>),
     outputs: Option<&ConfiguredSinks>,
 ) {
     let sinks = outputs.map(|outputs| outputs.start(&post));
@@ -327,7 +327,7 @@ async fn serve(
                 access,
                 post,
                 hosts,
-                desk,
+                diagnoses,
                 configured,
             });
             Some(Server::start((address, listener), certificate, shared, report))

@@ -1,6 +1,6 @@
 //! What a recording excites: levels, visits, boundaries and the grids of shapes worth trying in it.
 
-use super::{EffectForm, Scene};
+use super::{Form, Scene};
 use std::collections::BTreeSet;
 
 /// Greatest magnitude; at least the smallest positive number, so that it can divide.
@@ -88,8 +88,8 @@ pub(crate) fn time_constants(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
 }
 
 /// One form per time constant that this recording can tell.
-pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<EffectForm> {
-    let form = |tau_s| EffectForm { name, ..EffectForm::of(&[("tau_s", tau_s)]) };
+pub(crate) fn lag_forms(scene: &Scene, name: &'static str, grid_s: &[f64]) -> Vec<Form> {
+    let form = |tau_s| Form { name, ..Form::of(&[("tau_s", tau_s)]) };
     time_constants(scene, grid_s).into_iter().map(form).collect()
 }
 
@@ -114,19 +114,15 @@ pub(crate) fn delays(scene: &Scene, grid_s: &[f64]) -> Vec<f64> {
 const STEPS_MAX: usize = 96;
 
 /// Forms that step at the start of a run and stay, with at least two runs on either side.
-pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<EffectForm> {
+pub(crate) fn step_forms(scene: &Scene, name: &'static str) -> Vec<Form> {
     let mut seen = BTreeSet::new();
     let first_of_name: Vec<bool> = scene.run_names().iter().map(|run| seen.insert(run.clone())).collect();
     let last = scene.runs().len().saturating_sub(2);
     let starts: Vec<&String> =
         (2..=last).filter(|run| first_of_name[*run]).map(|run| &scene.run_names()[run]).collect();
     let ln_choices = ln_count(starts.len());
-    let form = |run: &&String| EffectForm {
-        name,
-        place: Some(("run".to_owned(), (*run).clone())),
-        ln_choices,
-        ..EffectForm::default()
-    };
+    let form =
+        |run: &&String| Form { name, place: Some(("run".to_owned(), (*run).clone())), ln_choices, ..Form::default() };
     starts.iter().step_by(starts.len().div_ceil(STEPS_MAX).max(1)).map(form).collect()
 }
 
@@ -165,19 +161,15 @@ pub(crate) fn stretch_of_runs(scene: &Scene, first: usize, last: usize) -> Strin
 const RUN_TO_RUN: &str = " to ";
 
 /// One form per word of a text column, where it has `2..=most` words.
-pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<EffectForm> {
+pub(crate) fn word_forms(scene: &Scene, name: &'static str, column: &str, most: usize) -> Vec<Form> {
     let Some(words) = scene.words(column) else { return Vec::new() };
     let words = words.words();
     if !(2..=most).contains(&words.len()) {
         return Vec::new();
     }
     let ln_choices = ln_count(words.len());
-    let form = |word: &String| EffectForm {
-        name,
-        place: Some((column.to_owned(), word.clone())),
-        ln_choices,
-        ..EffectForm::default()
-    };
+    let form =
+        |word: &String| Form { name, place: Some((column.to_owned(), word.clone())), ln_choices, ..Form::default() };
     words.iter().map(form).collect()
 }
 

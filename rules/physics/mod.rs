@@ -95,7 +95,7 @@ impl EffectDoc {
 
 /// One concrete shape of an effect: a form of the law with values for its shape parameters.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct EffectForm {
+pub struct Form {
     /// Which of the effect's forms; empty for the only one.
     pub name: &'static str,
     /// Shape parameters with their values.
@@ -112,7 +112,7 @@ pub struct EffectForm {
 /// Name of the form of [`Effect::still`].
 pub const STILL: &str = "still";
 
-impl EffectForm {
+impl Form {
     /// A form with these shape parameters.
     #[must_use]
     pub fn of(shape: &[(&'static str, f64)]) -> Self {
@@ -155,7 +155,7 @@ pub trait Effect: Sync + Send {
 
     /// The forms worth trying as a candidate in this scene, coarse in the shape parameters; empty when the scene lacks
     /// what the effect needs or never excites it.
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm>;
+    fn forms(&self, scene: &Scene) -> Vec<Form>;
 
     /// Names of its forms, as a model file gives them; none for an effect of one form.
     fn form_names(&self) -> &'static [&'static str] {
@@ -163,10 +163,10 @@ pub trait Effect: Sync + Send {
     }
 
     /// The columns of this form, `None` when the scene lacks an input.
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns>;
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns>;
 
     /// The form a model file means when it gives no form: its shape parameters are replaced by the file's.
-    fn default_form(&self, scene: &Scene) -> EffectForm {
+    fn default_form(&self, scene: &Scene) -> Form {
         self.forms(scene).into_iter().next().unwrap_or_default()
     }
 
@@ -182,7 +182,7 @@ pub trait Effect: Sync + Send {
 
     /// The form in which a state that changes with time stands still, for an effect that is nothing without it: to be
     /// compared with, never proposed.
-    fn still(&self) -> Option<EffectForm> {
+    fn still(&self) -> Option<Form> {
         None
     }
 

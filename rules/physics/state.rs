@@ -1,6 +1,6 @@
 //! States that effects carry: first-order lags with true time stamps, across pauses where they are known.
 
-use super::{EffectForm, Scene};
+use super::{Form, Scene};
 
 /// A first-order state `dx/dt = (u - x) / tau_s`, exact for an input held between rows, starting from zero. Across a
 /// known pause the input is held for ten periods, then it is zero; across an unknown pause the state stands still.
@@ -132,7 +132,7 @@ pub const BETWEEN_SAMPLES: &str = "between_samples";
 /// The same by the delay of a form; where that acts between samples, by the hidden delay in s of every row, where it has
 /// been found.
 #[must_use]
-pub fn delayed_between_samples(scene: &Scene, kind: &str, values: &[f64], form: &EffectForm) -> Vec<f64> {
+pub fn delayed_between_samples(scene: &Scene, kind: &str, values: &[f64], form: &Form) -> Vec<f64> {
     let delay_s = form.value("delay_s").unwrap_or(0.0);
     match scene.latent(kind).filter(|_| form.name == BETWEEN_SAMPLES) {
         Some(hidden_s) => delayed_by(scene, values, |row| hidden_s[row]),

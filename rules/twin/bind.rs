@@ -44,7 +44,7 @@ fn complete(part: &Part, scene: &Scene) -> Part {
             part.parameters.push(added(name, *value, Entry::Shape, doc.map(|doc| (doc.range, doc.unit))));
         }
     }
-    let shaped = crate::physics::EffectForm { shape: default.shape.clone(), ..form.clone() };
+    let shaped = crate::physics::Form { shape: default.shape.clone(), ..form.clone() };
     for (name, _) in effect.columns(&stand_in, &shaped).unwrap_or_default() {
         if !known(&part.parameters, name) {
             let doc = effect.doc().parameter(name);

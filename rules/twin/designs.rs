@@ -4,7 +4,7 @@ use super::frame::Frame;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::noise::Arma;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, EffectForm, Role, Scene};
+use crate::physics::{CATALOGUE, Effect, Form, Role, Scene};
 use crate::statistics::count;
 
 /// Kinds that build a model and are never a finding by themselves.
@@ -12,7 +12,7 @@ const BUILDING: [&str; 2] = ["no_load_power", "cutting_power"];
 
 /// What a flexible or seldom cause must explain beyond the price of its parameters, in units of information: whoever
 /// bends at a threshold, steps at any word or acts at edges only imitates others easily.
-fn reluctance(kind: &str, form: &EffectForm) -> f64 {
+fn reluctance(kind: &str, form: &Form) -> f64 {
     match kind {
         // A stage that is recorded has not been chosen to fit.
         "gear_stage" if form.place.is_some() => 0.0,
@@ -180,7 +180,7 @@ fn weighs_acceleration(model: &Model) -> bool {
 
 /// The columns of one form.
 #[must_use]
-pub fn design(effect: &'static dyn Effect, form: &EffectForm, scene: &Scene, frame: &Frame) -> Option<Design> {
+pub fn design(effect: &'static dyn Effect, form: &Form, scene: &Scene, frame: &Frame) -> Option<Design> {
     debug_assert!(form.name.is_empty() || effect.form_names().contains(&form.name), "{:?}", form.name);
     let columns = effect.columns(scene, form)?;
     let names: Vec<&'static str> = columns.iter().map(|(name, _)| *name).collect();

@@ -13,7 +13,7 @@ use super::sampled::{self, Edges};
 use super::scan::{HypothesisBank, best_of_each_law};
 use super::search::FIRST_INFORMATION;
 use crate::physics::state::BETWEEN_SAMPLES;
-use crate::physics::{Effect, EffectForm};
+use crate::physics::{Effect, Form};
 use crate::statistics::robust_deviation;
 
 /// Outlandish rows below which it makes no difference that they weigh little.
@@ -28,7 +28,7 @@ const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
 /// A form of an effect at edges as fitted with every row in full, and the noise beside it.
 pub struct SeenForm {
     effect: &'static dyn Effect,
-    form: EffectForm,
+    form: Form,
     noise: Arma,
 }
 
@@ -41,8 +41,8 @@ fn priced(fit: &Fit) -> f64 {
 impl Case<'_> {
     /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
     pub(super) fn weigh_edges(&mut self, base: Fit) -> Fit {
-        let veiled = self.frame.heavy();
-        if veiled < OUTLYING_ROWS_MIN {
+        let heavy_rows = self.frame.heavy();
+        if heavy_rows < OUTLYING_ROWS_MIN {
             return base;
         }
         let weighed = self.frame.clone();
@@ -53,7 +53,7 @@ impl Case<'_> {
         let Some(best) = fits.iter().max_by(likelihood).filter(|best| {
             // It must make half of the outlandish rows ordinary, in noise that a few others do not make look white.
             let noise = self.frame.noise_between_outliers(&best.residual, best.noise);
-            2 * self.frame.outlandish_in(&best.residual, noise) <= veiled
+            2 * self.frame.outlandish_in(&best.residual, noise) <= heavy_rows
         }) else {
             self.frame = weighed;
             return base;
@@ -149,7 +149,7 @@ impl Case<'_> {
     }
 
     /// A delay that shows between samples in this residual, with the edges it has late as the hidden state of the scene.
-    fn between_samples(&mut self, effect: &dyn Effect, residual: &[f64], noise: (Arma, f64)) -> Option<EffectForm> {
+    fn between_samples(&mut self, effect: &dyn Effect, residual: &[f64], noise: (Arma, f64)) -> Option<Form> {
         let period_s = self.scene.period_s();
         let at = |rows: i32| {
             let mut form = effect.default_form(&self.scene);
@@ -167,11 +167,11 @@ impl Case<'_> {
         self.scene.set_latent(kind, late_s);
         let delay_s = found.rows * period_s;
         self.delay_errors_s.insert(kind, found.rows_error * period_s);
-        Some(EffectForm {
+        Some(Form {
             name: BETWEEN_SAMPLES,
             known: vec![("share", 1.0), ("delay_s", delay_s)],
             ln_choices: 0.5 * found.price,
-            ..EffectForm::of(&[("delay_s", delay_s)])
+            ..Form::of(&[("delay_s", delay_s)])
         })
     }
 }

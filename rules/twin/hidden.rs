@@ -14,7 +14,7 @@ use super::ripple;
 use super::search::Hypothesis;
 use super::wave::{self, Wave};
 use crate::physics::drive::is_axis_output;
-use crate::physics::{EffectForm, OutputKind, Role};
+use crate::physics::{Form, OutputKind, Role};
 use crate::statistics::{count, median};
 use std::ops::Range;
 
@@ -57,7 +57,7 @@ impl Case<'_> {
         let state = self.switch_per_row(&found);
         self.scene.set_latent("auxiliary_switch", state);
         self.switching = Some(found.clone());
-        let form = EffectForm { name: "latent", ln_choices: 0.5 * found.price, ..EffectForm::default() };
+        let form = Form { name: "latent", ln_choices: 0.5 * found.price, ..Form::default() };
         let design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         Some(Design { noise: Some(found.noise), ..design })
     }
@@ -146,7 +146,7 @@ impl Case<'_> {
         let information = found.gain - ripple::price(self.frame.len());
         let (ln_choices, noise) = self.seeming_choices(base, &found.values, found.wave.noise, information);
         let shape = vec![("frequency_hz", found.wave.frequency / self.scene.period_s())];
-        let form = EffectForm { name: "latent", ln_choices, shape, ..EffectForm::default() };
+        let form = Form { name: "latent", ln_choices, shape, ..Form::default() };
         let mut design = super::designs::design(effect, &form, &self.scene, &self.frame)?;
         design.freedom = 1;
         design.noise = Some(noise);

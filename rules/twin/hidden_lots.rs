@@ -11,7 +11,7 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::linear::dot;
 use crate::physics::catalogue::hardness_batch::{LOTS_MAX, odd_lot, unwritten_lots};
-use crate::physics::{EffectForm, effect};
+use crate::physics::{Form, effect};
 use crate::statistics::count;
 use std::ops::Range;
 
@@ -55,7 +55,7 @@ impl Case<'_> {
     /// What each run tells of the weight of its cut.
     fn sums_of_runs(&self, base: &Fit) -> Option<RunSums> {
         let first = self.scene.run_names().first()?.clone();
-        let always = EffectForm { name: "step", place: Some(("run".to_owned(), first)), ..EffectForm::default() };
+        let always = Form { name: "step", place: Some(("run".to_owned(), first)), ..Form::default() };
         let (_, cut) = effect("hardness_batch")?.columns(&self.scene, &always)?.pop()?;
         let cut = self.frame.whiten(&self.frame.reduce(&cut), base.noise);
         let left = base.innovations(&self.frame);

@@ -5,7 +5,7 @@ use super::diagnose::Case;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::tone::{self, Tone, Turning};
-use crate::physics::{EffectForm, Scene, effect};
+use crate::physics::{Form, Scene, effect};
 
 /// The kind.
 pub(super) const KIND: &str = "runout";
@@ -15,7 +15,7 @@ pub(super) const KIND: &str = "runout";
 fn turning(scene: &Scene, frame: &Frame) -> Option<Turning> {
     let runout = effect(KIND)?;
     let columns: Vec<Vec<f64>> =
-        runout.columns(scene, &EffectForm::plain())?.iter().map(|(_, column)| frame.reduce(column)).collect();
+        runout.columns(scene, &Form::plain())?.iter().map(|(_, column)| frame.reduce(column)).collect();
     columns.try_into().ok()
 }
 
@@ -35,7 +35,7 @@ impl Case<'_> {
         }
         self.scene.set_latent(KIND, tone);
         let (ln_choices, noise) = self.seeming_choices(base, &values, found.noise, found.information);
-        let form = EffectForm { name: "latent", ln_choices, ..EffectForm::default() };
+        let form = Form { name: "latent", ln_choices, ..Form::default() };
         let found_as = design(runout, &form, &self.scene, &self.frame)?;
         self.tone = Some(found);
         Some(Design { noise: Some(noise), ..found_as })

@@ -4,7 +4,7 @@
 use super::frame::{Frame, Unit};
 use super::model::{Part, PartFunction, simulate};
 use super::noise::Arma;
-use crate::physics::{EffectForm, Scene};
+use crate::physics::{Form, Scene};
 use crate::statistics::count;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -119,7 +119,7 @@ fn follow_new_lots(
     let fitted = (0..units.len()).filter(|unit| !held.contains(unit)).flat_map(|unit| units[unit].rows.clone());
     let known: BTreeSet<&str> = fitted.filter_map(|row| lots.get(row)).collect();
     let first = scene.run_names().first()?.clone();
-    let always = EffectForm { name: "step", place: Some(("run".to_owned(), first)), ..EffectForm::default() };
+    let always = Form { name: "step", place: Some(("run".to_owned(), first)), ..Form::default() };
     let (_, cut) = part.effect_and_form()?.0.columns(scene, &always)?.pop()?;
     let gains: Vec<f64> = part.parameters.iter().map(|gain| gain.value).collect();
     let lots_known = count(known.len().max(2));

@@ -14,7 +14,7 @@ use super::frame::Frame;
 use super::model::{Part, PartFunction};
 use super::offered::empirical_channels;
 use super::scan::{self, HypothesisBank, price};
-use super::unknown::{EmpiricalForm, NOTHING_NAMED_INFORMATION};
+use super::unknown::{FormFit, NOTHING_NAMED_INFORMATION};
 use super::verdicts::CLASS_INFORMATION;
 use crate::physics::Scene;
 use crate::statistics::count;
@@ -77,14 +77,14 @@ fn is_visited(groups: &[usize], frame: &Frame) -> bool {
 
 impl Case<'_> {
     /// The form over where it acts, and what happens at other ends beside it; `from` is what it was fitted on top of.
-    pub(super) fn localised(&mut self, from: &Fit, whole: EmpiricalForm) -> EmpiricalForm {
+    pub(super) fn localised(&mut self, from: &Fit, whole: FormFit) -> FormFit {
         let form = self.over_one_end(from, whole);
         let form = self.with_further_ends(form);
         self.without_bent_line(from, form)
     }
 
     /// Ends alone, where the bent line has become superfluous beside them.
-    fn without_bent_line(&mut self, from: &Fit, form: EmpiricalForm) -> EmpiricalForm {
+    fn without_bent_line(&mut self, from: &Fit, form: FormFit) -> FormFit {
         let first = from.parts.len();
         let bent =
             |part: &Part| matches!(&part.body, PartFunction::Empirical(form) if matches!(form.shape, Shape::Bent(_)));
@@ -99,11 +99,11 @@ impl Case<'_> {
         if lost > CLASS_INFORMATION {
             return form;
         }
-        EmpiricalForm { information: form.information - lost, fit, ..form }
+        FormFit { information: form.information - lost, fit, ..form }
     }
 
     /// What is described, and lines over other ends on top of it that are as good as alarms of their own.
-    fn with_further_ends(&mut self, mut form: EmpiricalForm) -> EmpiricalForm {
+    fn with_further_ends(&mut self, mut form: FormFit) -> FormFit {
         let mut designs = end_designs(&self.scene, &self.frame);
         for number in 2..2 + FURTHER_MAX {
             let name = format!("unknown_{number}");
@@ -111,14 +111,13 @@ impl Case<'_> {
             let Some(best) = self.likeliest(&form.fit, &designs) else { break };
             let more = self.with_form(&form.fit, &designs[best]);
             let Some(more) = more.filter(|more| more.information > NOTHING_NAMED_INFORMATION) else { break };
-            form =
-                EmpiricalForm { design: form.design, fit: more.fit, information: form.information + more.information };
+            form = FormFit { design: form.design, fit: more.fit, information: form.information + more.information };
         }
         form
     }
 
     /// A line over one end of the form's channel instead of a bent one, where it explains as much.
-    fn over_one_end(&mut self, from: &Fit, whole: EmpiricalForm) -> EmpiricalForm {
+    fn over_one_end(&mut self, from: &Fit, whole: FormFit) -> FormFit {
         let PartFunction::Empirical(form) = &whole.design.part.body else { return whole };
         if !matches!(form.shape, Shape::Bent(_)) {
             return whole;

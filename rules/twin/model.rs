@@ -4,7 +4,7 @@ use super::channel::{SIMULATED_OUTPUT, is_simulated};
 use super::empirical::Empirical;
 use super::expression::Expression;
 use super::term::Term;
-use crate::physics::{Effect, EffectForm, Entry, ParameterDoc, Role, Scene};
+use crate::physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -30,7 +30,7 @@ pub struct Parameter {
 #[derive(Clone)]
 pub enum PartFunction {
     /// An effect of the catalogue in a form; the shape values stand in the parameters.
-    Effect(&'static dyn Effect, EffectForm),
+    Effect(&'static dyn Effect, Form),
     /// A sum of coefficient times term; one parameter per term.
     Linear(Vec<Term>),
     /// No-load power as a table over speed; one parameter per speed, interpolated quadratically.
@@ -71,7 +71,7 @@ pub struct Part {
 impl Part {
     /// A candidate as a part, its linear parameters at zero where they are not known.
     #[must_use]
-    pub fn candidate(effect: &'static dyn Effect, form: &EffectForm, linear: &[&'static str]) -> Self {
+    pub fn candidate(effect: &'static dyn Effect, form: &Form, linear: &[&'static str]) -> Self {
         let shape = form.shape.iter().map(|(name, value)| parameter(effect, name, *value, Entry::Shape));
         let linear = linear.iter().map(|name| parameter(effect, name, 0.0, Entry::Linear));
         let mut parameters: Vec<Parameter> = linear.chain(shape).collect();
@@ -103,7 +103,7 @@ impl Part {
 
     /// The effect of the catalogue with the form as it is now; `None` of any other part.
     #[must_use]
-    pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, EffectForm)> {
+    pub(super) fn effect_and_form(&self) -> Option<(&'static dyn Effect, Form)> {
         match &self.body {
             PartFunction::Effect(effect, form) => Some((*effect, self.form(form))),
             _ => None,
@@ -111,7 +111,7 @@ impl Part {
     }
 
     /// The form with the present shape values.
-    fn form(&self, form: &EffectForm) -> EffectForm {
+    fn form(&self, form: &Form) -> Form {
         let mut form = form.clone();
         for parameter in self.parameters.iter().filter(|parameter| parameter.entry == Entry::Shape) {
             match form.shape.iter_mut().find(|(name, _)| *name == parameter.name) {

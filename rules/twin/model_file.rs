@@ -4,7 +4,7 @@ use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::table::SpeedTable;
 use super::term::Term;
-use crate::physics::{CATALOGUE, Effect, EffectForm, Entry, Role, effect};
+use crate::physics::{CATALOGUE, Effect, Entry, Form, Role, effect};
 use adapters::channel::nearest;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -257,8 +257,8 @@ impl<'t> Reader<'t> {
         Some(part(kind, PartFunction::Effect(effect, form), parameters))
     }
 
-    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> EffectForm {
-        let mut form = EffectForm::plain();
+    fn form(&mut self, effect: &'static dyn Effect, table: &Table<'_>) -> Form {
+        let mut form = Form::plain();
         let chosen = table.get("form").or_else(|| table.get("process"));
         if let Some(name) = chosen.and_then(|name| name.get_ref().as_str()) {
             match effect.form_names().iter().find(|known| **known == name) {
@@ -494,7 +494,7 @@ mod tests {
             for name in effect.form_names() {
                 let offset = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"offset\"\n";
                 let mut model = parse_model(offset).expect("reads");
-                model.parts = vec![Part::candidate(*effect, &EffectForm { name, ..EffectForm::plain() }, &linear)];
+                model.parts = vec![Part::candidate(*effect, &Form { name, ..Form::plain() }, &linear)];
                 let read = parse_model(&write_model(&model));
                 let read = read.unwrap_or_else(|problems| panic!("{}: {problems:?}", effect.doc().kind));
                 assert_eq!(read.parts[0].parameters.len(), linear.len());

@@ -103,12 +103,12 @@ pub fn unwhiten(innovations: &[f64], stretches: &[Range<usize>], noise: Arma) ->
     for rows in stretches {
         let mut next = 0.0;
         for row in rows.clone().rev() {
-            let carried = innovations[row] - noise.theta * next;
+            let rest = innovations[row] - noise.theta * next;
             if row == rows.start {
                 out[row] = noise.first_weight() * innovations[row] - noise.phi * next;
             } else {
-                out[row] = carried - noise.phi * next;
-                next = carried;
+                out[row] = rest - noise.phi * next;
+                next = rest;
             }
         }
     }

@@ -20,7 +20,7 @@ pub(super) fn diagnosed(rows: u32, level: impl Fn(u32) -> f64, spilt: impl Fn(f6
         let flow = 2.0 * pump - spilt(level) + 0.2 * noise;
         writeln!(text, "{row},{},{pump:.5},{level:.5},{flow:.5}", row / 150).expect("a string takes it");
     }
-    let recording = read_csv(text.as_bytes(), "vessel.csv").expect("readable").recording;
+    let recording = read_csv(text.as_bytes(), "tank.csv").expect("readable").recording;
     let found = diagnose(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable");
     (recording, found)
 }

@@ -28,8 +28,8 @@ struct StateTransition {
 
 impl<T: Copy> Lanes<T> {
     /// With what a state carries that begins with a chance, and with the weight of a chance to go on.
-    fn begin(rhythm: &Rhythm, carried: impl Fn(usize, f64) -> T, weight: impl Fn(f64) -> f64) -> Self {
-        let now = [0, 1].map(|on| rhythm.begins[on].iter().map(|begins| carried(on, *begins)).collect::<Vec<T>>());
+    fn begin(rhythm: &Rhythm, value: impl Fn(usize, f64) -> T, weight: impl Fn(f64) -> f64) -> Self {
+        let now = [0, 1].map(|on| rhythm.begins[on].iter().map(|begins| value(on, *begins)).collect::<Vec<T>>());
         let stay = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| weight(1.0 - end)).collect());
         let turn = [0, 1].map(|on| rhythm.ends[on].iter().map(|end| weight(*end)).collect());
         Self { next: now.clone(), now, stay, turn }

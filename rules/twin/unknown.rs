@@ -111,7 +111,7 @@ fn has_friction(fit: &Fit) -> bool {
 
 /// An empirical form fitted on top of something.
 #[derive(Clone)]
-pub(super) struct EmpiricalForm {
+pub(super) struct FormFit {
     pub(super) design: Design,
     pub(super) fit: Fit,
     /// Information over what it was fitted on top of.
@@ -247,7 +247,7 @@ impl Case<'_> {
             && alone.information > named + margin(&alone.design, named)
             && !self.is_another_shape(&alone.design, best);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
-        let stands = |given: EmpiricalForm| named + on_top.information - given.information > STANDS_SHARE * named;
+        let stands = |given: FormFit| named + on_top.information - given.information > STANDS_SHARE * named;
         let close = alone.information > CLOSE_SHARE * named;
         let own = self.is_over_own_column(&alone.design, best);
         let unlike = anything && close && !own && self.unlike(&found.best);
@@ -283,13 +283,13 @@ impl Case<'_> {
 
     /// A form with others on top of it, as long as they explain something: one form seldom describes the whole of what is
     /// left, and its rest is no noise to be resampled.
-    fn deepened(&mut self, form: &EmpiricalForm, forms: &Yardsticks<'_>) -> EmpiricalForm {
+    fn deepened(&mut self, form: &FormFit, forms: &Yardsticks<'_>) -> FormFit {
         let mut deepest = form.clone();
         for _ in 0..DEEPER_MAX {
             let scores = forms.bank.scan(&deepest.fit, self.ln_rows(&deepest.fit));
             let more = self.best_empirical(&deepest.fit, forms, &scores);
             let Some(more) = more.filter(|more| more.information > UNKNOWN_INFORMATION) else { break };
-            deepest = EmpiricalForm { fit: more.fit, information: deepest.information + more.information, ..deepest };
+            deepest = FormFit { fit: more.fit, information: deepest.information + more.information, ..deepest };
         }
         deepest
     }
@@ -358,12 +358,7 @@ impl Case<'_> {
     }
 
     /// The empirical form that explains most on top of `from`, fitted in full; information relative to `from`.
-    pub(super) fn best_empirical(
-        &mut self,
-        from: &Fit,
-        forms: &Yardsticks<'_>,
-        scores: &[Score],
-    ) -> Option<EmpiricalForm> {
+    pub(super) fn best_empirical(&mut self, from: &Fit, forms: &Yardsticks<'_>, scores: &[Score]) -> Option<FormFit> {
         let best = likeliest(scores)?;
         let design = self.sharpened(from, &forms.bank.designs[best.design], best.gain);
         self.with_form(from, &design)
@@ -391,12 +386,12 @@ impl Case<'_> {
     }
 
     /// An empirical form on top of `from`, fitted in full.
-    pub(super) fn with_form(&mut self, from: &Fit, design: &Design) -> Option<EmpiricalForm> {
+    pub(super) fn with_form(&mut self, from: &Fit, design: &Design) -> Option<FormFit> {
         let mut parts = from.parts.clone();
         parts.push(design.part.clone());
         let fit = self.with_data(|data| fit(data, &parts, from.noise))?;
         let gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
         let information = gain - price(design, self.ln_rows(from));
-        Some(EmpiricalForm { design: design.clone(), fit, information })
+        Some(FormFit { design: design.clone(), fit, information })
     }
 }

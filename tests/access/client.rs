@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// A gateway whose data directory lies in a directory of its own.
-pub(crate) struct House {
+pub(crate) struct Testbed {
     pub(crate) gateway: Gateway,
     pub(crate) address: String,
     pub(crate) config: PathBuf,
@@ -15,7 +15,7 @@ pub(crate) struct House {
 }
 
 /// Starts a simulated machine that may be armed, with these lines under `[http]`.
-pub(crate) fn house(http: &str) -> House {
+pub(crate) fn testbed(http: &str) -> Testbed {
     let directory = tempfile::tempdir().expect("a directory");
     let scripts = directory.path().join("data/scripts");
     std::fs::create_dir_all(&scripts).expect("a directory");
@@ -30,7 +30,7 @@ pub(crate) fn house(http: &str) -> House {
     let line = gateway.wait_said("with the token");
     let token =
         line.split("with the token ").nth(1).and_then(|rest| rest.split(';').next()).expect("a token").to_owned();
-    House { gateway, address, config, token, directory }
+    Testbed { gateway, address, config, token, directory }
 }
 
 /// The gateway of this configuration, and `HOST:PORT` of its page.
@@ -43,7 +43,7 @@ pub(crate) fn started(config: &Path) -> (Gateway, String) {
     (gateway, address)
 }
 
-impl House {
+impl Testbed {
     /// A client that nobody has signed in.
     pub(crate) fn client(&self) -> Client {
         Client { address: self.address.clone(), cookie: String::new() }

@@ -1,7 +1,7 @@
 //! A crowd of clients that ask for nothing, ask without end, or read nothing: the tick, the orders at the box and the page must
 //! not suffer.
 
-use super::client::{House, house};
+use super::client::{Testbed, testbed};
 use super::process::{get, wait_for};
 use gateway::control::{Order, Reply, order};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -45,26 +45,26 @@ fn skipped(address: &str) -> (u64, u64, f64) {
 
 /// Lets the crowd in; gives how long each order to disarm took, sorted.
 fn withstood(crowd: &Crowd) -> Vec<Duration> {
-    let house = house("");
+    let testbed = testbed("");
     wait_for("ticks", Duration::from_secs(60), || {
-        let status = get(&house.address, "/api/v1/status").json();
+        let status = get(&testbed.address, "/api/v1/status").json();
         (status["gate"]["permitted_pct"].is_number() && status["tick"]["count"].as_u64() > Some(20)).then_some(())
     });
-    let before = skipped(&house.address);
-    let address: SocketAddr = house.address.parse().expect("an address");
+    let before = skipped(&testbed.address);
+    let address: SocketAddr = testbed.address.parse().expect("an address");
     let began = Instant::now();
     let (half_open, reading) = (crowd.half_open, crowd.reading);
     let comes = thread::spawn(move || flood(address, half_open, reading));
-    let mut disarmed = orders(&house, crowd.orders, Duration::from_millis(20));
+    let mut disarmed = orders(&testbed, crowd.orders, Duration::from_millis(20));
     let sockets = comes.join().expect("no panic");
     let came = began.elapsed();
-    disarmed.extend(orders(&house, crowd.orders, Duration::from_millis(20)));
-    let page_within = page(&house.address);
-    let files = std::fs::read_dir(format!("/proc/{}/fd", house.gateway.pid())).expect("a process").count();
+    disarmed.extend(orders(&testbed, crowd.orders, Duration::from_millis(20)));
+    let page_within = page(&testbed.address);
+    let files = std::fs::read_dir(format!("/proc/{}/fd", testbed.gateway.pid())).expect("a process").count();
     let crowded = sockets.len();
     drop(sockets);
-    let page_after = page(&house.address);
-    let after = skipped(&house.address);
+    let page_after = page(&testbed.address);
+    let after = skipped(&testbed.address);
     disarmed.sort_unstable();
     println!(
         "{crowded} sockets within {came:?}, {files} files open: disarm n = {}, median {:?}, greatest {:?}; page within the crowd \
@@ -86,7 +86,7 @@ fn withstood(crowd: &Crowd) -> Vec<Duration> {
         "{page_within:?} {page_after:?}"
     );
     assert!(crowded > (half_open + reading) / 2, "{crowded} connections were made");
-    house.gateway.stop();
+    testbed.gateway.stop();
     disarmed
 }
 
@@ -105,8 +105,8 @@ fn page(address: &str) -> Duration {
 }
 
 /// Arms and disarms at the box; gives how long each disarming took.
-fn orders(house: &House, count: usize, pause: Duration) -> Vec<Duration> {
-    let data_dir = house.directory.path().join("data");
+fn orders(testbed: &Testbed, count: usize, pause: Duration) -> Vec<Duration> {
+    let data_dir = testbed.directory.path().join("data");
     let mut disarmed = Vec::new();
     for _ in 0..count {
         let by = || "test".to_owned();
@@ -141,12 +141,12 @@ fn flood(address: SocketAddr, half_open: usize, reading: usize) -> Vec<TcpStream
 /// A few clients that do not read keep the others from nothing, and the streams of one address are limited.
 #[test]
 fn the_streams_of_one_client_are_limited_and_free_again_when_it_has_gone() {
-    let house = house("");
-    wait_for("ticks", Duration::from_secs(60), || (get(&house.address, "/healthz").status == 200).then_some(()));
+    let testbed = testbed("");
+    wait_for("ticks", Duration::from_secs(60), || (get(&testbed.address, "/healthz").status == 200).then_some(()));
     let listen = || {
-        let mut stream = TcpStream::connect(&house.address).expect("it listens");
+        let mut stream = TcpStream::connect(&testbed.address).expect("it listens");
         stream.set_read_timeout(Some(Duration::from_secs(10))).expect("a limit");
-        write!(stream, "GET /api/v1/live HTTP/1.1\r\nHost: {}\r\n\r\n", house.address).expect("sent");
+        write!(stream, "GET /api/v1/live HTTP/1.1\r\nHost: {}\r\n\r\n", testbed.address).expect("sent");
         let mut first = [0; 12];
         std::io::Read::read_exact(&mut stream, &mut first).expect("answered");
         (String::from_utf8_lossy(&first).into_owned(), stream)
@@ -157,7 +157,7 @@ fn the_streams_of_one_client_are_limited_and_free_again_when_it_has_gone() {
     assert_eq!((taken, refused), (8, 4));
     drop(streams);
     wait_for("a free one", Duration::from_secs(5), || (listen().0 == "HTTP/1.1 200").then_some(()));
-    let status: Value = get(&house.address, "/api/v1/status").json();
+    let status: Value = get(&testbed.address, "/api/v1/status").json();
     assert_eq!(status["tick"]["skipped"], 0);
-    house.gateway.stop();
+    testbed.gateway.stop();
 }

@@ -1,7 +1,7 @@
 //! The description of the API against a box, by schemathesis (PyPI): whatever it makes of the description, the answer is one of
 //! those that are described, and never a 500.
 
-use super::client::house;
+use super::client::testbed;
 use super::process::{stderr, stdout};
 use std::process::Command;
 
@@ -19,15 +19,15 @@ fn schemathesis() -> Option<Command> {
 
 fn tried(examples: &str) {
     let Some(mut command) = schemathesis() else { return };
-    let house = house("allow_arming = true\n");
+    let testbed = testbed("allow_arming = true\n");
     // The persons must still be there in the end, and streams do not end: both are tried elsewhere.
-    let schema = format!("http://{}/openapi.json", house.address);
-    let bearer = format!("Authorization: Bearer admin:{}", house.token);
+    let schema = format!("http://{}/openapi.json", testbed.address);
+    let bearer = format!("Authorization: Bearer admin:{}", testbed.token);
     command.args([
         "run",
         &schema,
         "--url",
-        &format!("http://{}", house.address),
+        &format!("http://{}", testbed.address),
         "--header",
         &bearer,
         "--max-examples",
@@ -47,12 +47,14 @@ fn tried(examples: &str) {
         "examples,coverage,fuzzing",
     ]);
     command.args(["--exclude-path", "/api/v1/persons/{name}/token", "--exclude-path", "/api/v1/login"]);
-    command.args(["--request-timeout", "10", "--no-color"]).env("HYPOTHESIS_STORAGE_DIRECTORY", house.directory.path());
-    let output = command.current_dir(house.directory.path()).output().expect("it runs");
+    command
+        .args(["--request-timeout", "10", "--no-color"])
+        .env("HYPOTHESIS_STORAGE_DIRECTORY", testbed.directory.path());
+    let output = command.current_dir(testbed.directory.path()).output().expect("it runs");
     assert!(output.status.success(), "{}\n{}", stdout(&output), stderr(&output));
     let told = stdout(&output);
     println!("{}", told.lines().rev().take(12).collect::<Vec<_>>().into_iter().rev().collect::<Vec<_>>().join("\n"));
-    house.gateway.stop();
+    testbed.gateway.stop();
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A page that other computers can reach: over TLS, and for persons only; checked with curl as a client that is not ours.
 
-use super::client::house;
+use super::client::testbed;
 use super::process::{program, stderr, text, wait_for};
 use std::process::{Command, Output};
 use std::time::Duration;
@@ -36,10 +36,10 @@ fn over_tls_everybody_signs_in_and_the_certificate_is_made_once() {
         assert!(std::env::var_os("CNC_GATEWAY_CI").is_none(), "no curl: install the package of this name");
         return eprintln!("SKIPPED: no curl here");
     }
-    let mut house = house("tls = true\ntokens = \"always\"\nallow_hosts = \"gateway.local\"\n");
-    let certificate = house.directory.path().join("data/tls/certificate.pem");
-    let fingerprint = house.gateway.wait_said("SHA-256 fingerprint");
-    let port = house.address.rsplit(':').next().expect("a port").to_owned();
+    let mut testbed = testbed("tls = true\ntokens = \"always\"\nallow_hosts = \"gateway.local\"\n");
+    let certificate = testbed.directory.path().join("data/tls/certificate.pem");
+    let fingerprint = testbed.gateway.wait_said("SHA-256 fingerprint");
+    let port = testbed.address.rsplit(':').next().expect("a port").to_owned();
     let base = format!("https://127.0.0.1:{port}");
     let resolve = format!("gateway.local:{port}:127.0.0.1");
     let trusted = ["--cacert", text(&certificate), "--resolve", &resolve];
@@ -55,10 +55,10 @@ fn over_tls_everybody_signs_in_and_the_certificate_is_made_once() {
     let sent_on = ask(&["--header", "Accept: text/html", &format!("{base}/")]);
     assert!(sent_on.ends_with(&format!("303 {base}/sign-in?next=/")), "{sent_on}");
     assert!(ask(&[&format!("https://gateway.local:{port}/healthz")]).ends_with("200 "), "a name that is allowed");
-    let bearer = format!("Authorization: Bearer admin:{}", house.token);
+    let bearer = format!("Authorization: Bearer admin:{}", testbed.token);
     assert!(ask(&["--header", &bearer, &format!("{base}/metrics")]).contains("cncgw_ticks_total"));
-    let jar = house.directory.path().join("cookies");
-    let body = format!("{{\"name\":\"admin\",\"token\":\"{}\"}}", house.token);
+    let jar = testbed.directory.path().join("cookies");
+    let body = format!("{{\"name\":\"admin\",\"token\":\"{}\"}}", testbed.token);
     let json = ["--header", "Content-Type: application/json", "--cookie-jar", text(&jar), "--data", &body];
     let signed = ask(&[&json[..], &[&format!("{base}/api/v1/login")]].concat());
     assert!(signed.ends_with("200 "), "{signed}");
@@ -69,9 +69,9 @@ fn over_tls_everybody_signs_in_and_the_certificate_is_made_once() {
     assert!(!plain.status.success(), "nothing is answered in clear");
     let unknown = curl(&[&format!("{base}/healthz")]);
     assert!(!unknown.status.success(), "nobody trusts the certificate unasked");
-    house.gateway.signal("TERM");
-    assert!(house.gateway.wait().success());
-    let (mut again, _) = super::client::started(&house.config);
+    testbed.gateway.signal("TERM");
+    assert!(testbed.gateway.wait().success());
+    let (mut again, _) = super::client::started(&testbed.config);
     let told = again.wait_said("SHA-256 fingerprint");
     let digits = |line: &str| line.rsplit(' ').next().map(str::to_owned);
     assert_eq!(digits(&fingerprint), digits(&told));

@@ -1,6 +1,6 @@
 //! Persons, tokens, sessions, and what they may do: as a user does it, and as it stands in the audit.
 
-use super::client::{house, rows, started};
+use super::client::{rows, started, testbed};
 use super::process::wait_for;
 use serde_json::{Value, json};
 use std::os::unix::fs::PermissionsExt;
@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 
 #[test]
 fn a_first_token_signs_in_and_persons_come_and_go() {
-    let mut house = house("session_s = 12.0\n");
-    let file = house.directory.path().join("data/persons.json");
+    let mut testbed = testbed("session_s = 12.0\n");
+    let file = testbed.directory.path().join("data/persons.json");
     let kept = std::fs::read_to_string(&file).expect("persons");
-    assert!(kept.contains("$argon2id$") && !kept.contains(&house.token), "{kept}");
+    assert!(kept.contains("$argon2id$") && !kept.contains(&testbed.token), "{kept}");
     assert_eq!(std::fs::metadata(&file).expect("there").permissions().mode() & 0o777, 0o600);
-    let mut admin = house.client();
+    let mut admin = testbed.client();
     assert_eq!(admin.get("/api/v1/session").json()["person"], Value::Null);
-    let answer = admin.sign_in("admin", &house.token.to_uppercase().replace('-', " "));
+    let answer = admin.sign_in("admin", &testbed.token.to_uppercase().replace('-', " "));
     let session = answer.json();
     assert_eq!((answer.status, &session["person"]["role"]), (200, &json!("admin")), "{}", answer.body);
     assert_eq!(session["may"], json!({ "edit": true, "arm": false, "disarm": true, "manage": true }));
@@ -27,11 +27,11 @@ fn a_first_token_signs_in_and_persons_come_and_go() {
     let token = made.json()["token"].as_str().expect("a token").to_owned();
     assert_eq!(admin.json("POST", "/api/v1/persons", &json!({ "name": "李伟", "role": "viewer" })).status, 409);
     assert_eq!(admin.json("PUT", "/api/v1/persons/admin", &json!({ "role": "viewer" })).status, 409, "the last one");
-    let mut li = house.client();
+    let mut li = testbed.client();
     assert_eq!(li.sign_in("李伟", &token).status, 200);
     assert_eq!(li.get("/api/v1/persons").status, 403);
     // A new token ends the session, and so does time.
-    let (code, said) = house.command(&["person", "token", "李伟", "--by", "foreman"]);
+    let (code, said) = testbed.command(&["person", "token", "李伟", "--by", "foreman"]);
     assert_eq!(code, Some(0), "{said}");
     wait_for("the end of the session", Duration::from_secs(5), || {
         (li.get("/api/v1/session").json()["person"].is_null()).then_some(())
@@ -42,16 +42,16 @@ fn a_first_token_signs_in_and_persons_come_and_go() {
     assert_eq!(admin.json("POST", "/api/v1/persons", &json!({ "name": "late", "role": "admin" })).status, 401);
     assert_eq!(li.sign_in("李伟", &token).status, 401, "the old token is worth nothing");
     // A request that brings name and token itself.
-    let bearer = format!("Authorization: Bearer admin:{}\r\n", house.token);
-    assert_eq!(house.client().send("GET", "/api/v1/persons", &bearer, "").status, 200);
-    let removed = house.client().send("DELETE", "/api/v1/persons/%E6%9D%8E%E4%BC%9F", &bearer, "");
+    let bearer = format!("Authorization: Bearer admin:{}\r\n", testbed.token);
+    assert_eq!(testbed.client().send("GET", "/api/v1/persons", &bearer, "").status, 200);
+    let removed = testbed.client().send("DELETE", "/api/v1/persons/%E6%9D%8E%E4%BC%9F", &bearer, "");
     assert_eq!(removed.status, 200, "{}", removed.body);
-    house.gateway.signal("TERM");
-    assert!(house.gateway.wait().success());
-    let (mut again, _) = started(&house.config);
+    testbed.gateway.signal("TERM");
+    assert!(testbed.gateway.wait().success());
+    let (mut again, _) = started(&testbed.config);
     again.wait_said("live page");
     assert!(!again.stop().contains("with the token"), "the first token is shown once");
-    let audit = house.audit();
+    let audit = testbed.audit();
     for (kind, outcome, about, count) in [
         ("persons", "known", "admin: admin", 2),
         ("login", "done", "admin from 127.0.0.1", 1),
@@ -68,34 +68,34 @@ fn a_first_token_signs_in_and_persons_come_and_go() {
     assert!(
         audit.iter().any(|row| row["kind"] == "persons" && row["outcome"] == "token" && row["person"] == "foreman")
     );
-    assert!(!serde_json::to_string(&audit).expect("text").contains(&house.token), "no token stands in the audit");
+    assert!(!serde_json::to_string(&audit).expect("text").contains(&testbed.token), "no token stands in the audit");
 }
 
 #[test]
 fn five_wrong_tokens_and_the_sixth_is_not_even_tried() {
-    let house = house("");
-    let mut client = house.client();
+    let testbed = testbed("");
+    let mut client = testbed.client();
     let codes: Vec<u16> = (0..6).map(|_| client.sign_in("admin", "aaaa-bbbb").status).collect();
     assert_eq!(codes, [401, 401, 401, 401, 429, 429]);
-    let right = client.sign_in("admin", &house.token);
+    let right = client.sign_in("admin", &testbed.token);
     assert_eq!(right.status, 429, "the right one comes too late: {}", right.body);
     assert!(
         right.head.contains("retry-after: ") && right.json()["retry_after_s"].as_u64() > Some(800),
         "{}",
         right.head
     );
-    let (code, said) = house.command(&["disarm", "--by", "foreman"]);
+    let (code, said) = testbed.command(&["disarm", "--by", "foreman"]);
     assert_eq!(code, Some(0), "orders at the box go on: {said}");
-    assert_eq!(house.client().get("/api/v1/status").status, 200, "and so does reading");
-    house.gateway.stop();
+    assert_eq!(testbed.client().get("/api/v1/status").status, 200, "and so does reading");
+    testbed.gateway.stop();
 }
 
 #[test]
 fn arming_from_the_page_needs_leave_and_the_token_once_more() {
-    let house = house("allow_arming = true\n");
-    let token = house.person("Wang", "armer");
-    let (mut wang, mut watch) = (house.client(), house.client());
-    assert_eq!(watch.sign_in("Watch", &house.person("Watch", "viewer")).status, 200);
+    let testbed = testbed("allow_arming = true\n");
+    let token = testbed.person("Wang", "armer");
+    let (mut wang, mut watch) = (testbed.client(), testbed.client());
+    assert_eq!(watch.sign_in("Watch", &testbed.person("Watch", "viewer")).status, 200);
     assert_eq!(wang.sign_in("Wang", &token).status, 200);
     wait_for("a decision", Duration::from_secs(60), || {
         (wang.get("/api/v1/status").json()["gate"]["permitted_pct"].is_number()).then_some(())
@@ -121,10 +121,10 @@ fn arming_from_the_page_needs_leave_and_the_token_once_more() {
     assert!(latencies[5] < Duration::from_millis(100), "{latencies:?}");
     assert_eq!(wang.json("POST", "/api/v1/alarms/acknowledge", &json!({ "code": "none" })).status, 409);
     assert_eq!(wang.json("POST", "/api/v1/alarms/acknowledge", &json!({})).status, 200);
-    let mut house = house;
-    house.gateway.signal("TERM");
-    assert!(house.gateway.wait().success());
-    let audit = house.audit();
+    let mut testbed = testbed;
+    testbed.gateway.signal("TERM");
+    assert!(testbed.gateway.wait().success());
+    let audit = testbed.audit();
     assert_eq!(rows(&audit, "armed", "armed", "600 s"), 11);
     assert_eq!(rows(&audit, "armed", "refused", "wrong name or token"), 1);
     assert_eq!(rows(&audit, "disarmed", "person", ""), 10);
@@ -136,19 +136,19 @@ fn arming_from_the_page_needs_leave_and_the_token_once_more() {
 
 #[test]
 fn without_leave_the_gate_is_armed_at_the_box_only() {
-    let house = house("");
-    let admin = house.admin();
-    let refused = admin.json("POST", "/api/v1/arm", &json!({ "token": house.token }));
+    let testbed = testbed("");
+    let admin = testbed.admin();
+    let refused = admin.json("POST", "/api/v1/arm", &json!({ "token": testbed.token }));
     assert!(refused.status == 403 && refused.body.contains("allow_arming"), "{}", refused.body);
     assert_eq!(admin.get("/api/v1/session").json()["arming_allowed"], false);
-    assert_eq!(house.command(&["arm", "--by", "fitter"]).0, Some(0));
-    house.gateway.stop();
+    assert_eq!(testbed.command(&["arm", "--by", "fitter"]).0, Some(0));
+    testbed.gateway.stop();
 }
 
 #[test]
 fn a_browser_without_scripts_reads_signs_in_and_gives_the_machine_back() {
-    let house = house("");
-    let mut client = house.client();
+    let testbed = testbed("");
+    let mut client = testbed.client();
     let read = |client: &super::client::Client, path: &str| client.send("GET", path, "Accept: text/html\r\n", "");
     wait_for("the machine", Duration::from_secs(20), || {
         read(&client, "/plain").body.contains("class=\"state\"").then_some(())
@@ -160,13 +160,13 @@ fn a_browser_without_scripts_reads_signs_in_and_gives_the_machine_back() {
     let form = "Content-Type: application/x-www-form-urlencoded\r\nAccept: text/html\r\n";
     let wrong = client.send("POST", "/api/v1/login", form, "name=admin&token=x&next=//evil.example");
     assert!(wrong.status == 401 && wrong.body.contains("wrong") && !wrong.body.contains("evil"), "{}", wrong.body);
-    let body = format!("name=admin&token={}&next=/plain", house.token);
+    let body = format!("name=admin&token={}&next=/plain", testbed.token);
     let signed = client.send("POST", "/api/v1/login", form, &body);
     assert!(signed.status == 303 && signed.head.contains("location: /plain"), "{}", signed.head);
     let set = signed.head.lines().find_map(|line| line.strip_prefix("set-cookie: ")).expect("a cookie");
     client.cookie = set.split(';').next().expect("a pair").to_owned();
     assert!(read(&client, "/plain").body.contains("admin (admin)"));
-    assert_eq!(house.command(&["arm", "--by", "fitter"]).0, Some(0));
+    assert_eq!(testbed.command(&["arm", "--by", "fitter"]).0, Some(0));
     wait_for("the button", Duration::from_secs(10), || {
         read(&client, "/plain").body.contains("Back to the dial").then_some(())
     });
@@ -175,5 +175,5 @@ fn a_browser_without_scripts_reads_signs_in_and_gives_the_machine_back() {
     wait_for("given back", Duration::from_secs(10), || {
         client.get("/api/v1/status").json()["gate"]["armed_by"].is_null().then_some(())
     });
-    house.gateway.stop();
+    testbed.gateway.stop();
 }

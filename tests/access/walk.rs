@@ -1,7 +1,7 @@
 //! Every route of the table, one after another: whatever changes something refuses whoever is not signed in or may not, what is
 //! malformed, too long, too slow, and what is meant for another host.
 
-use super::client::{Client, House, house};
+use super::client::{Client, Testbed, testbed};
 use gateway::access::Role;
 use gateway::http::{Needs, Route, described, description, routes};
 use serde_json::Value;
@@ -56,18 +56,18 @@ fn the_description_and_the_table_tell_the_same_routes() {
 
 #[test]
 fn every_route_refuses_what_it_must() {
-    let house = house("allow_arming = true\n");
+    let testbed = testbed("allow_arming = true\n");
     let document: Value = serde_json::from_str(description()).expect("JSON");
-    let (nobody, admin) = (house.client(), house.admin());
-    let mut viewer = house.client();
-    assert_eq!(viewer.sign_in("Watch", &house.person("Watch", "viewer")).status, 200);
+    let (nobody, admin) = (testbed.client(), testbed.admin());
+    let mut viewer = testbed.client();
+    assert_eq!(viewer.sign_in("Watch", &testbed.person("Watch", "viewer")).status, 200);
     for route in routes() {
         refuses(route, &document, [&nobody, &viewer, &admin]);
     }
     slow(&admin, &nobody);
     let before = admin.get("/api/v1/session").json();
     assert_eq!(before["person"]["name"], "admin", "nothing of this has signed anybody out: {before}");
-    walked(house);
+    walked(testbed);
 }
 
 fn refuses(route: &Route, document: &Value, [nobody, viewer, admin]: [&Client; 3]) {
@@ -139,10 +139,10 @@ fn begun(address: &str, text: &str) -> TcpStream {
 }
 
 /// What was refused stands in the audit, and no more of it than is of use.
-fn walked(mut house: House) {
-    house.gateway.signal("TERM");
-    assert!(house.gateway.wait().success(), "{}", house.gateway.said());
-    let audit = house.audit();
+fn walked(mut testbed: Testbed) {
+    testbed.gateway.signal("TERM");
+    assert!(testbed.gateway.wait().success(), "{}", testbed.gateway.said());
+    let audit = testbed.audit();
     let refused = super::client::rows(&audit, "request_refused", "refused", "");
     let changes = routes().filter(|route| route.changes()).count();
     assert!(refused >= changes.min(50), "{refused} refusals of {changes} routes");

@@ -51,7 +51,7 @@ fn typed(browser: &mut Browser, text: &str) {
     ));
 }
 
-fn in_charge(address: &str) -> String {
+fn active_version(address: &str) -> String {
     let status = super::process::get(address, "/api/v1/status").json();
     let scripts = status["scripts"].as_array().expect("scripts").clone();
     let found = scripts.iter().find(|script| script["file"] == FILE).expect("it runs");
@@ -72,7 +72,7 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
     browser.open(&format!("http://{address}/rules?file={FILE}&lang=en"));
     browser.wait_until("document.body?.dataset.fresh === 'yes' && globalThis.cncGateway?.view()?.rules?.editor?.text");
     let original = browser.value("cncGateway.view().rules.editor.text").as_str().expect("text").to_owned();
-    let before = in_charge(&address);
+    let before = active_version(&address);
     let rule = format!("/api/v1/rules/{FILE}");
     let changed = format!("{original}\n// Looked through.\n");
     let body = json!({ "text": changed, "digest": "" });
@@ -95,7 +95,7 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
     press(&mut browser, "activate");
     let note = browser.value("cncGateway.view().rules.note.textContent");
     assert!(note.as_str().is_some_and(|note| note.contains("stays a draft")), "{note}");
-    assert_eq!(in_charge(&address), before, "what fails its trials does not come into charge");
+    assert_eq!(active_version(&address), before, "what fails its trials does not come into force");
 
     typed(&mut browser, &changed);
     assert_eq!(press(&mut browser, "save"), "The draft is saved; the version in charge goes on.");
@@ -112,13 +112,15 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
         "{told}"
     );
     assert!(press(&mut browser, "activate").starts_with("In charge from now on."));
-    wait_for("the new version in charge", Duration::from_secs(20), || (in_charge(&address) != before).then_some(()));
+    wait_for("the new version in force", Duration::from_secs(20), || {
+        (active_version(&address) != before).then_some(())
+    });
 
     browser.wait_until("cncGateway.view().rules.versions.querySelectorAll('button').length > 1");
     browser.value("cncGateway.view().rules.versions.querySelectorAll('button')[1].click()");
     browser.wait_until(&format!("cncGateway.view().rules.editor.text === {}", json!(original)));
     press(&mut browser, "activate");
-    wait_for("the version before", Duration::from_secs(20), || (in_charge(&address) == before).then_some(()));
+    wait_for("the version before", Duration::from_secs(20), || (active_version(&address) == before).then_some(()));
     assert_eq!(std::fs::read_to_string(data.join("scripts").join(FILE)).expect("there"), original);
     let audit = ask(&mut browser, "POST", "/api/v1/logout", &json!({}));
     assert_eq!(audit.0, 200);

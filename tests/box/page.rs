@@ -40,18 +40,18 @@ fn page_and_history_agree(for_s: &str, wanted: usize) {
     browser.wait_until("document.body?.dataset.fresh === 'yes'");
     browser.wait_until("document.getElementById('state')?.dataset.word === 'cutting'");
     languages(&mut browser);
-    let shots = shots(&mut browser, wanted);
+    let moments = moments(&mut browser, wanted);
     chart(&mut browser);
     // The machine's time is over: the box ends by itself, and everything shown must be in the history.
     assert!(gateway.wait_at_most(Duration::from_secs(900)).success(), "{}", gateway.said());
     let database = data.join("history.db");
     let database = database.to_str().expect("a path");
-    for (at_ms, shown) in &shots {
+    for (at_ms, shown) in &moments {
         compare(database, *at_ms, shown);
     }
     let seconds = seconds_per_state(database);
     assert!(FIVE.iter().all(|word| seconds.iter().any(|(state, _)| state == word)), "{seconds:?}");
-    println!("{} moments of the page agree with the history; seconds per state: {seconds:?}", shots.len());
+    println!("{} moments of the page agree with the history; seconds per state: {seconds:?}", moments.len());
     browser.wait_until("document.body.dataset.fresh === 'no'");
 }
 
@@ -66,21 +66,21 @@ fn seconds_per_state(database: &str) -> Vec<(String, f64)> {
 }
 
 /// Several moments as the page shows them: its own time, state word and numbers.
-fn shots(browser: &mut Browser, wanted: usize) -> Vec<(i64, Value)> {
+fn moments(browser: &mut Browser, wanted: usize) -> Vec<(i64, Value)> {
     let read = "(() => {
         const tile = (name) => document.querySelector(`[data-quantity=${name}][data-value]`)?.dataset.value ?? null;
         return { at: Number(document.getElementById('state').dataset.ms), word: document.getElementById('state').dataset.word,
                  spindle_power_w: tile('spindle_power_w'), spindle_speed_rpm: tile('spindle_speed_rpm'), feed_mm_min: tile('feed_mm_min') };
     })()";
-    let mut shots: Vec<(i64, Value)> = Vec::new();
-    while shots.len() < wanted {
-        let shot = browser.value(read);
-        let at_ms = shot["at"].as_i64().expect("a time");
-        if shots.last().is_none_or(|(last, _)| *last != at_ms) {
-            shots.push((at_ms, shot));
+    let mut moments: Vec<(i64, Value)> = Vec::new();
+    while moments.len() < wanted {
+        let moment = browser.value(read);
+        let at_ms = moment["at"].as_i64().expect("a time");
+        if moments.last().is_none_or(|(last, _)| *last != at_ms) {
+            moments.push((at_ms, moment));
         }
     }
-    shots
+    moments
 }
 
 /// One moment against `history query`.

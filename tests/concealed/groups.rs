@@ -8,12 +8,12 @@ use crate::laws;
 use crate::noise::Noise;
 use crate::real::inject;
 use crate::schedule::{Mode, Needs};
-use crate::spindle_case::Wish;
+use crate::spindle_case::CaseSpec;
 use crate::{drive, thermal};
 
 /// A case that can be built.
 pub(crate) enum Order {
-    Spindle(Box<Wish>),
+    Spindle(Box<CaseSpec>),
     Drive(drive::Order),
     Thermal(thermal::Order),
     Injected(inject::Order),
@@ -22,7 +22,7 @@ pub(crate) enum Order {
 impl Order {
     pub(crate) fn build(&self) -> Option<Case> {
         match self {
-            Self::Spindle(wish) => wish.build(),
+            Self::Spindle(spec) => spec.build(),
             Self::Drive(order) => drive::build(order),
             Self::Thermal(order) => thermal::build(order),
             Self::Injected(order) => order.build(),
@@ -32,7 +32,7 @@ impl Order {
     /// Group and name of the case.
     pub(crate) fn label(&self) -> String {
         match self {
-            Self::Spindle(wish) => format!("{}/{}", wish.group, wish.name),
+            Self::Spindle(spec) => format!("{}/{}", spec.group, spec.name),
             Self::Drive(order) => format!("{}/{}", order.group, order.name),
             Self::Thermal(order) => format!("{}/{}", order.group, order.name),
             Self::Injected(order) => format!("{}/{}", order.group(), order.name()),
@@ -41,7 +41,7 @@ impl Order {
 
     pub(crate) fn group(&self) -> String {
         match self {
-            Self::Spindle(wish) => wish.group.clone(),
+            Self::Spindle(spec) => spec.group.clone(),
             Self::Drive(order) => order.group.clone(),
             Self::Thermal(order) => order.group.clone(),
             Self::Injected(order) => order.group(),
@@ -70,9 +70,9 @@ fn length() -> f64 {
     std::env::var("CONCEALED_LENGTH").map_or(1.0, |text| text.trim().parse().expect("CONCEALED_LENGTH is a number"))
 }
 
-fn wish(group: String, name: String, seed: u64, mode: Mode, entries: Vec<Entry>, rho: f64) -> Wish {
+fn spec(group: String, name: String, seed: u64, mode: Mode, entries: Vec<Entry>, rho: f64) -> CaseSpec {
     let mut dice = Dice::seeded(&format!("{group}/{name}/wish"), seed);
-    Wish {
+    CaseSpec {
         noise: Noise::draw(&mut dice),
         process: Process::Turning,
         seconds: length() * dice.uniform(1900.0, 2100.0),
@@ -101,7 +101,7 @@ fn form(name: &str, seed: u64) -> Entry {
     forms[seed as usize % forms.len()].clone()
 }
 
-fn singles(seed: u64) -> Vec<Wish> {
+fn singles(seed: u64) -> Vec<CaseSpec> {
     let mut list = Vec::new();
     let plain = [
         (Mode::Rich, &[0.25, 0.5, 1.0, 2.0][..]),
@@ -115,7 +115,7 @@ fn singles(seed: u64) -> Vec<Wish> {
             list.extend(
                 names()
                     .iter()
-                    .map(|name| wish(group.clone(), name.to_string(), seed, mode, vec![form(name, seed)], *rho)),
+                    .map(|name| spec(group.clone(), name.to_string(), seed, mode, vec![form(name, seed)], *rho)),
             );
         }
     }
@@ -124,37 +124,37 @@ fn singles(seed: u64) -> Vec<Wish> {
     list
 }
 
-fn other_processes(seed: u64) -> Vec<Wish> {
+fn other_processes(seed: u64) -> Vec<CaseSpec> {
     let milling =
         ["flank_wear", "hardness_batch", "bearing_warm_up", "auxiliary_switch", "clock_lag", "spindle_inertia"];
     let drilling = ["flank_wear", "hardness_batch", "meter_window", "zero_drift"];
     let one = |process: Process, label: &str, name: &&str| {
-        let mut wish =
-            wish(format!("single-{label}-rho1"), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
-        wish.process = process;
-        wish
+        let mut spec =
+            spec(format!("single-{label}-rho1"), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        spec.process = process;
+        spec
     };
     let mills = milling.iter().map(|n| one(Process::Milling, "milling", n));
     mills.chain(drilling.iter().map(|n| one(Process::Drilling, "drilling", n))).collect()
 }
 
-fn special(seed: u64) -> Vec<Wish> {
+fn special(seed: u64) -> Vec<CaseSpec> {
     let group = "single-special-rho1";
-    let one = |name: &str, mode: Mode| wish(group.into(), name.into(), seed, mode, vec![form(name, seed)], 1.0);
+    let one = |name: &str, mode: Mode| spec(group.into(), name.into(), seed, mode, vec![form(name, seed)], 1.0);
     let mut list = vec![
         one("runout", Mode::Rich),
         one("inverter_loss", Mode::Rich),
         one("constant_load_control", Mode::ClosedLoop),
     ];
     for name in ["sensor_gain", "clock_lag", "zero_drift", "bearing_warm_up", "flank_wear"] {
-        let mut wish = wish("single-current-rho1".into(), name.into(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
-        wish.current = true;
-        list.push(wish);
+        let mut spec = spec("single-current-rho1".into(), name.into(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        spec.current = true;
+        list.push(spec);
     }
     list
 }
 
-fn several(seed: u64) -> Vec<Wish> {
+fn several(seed: u64) -> Vec<CaseSpec> {
     let mut list = Vec::new();
     let mut dice = Dice::seeded("several", seed);
     for (mode, rho, count) in [(Mode::Rich, 1.0, 10), (Mode::Rich, 0.5, 4), (Mode::Production, 1.0, 6)] {
@@ -170,13 +170,13 @@ fn several(seed: u64) -> Vec<Wish> {
     ];
     for (a, b) in opposites {
         let pair = vec![form(a, seed), form(b, seed / 2)];
-        list.push(wish("opposite-rich-rho1".into(), format!("{a}+{b}"), seed, Mode::Rich, pair, 1.0));
+        list.push(spec("opposite-rich-rho1".into(), format!("{a}+{b}"), seed, Mode::Rich, pair, 1.0));
     }
     list
 }
 
 /// Effects that are found together often and whose sum says something.
-fn together(group: &str, index: usize, seed: u64, mode: Mode, count: usize, rho: f64, dice: &mut Dice) -> Wish {
+fn together(group: &str, index: usize, seed: u64, mode: Mode, count: usize, rho: f64, dice: &mut Dice) -> CaseSpec {
     let clerks = ["engagement_timing", "recipe_error", "override_delay"];
     let excluded = ["regeneration", "saturation", "stribeck", "ripple_alias"];
     let pool: Vec<&str> = names().into_iter().filter(|n| !clerks.contains(n) && !excluded.contains(n)).collect();
@@ -188,37 +188,37 @@ fn together(group: &str, index: usize, seed: u64, mode: Mode, count: usize, rho:
         }
     }
     let entries = chosen.iter().map(|n| form(n, dice.whole(0, 5) as u64)).collect();
-    wish(group.into(), format!("{index}-{}", chosen.join("+")), seed, mode, entries, rho)
+    spec(group.into(), format!("{index}-{}", chosen.join("+")), seed, mode, entries, rho)
 }
 
-fn unlisted(seed: u64) -> Vec<Wish> {
+fn unlisted(seed: u64) -> Vec<CaseSpec> {
     let mut list = Vec::new();
     for (mode, rho) in [(Mode::Rich, 1.0), (Mode::Rich, 0.5), (Mode::Production, 1.0)] {
         for entry in laws::unlisted() {
             let name = entry.form.replace([' ', ','], "_");
             let group = format!("unlisted-{}-rho{rho}", mode.name());
-            let mut wish = wish(group, name, seed, mode, vec![entry], rho);
-            wish.expect = Expect::Unknown;
-            list.push(wish);
+            let mut spec = spec(group, name, seed, mode, vec![entry], rho);
+            spec.expect = Expect::Unknown;
+            list.push(spec);
         }
     }
     list
 }
 
-fn nothing(seed: u64) -> Vec<Wish> {
+fn nothing(seed: u64) -> Vec<CaseSpec> {
     let mut list = Vec::new();
     for noise in Noise::ALL {
         for mode in [Mode::Rich, Mode::Production, Mode::Mono, Mode::ClosedLoop] {
-            let mut wish = wish(format!("nothing-{}", noise.name()), mode.name().into(), seed, mode, Vec::new(), 1.0);
-            (wish.noise, wish.expect) = (noise, Expect::Nothing);
-            list.push(wish);
+            let mut spec = spec(format!("nothing-{}", noise.name()), mode.name().into(), seed, mode, Vec::new(), 1.0);
+            (spec.noise, spec.expect) = (noise, Expect::Nothing);
+            list.push(spec);
         }
     }
     list
 }
 
 /// Not to be told apart by construction.
-fn alike(seed: u64) -> Vec<Wish> {
+fn alike(seed: u64) -> Vec<CaseSpec> {
     let one_speed = Needs { one_speed: true, ..Needs::default() };
     let lots_with_tools = Needs { lots_with_tools: true, ..Needs::default() };
     let kinds = [
@@ -230,31 +230,31 @@ fn alike(seed: u64) -> Vec<Wish> {
     ];
     let mut list = Vec::new();
     for (name, why, mode, needs) in kinds {
-        let mut wish = wish("alike-by-plan".into(), format!("{name}-{why}"), seed, mode, vec![form(name, seed)], 1.0);
-        (wish.needs, wish.expect) = (needs, Expect::Class);
-        list.push(wish);
+        let mut spec = spec("alike-by-plan".into(), format!("{name}-{why}"), seed, mode, vec![form(name, seed)], 1.0);
+        (spec.needs, spec.expect) = (needs, Expect::Class);
+        list.push(spec);
     }
     list
 }
 
 /// What the refit of the nominal law swallows: silence is right, and so is a class with the truth in it.
-fn absorbed(seed: u64) -> Vec<Wish> {
+fn absorbed(seed: u64) -> Vec<CaseSpec> {
     let one = |entry: Entry| {
-        let mut wish = wish("absorbed".into(), entry.name.into(), seed, Mode::Rich, vec![entry], 0.0);
-        wish.expect = Expect::Class;
-        wish
+        let mut spec = spec("absorbed".into(), entry.name.into(), seed, Mode::Rich, vec![entry], 0.0);
+        spec.expect = Expect::Class;
+        spec
     };
     laws::absorbed().into_iter().map(one).collect()
 }
 
 /// Effects under spikes, dropouts, zeros and repeats.
-fn faulty(seed: u64) -> Vec<Wish> {
+fn faulty(seed: u64) -> Vec<CaseSpec> {
     let names =
         ["flank_wear", "hardness_batch", "bearing_warm_up", "auxiliary_switch", "speed_softening", "zero_drift"];
     let one = |name: &&str| {
-        let mut wish = wish("faulty-rich-rho1".into(), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
-        wish.noise = Noise::Faulty;
-        wish
+        let mut spec = spec("faulty-rich-rho1".into(), name.to_string(), seed, Mode::Rich, vec![form(name, seed)], 1.0);
+        spec.noise = Noise::Faulty;
+        spec
     };
     names.iter().map(one).collect()
 }

@@ -16,7 +16,7 @@ use crate::world::{Day, Seeded, Stage, rows};
 
 /// What a case of spindle power shall be.
 #[derive(Clone)]
-pub(crate) struct Wish {
+pub(crate) struct CaseSpec {
     pub(crate) group: String,
     pub(crate) name: String,
     pub(crate) seed: u64,
@@ -38,7 +38,7 @@ const NOISE_SHARE: (f64, f64) = (0.003, 0.05);
 /// A remainder below 0.3 deviations and below this share of the mean output need not be claimed.
 const CLAIMABLE_SHARE: f64 = 0.0054;
 
-impl Wish {
+impl CaseSpec {
     /// The case, or none when no plausible strength leaves the wished remainder in any of five days.
     pub(crate) fn build(&self) -> Option<Case> {
         (0..5).find_map(|attempt| self.attempt(attempt))

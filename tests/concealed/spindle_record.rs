@@ -5,7 +5,7 @@ use crate::case::{Table, short};
 use crate::dice::Dice;
 use crate::laws::KNOWN_INERTIA_KG_M2;
 use crate::schedule::{Mode, OPERATIONS};
-use crate::spindle_case::Wish;
+use crate::spindle_case::CaseSpec;
 use crate::tick::Tick;
 use crate::world::Stage;
 
@@ -30,7 +30,7 @@ pub(crate) struct Style {
 }
 
 impl Style {
-    pub(crate) fn draw(wish: &Wish, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(spec: &CaseSpec, dice: &mut Dice) -> Self {
         let clock = *dice.pick(&[Clock::Running, Clock::Running, Clock::Utc, Clock::Restarting]);
         let optional = [
             ("pass", 0.7),
@@ -48,12 +48,12 @@ impl Style {
         ];
         let mut columns: Vec<&'static str> =
             optional.iter().filter(|(_, p)| dice.chance(*p)).map(|(n, _)| *n).collect();
-        for column in wish.entries.iter().flat_map(|e| e.columns) {
+        for column in spec.entries.iter().flat_map(|e| e.columns) {
             if !columns.contains(column) {
                 columns.push(column);
             }
         }
-        let has = |name: &str| wish.entries.iter().any(|e| e.name == name);
+        let has = |name: &str| spec.entries.iter().any(|e| e.name == name);
         let whole_machine = has("auxiliary_switch") || has("axis_friction") || has("gravity_axis");
         Self {
             clock,
@@ -70,11 +70,11 @@ impl Style {
 }
 
 /// The recording.
-pub(crate) fn table(wish: &Wish, style: &Style, stage: &Stage, record: &[Tick], output: &[Option<f64>]) -> Table {
+pub(crate) fn table(spec: &CaseSpec, style: &Style, stage: &Stage, record: &[Tick], output: &[Option<f64>]) -> Table {
     let mut table = Table::default();
     write_time(&mut table, style.clock, record);
     write_grouping(&mut table, style, stage, record);
-    write_motion(&mut table, wish, style, stage, record);
+    write_motion(&mut table, spec, style, stage, record);
     write_surroundings(&mut table, style, record);
     table.sparse(style.output, 2, output.iter().copied());
     table
@@ -130,7 +130,7 @@ fn write_grouping(table: &mut Table, style: &Style, stage: &Stage, record: &[Tic
     }
 }
 
-fn write_motion(table: &mut Table, wish: &Wish, style: &Style, stage: &Stage, record: &[Tick]) {
+fn write_motion(table: &mut Table, spec: &CaseSpec, style: &Style, stage: &Stage, record: &[Tick]) {
     table.number("spindle_speed_rpm", 1, record.iter().map(|t| t.speed_rpm));
     let feed = |t: &Tick| if t.engaged { t.feed_mm_rev * t.speed_rpm } else { 0.0 };
     table.number("feed_mm_min", 2, record.iter().map(feed));
@@ -150,7 +150,7 @@ fn write_motion(table: &mut Table, wish: &Wish, style: &Style, stage: &Stage, re
     }
     table.number("depth_of_cut_mm", 4, record.iter().map(|t| t.depth_mm));
     table.number("diameter_mm", 2, record.iter().map(|t| t.diameter_mm));
-    if wish.process != Process::Turning {
+    if spec.process != Process::Turning {
         table.number("width_of_cut_mm", 2, record.iter().map(|t| t.width_mm));
         table.number("teeth", 0, record.iter().map(|t| t.teeth));
     }
@@ -186,7 +186,7 @@ fn write_surroundings(table: &mut Table, style: &Style, record: &[Tick]) {
 }
 
 /// The nominal model: the base physics with values that are off by 3 to 15 %.
-pub(crate) fn model(wish: &Wish, style: &Style, stage: &Stage, dice: &mut Dice) -> String {
+pub(crate) fn model(spec: &CaseSpec, style: &Style, stage: &Stage, dice: &mut Dice) -> String {
     let mut off = |value: f64| short(value * (1.0 + dice.sign() * dice.uniform(0.03, 0.15)), 9);
     let base = &stage.baseline;
     let process = match base.process {
@@ -198,7 +198,7 @@ pub(crate) fn model(wish: &Wish, style: &Style, stage: &Stage, dice: &mut Dice) 
         "schema = \"model/1\"\nname   = \"{} machine, nominal\"\noutput = \"{}\"\n\n\
          [[effect]]\nkind = \"no_load_power\"\nparameters = {{ p0_w = {}, p1_w_per_rpm = {}, p2_w_per_rpm2 = {} }}\n\n\
          [[effect]]\nkind = \"cutting_power\"\n{process}parameters = {{ kc11_n_per_mm2 = {}, mc = {} }}\n",
-        wish.mode.name(),
+        spec.mode.name(),
         style.output,
         off(base.no_load[0]),
         off(base.no_load[1]),

@@ -3,7 +3,7 @@
 
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
-use rules::physics::{Effect, EffectDoc, EffectForm, Entry, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use rules::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::collections::BTreeMap;
 
 /// The spindle counts as turning above this speed, rpm. Encoders show a few turns at rest; no spindle cuts this slowly.
@@ -56,12 +56,12 @@ impl Effect for WorkLamp {
     }
 
     /// Offered only where the spindle both turned and stood; otherwise it is an offset.
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let told = turning(scene).is_some_and(|on| on.contains(&0.0) && on.contains(&1.0));
-        if told { vec![EffectForm::plain()] } else { Vec::new() }
+        if told { vec![Form::plain()] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", turning(scene)?)])
     }
 }
@@ -79,7 +79,7 @@ fn scene(speeds_rpm: &[f64]) -> Scene {
 fn an_effect_is_offered_where_it_can_be_told_and_nowhere_else() {
     let rich = scene(&[0.0, 0.0, 800.0, 800.0, 1500.0]);
     let forms = WorkLamp.forms(&rich);
-    assert_eq!(forms, [EffectForm::plain()]);
+    assert_eq!(forms, [Form::plain()]);
     let columns = WorkLamp.columns(&rich, &forms[0]).expect("the speed is recorded");
     assert_eq!(columns, [("level", vec![0.0, 0.0, 1.0, 1.0, 1.0])]);
     assert!(columns.iter().all(|(name, _)| DOC.parameter(name).is_some()), "every column is a declared parameter");

@@ -14,7 +14,7 @@
 //! and never outside the ladder's own limits (50 to 120 %). With the operator's dial it becomes one override by the
 //! [`LadderRule`]: the lesser of the two, or their product where the machine's maker lets the gateway go above the dial;
 //! a dial at 0 % stays sovereign either way. The result goes to G012 in every scan, whatever anybody else wrote there. A
-//! second byte (R910 by default) goes, inverted, to the second override G013; 0 there is no wish.
+//! second byte (R910 by default) goes, inverted, to the second override G013; 0 there is no request.
 //!
 //! Requests, two bytes from another configurable byte on (R905 by default), and the dial behind them:
 //!

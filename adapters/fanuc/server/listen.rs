@@ -37,7 +37,7 @@ impl Default for ServerSettings {
     }
 }
 
-struct Shared {
+struct ServerState {
     served: Mutex<Box<dyn ServedControl>>,
     settings: ServerSettings,
     fault: Mutex<InjectedFault>,
@@ -49,7 +49,7 @@ struct Shared {
 
 /// A server on its own threads; they end when it is dropped.
 pub struct Server {
-    shared: Arc<Shared>,
+    shared: Arc<ServerState>,
     address: SocketAddr,
 }
 
@@ -68,7 +68,7 @@ impl Server {
     ) -> std::io::Result<Self> {
         let address = listener.local_addr()?;
         listener.set_nonblocking(true)?;
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(ServerState {
             served: Mutex::new(served),
             settings,
             fault: Mutex::new(InjectedFault::None),
@@ -123,7 +123,7 @@ impl Drop for Server {
     }
 }
 
-fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+fn accept(listener: &TcpListener, shared: &Arc<ServerState>) {
     while !shared.stop.load(Ordering::SeqCst) {
         match listener.accept() {
             Ok((stream, _)) => begin(stream, shared),
@@ -132,7 +132,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-fn begin(stream: TcpStream, shared: &Arc<Shared>) {
+fn begin(stream: TcpStream, shared: &Arc<ServerState>) {
     let own = shared.clone();
     // Without a thread for it the connection is closed, which is what a busy controller does.
     let _no_thread = std::thread::Builder::new().name("focas-session".to_owned()).spawn(move || {
@@ -143,7 +143,7 @@ fn begin(stream: TcpStream, shared: &Arc<Shared>) {
 
 struct ClientSession {
     stream: TcpStream,
-    shared: Arc<Shared>,
+    shared: Arc<ServerState>,
     counted: bool,
 }
 

@@ -51,13 +51,13 @@ impl OffsetTrail {
         }
         *last = Some(known);
         let left_out = self.pace.may_tell(verdict.at_ns)?;
-        let wish = proposal.map_or("nothing is proposed any more".to_owned(), |it| words(&it.reason));
+        let wanted = proposal.map_or("nothing is proposed any more".to_owned(), |it| words(&it.reason));
         Some(Audit {
             outcome: outcome(verdict).to_owned(),
             before: Some(verdict.shift_um),
             asked: verdict.wanted_um,
             after: Some(verdict.permitted_um),
-            reason: format!("{wish}: {}{left_out}", reason(verdict, limits)),
+            reason: format!("{wanted}: {}{left_out}", reason(verdict, limits)),
             script: proposal.map_or(String::new(), |it| words(&it.script)),
             script_version: proposal.map_or(String::new(), |it| format!("{:016x}", it.version)),
             ..row("request", verdict.axis, verdict.at_ns)

@@ -5,8 +5,8 @@ mod shown;
 
 use super::health::Health;
 use crate::config::Config;
-use crate::diagnosis::desk::Desk;
-use crate::diagnosis::kept::Kept;
+use crate::diagnosis::handle::DiagnosisHandle;
+use crate::diagnosis::store::DiagnosisStore;
 use crate::diagnosis::words;
 use crate::diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
 use crate::history::{self, Alarm, AlarmClear, ExtraSeries, ExtraValue};
@@ -91,7 +91,7 @@ impl Twin {
             model,
             history: config.history.path.clone(),
             improved: data_dir.join("model-improved.toml"),
-            kept: Kept::below(data_dir),
+            kept: DiagnosisStore::below(data_dir),
         };
         let mut twin = Self {
             places,
@@ -124,7 +124,7 @@ impl Twin {
         }
         match Worker::start(self.places.clone(), known) {
             Ok(worker) => {
-                self.active.iter().for_each(|active| worker.desk().in_charge(&active.loaded));
+                self.active.iter().for_each(|active| worker.diagnoses().set_model(&active.loaded));
                 self.worker = Some(worker);
             }
             Err(error) => {
@@ -136,8 +136,8 @@ impl Twin {
 
     /// Where diagnoses are asked for; `None` where there is no thread for them.
     #[must_use]
-    pub fn desk(&self) -> Option<Desk> {
-        self.worker.as_ref().map(|worker| worker.desk().clone())
+    pub fn diagnoses(&self) -> Option<DiagnosisHandle> {
+        self.worker.as_ref().map(|worker| worker.diagnoses().clone())
     }
 
     fn put_in_charge(&mut self, loaded: LoadedModel, before: Remembered) {
@@ -156,7 +156,7 @@ impl Twin {
         self.told.push(Notice::new(Severity::Info, "twin_model", text));
         self.problem = None;
         self.new = (!same).then(|| loaded.clone());
-        self.worker.iter().for_each(|worker| worker.desk().in_charge(&loaded));
+        self.worker.iter().for_each(|worker| worker.diagnoses().set_model(&loaded));
         self.active = Some(ActiveModel { live: Live::new(loaded.model.clone(), memory), loaded });
     }
 
@@ -272,7 +272,7 @@ impl Twin {
         let Some(Due { from_ns, .. }) = self.due.filter(|due| now_ns >= due.at_ns && !self.diagnosing) else { return };
         let Some(worker) = &self.worker else { return };
         // While a person's diagnosis is under way, this one waits.
-        if worker.desk().ask(None, from_ns, now_ns).is_ok() {
+        if worker.diagnoses().ask(None, from_ns, now_ns).is_ok() {
             (self.begun_ns, self.diagnosing) = (Some(now_ns), true);
             let text = "a diagnosis of the difference between machine and simulation has begun in the background";
             health.event(now_ns, SOURCE, &Notice::new(Severity::Info, "diagnosis_begun", text));

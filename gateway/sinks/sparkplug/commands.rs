@@ -16,7 +16,7 @@ const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
 const ACKNOWLEDGE_ALARM: (&str, u64) = ("request/acknowledge_alarm", 10);
 const ANSWER: (&str, u64) = ("request/answer", 11);
 
-/// Wishes in one message; what is more is not looked at.
+/// Requests in one message; what is more is not looked at.
 const CHANGES_MAX: usize = 4;
 
 /// What a birth says of them: where requests are not allowed, only the answer, because a refusal is told too.

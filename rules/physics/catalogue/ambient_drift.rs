@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Displacement that follows the shop.
@@ -61,14 +61,14 @@ impl Effect for AmbientDrift {
         &["direct", "lag", TWO_MASSES]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let known = scene.role(Role::Ambient).is_some_and(|ambient| spread(ambient) > 0.2);
         if !known || !is_displacement(scene) {
             return Vec::new();
         }
-        let direct = EffectForm { name: "direct", ..EffectForm::plain() };
+        let direct = Form { name: "direct", ..Form::plain() };
         let lags = |name| lag_forms(scene, name, &[1800.0, 3600.0, 7200.0]);
-        let two_masses = lags(TWO_MASSES).into_iter().map(|form| EffectForm { ln_choices: LN_2, ..form });
+        let two_masses = lags(TWO_MASSES).into_iter().map(|form| Form { ln_choices: LN_2, ..form });
         [direct].into_iter().chain(lags("lag")).chain(two_masses).collect()
     }
 
@@ -76,7 +76,7 @@ impl Effect for AmbientDrift {
         scene.role_name(Role::Ambient)
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let ambient = scene.role(Role::Ambient)?;
         let first = *ambient.first()?;
         let change: Vec<f64> = ambient.iter().map(|t| t - first).collect();
@@ -91,8 +91,8 @@ impl Effect for AmbientDrift {
         Some(vec![("per_k", followed)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", 3600.0)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) }
     }
 }
 
@@ -115,7 +115,7 @@ mod tests {
         set(&mut recording, "ambient_temperature_c", |row| if row < 10 { 20.0 } else { 14.0 });
         set(&mut recording, "thermal_error_um", |_| 1.0);
         let scene = scene(&recording, "thermal_error_um");
-        let lag = EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", 3600.0)]) };
+        let lag = Form { name: "lag", ..Form::of(&[("tau_s", 3600.0)]) };
         let column = column(&AmbientDrift, &scene, &lag);
         // It fell all night, so that the column is an hour behind: 0.6 K.
         assert!(column[9] == 0.0 && (column[10] + 5.4).abs() < 0.01, "{column:?}");
@@ -128,7 +128,7 @@ mod tests {
         set(&mut recording, "thermal_error_um", |_| 1.0);
         let scene = scene(&recording, "thermal_error_um");
         let after = |name, minutes: usize| {
-            let form = EffectForm { name, ..EffectForm::of(&[("tau_s", 3600.0)]) };
+            let form = Form { name, ..Form::of(&[("tau_s", 3600.0)]) };
             column(&AmbientDrift, &scene, &form)[10 + minutes]
         };
         assert!(after("two_masses", 10) > 0.4 * after("lag", 10), "{}", after("two_masses", 10));

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_axis_output, is_power};
 use crate::physics::excitation::{ln_count, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ impl Effect for AuxiliarySwitch {
         &["flag", "latent"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_power(scene) || is_axis_output(scene) {
             return Vec::new();
         }
@@ -57,10 +57,10 @@ impl Effect for AuxiliarySwitch {
         let flags: Vec<&str> = names.filter(|name| scene.column(name).is_some_and(varies)).collect();
         let ln_choices = ln_count(flags.len());
         let place = |flag: &&str| Some(((*flag).to_owned(), "1".to_owned()));
-        flags.iter().map(|flag| EffectForm { name: "flag", place: place(flag), ln_choices, ..EffectForm::default() }).collect()
+        flags.iter().map(|flag| Form { name: "flag", place: place(flag), ln_choices, ..Form::default() }).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("level", scene.latent_or_zero(DOC.kind))]);
         }

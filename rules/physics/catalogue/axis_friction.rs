@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Power to move the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -59,13 +59,13 @@ impl Effect for AxisFriction {
         &["coulomb", "viscous", "both"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let named = ["coulomb", "viscous"].map(|name| EffectForm { name, ..EffectForm::plain() });
-        let acts = |form: &EffectForm| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let named = ["coulomb", "viscous"].map(|name| Form { name, ..Form::plain() });
+        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
         named.into_iter().filter(acts).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocities = axis_velocities(scene);
         if velocities.is_empty() || !is_power(scene) || is_axis_output(scene) {
             return None;

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, rate};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -55,12 +55,12 @@ impl Effect for AxisInertia {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let columns = self.columns(scene, &EffectForm::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| EffectForm::plain()).into_iter().collect()
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.columns(scene, &Form::plain());
+        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         if is_axis_output(scene) && !is_power(scene) {
             return Some(vec![("per_m_s2", acceleration(scene)?)]);
         }

@@ -3,7 +3,7 @@
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, STILL, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, STILL, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +76,7 @@ impl Effect for BearingWarmUp {
         &["lag", "measured"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let velocity = sliding(scene);
         if friction(scene, velocity.as_deref()).is_none_or(|friction| friction.iter().all(|g| *g == 0.0)) {
             return Vec::new();
@@ -85,11 +85,11 @@ impl Effect for BearingWarmUp {
         let fast: &[f64] = if velocity.is_some() { &[75.0, 150.0] } else { &[] };
         let mut forms = lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
         let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
-        forms.extend(measured.map(|_| EffectForm { name: "measured", ..EffectForm::plain() }));
+        forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocity = sliding(scene);
         let friction = friction(scene, velocity.as_deref())?;
         if form.name == STILL {
@@ -110,12 +110,12 @@ impl Effect for BearingWarmUp {
         ])
     }
 
-    fn still(&self) -> Option<EffectForm> {
-        Some(EffectForm::still())
+    fn still(&self) -> Option<Form> {
+        Some(Form::still())
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", 900.0)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("tau_s", 900.0)]) }
     }
 }
 

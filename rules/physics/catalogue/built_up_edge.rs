@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::visits;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Built-up edge at low cutting speed.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ impl Effect for BuiltUpEdge {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(speed) = scene.column("cutting_speed_m_min").filter(|_| cut(scene).is_some()) else {
             return Vec::new();
         };
@@ -64,18 +64,18 @@ impl Effect for BuiltUpEdge {
         let inside = |centre: f64| visits(scene, |row| cutting[row] && near(centre)(row));
         let outside = |centre: f64| visits(scene, |row| cutting[row] && !near(centre)(row));
         let centres = [40.0, 30.0, 50.0].into_iter().filter(|centre| inside(*centre) >= 3 && outside(*centre) >= 3);
-        centres.map(|centre| EffectForm::of(&[("centre_m_min", centre)])).collect()
+        centres.map(|centre| Form::of(&[("centre_m_min", centre)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let speed = scene.column("cutting_speed_m_min")?;
         let centre = form.value("centre_m_min").unwrap_or(40.0);
         let window = |row: usize| -(-((speed[row] - centre) / WIDTH_M_MIN).powi(2)).exp();
         Some(vec![("drop", cut_times(scene, window)?)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("centre_m_min", 40.0)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("centre_m_min", 40.0)])
     }
 }
 

@@ -1,7 +1,7 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Self-excited vibration in the cut.
@@ -55,23 +55,23 @@ impl Effect for Chatter {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| cut(scene).is_some()) else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let depths = || depth.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(depth, _)| *depth);
         let limits = [0.4, 0.55, 0.7, 0.85].into_iter().filter_map(|share| quantile(depths(), share));
         let mut limits: Vec<f64> = limits.filter(|limit| depths().any(|depth| depth > *limit)).collect();
         limits.dedup();
-        limits.into_iter().map(|limit| EffectForm::of(&[("limit_mm", limit)])).collect()
+        limits.into_iter().map(|limit| Form::of(&[("limit_mm", limit)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let depth = scene.column("depth_of_cut_mm")?;
         let limit_mm = form.value("limit_mm").unwrap_or(2.0);
         Some(vec![("gain", cut_times(scene, |row| (depth[row] / limit_mm - 1.0).max(0.0))?)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("limit_mm", 2.0)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("limit_mm", 2.0)])
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::{varies, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Thinner chips at small depth.
 #[derive(Debug, Clone, Copy)]
@@ -55,22 +55,22 @@ impl Effect for ChipThinning {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| cut(scene).is_some()) else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let depths: Vec<f64> = (0..scene.rows()).filter(|row| cutting[*row]).map(|row| depth[row]).collect();
         let shallow = |r_mm: &f64| visits(scene, |row| cutting[row] && depth[row] < *r_mm) >= 3;
         let radii = [0.8, 0.4, 1.2].into_iter().filter(|r_mm| varies(&depths) && shallow(r_mm));
-        radii.map(|r_mm| EffectForm::of(&[("r_mm", r_mm)])).collect()
+        radii.map(|r_mm| Form::of(&[("r_mm", r_mm)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let depth = scene.column("depth_of_cut_mm")?;
         let r_mm = form.value("r_mm").unwrap_or(0.8).max(f64::MIN_POSITIVE);
         Some(vec![("gain", cut_times(scene, |row| (1.0 - depth[row] / r_mm).max(0.0))?)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("r_mm", 0.8)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("r_mm", 0.8)])
     }
 }

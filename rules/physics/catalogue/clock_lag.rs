@@ -3,7 +3,7 @@
 use crate::physics::drive::rate;
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
 #[derive(Debug, Clone, Copy)]
@@ -68,17 +68,17 @@ impl Effect for ClockLag {
         &["delay", "small", BETWEEN_SAMPLES]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();
         }
         let delays = delays(scene, &[0.25, 0.5, 1.0, 1.5, 2.0, 3.0]);
         let both = delays.iter().flat_map(|delay| [*delay, -delay]);
-        let late = |delay| EffectForm { name: "delay", ..EffectForm::of(&[("delay_s", delay)]) }.whole();
+        let late = |delay| Form { name: "delay", ..Form::of(&[("delay_s", delay)]) }.whole();
         both.map(late).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let simulated = scene.simulated()?;
         if form.name == "small" {
             return Some(vec![("lag_s", rate(scene, simulated).iter().map(|rate| -rate).collect())]);
@@ -87,7 +87,7 @@ impl Effect for ClockLag {
         Some(vec![("share", late.iter().zip(simulated).map(|(late, now)| late - now).collect())])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "delay", ..EffectForm::of(&[("delay_s", 0.0)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "delay", ..Form::of(&[("delay_s", 0.0)]) }
     }
 }

@@ -3,7 +3,7 @@
 use crate::physics::cut::{cutting_rows, engaged};
 use crate::physics::excitation::varies;
 use crate::physics::state::first_order_in_each_pass;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, quantile};
 
 /// Feed that a load controller turns down.
@@ -77,20 +77,20 @@ impl Effect for ConstantLoadControl {
         &["feed", "unseen"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let tried = if is_feed(scene) {
-            vec![EffectForm { name: "feed", ..EffectForm::plain() }]
+            vec![Form { name: "feed", ..Form::plain() }]
         } else if knows_the_program_only(scene) {
             let unseen = |(exponent, tau_s)| unseen(exponent, tau_s).whole();
             [(0.1, 1.0), (0.1, 3.0), (0.5, 1.0), (0.5, 3.0)].map(unseen).into()
         } else {
             Vec::new()
         };
-        let acts = |form: &EffectForm| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
+        let acts = |form: &Form| self.columns(scene, form).is_some_and(|columns| varies(&columns[0].1));
         tried.into_iter().filter(acts).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let load = scene.load()?;
         let engaged = engaged(scene);
         let cutting = |row: &usize| engaged[*row] > 0.5 && load[*row] > 0.0;
@@ -111,13 +111,13 @@ impl Effect for ConstantLoadControl {
         Some(vec![("response", (0..scene.rows()).map(law).collect())])
     }
 
-    fn default_form(&self, scene: &Scene) -> EffectForm {
-        if is_feed(scene) { EffectForm { name: "feed", ..EffectForm::plain() } } else { unseen(0.1, 1.0) }
+    fn default_form(&self, scene: &Scene) -> Form {
+        if is_feed(scene) { Form { name: "feed", ..Form::plain() } } else { unseen(0.1, 1.0) }
     }
 }
 
-fn unseen(exponent: f64, tau_s: f64) -> EffectForm {
-    EffectForm { name: "unseen", ..EffectForm::of(&[("exponent", exponent), ("tau_s", tau_s)]) }
+fn unseen(exponent: f64, tau_s: f64) -> Form {
+    Form { name: "unseen", ..Form::of(&[("exponent", exponent), ("tau_s", tau_s)]) }
 }
 
 /// Is the output what such a controller turns?

@@ -3,7 +3,7 @@
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::{varies, visits};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::median;
 
 /// Cut that differs wet and dry.
@@ -70,7 +70,7 @@ impl Effect for CoolantRegime {
         &[FADING, ARRIVING]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(coolant) = scene.column("coolant_on") else { return Vec::new() };
         let cutting = cutting_rows(scene);
         let wet = visits(scene, |row| cutting[row] && coolant[row] > 0.5);
@@ -79,13 +79,13 @@ impl Effect for CoolantRegime {
             return Vec::new();
         }
         let speeds = wet_speeds(scene, coolant).filter(|speeds| varies(speeds));
-        let fading = speeds.map(|_| EffectForm { name: FADING, ..EffectForm::of(&[("fading", 1.0)]) });
+        let fading = speeds.map(|_| Form { name: FADING, ..Form::of(&[("fading", 1.0)]) });
         let arriving = ARRIVING_S.into_iter().filter(|tau_s| *tau_s > ARRIVING_PERIODS * scene.period_s());
-        let arriving = arriving.map(|tau_s| EffectForm { name: ARRIVING, ..EffectForm::of(&[("tau_s", tau_s)]) });
-        [EffectForm::plain()].into_iter().chain(fading).chain(arriving).collect()
+        let arriving = arriving.map(|tau_s| Form { name: ARRIVING, ..Form::of(&[("tau_s", tau_s)]) });
+        [Form::plain()].into_iter().chain(fading).chain(arriving).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column("coolant_on")?;
         let wet = match form.name {
             ARRIVING => first_order_behind(scene, coolant, form.value("tau_s").unwrap_or(1.0)),
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn coolant_that_arrives_late_is_all_there_later() {
-        let form = EffectForm { name: "arriving", ..EffectForm::of(&[("tau_s", 0.5)]) };
+        let form = Form { name: "arriving", ..Form::of(&[("tau_s", 0.5)]) };
         let scene = cut_for_four_seconds([100.0; 4], [0.0, 1.0, 1.0, 1.0]);
         let column = column(&CoolantRegime, &scene, &form);
         assert!(column[0] == 0.0 && column[1] < 500.0 && column[1] < column[2] && column[3] > 780.0, "{column:?}");
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn coolant_that_fades_does_half_at_twice_the_usual_speed() {
-        let form = EffectForm { name: "fading", ..EffectForm::of(&[("fading", 1.0)]) };
+        let form = Form { name: "fading", ..Form::of(&[("fading", 1.0)]) };
         let scene = cut_for_four_seconds([100.0, 100.0, 200.0, 200.0], [1.0, 1.0, 1.0, 0.0]);
         assert_eq!(column(&CoolantRegime, &scene, &form), [800.0, 800.0, 400.0, 0.0]);
     }

@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread, varies};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Displacement that follows the coolant.
 #[derive(Debug, Clone, Copy)]
@@ -62,15 +62,15 @@ impl Effect for CoolantTemperature {
         &["direct", "flowing", "lag"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let known = scene.column(COOLANT).is_some_and(|coolant| spread(coolant) > 0.2);
         if !known || !is_displacement(scene) {
             return Vec::new();
         }
-        let direct = EffectForm { name: "direct", ..EffectForm::plain() };
+        let direct = Form { name: "direct", ..Form::plain() };
         // Only coolant that flows carries its warmth anywhere.
         let flowing =
-            scene.column("coolant_on").filter(|on| varies(on)).map(|_| EffectForm { name: "flowing", ..EffectForm::plain() });
+            scene.column("coolant_on").filter(|on| varies(on)).map(|_| Form { name: "flowing", ..Form::plain() });
         [direct].into_iter().chain(flowing).chain(lag_forms(scene, "lag", &[600.0, 1800.0])).collect()
     }
 
@@ -78,7 +78,7 @@ impl Effect for CoolantTemperature {
         Some(COOLANT)
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let coolant = scene.column(COOLANT)?;
         let first = *coolant.first()?;
         let change: Vec<f64> = coolant.iter().map(|t| t - first).collect();
@@ -90,7 +90,7 @@ impl Effect for CoolantTemperature {
         Some(vec![("per_k", followed)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "direct", ..EffectForm::plain() }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "direct", ..Form::plain() }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Heat in the motor windings.
 #[derive(Debug, Clone, Copy)]
@@ -59,17 +59,17 @@ impl Effect for CopperLoss {
         &[WEAKENED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = krpm(scene).filter(|krpm| varies(krpm));
-        let columns = turns.as_ref().and_then(|_| self.columns(scene, &EffectForm::plain()));
+        let columns = turns.as_ref().and_then(|_| self.columns(scene, &Form::plain()));
         let (Some(krpm), Some(_)) = (turns, columns.filter(|columns| varies(&columns[0].1))) else { return Vec::new() };
         let top_rpm = 1000.0 * krpm.iter().copied().fold(0.0, f64::max);
         let weakened = BASE_SHARES
-            .map(|share| EffectForm { name: WEAKENED, ..EffectForm::of(&[("base_speed_rpm", share * top_rpm)]) });
-        std::iter::once(EffectForm::plain()).chain(weakened).collect()
+            .map(|share| Form { name: WEAKENED, ..Form::of(&[("base_speed_rpm", share * top_rpm)]) });
+        std::iter::once(Form::plain()).chain(weakened).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let torque = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
         let krpm = krpm(scene)?;
         let base_krpm = match form.name {

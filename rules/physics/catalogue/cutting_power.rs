@@ -1,7 +1,7 @@
 //! Power of the cut after Kienzle: specific force times the section of the chip, falling with its thickness.
 
 use crate::physics::cut::{engaged, in_output};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Cutting power after Kienzle.
@@ -59,15 +59,15 @@ impl Effect for CuttingPower {
         &["turning", "milling", "drilling"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let milled = scene.column("width_of_cut_mm").is_some();
         let names = if milled { ["milling", "turning", "drilling"] } else { ["turning", "milling", "drilling"] };
         let names = names.into_iter();
         let known = names.filter(|name| section(scene, name, 0.23).is_some());
-        known.take(1).flat_map(|name| [0.23, 0.15, 0.3].map(|mc| EffectForm { name, ..EffectForm::of(&[("mc", mc)]) })).collect()
+        known.take(1).flat_map(|name| [0.23, 0.15, 0.3].map(|mc| Form { name, ..Form::of(&[("mc", mc)]) })).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let process = if form.name.is_empty() { "turning" } else { form.name };
         let section = section(scene, process, form.value("mc").unwrap_or(0.23))?;
         let mut engaged = engaged(scene);
@@ -77,8 +77,8 @@ impl Effect for CuttingPower {
         Some(vec![("kc11_n_per_mm2", section.iter().zip(&engaged).map(|(power, engaged)| power * engaged).collect())])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "turning", ..EffectForm::of(&[("mc", 0.23)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "turning", ..Form::of(&[("mc", 0.23)]) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, way_mm};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -61,11 +61,11 @@ impl Effect for DepthTaper {
         &["linear", "quadratic", "distance", "distance_quadratic"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() || !scene.passes().iter().any(|pass| pass.len() >= 5) {
             return Vec::new();
         }
-        let named = |name| EffectForm { name, ..EffectForm::plain() };
+        let named = |name| Form { name, ..Form::plain() };
         let mut forms = vec![named("linear"), named("quadratic")];
         // Where another drive settles in each pass, what fades by the time in the pass has been asked for by name.
         if lengths_differ(scene) && scene.feed_load_growth().is_none() {
@@ -74,7 +74,7 @@ impl Effect for DepthTaper {
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let by_distance = form.name.starts_with("distance");
         let (along, middle) = if by_distance { (from_start(scene), 0.0) } else { (along_pass(scene), 1.0 / 12.0) };
         let mut columns = vec![("slope", cut_times(scene, |row| along[row].unwrap_or(0.0))?)];

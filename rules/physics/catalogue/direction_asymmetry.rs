@@ -1,7 +1,7 @@
 //! Friction differs between the two directions of motion.
 
 use crate::physics::drive::{directions, goes_both_ways, is_power, motion, rest_width};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, mean};
 
 /// Friction that differs between directions.
@@ -67,18 +67,18 @@ impl Effect for DirectionAsymmetry {
         &["slope", "step", "level", "viscous"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(motion) = motion(scene).filter(|motion| goes_both_ways(motion)) else { return Vec::new() };
-        let named = |name| EffectForm { name, ..EffectForm::plain() };
+        let named = |name| Form { name, ..Form::plain() };
         if is_power(scene) {
             return ["slope", "step"].map(named).into();
         }
         // About which speed a slope is told is a choice.
         let about: Vec<_> = mean_of_restless(&motion).map(|about| ("about", about)).into_iter().collect();
-        vec![named("level"), EffectForm { name: "viscous", shape: about.clone(), known: about, ..EffectForm::plain() }]
+        vec![named("level"), Form { name: "viscous", shape: about.clone(), known: about, ..Form::plain() }]
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocity = motion(scene)?;
         let (name, column) = match form.name {
             "step" => ("level", directions(&velocity).collect()),
@@ -92,8 +92,8 @@ impl Effect for DirectionAsymmetry {
         Some(vec![(name, column)])
     }
 
-    fn default_form(&self, scene: &Scene) -> EffectForm {
-        EffectForm { name: if is_power(scene) { "slope" } else { "level" }, ..EffectForm::plain() }
+    fn default_form(&self, scene: &Scene) -> Form {
+        Form { name: if is_power(scene) { "slope" } else { "level" }, ..Form::plain() }
     }
 }
 

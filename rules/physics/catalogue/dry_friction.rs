@@ -3,7 +3,7 @@
 use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
 use crate::physics::excitation::greatest;
 use crate::physics::state::{bent_over_the_way, strokes};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, OutputKind, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
 #[derive(Debug, Clone, Copy)]
@@ -70,21 +70,21 @@ impl Effect for DryFriction {
         &[PRESLIDING]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(velocity) = motion(scene) else { return Vec::new() };
         if velocity.iter().all(|v| *v == 0.0) {
             return Vec::new();
         }
         match scene.output_kind() {
-            OutputKind::Power => vec![EffectForm::plain()],
+            OutputKind::Power => vec![Form::plain()],
             _ => {
-                let sudden = [1e-4, 0.002, 0.01, 0.04].map(|share| EffectForm::of(&[("reversal_share", share)]));
+                let sudden = [1e-4, 0.002, 0.01, 0.04].map(|share| Form::of(&[("reversal_share", share)]));
                 sudden.into_iter().chain(presliding(scene, &velocity)).collect()
             }
         }
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocity = motion(scene)?;
         if form.name == PRESLIDING {
             let way = form.value("presliding_way").unwrap_or(PRESLIDING_WAY_M);
@@ -113,13 +113,13 @@ const SLIPS_SHARE: f64 = 0.1;
 const STROKES_MIN: usize = 4;
 
 /// Where the motion reverses, forms that build up over a share of the longest stroke.
-fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<EffectForm> {
+fn presliding(scene: &Scene, velocity: &[f64]) -> Vec<Form> {
     let strokes = strokes(scene, velocity);
     let longest = greatest(&strokes);
     if strokes.len() < STROKES_MIN || longest <= 0.0 {
         return Vec::new();
     }
-    let form = |share: &f64| EffectForm { name: PRESLIDING, ..EffectForm::of(&[("presliding_way", share * longest)]) };
+    let form = |share: &f64| Form { name: PRESLIDING, ..Form::of(&[("presliding_way", share * longest)]) };
     STROKE_SHARES.iter().map(form).collect()
 }
 
@@ -141,7 +141,7 @@ mod tests {
         let mut recording = Recording::new("guide", (0..300).map(|row| 0.01 * f64::from(row)).collect(), None);
         set(&mut recording, "velocity_m_s", velocity);
         set(&mut recording, "axis_force_n", |_| 1.0);
-        let form = EffectForm { name: "presliding", ..EffectForm::of(&[("presliding_way", 0.01)]) };
+        let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
         let friction = column(&DryFriction, &scene(&recording, "axis_force_n"), &form);
         assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
         assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);

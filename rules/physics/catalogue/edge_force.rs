@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{engaged, in_output, teeth_in_cut};
 use crate::physics::drive::{is_axis_output, is_displacement};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Force along the cutting edge.
 #[derive(Debug, Clone, Copy)]
@@ -60,13 +60,13 @@ impl Effect for EdgeForce {
         &[MILLED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let whole = [0.0, 0.8].map(|nose_mm| EffectForm::of(&[("nose_mm", nose_mm)]));
-        let milled = EffectForm { name: MILLED, ..EffectForm::plain() };
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let whole = [0.0, 0.8].map(|nose_mm| Form::of(&[("nose_mm", nose_mm)]));
+        let milled = Form { name: MILLED, ..Form::plain() };
         whole.into_iter().chain([milled]).filter(|form| self.columns(scene, form).is_some()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if is_displacement(scene) || is_axis_output(scene) {
             return None;
         }
@@ -101,7 +101,7 @@ mod tests {
         // A slot, then a cut of half the diameter: of four teeth two and one are in the work.
         set(&mut recording, "width_of_cut_mm", |row| [20.0, 10.0][row]);
         set(&mut recording, "spindle_power_w", |_| 1.0);
-        let milled = EffectForm { name: "milled", ..EffectForm::plain() };
+        let milled = Form { name: "milled", ..Form::plain() };
         let power = column(&EdgeForce, &scene(&recording, "spindle_power_w"), &milled);
         assert!((power[0] - 4.0).abs() < 1e-9 && (power[1] - 2.0).abs() < 1e-9, "teeth * ap * vc / 60: {power:?}");
     }

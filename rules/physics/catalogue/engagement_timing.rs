@@ -3,7 +3,7 @@
 use crate::physics::cut::cut;
 use crate::physics::excitation::delays;
 use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
 #[derive(Debug, Clone, Copy)]
@@ -60,16 +60,16 @@ impl Effect for EngagementTiming {
         &[BETWEEN_SAMPLES]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.load().is_none() || cut(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
         }
         let delays = delays(scene, &[0.5, 1.0, 2.0, 3.0, 5.0]);
         let both = delays.iter().flat_map(|delay| [*delay, -delay]);
-        both.map(|delay| EffectForm::of(&[("delay_s", delay)]).whole()).collect()
+        both.map(|delay| Form::of(&[("delay_s", delay)]).whole()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let engaged = scene.role(Role::Engaged)?;
         let load = held_from_cut(scene, scene.load_at_output()?, engaged);
         let shifted = delayed_between_samples(scene, DOC.kind, engaged, form);
@@ -81,8 +81,8 @@ impl Effect for EngagementTiming {
         true
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("delay_s", 0.0)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("delay_s", 0.0)])
     }
 }
 

@@ -1,7 +1,7 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
 use crate::physics::cut::{cut, cut_times, way_mm};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::count;
 use std::ops::Range;
 
@@ -100,24 +100,24 @@ impl Effect for EntryExit {
         &["ramp", TRAVEL, "settling"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
         }
         let longest_s = scene.passes().iter().map(|pass| length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
-        let mut forms: Vec<EffectForm> = lengths_s().map(|length_s| EffectForm::of(&[("length_s", length_s)])).collect();
+        let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::of(&[("length_s", length_s)])).collect();
         forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| entries("ramp", TIMES, length_s)));
         forms.extend(ways_mm(scene).into_iter().flat_map(|length_mm| entries(TRAVEL, WAYS, length_mm)));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
         let shown = scene.feed_load_growth().is_some();
         let long = lengths_s().filter(|_| shown).filter(|length_s| *length_s >= SETTLING_PERIODS * scene.period_s());
-        forms.extend(long.map(|length_s| EffectForm { name: "settling", ..EffectForm::of(&[("length_s", length_s)]) }));
+        forms.extend(long.map(|length_s| Form { name: "settling", ..Form::of(&[("length_s", length_s)]) }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let travels = form.name == TRAVEL;
         let [length, exit_length] = if travels { WAYS } else { TIMES };
         let over = form.value(length).unwrap_or(1.0).max(f64::MIN_POSITIVE);
@@ -150,8 +150,8 @@ impl Effect for EntryExit {
         true
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("length_s", 1.0)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("length_s", 1.0)])
     }
 }
 
@@ -164,8 +164,8 @@ const TIMES: [&str; 2] = ["length_s", "exit_length_s"];
 const WAYS: [&str; 2] = ["length_mm", "exit_length_mm"];
 
 /// Forms of this name with an entry of this length, and an exit half as long and as long.
-fn entries(name: &'static str, [entry, exit]: [&'static str; 2], length: f64) -> [EffectForm; 2] {
-    [0.5, 1.0].map(|share| EffectForm { name, ..EffectForm::of(&[(entry, length), (exit, share * length)]) })
+fn entries(name: &'static str, [entry, exit]: [&'static str; 2], length: f64) -> [Form; 2] {
+    [0.5, 1.0].map(|share| Form { name, ..Form::of(&[(entry, length), (exit, share * length)]) })
 }
 
 /// The form over the way at the feed.

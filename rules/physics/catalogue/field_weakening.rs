@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, is_power};
 use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Change of losses above base speed.
 #[derive(Debug, Clone, Copy)]
@@ -72,18 +72,18 @@ impl Effect for FieldWeakening {
         &["whole", "excess"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, BENDS_TRIED);
         let names = if reads_load(scene) { self.form_names() } else { &["whole"] };
         let ln_choices = ln_count(speeds.len() * names.len());
-        let form = |name, speed: &f64| EffectForm { name, ln_choices, ..EffectForm::of(&[("base_speed_rpm", *speed)]) };
+        let form = |name, speed: &f64| Form { name, ln_choices, ..Form::of(&[("base_speed_rpm", *speed)]) };
         names.iter().flat_map(|name| speeds.iter().map(move |speed| form(name, speed))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let krpm = driven_krpm(scene)?;
         let base = form.value("base_speed_rpm").unwrap_or(1500.0) / 1000.0;
         let mut columns = vec![("magnetising", krpm.iter().map(|n| (n - base).max(0.0)).collect())];
@@ -99,8 +99,8 @@ impl Effect for FieldWeakening {
         true
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "whole", ..EffectForm::of(&[("base_speed_rpm", 1500.0)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "whole", ..Form::of(&[("base_speed_rpm", 1500.0)]) }
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::greatest;
 use crate::physics::tool_load;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 use crate::statistics::count;
 use std::borrow::Cow;
 
@@ -110,26 +110,26 @@ impl Effect for FlankWear {
         &["break_in", "edges", "followed"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if is_displacement(scene) || scene.role(Role::Engaged).is_none() || scene.column("cutting_time_min").is_none() {
             return Vec::new();
         }
         // The same curve for every tool is only a clock: where a drive tells how worn each is, that is what counts.
         if scene.feed_load_growth().is_some() {
-            return vec![EffectForm { name: "followed", ..EffectForm::plain() }];
+            return vec![Form { name: "followed", ..Form::plain() }];
         }
         let longest_min = greatest(scene.column("cutting_time_min").unwrap_or_default());
-        let powers = [1.0, 0.5, 1.5, 2.5].map(|p| EffectForm::of(&[("p", p)]));
+        let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::of(&[("p", p)]));
         let break_ins =
-            BREAK_INS.map(|share| EffectForm { name: "break_in", ..EffectForm::of(&[("break_in_min", share * longest_min)]) });
+            BREAK_INS.map(|share| Form { name: "break_in", ..Form::of(&[("break_in_min", share * longest_min)]) });
         let edges = edges(scene).map(|edges| {
             let place = Some(("tool".to_owned(), edges.join(EDGE_TO_EDGE)));
-            [1.0, 0.5].map(|p| EffectForm { name: "edges", place: place.clone(), ..EffectForm::of(&[("p", p)]) })
+            [1.0, 0.5].map(|p| Form { name: "edges", place: place.clone(), ..Form::of(&[("p", p)]) })
         });
         powers.into_iter().chain(break_ins).chain(edges.into_iter().flatten()).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let engaged = scene.role(Role::Engaged)?;
         let minutes = scene.column("cutting_time_min")?;
         let depth = length_of_edge(scene);

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::driven_krpm;
 use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use std::collections::BTreeSet;
 
 /// Drag and efficiency of a gear stage.
@@ -81,7 +81,7 @@ impl Effect for GearStage {
         &["stage", "speed", SLOPED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none() {
             return Vec::new();
         }
@@ -89,17 +89,17 @@ impl Effect for GearStage {
         let ln_choices = ln_count(stages.len());
         if stages.len() > 1 {
             let place = |stage: &i64| Some(("gear_stage".to_owned(), stage.to_string()));
-            let form = |name| move |stage: &i64| EffectForm { name, place: place(stage), ln_choices, ..EffectForm::default() };
+            let form = |name| move |stage: &i64| Form { name, place: place(stage), ln_choices, ..Form::default() };
             return stages.iter().map(form("stage")).chain(stages.iter().map(form(SLOPED))).collect();
         }
         let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
         let form =
-            |name| move |speed: &f64| EffectForm { name, ln_choices, ..EffectForm::of(&[("switch_rpm", *speed)]) };
+            |name| move |speed: &f64| Form { name, ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
         speeds.iter().map(form("speed")).chain(speeds.iter().map(form(SLOPED))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let krpm = driven_krpm(scene)?;
         let here: Vec<bool> = match &form.place {
             // Wheels that stand take nothing, whatever stage is engaged.
@@ -129,8 +129,8 @@ impl Effect for GearStage {
         true
     }
 
-    fn default_form(&self, scene: &Scene) -> EffectForm {
-        let speed = EffectForm { name: "speed", ..EffectForm::of(&[("switch_rpm", 1000.0)]) };
+    fn default_form(&self, scene: &Scene) -> Form {
+        let speed = Form { name: "speed", ..Form::of(&[("switch_rpm", 1000.0)]) };
         self.forms(scene).into_iter().next().unwrap_or(speed)
     }
 }

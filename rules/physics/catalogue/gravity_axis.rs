@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{directions, in_si, is_displacement, is_power, motion, rate};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
 #[derive(Debug, Clone, Copy)]
@@ -59,14 +59,14 @@ impl Effect for GravityAxis {
         &["braked"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let braked = EffectForm { name: "braked", ..EffectForm::plain() };
-        let forms = if is_power(scene) { vec![EffectForm::plain()] } else { vec![EffectForm::plain(), braked] };
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let braked = Form { name: "braked", ..Form::plain() };
+        let forms = if is_power(scene) { vec![Form::plain()] } else { vec![Form::plain(), braked] };
         let acts = |columns: ParameterColumns| !is_power(scene) || varies(&columns[0].1);
         forms.into_iter().filter(|form| self.columns(scene, form).is_some_and(acts)).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let declared = scene.role_name(Role::Vertical)?;
         if is_displacement(scene) {
             return None;

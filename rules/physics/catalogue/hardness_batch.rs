@@ -4,7 +4,7 @@ use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{
     ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -101,19 +101,19 @@ impl Effect for HardnessBatch {
         &["lot", "lots", "step", "stretch", "stretches"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() {
             return Vec::new();
         }
         let mut forms = word_forms(scene, "lot", "lot", GAINS.len() + 1);
         if forms.len() > 2 {
-            forms.push(EffectForm { name: "lots", ..EffectForm::plain() });
+            forms.push(Form { name: "lots", ..Form::plain() });
         }
         forms.extend(steps_between_lots(scene));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "lots" {
             return every_lot(scene);
         }
@@ -137,10 +137,10 @@ impl Effect for HardnessBatch {
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];
 
 /// Steps at the start of a run; where the lots are recorded, only of a run that begins one.
-fn steps_between_lots(scene: &Scene) -> Vec<EffectForm> {
+fn steps_between_lots(scene: &Scene) -> Vec<Form> {
     let mut steps = step_forms(scene, "step");
     let Some(lots) = scene.words("lot").filter(|lots| lots.words().len() > 1) else { return steps };
-    let begins_a_lot = |form: &EffectForm| {
+    let begins_a_lot = |form: &Form| {
         let run = form.place.as_ref().and_then(|(_, run)| run_named(scene, run));
         run.is_some_and(|run| lots.get(scene.runs()[run].start) != lots.get(scene.runs()[run - 1].start))
     };
@@ -152,16 +152,16 @@ fn steps_between_lots(scene: &Scene) -> Vec<EffectForm> {
 
 /// The form for an odd lot nobody wrote down: the runs from `first` to `last`, one of `e^ln_choices` stretches.
 #[must_use]
-pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> EffectForm {
+pub fn odd_lot(scene: &Scene, first: usize, last: usize, ln_choices: f64) -> Form {
     let place = Some(("run".to_owned(), stretch_of_runs(scene, first, last)));
-    EffectForm { name: "stretch", place, ln_choices, ..EffectForm::default() }
+    Form { name: "stretch", place, ln_choices, ..Form::default() }
 }
 
 /// The form for lots nobody wrote down: these runs begin the second and the further ones.
 #[must_use]
-pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> EffectForm {
+pub fn unwritten_lots(scene: &Scene, starts: &[usize], ln_choices: f64) -> Form {
     let names: Vec<&str> = starts.iter().map(|run| scene.run_names()[*run].as_str()).collect();
-    EffectForm { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..EffectForm::default() }
+    Form { name: "stretches", place: Some(("run".to_owned(), names.join(LOT_TO_LOT))), ln_choices, ..Form::default() }
 }
 
 /// Lots beyond which no gains of their own are fitted.

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
 use crate::physics::excitation::{greatest, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Losses in the inverter.
@@ -70,7 +70,7 @@ impl Effect for InverterLoss {
         &["conduction", "both", MAGNETISED]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = krpm(scene).is_some_and(|krpm| varies(&krpm));
         let known = turns && is_power(scene) && scene.load().is_some_and(varies);
         if !known {
@@ -79,11 +79,11 @@ impl Effect for InverterLoss {
         let magnetising = vec![("magnetising_share", MAGNETISING_SHARE)];
         // How much it is hides in the coefficient; left open it would bend into the copper loss.
         let (shape, known, ln_choices) = (magnetising.clone(), magnetising, LN_2);
-        let magnetised = EffectForm { name: MAGNETISED, shape, known, ln_choices, ..EffectForm::plain() };
-        vec![EffectForm { name: "conduction", ..EffectForm::plain() }, magnetised]
+        let magnetised = Form { name: MAGNETISED, shape, known, ln_choices, ..Form::plain() };
+        vec![Form { name: "conduction", ..Form::plain() }, magnetised]
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let current = is_power(scene).then(|| torque_at_1000_rpm(scene))??;
         if form.name == MAGNETISED {
             let magnetising = form.value("magnetising_share").unwrap_or(MAGNETISING_SHARE) * greatest(&current);
@@ -97,8 +97,8 @@ impl Effect for InverterLoss {
         Some(columns)
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "both", ..EffectForm::plain() }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "both", ..Form::plain() }
     }
 }
 

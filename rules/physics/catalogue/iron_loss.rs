@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
 /// Losses in the iron of the motor.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ impl Effect for IronLoss {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
         // On a drive whose only motion is its own speed, a loss torque that hardly grows is a shape of its friction.
         let drive =
@@ -63,11 +63,11 @@ impl Effect for IronLoss {
         (turns && !drive).then(|| self.default_form(scene)).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(1.3))?)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("p", 1.3)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("p", 1.3)])
     }
 }

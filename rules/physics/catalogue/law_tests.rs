@@ -2,10 +2,10 @@
 
 use super::effect;
 use super::tests::{self, scene, set, set_words};
-use crate::physics::{EffectForm, Scene};
+use crate::physics::{Form, Scene};
 use adapters::recording::Recording;
 
-fn column(kind: &str, scene: &Scene, form: &EffectForm) -> Vec<f64> {
+fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
     tests::column(effect(kind).expect("known"), scene, form)
 }
 
@@ -16,7 +16,7 @@ fn the_published_cutting_power() {
         set(&mut recording, name, |_| value);
     }
     set(&mut recording, "spindle_power_w", |_| 1.0);
-    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &EffectForm::of(&[("mc", 0.0)]));
+    let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &Form::of(&[("mc", 0.0)]));
     assert!((2000.0 * power[0] - 2000.0 * 2.0 * 0.25 * 120.0 / 60.0).abs() < 1e-9, "kc ap f vc / 60 W");
 }
 
@@ -27,7 +27,7 @@ fn drilling_is_milling_with_the_whole_diameter() {
         set(&mut recording, name, |_| value);
     }
     set(&mut recording, "spindle_power_w", |_| 1.0);
-    let form = EffectForm { name: "drilling", ..EffectForm::of(&[("mc", 0.25)]) };
+    let form = Form { name: "drilling", ..Form::of(&[("mc", 0.25)]) };
     let power = column("cutting_power", &scene(&recording, "spindle_power_w"), &form);
     let rate_cm3_min = std::f64::consts::PI * 100.0 / 4.0 * 200.0 / 1000.0;
     assert!((power[0] - 0.1_f64.powf(-0.25) * rate_cm3_min / 60.0).abs() < 1e-9);
@@ -40,7 +40,7 @@ fn a_running_mean_and_a_lag_settle_to_the_input() {
     let mut scene = scene(&recording, "spindle_power_w");
     scene.set_simulated(Some(scene.recorded().to_vec()));
     for name in ["mean", "lag"] {
-        let form = EffectForm { name, ..EffectForm::of(&[("window_s", 1.0)]) };
+        let form = Form { name, ..Form::of(&[("window_s", 1.0)]) };
         let smear = column("meter_window", &scene, &form);
         assert!(smear[..49].iter().all(|value| value.abs() < 1e-9), "{name}: nothing before the edge");
         assert!(smear[50..58].iter().all(|value| *value < -10.0), "{name}: behind after the edge");
@@ -53,7 +53,7 @@ fn inertia_is_the_rate_of_kinetic_energy() {
     let mut recording = Recording::new("ramp", (0..100).map(|row| 0.1 * f64::from(row)).collect(), None);
     set(&mut recording, "spindle_speed_rpm", |row| 20.0 * row as f64);
     set(&mut recording, "spindle_power_w", |_| 0.0);
-    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &EffectForm::plain());
+    let power = column("spindle_inertia", &scene(&recording, "spindle_power_w"), &Form::plain());
     let energy_j: f64 = power[1..99].iter().map(|power| 0.1 * power).sum();
     let top = 1970.0 * std::f64::consts::PI / 30.0;
     assert!((energy_j / (0.5 * top * top) - 1.0).abs() < 0.01, "{energy_j}");
@@ -84,7 +84,7 @@ fn with_inputs(rows: u32, period_s: f64, output: &str, inputs: &[(&str, &dyn Fn(
     scene(&recording, output)
 }
 
-fn forms(kind: &str, scene: &Scene) -> Vec<EffectForm> {
+fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
     effect(kind).expect("known").forms(scene)
 }
 
@@ -95,7 +95,7 @@ fn in_excess_of_a_known_copper_loss_a_weak_field_begins_at_base_speed() {
     let mut motor = with_inputs(101, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &speed)]);
     motor.set_load(Some(vec![3000.0; 101]));
     let loss = |name| {
-        let form = EffectForm { name, ..EffectForm::of(&[("base_speed_rpm", 1500.0)]) };
+        let form = Form { name, ..Form::of(&[("base_speed_rpm", 1500.0)]) };
         effect("field_weakening").expect("known").columns(&motor, &form).expect("columns").swap_remove(1).1
     };
     let (whole, excess) = (loss("whole"), loss("excess"));
@@ -108,10 +108,10 @@ fn in_excess_of_a_known_copper_loss_a_weak_field_begins_at_base_speed() {
 #[test]
 fn warm_up_lowers_and_preload_raises_idle_power() {
     let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &|_| 2000.0)]);
-    let warm_up = column("bearing_warm_up", &idle, &EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", 600.0)]) });
+    let warm_up = column("bearing_warm_up", &idle, &Form { name: "lag", ..Form::of(&[("tau_s", 600.0)]) });
     let warm = 2.0_f64.powf(10.0 / 3.0);
     assert!(warm_up[0] == 0.0 && (warm_up[3599] / -warm - 1.0).abs() < 0.01, "{}", warm_up[3599]);
-    let gradient = EffectForm { name: "gradient", ..EffectForm::of(&[("tau_s", 120.0), ("slow_tau_s", 720.0)]) };
+    let gradient = Form { name: "gradient", ..Form::of(&[("tau_s", 120.0), ("slow_tau_s", 720.0)]) };
     let preload = column("preload_growth", &idle, &gradient);
     let peak = preload.iter().copied().fold(0.0, f64::max);
     assert!(peak > 5.0 * preload[3599] && preload[3599] > 0.0, "rises, then falls as the housing follows");
@@ -132,8 +132,7 @@ fn stribeck_needs_visits_at_creep() {
     let creep = with_inputs(400, 0.1, "force_n", &[("velocity_m_s", &creeping)]);
     let tried = forms("stribeck", &creep);
     assert!(tried.iter().any(|form| form.name == "lorentzian"), "{tried:?}");
-    let level =
-        |name| column("stribeck", &creep, &EffectForm { name, ..EffectForm::of(&[("stribeck_speed", 0.1)]) })[45];
+    let level = |name| column("stribeck", &creep, &Form { name, ..Form::of(&[("stribeck_speed", 0.1)]) })[45];
     // At nearly five times the Stribeck speed.
     assert!(level("") < 1e-9 && level("exponential") < 0.02 && (0.03..0.06).contains(&level("lorentzian")));
     let turning = |row: usize| 3000.0 * (row as f64 / 300.0).sin().abs();
@@ -151,7 +150,7 @@ fn an_entry_over_a_way_lasts_longer_at_a_slow_feed() {
     let mut scene = with_inputs(400, 1.0, "spindle_power_w", &inputs);
     scene.set_load(Some((0..400).map(|row| 500.0 * engaged(row)).collect()));
     assert!(forms("entry_exit", &scene).iter().any(|form| form.name == "travel"));
-    let form = EffectForm { name: "travel", ..EffectForm::of(&[("length_mm", 4.0), ("exit_length_mm", 4.0)]) };
+    let form = Form { name: "travel", ..Form::of(&[("length_mm", 4.0), ("exit_length_mm", 4.0)]) };
     let entry = column("entry_exit", &scene, &form);
     let rows = |pass: usize| (40 * pass..40 * pass + 40).filter(|row| entry[*row] > 0.0).count();
     assert_eq!((rows(0), rows(1)), (4, 1), "a millimetre per row, and four");
@@ -182,8 +181,7 @@ fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
         effect("flank_wear").expect("known").columns(&super::tests::scene(&recording, "spindle_power_w"), &edges);
     let columns = columns.expect("columns");
     assert!((columns[0].1[60] - 2000.0).abs() < 1e-9 && (columns[1].1[180] - 2000.0).abs() < 1e-9, "half each");
-    let broken_in =
-        column("flank_wear", &scene, &EffectForm { name: "break_in", ..EffectForm::of(&[("break_in_min", 1.0)]) });
+    let broken_in = column("flank_wear", &scene, &Form { name: "break_in", ..Form::of(&[("break_in_min", 1.0)]) });
     assert!(broken_in[119] / broken_in[30] < 1.01 && broken_in[30] / broken_in[3] > 2.0);
 }
 
@@ -202,7 +200,7 @@ fn directions_differ_only_where_both_are_visited() {
     let one_way = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| 0.1 + row as f64 / 100.0)]);
     assert!(forms("direction_asymmetry", &one_way).is_empty());
     let both = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| (row as f64 / 5.0).sin())]);
-    let level = column("direction_asymmetry", &both, &EffectForm::plain());
+    let level = column("direction_asymmetry", &both, &Form::plain());
     assert!(level.iter().all(|level| (0.0..=1.0).contains(level)));
 }
 
@@ -213,14 +211,14 @@ fn weight_needs_an_axis_declared_vertical() {
     set(&mut recording, "total_power_w", |_| 1.0);
     let undeclared = Scene::new(&recording, "total_power_w", &std::collections::BTreeMap::new()).expect("recorded");
     assert!(forms("gravity_axis", &undeclared).is_empty());
-    assert_eq!(column("gravity_axis", &scene(&recording, "total_power_w"), &EffectForm::plain()), vec![0.0, 0.1]);
+    assert_eq!(column("gravity_axis", &scene(&recording, "total_power_w"), &Form::plain()), vec![0.0, 0.1]);
 }
 
 #[test]
 fn a_late_meter_lies_below_a_rising_edge() {
     let mut late = with_inputs(20, 1.0, "spindle_power_w", &[]);
     late.set_simulated(Some((0..20).map(|row| if row < 10 { 100.0 } else { 500.0 }).collect()));
-    let delay = |delay_s| EffectForm { name: "delay", ..EffectForm::of(&[("delay_s", delay_s)]) };
+    let delay = |delay_s| Form { name: "delay", ..Form::of(&[("delay_s", delay_s)]) };
     let column_of = |delay_s| column("clock_lag", &late, &delay(delay_s));
     assert_eq!(column_of(2.0)[10..13], [-400.0, -400.0, 0.0]);
     assert_eq!(column_of(-1.0)[9..11], [400.0, 0.0]);
@@ -231,7 +229,7 @@ fn a_late_meter_lies_below_a_rising_edge() {
 fn a_late_flag_moves_the_whole_step_of_the_cut() {
     let engaged = |row: usize| f64::from(u8::from((5..10).contains(&(row % 20))));
     let flagged = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged)]);
-    let column = column("engagement_timing", &flagged, &EffectForm::of(&[("delay_s", 1.0)]));
+    let column = column("engagement_timing", &flagged, &Form::of(&[("delay_s", 1.0)]));
     assert_eq!((column[5], column[10]), (-800.0, 800.0));
     assert!(column.iter().enumerate().all(|(row, value)| *value == 0.0 || row % 20 == 5 || row % 20 == 10));
 }
@@ -241,7 +239,7 @@ fn taper_starts_again_in_every_pass_and_turns_with_the_direction() {
     let engaged = |row: usize| f64::from(u8::from(row % 20 < 11));
     let place = |row: usize| if row < 20 { (row % 20) as f64 } else { -((row % 20) as f64) };
     let passes = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &engaged), ("axis_position_mm", &place)]);
-    let slope = column("depth_taper", &passes, &EffectForm::plain());
+    let slope = column("depth_taper", &passes, &Form::plain());
     assert_eq!((slope[0], slope[10]), (-400.0, 400.0));
     assert_eq!((slope[20], slope[30], slope[15]), (400.0, -400.0, 0.0));
 }
@@ -310,9 +308,9 @@ fn a_taper_by_distance_is_the_same_at_the_same_place_of_every_pass() {
     scene.set_load(Some(vec![500.0; 120]));
     let names: Vec<&str> = effect("depth_taper").expect("known").forms(&scene).iter().map(|form| form.name).collect();
     assert_eq!(names, ["linear", "quadratic", "distance", "distance_quadratic"]);
-    let taper = column("depth_taper", &scene, &EffectForm { name: "distance", ..EffectForm::plain() });
+    let taper = column("depth_taper", &scene, &Form { name: "distance", ..Form::plain() });
     assert!(taper[20] > 0.0 && (taper[20] - taper[100]).abs() < 1e-9, "{} {}", taper[20], taper[100]);
-    let share = column("depth_taper", &scene, &EffectForm { name: "linear", ..EffectForm::plain() });
+    let share = column("depth_taper", &scene, &Form { name: "linear", ..Form::plain() });
     assert!((share[59] - share[109]).abs() < 1e-9, "by share the ends of both passes are alike");
 }
 
@@ -321,7 +319,7 @@ fn a_flag_that_is_late_within_a_row_moves_the_whole_cut() {
     // A row in which the tool was in the work for three quarters shows three quarters of the load.
     let share = |row: usize| if row == 10 { 0.75 } else { f64::from(u8::from(row > 10)) };
     let scene = with_inputs(40, 1.0, "spindle_power_w", &[("engaged", &share), ("depth_of_cut_mm", &|_| 1.0)]);
-    let moved = column("engagement_timing", &scene, &EffectForm::of(&[("delay_s", -0.5)]));
+    let moved = column("engagement_timing", &scene, &Form::of(&[("delay_s", -0.5)]));
     let whole = 800.0;
     assert!((moved[9] - 0.375 * whole).abs() < 1e-9, "{}", moved[9]);
     assert!((moved[10] - 0.125 * whole).abs() < 1e-9, "{}", moved[10]);
@@ -350,7 +348,7 @@ fn a_controller_unseen_takes_from_heavy_cuts_after_a_while() {
     let scene = with_inputs(120, 1.0, "spindle_power_w", &inputs);
     let tried = forms("constant_load_control", &scene);
     assert!(!tried.is_empty() && tried.iter().all(|form| form.name == "unseen"), "{tried:?}");
-    let form = EffectForm { name: "unseen", ..EffectForm::of(&[("exponent", 0.5), ("tau_s", 2.0)]) };
+    let form = Form { name: "unseen", ..Form::of(&[("exponent", 0.5), ("tau_s", 2.0)]) };
     let taken = column("constant_load_control", &scene, &form);
     // Three times the depth is heavy, one is light, two is the median.
     assert!(taken[45].abs() < 1e-9 && taken[59] < -100.0 && taken[50] > taken[59], "{:?}", &taken[40..60]);
@@ -371,7 +369,7 @@ fn the_friction_of_a_feed_drive_falls_as_it_warms() {
     let scene = with_inputs(1200, 1.0, "axis_force_n", &[("axis_velocity_mm_min", &velocity)]);
     let tried = forms("bearing_warm_up", &scene);
     assert!(tried.iter().any(|form| form.value("tau_s") == Some(150.0)), "{tried:?}");
-    let fall = column("bearing_warm_up", &scene, &EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", 150.0)]) });
+    let fall = column("bearing_warm_up", &scene, &Form { name: "lag", ..Form::of(&[("tau_s", 150.0)]) });
     assert!((0..1200).all(|row| fall[row] * velocity(row) <= 0.0), "against the friction, whatever the direction");
     let size = |rows: std::ops::Range<usize>| fall[rows].iter().map(|x| x.abs()).fold(0.0, f64::max);
     assert!(size(1000..1200) > 5.0 * size(0..20));
@@ -394,7 +392,7 @@ fn a_removal_rate_of_the_moment_has_the_engagement_in_it_already() {
             ("removal_rate_cm3_min", rate),
         ];
         let scene = with_inputs(80, 1.0, "spindle_power_w", &inputs);
-        let form = EffectForm { name: "milling", ..EffectForm::of(&[("mc", 0.25)]) };
+        let form = Form { name: "milling", ..Form::of(&[("mc", 0.25)]) };
         column("cutting_power", &scene, &form)
     };
     let (moment, nominal) = (section(&|row| full * engaged(row)), section(&|_| full));

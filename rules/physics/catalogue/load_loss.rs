@@ -2,7 +2,7 @@
 
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Losses that grow with the load.
 #[derive(Debug, Clone, Copy)]
@@ -59,19 +59,19 @@ impl Effect for LoadLoss {
         &["quadratic", "both"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let loaded = !is_displacement(scene) && scene.load().is_some_and(varies);
-        let named = |name| EffectForm { name, ..EffectForm::plain() };
+        let named = |name| Form { name, ..Form::plain() };
         if loaded { vec![named("quadratic"), named("both")] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let load = scene.load()?;
         let quadratic = ("quadratic_per_w", load.iter().map(|load| load * load).collect());
         Some(if form.name == "quadratic" { vec![quadratic] } else { vec![("linear", load.to_vec()), quadratic] })
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "both", ..EffectForm::plain() }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "both", ..Form::plain() }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::delayed;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Averaging in the meter.
 #[derive(Debug, Clone, Copy)]
@@ -67,22 +67,22 @@ impl Effect for MeterWindow {
         &["lag", "mean", LATE]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();
         }
         let windows = delays(scene, &[0.5, 1.0, 2.0, 4.0]);
-        let form = |name| move |window_s: &f64| EffectForm { name, ..EffectForm::of(&[("window_s", *window_s)]) }.whole();
+        let form = |name| move |window_s: &f64| Form { name, ..Form::of(&[("window_s", *window_s)]) }.whole();
         let late_windows = delays(scene, &LATE_WINDOWS_S);
         let late = late_windows.iter().flat_map(|window_s| LATE_SHARES.map(|share| (*window_s, share * window_s)));
         let late = late.map(|(window_s, delay_s)| {
             let shape = [("window_s", window_s), ("delay_s", delay_s)];
-            EffectForm { name: LATE, ..EffectForm::of(&shape) }
+            Form { name: LATE, ..Form::of(&shape) }
         });
         windows.iter().map(form("lag")).chain(windows.iter().map(form("mean"))).chain(late).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let simulated = scene.simulated()?;
         let window_s = form.value("window_s").unwrap_or(1.0).max(1e-6);
         let mut smeared = vec![0.0; scene.rows()];
@@ -98,8 +98,8 @@ impl Effect for MeterWindow {
         Some(vec![("share", smeared.iter().zip(simulated).map(|(smeared, now)| smeared - now).collect())])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "lag", ..EffectForm::of(&[("window_s", 1.0)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("window_s", 1.0)]) }
     }
 }
 

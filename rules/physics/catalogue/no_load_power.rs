@@ -2,7 +2,7 @@
 
 use crate::physics::drive::driven_krpm;
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// No-load power of the spindle.
 #[derive(Debug, Clone, Copy)]
@@ -63,12 +63,12 @@ impl Effect for NoLoadPower {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
-        turns.then(EffectForm::plain).into_iter().collect()
+        turns.then(Form::plain).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let rpm: Vec<f64> = scene.role(Role::Speed)?.iter().map(|rpm| rpm.abs()).collect();
         let square = rpm.iter().map(|rpm| rpm * rpm).collect();
         Some(vec![("p0_w", vec![1.0; rpm.len()]), ("p1_w_per_rpm", rpm), ("p2_w_per_rpm2", square)])

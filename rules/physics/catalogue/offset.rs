@@ -1,6 +1,6 @@
 //! A constant that the simulation lacks.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// A constant in the output.
 #[derive(Debug, Clone, Copy)]
@@ -43,11 +43,11 @@ impl Effect for Offset {
         &DOC
     }
 
-    fn forms(&self, _scene: &Scene) -> Vec<EffectForm> {
-        vec![EffectForm::plain()]
+    fn forms(&self, _scene: &Scene) -> Vec<Form> {
+        vec![Form::plain()]
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", vec![1.0; scene.rows()])])
     }
 }

@@ -3,7 +3,7 @@
 use crate::physics::cut::{cut, cutting_rows};
 use crate::physics::excitation::{delays, visits};
 use crate::physics::state::delayed;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Feed that follows late.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +56,7 @@ impl Effect for OverrideDelay {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(feed) = feed(scene).filter(|_| scene.load().is_some() && cut(scene).is_some()) else {
             return Vec::new();
         };
@@ -66,10 +66,10 @@ impl Effect for OverrideDelay {
         if visits(scene, changes) < 3 {
             return Vec::new();
         }
-        delays(scene, &[0.1, 0.25, 0.5, 1.0, 2.0]).iter().map(|delay| EffectForm::of(&[("delay_s", *delay)])).collect()
+        delays(scene, &[0.1, 0.25, 0.5, 1.0, 2.0]).iter().map(|delay| Form::of(&[("delay_s", *delay)])).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let feed = feed_in_the_cut(scene)?;
         let before = delayed(scene, &feed, form.value("delay_s").unwrap_or(0.25));
         let law = |((load, before), now): ((&f64, &f64), &f64)| {
@@ -83,8 +83,8 @@ impl Effect for OverrideDelay {
         true
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("delay_s", 0.25)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("delay_s", 0.25)])
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, STILL, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, STILL, Scene, Texts};
 
 /// Friction that rises with bearing preload.
 #[derive(Debug, Clone, Copy)]
@@ -68,21 +68,21 @@ impl Effect for PreloadGrowth {
         &["lag", "gradient"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if driven_krpm(scene).is_none_or(|krpm| krpm.iter().all(|n| *n == 0.0)) {
             return Vec::new();
         }
         let mut forms = lag_forms(scene, "lag", &[120.0, 300.0, 600.0]);
-        let gradient = |form: &EffectForm| {
+        let gradient = |form: &Form| {
             let tau_s = form.value("tau_s").unwrap_or(TAU_S);
-            EffectForm { name: "gradient", ..EffectForm::of(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
+            Form { name: "gradient", ..Form::of(&[("tau_s", tau_s), ("slow_tau_s", SLOWER * tau_s)]) }
         };
-        let gradients: Vec<EffectForm> = forms.iter().take(2).map(gradient).collect();
+        let gradients: Vec<Form> = forms.iter().take(2).map(gradient).collect();
         forms.extend(gradients);
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let friction = speed_to_the(scene, 2.0)?;
         if form.name == STILL {
             return Some(vec![("growth", friction)]);
@@ -97,12 +97,12 @@ impl Effect for PreloadGrowth {
         Some(vec![("growth", friction.iter().zip(&warmth).map(|(g, w)| g * w).collect())])
     }
 
-    fn still(&self) -> Option<EffectForm> {
-        Some(EffectForm::still())
+    fn still(&self) -> Option<Form> {
+        Some(Form::still())
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "lag", ..EffectForm::of(&[("tau_s", TAU_S)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "lag", ..Form::of(&[("tau_s", TAU_S)]) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{where_word, word_forms};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Depth or width mis-stated for an operation.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ impl Effect for RecipeError {
         &["word"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if cut(scene).is_none() {
             return Vec::new();
         }
@@ -57,7 +57,7 @@ impl Effect for RecipeError {
         ["operation", "pass", "program"].into_iter().map(forms).find(|forms| !forms.is_empty()).unwrap_or_default()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let (column, word) = form.place.as_ref()?;
         let here = where_word(scene, column, word)?;
         Some(vec![("gain", cut_times(scene, |row| here[row])?)])

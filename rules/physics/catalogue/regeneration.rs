@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::visits;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
 /// Braking power that is not fed back.
 #[derive(Debug, Clone, Copy)]
@@ -59,15 +59,15 @@ impl Effect for Regeneration {
         &["braking", "clipped"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         ["braking", "clipped"]
             .into_iter()
-            .map(|name| EffectForm { name, ..EffectForm::plain() })
+            .map(|name| Form { name, ..Form::plain() })
             .filter(|form| acts(scene, form))
             .collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if scene.output_kind() != OutputKind::Power {
             return None;
         }
@@ -81,6 +81,6 @@ impl Effect for Regeneration {
     }
 }
 
-fn acts(scene: &Scene, form: &EffectForm) -> bool {
+fn acts(scene: &Scene, form: &Form) -> bool {
     Regeneration.columns(scene, form).is_some_and(|columns| visits(scene, |row| columns[0].1[row] > 0.0) >= 3)
 }

@@ -1,6 +1,6 @@
 //! The ripple of the mains, sampled too slowly, looks like a slow wave.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Mains ripple folded by slow sampling.
@@ -74,11 +74,11 @@ impl Effect for RippleAlias {
         &["latent"]
     }
 
-    fn forms(&self, _scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, _scene: &Scene) -> Vec<Form> {
         Vec::new()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }
@@ -87,8 +87,8 @@ impl Effect for RippleAlias {
         Some(vec![("cosine", wave(f64::cos)), ("sine", wave(f64::sin))])
     }
 
-    fn default_form(&self, scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("frequency_hz", 0.1 / scene.period_s())])
+    fn default_form(&self, scene: &Scene) -> Form {
+        Form::of(&[("frequency_hz", 0.1 / scene.period_s())])
     }
 
     fn has_hidden_state(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::drive::RAD_PER_S_OF_RPM;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Cut that swells once per turn.
 #[derive(Debug, Clone, Copy)]
@@ -67,15 +67,15 @@ impl Effect for Runout {
         &["latent"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let (Some(speed), Some(cut)) = (scene.role(Role::Speed), cut(scene)) else { return Vec::new() };
         let in_cut = cut.iter().zip(speed).filter(|(cut, _)| **cut != 0.0).map(|(_, speed)| speed.abs());
         let fastest_rpm = in_cut.fold(0.0, f64::max);
         let told = fastest_rpm > 1.0 && fastest_rpm / 60.0 * scene.period_s() * 2.2 < 1.0;
-        told.then(EffectForm::plain).into_iter().collect()
+        told.then(Form::plain).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "latent" {
             return Some(vec![("scale", scene.latent_or_zero(DOC.kind))]);
         }

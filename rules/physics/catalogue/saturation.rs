@@ -1,6 +1,6 @@
 //! The meter or drive shows no more than its ceiling.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Ceiling of the meter.
@@ -54,9 +54,9 @@ impl Effect for Saturation {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(simulated) = scene.simulated() else { return Vec::new() };
-        let form = |ceiling: f64| EffectForm::of(&[("ceiling", ceiling)]);
+        let form = |ceiling: f64| Form::of(&[("ceiling", ceiling)]);
         if let Some(ceiling) = pile_up(scene) {
             return vec![form(ceiling)];
         }
@@ -70,7 +70,7 @@ impl Effect for Saturation {
         levels.filter(|ceiling| beyond(*ceiling)).map(form).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let ceiling = form.value("ceiling")?;
         Some(vec![("share", scene.simulated()?.iter().map(|value| (ceiling - value).min(0.0)).collect())])
     }

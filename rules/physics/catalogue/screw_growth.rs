@@ -3,7 +3,7 @@
 use crate::physics::drive::{axis_velocities, in_si, is_displacement};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::first_order;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the ball screw.
 #[derive(Debug, Clone, Copy)]
@@ -56,13 +56,13 @@ impl Effect for ScrewGrowth {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let moves = axis_velocities(scene).iter().any(|velocity| varies(velocity));
         let grid: &[f64] = if moves && is_displacement(scene) { &[1200.0, 2400.0, 3600.0] } else { &[] };
         lag_forms(scene, "", grid)
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocities = axis_velocities(scene);
         if velocities.is_empty() {
             return None;
@@ -76,8 +76,8 @@ impl Effect for ScrewGrowth {
         Some(vec![("growth", growth)])
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm::of(&[("tau_s", 2400.0)])
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form::of(&[("tau_s", 2400.0)])
     }
 }
 

@@ -1,7 +1,7 @@
 //! The meter shows a fixed share too much or too little.
 
 use crate::physics::excitation::{recording_share, since_run, step_forms, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
 #[derive(Debug, Clone, Copy)]
@@ -48,16 +48,16 @@ impl Effect for SensorGain {
         &["constant", "drift", "step"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !scene.simulated().is_some_and(varies) {
             return Vec::new();
         }
-        let mut forms = vec![EffectForm { name: "constant", ..EffectForm::plain() }, EffectForm { name: "drift", ..EffectForm::plain() }];
+        let mut forms = vec![Form { name: "constant", ..Form::plain() }, Form { name: "drift", ..Form::plain() }];
         forms.extend(step_forms(scene, "step"));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let simulated = scene.simulated()?;
         let factor = match (form.name, &form.place) {
             ("step", Some((_, run))) => since_run(scene, run)?,

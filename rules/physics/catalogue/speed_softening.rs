@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut_times, cutting_rows};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Specific force that falls with cutting speed.
@@ -46,16 +46,16 @@ impl Effect for SpeedSoftening {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let columns = self.columns(scene, &EffectForm::plain());
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.columns(scene, &Form::plain());
         let cutting = cutting_rows(scene);
         let speeds =
             |speed: &[f64]| speed.iter().zip(&cutting).filter(|(_, cutting)| **cutting).map(|(v, _)| *v).collect();
         let differ = scene.column("cutting_speed_m_min").map(speeds).is_some_and(|speeds: Vec<f64>| varies(&speeds));
-        columns.filter(|_| differ).map(|_| EffectForm::plain()).into_iter().collect()
+        columns.filter(|_| differ).map(|_| Form::plain()).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let speed = scene.column("cutting_speed_m_min")?;
         let cutting = cutting_rows(scene);
         let middle =

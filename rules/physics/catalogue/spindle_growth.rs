@@ -3,7 +3,7 @@
 use crate::physics::drive::{is_displacement, krpm};
 use crate::physics::excitation::{lag_forms, time_constants, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the spindle with its own heat.
 #[derive(Debug, Clone, Copy)]
@@ -100,7 +100,7 @@ impl Effect for SpindleGrowth {
         &["one", "two", "measured"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if !is_displacement(scene) {
             return Vec::new();
         }
@@ -110,15 +110,15 @@ impl Effect for SpindleGrowth {
         let taus = time_constants(scene, grid);
         for (quick, slow) in [(180.0, 1800.0), (600.0, 3600.0), (600.0, 7200.0)] {
             if taus.contains(&slow) {
-                forms.push(EffectForm { name: "two", ..EffectForm::of(&[("tau_s", quick), ("slow_tau_s", slow)]) });
+                forms.push(Form { name: "two", ..Form::of(&[("tau_s", quick), ("slow_tau_s", slow)]) });
             }
         }
         let measured = scene.role(Role::Temperature).filter(|temperature| varies(temperature));
-        forms.extend(measured.map(|_| EffectForm { name: "measured", ..EffectForm::plain() }));
+        forms.extend(measured.map(|_| Form { name: "measured", ..Form::plain() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "measured" {
             let temperature = scene.role(Role::Temperature)?;
             let first = *temperature.first()?;
@@ -135,8 +135,8 @@ impl Effect for SpindleGrowth {
         Some(columns)
     }
 
-    fn default_form(&self, _scene: &Scene) -> EffectForm {
-        EffectForm { name: "one", ..EffectForm::of(&[("tau_s", TAU_S)]) }
+    fn default_form(&self, _scene: &Scene) -> Form {
+        Form { name: "one", ..Form::of(&[("tau_s", TAU_S)]) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::{greatest, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.
 #[derive(Debug, Clone, Copy)]
@@ -58,15 +58,15 @@ impl Effect for SpindleInertia {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(speed) = scene.role(Role::Speed).filter(|_| driven_krpm(scene).is_some()) else { return Vec::new() };
         let Some(rates) = spindle_rate_rpm_per_s(scene) else { return Vec::new() };
         let least = RAMP_PER_S * greatest(speed);
         let ramps = visits(scene, |row| rates[row].abs() > least);
-        if ramps >= 2 { vec![EffectForm::plain()] } else { Vec::new() }
+        if ramps >= 2 { vec![Form::plain()] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         driven_krpm(scene)?;
         let speed = scene.role(Role::Speed)?;
         let rates = spindle_rate_rpm_per_s(scene)?.into_iter().map(|rpm_per_s| rpm_per_s * RAD_PER_S_OF_RPM);

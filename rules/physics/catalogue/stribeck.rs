@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, motion, soft_sign, turns};
 use crate::physics::excitation::{greatest, varies, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Extra friction at creep speed.
 #[derive(Debug, Clone, Copy)]
@@ -59,18 +59,18 @@ impl Effect for Stribeck {
         &FALLS[1..]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let Some(velocity) = motion(scene).filter(|velocity| varies(velocity)) else { return Vec::new() };
         let top = greatest(&velocity);
         let creeps = |speed: f64| visits(scene, |row| (0.02 * speed..speed).contains(&velocity[row].abs())) >= 3;
         let speeds = [0.01, 0.03, 0.1, 0.2].into_iter().map(|share| share * top).filter(|speed| creeps(*speed));
         // How the film of a guide carries differs; of a spindle's bearings a long tail is but any bend over speed.
         let falls = if turns(scene) { &FALLS[..1] } else { &FALLS };
-        let form = |name, speed| EffectForm { name, ..EffectForm::of(&[("stribeck_speed", speed)]) };
+        let form = |name, speed| Form { name, ..Form::of(&[("stribeck_speed", speed)]) };
         speeds.flat_map(|speed| falls.iter().map(move |name| form(*name, speed))).collect()
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocity = motion(scene)?;
         let speed = form.value("stribeck_speed").unwrap_or(0.05 * greatest(&velocity)).max(f64::MIN_POSITIVE);
         let law = |v: &f64| {
@@ -81,9 +81,9 @@ impl Effect for Stribeck {
         Some(vec![("level", velocity.iter().map(law).collect())])
     }
 
-    fn default_form(&self, scene: &Scene) -> EffectForm {
+    fn default_form(&self, scene: &Scene) -> Form {
         let top = motion(scene).map_or(1.0, |velocity| greatest(&velocity));
-        EffectForm::of(&[("stribeck_speed", 0.05 * top)])
+        Form::of(&[("stribeck_speed", 0.05 * top)])
     }
 }
 

@@ -1,7 +1,7 @@
 //! The mains go up and down, and some consumers with them.
 
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Output that follows the supply voltage.
 #[derive(Debug, Clone, Copy)]
@@ -44,16 +44,16 @@ impl Effect for SupplyVoltage {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let swings = scene.role(Role::Voltage).is_some_and(varies);
-        if swings && scene.simulated().is_some() { vec![EffectForm::plain()] } else { Vec::new() }
+        if swings && scene.simulated().is_some() { vec![Form::plain()] } else { Vec::new() }
     }
 
     fn own_column<'a>(&self, scene: &'a Scene) -> Option<&'a str> {
         scene.role_name(Role::Voltage)
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let voltage = scene.role(Role::Voltage)?;
         let simulated = scene.simulated()?;
         let mean = voltage.iter().sum::<f64>() / voltage.len().max(1) as f64;

@@ -1,7 +1,7 @@
 //! Every effect of the catalogue: told completely, finite on a rich recording, silent on a poor one.
 
 use super::CATALOGUE;
-use crate::physics::{Effect, EffectForm, Entry, ParameterColumns, Role, Scene, Texts};
+use crate::physics::{Effect, Entry, Form, ParameterColumns, Role, Scene, Texts};
 use adapters::recording::{Cells, Numbers, Recording, Words};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -64,7 +64,7 @@ fn rich(output: &str) -> Scene {
 }
 
 /// The first column that an effect makes.
-pub(super) fn column(effect: &dyn Effect, scene: &Scene, form: &EffectForm) -> Vec<f64> {
+pub(super) fn column(effect: &dyn Effect, scene: &Scene, form: &Form) -> Vec<f64> {
     effect.columns(scene, form).expect("makes columns").swap_remove(0).1
 }
 
@@ -81,7 +81,7 @@ pub(super) fn scene(recording: &Recording, output: &str) -> Scene {
     scene
 }
 
-fn columns_of(effect: &dyn Effect, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+fn columns_of(effect: &dyn Effect, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
     let columns = effect.columns(scene, form)?;
     let kind = effect.doc().kind;
     for (name, column) in &columns {
@@ -99,7 +99,7 @@ fn check_scene(scene: &Scene) {
             let columns = columns_of(*effect, scene, &form);
             assert!(columns.is_some(), "{} offers {form:?} but cannot make it", effect.doc().kind);
         }
-        for form in [effect.default_form(scene), EffectForm::plain()] {
+        for form in [effect.default_form(scene), Form::plain()] {
             columns_of(*effect, scene, &form);
         }
     }

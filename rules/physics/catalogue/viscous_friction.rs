@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, motion};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Friction in proportion to speed.
 #[derive(Debug, Clone, Copy)]
@@ -45,12 +45,12 @@ impl Effect for ViscousFriction {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
-        let columns = self.columns(scene, &EffectForm::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| EffectForm::plain()).into_iter().collect()
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
+        let columns = self.columns(scene, &Form::plain());
+        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
     }
 
-    fn columns(&self, scene: &Scene, _form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let velocity = motion(scene)?;
         let law = |v: &f64| if is_power(scene) { v * v } else { *v };
         Some(vec![("coefficient", velocity.iter().map(law).collect())])

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Air drag of what turns.
 #[derive(Debug, Clone, Copy)]
@@ -55,12 +55,12 @@ impl Effect for Windage {
         &DOC
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         let turns = driven_krpm(scene).is_some_and(|krpm| varies(&krpm));
-        if turns { vec![EffectForm::of(&[("p", 3.0)]), EffectForm::of(&[("p", 2.6)])] } else { Vec::new() }
+        if turns { vec![Form::of(&[("p", 3.0)]), Form::of(&[("p", 2.6)])] } else { Vec::new() }
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", speed_to_the(scene, form.value("p").unwrap_or(3.0))?)])
     }
 }

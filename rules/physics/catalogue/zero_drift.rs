@@ -1,7 +1,7 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
 use crate::physics::excitation::{recording_elapsed_s, recording_share};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, EffectForm, ParameterDoc, Scene, Texts};
+use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Zero of the meter that creeps.
@@ -98,19 +98,19 @@ impl Effect for ZeroDrift {
         &["linear", "settling", "bent", "wander", "restless"]
     }
 
-    fn forms(&self, scene: &Scene) -> Vec<EffectForm> {
+    fn forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.rows() < 20 {
             return Vec::new();
         }
         let whole_s = recording_elapsed_s(scene).last().copied().unwrap_or(0.0);
-        let mut forms = vec![EffectForm { name: "linear", ..EffectForm::plain() }];
+        let mut forms = vec![Form { name: "linear", ..Form::plain() }];
         let grid = [600.0, 1200.0, 2400.0, 4800.0].into_iter().filter(|tau_s| *tau_s < 0.5 * whole_s);
-        forms.extend(grid.map(|tau_s| EffectForm { name: "settling", ..EffectForm::of(&[("tau_s", tau_s)]) }));
-        forms.extend(["bent", "wander", "restless"].map(|name| EffectForm { name, ..EffectForm::plain() }));
+        forms.extend(grid.map(|tau_s| Form { name: "settling", ..Form::of(&[("tau_s", tau_s)]) }));
+        forms.extend(["bent", "wander", "restless"].map(|name| Form { name, ..Form::plain() }));
         forms
     }
 
-    fn columns(&self, scene: &Scene, form: &EffectForm) -> Option<ParameterColumns> {
+    fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let share = recording_share(scene);
         match form.name {
             "settling" => {

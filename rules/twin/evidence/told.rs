@@ -259,7 +259,7 @@ impl EvidenceReport<'_, '_> {
 /// A candidate with these values of its linear parameters, within what is possible.
 fn with_values(
     effect: &'static dyn Effect,
-    form: &crate::physics::EffectForm,
+    form: &crate::physics::Form,
     names: &[&'static str],
     values: &[f64],
 ) -> Part {

@@ -2,7 +2,7 @@
 //! ended at any moment.
 
 use super::child::Stage;
-use super::kept::{DiagnosisFile, Kept};
+use super::store::{DiagnosisFile, DiagnosisStore};
 use super::worker::{DiagnosisRequest, LoadedModel};
 use crate::files::{read_text, replace_durably};
 use adapters::clock::TimeNs;
@@ -28,7 +28,7 @@ pub enum Run {
     Done {
         /// Who asked for it; `None`: the box itself.
         by: Option<String>,
-        /// See `kept::key`.
+        /// See `store::key`.
         key: String,
         /// How long it took, s.
         seconds: f64,
@@ -82,7 +82,7 @@ impl DiagnosisRefusal {
 }
 
 #[derive(Debug, Default)]
-struct DeskState {
+struct DiagnosisState {
     run: Run,
     child: Option<Child>,
     model: Option<LoadedModel>,
@@ -90,30 +90,30 @@ struct DeskState {
     pace_s: Option<f64>,
 }
 
-/// See the [module](self). Clones are the same desk.
+/// See the [module](self). Clones are handles of the same diagnoses.
 #[derive(Debug, Clone)]
-pub struct Desk {
-    state: Arc<Mutex<DeskState>>,
+pub struct DiagnosisHandle {
+    state: Arc<Mutex<DiagnosisState>>,
     requests: SyncSender<DiagnosisRequest>,
     model: PathBuf,
-    kept: Kept,
+    kept: DiagnosisStore,
 }
 
-impl Desk {
-    /// A desk whose requests go there.
+impl DiagnosisHandle {
+    /// A handle whose requests go there.
     #[must_use]
-    pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, kept: Kept) -> Self {
+    pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, kept: DiagnosisStore) -> Self {
         Self { state: Arc::default(), requests, model, kept }
     }
 
-    fn lock(&self) -> MutexGuard<'_, DeskState> {
+    fn lock(&self) -> MutexGuard<'_, DiagnosisState> {
         // The state is complete whenever the lock is free.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What was kept of diagnoses.
     #[must_use]
-    pub fn kept(&self) -> &Kept {
+    pub fn kept(&self) -> &DiagnosisStore {
         &self.kept
     }
 
@@ -124,7 +124,7 @@ impl Desk {
     }
 
     /// Another model has come into force.
-    pub fn in_charge(&self, loaded: &LoadedModel) {
+    pub fn set_model(&self, loaded: &LoadedModel) {
         self.lock().model = Some(loaded.clone());
     }
 

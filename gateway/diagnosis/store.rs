@@ -20,7 +20,7 @@ const FILE_MAX: usize = 16 << 20;
 
 /// Where the files are.
 #[derive(Debug, Clone)]
-pub struct Kept {
+pub struct DiagnosisStore {
     directory: PathBuf,
 }
 
@@ -62,7 +62,7 @@ pub fn is_key(text: &str) -> bool {
     text.split_once('-').is_some_and(|(at, of)| digits(at, u8::is_ascii_digit) && digits(of, u8::is_ascii_hexdigit))
 }
 
-impl Kept {
+impl DiagnosisStore {
     /// Below this data directory.
     #[must_use]
     pub fn below(data_dir: &Path) -> Self {
@@ -171,14 +171,14 @@ mod tests {
         assert!(is_key(&key(&row)) && key(&row).starts_with("1700000000123-"));
         for wrong in ["", "-", "1-", "../1-a", "1-a/b", "1-g", "a-1", "1-a.html", "123456789012345678901-a"] {
             assert!(!is_key(wrong), "{wrong}");
-            assert_eq!(Kept::at(PathBuf::from("/")).text(wrong, DiagnosisFile::Words), None);
+            assert_eq!(DiagnosisStore::at(PathBuf::from("/")).text(wrong, DiagnosisFile::Words), None);
         }
     }
 
     #[test]
     fn the_oldest_go_with_all_their_files() {
         let directory = tempfile::tempdir().expect("a directory");
-        let kept = Kept::at(directory.path().to_owned());
+        let kept = DiagnosisStore::at(directory.path().to_owned());
         for at in 0..KEPT_MAX + 3 {
             for part in [DiagnosisFile::Words, DiagnosisFile::Model] {
                 replace(&kept.path(&format!("{}-00ff", 900 + at), part), "{}").expect("written");
