@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | nothing | anything | nothing |
 //! | names | the same names | these names; the weaker of both verdicts |
-//! | names | the same names and more | `ambiguous`: what both name, the rest beside it |
+//! | names | the same names and more | `ambiguous`: what both name; the rest beside it, in place of something without a name |
 //! | names | other names | `ambiguous`: names of the one, those of the other beside them |
 //! | something without a name | at most one name | `unexplained`, the name beside it |
 //!
@@ -84,18 +84,23 @@ fn weaker(a: Verdict, b: Verdict) -> Verdict {
 impl Diagnosis {
     /// This one with the names of another beside its own, and the verdict of both.
     fn beside(mut self, other: Self, verdict: Verdict) -> Self {
-        let instead_of = match verdict {
-            Verdict::Unexplained => UNKNOWN.to_owned(),
-            _ => self.missing.first().map_or_else(|| UNKNOWN.to_owned(), |missing| missing.effect.clone()),
+        let told = names(&self);
+        let replaced = match self.missing.first() {
+            // What the other names on top of the same names replaces none of them: it is what else may be there.
+            Some(first) if verdict != Verdict::Unexplained && !told.is_subset(&names(&other)) => first.effect.clone(),
+            _ => UNKNOWN.to_owned(),
         };
-        let of_other = other.missing.into_iter().map(|missing| missing.effect);
-        for name in of_other.chain(other.alternatives.into_iter().map(|other| other.effect)) {
-            let is_told = self.missing.iter().any(|missing| missing.effect == name)
-                || self.alternatives.iter().any(|known| known.effect == name);
-            if name != UNKNOWN && !is_told {
-                self.alternatives.push(alternative(&name, &instead_of));
+        let more = other.missing.iter().map(|missing| (missing.effect.as_str(), replaced.as_str()));
+        let rivals = other.alternatives.iter().map(|rival| (rival.effect.as_str(), rival.instead_of.as_str()));
+        let mut alternatives = self.alternatives.clone();
+        for (name, instead_of) in more.chain(rivals) {
+            let is_known = alternatives.iter().any(|known| known.effect == name);
+            if name != UNKNOWN && !told.contains(name) && !is_known {
+                let instead_of = if told.contains(instead_of) { instead_of } else { &replaced };
+                alternatives.push(alternative(name, instead_of));
             }
         }
+        self.alternatives = alternatives;
         self.verdict = verdict;
         if verdict != Verdict::Explained {
             let open = self.alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
@@ -169,7 +174,9 @@ mod tests {
     fn what_one_names_beyond_the_other_stands_beside() {
         let (one, two) = (said(Explained, &["stribeck"], &[]), said(Explained, &["stribeck", "offset"], &[]));
         let wanted = (Ambiguous, vec!["stribeck"], vec!["offset"]);
-        assert_eq!(told(&both(one.clone(), two.clone())), wanted);
+        let more = both(one.clone(), two.clone());
+        assert_eq!(told(&more), wanted);
+        assert_eq!(more.alternatives[0].instead_of, UNKNOWN, "it takes the place of nothing that both name");
         assert_eq!(told(&both(two, one)), wanted);
     }
 
