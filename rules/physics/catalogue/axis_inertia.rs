@@ -1,7 +1,7 @@
 //! Force and power that accelerate a feed axis.
 
 use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, rate};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::plain_where_it_varies;
 use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of the feed axes.
@@ -56,8 +56,7 @@ impl Effect for AxisInertia {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+        plain_where_it_varies(self, scene)
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {

@@ -1,7 +1,7 @@
 //! Friction that grows in proportion to speed.
 
 use crate::physics::drive::{is_power, motion};
-use crate::physics::excitation::varies;
+use crate::physics::excitation::plain_where_it_varies;
 use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
 
 /// Friction in proportion to speed.
@@ -46,8 +46,7 @@ impl Effect for ViscousFriction {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+        plain_where_it_varies(self, scene)
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
