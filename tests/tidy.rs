@@ -3,6 +3,8 @@
 
 #[path = "tidy/names.rs"]
 mod names;
+#[path = "tidy/reasons.rs"]
+mod reasons;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -96,23 +96,31 @@ impl FromStr for Address {
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let text = text.trim();
-        let fail = |problems| AddressError { address: text.to_owned(), problems };
-        let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
-        let (body, query) = match rest.rsplit_once('?') {
-            Some((body, query)) => (body, query),
-            None => (rest, ""),
-        };
-        let mut keys = Keys::of(query);
-        let target = target::parse(scheme, body, &mut keys);
-        let mut problems = keys.finish();
-        match target {
-            Ok(target) if problems.is_empty() => Ok(Self { text: text.to_owned(), target }),
-            Ok(_) => Err(fail(problems)),
-            Err(problem) => {
-                problems.insert(0, problem);
-                Err(fail(problems))
-            }
-        }
+        let target = parse(text, no_scheme, target::parse)?;
+        Ok(Self { text: text.to_owned(), target })
+    }
+}
+
+/// What a text `SCHEME:BODY?KEYS` means. `no_scheme` says what is missing in a text without a scheme; `target` is given
+/// scheme, body and keys, and takes the keys that it knows.
+///
+/// # Errors
+/// Everything that is wrong: what `target` says comes first, then keys that are unknown, doubled or out of range.
+pub fn parse<T>(
+    text: &str,
+    no_scheme: impl Fn(&str) -> String,
+    target: impl Fn(&str, &str, &mut Keys) -> Result<T, String>,
+) -> Result<T, AddressError> {
+    let fail = |problems| AddressError { address: text.to_owned(), problems };
+    let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme(text)]))?;
+    let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
+    let mut keys = Keys::of(query);
+    let target = target(scheme, body, &mut keys);
+    let problems = keys.finish();
+    match target {
+        Ok(target) if problems.is_empty() => Ok(target),
+        Ok(_) => Err(fail(problems)),
+        Err(problem) => Err(fail(std::iter::once(problem).chain(problems).collect())),
     }
 }
 

@@ -1,9 +1,9 @@
 //! `cnc-gateway arm`, `disarm`, `acknowledge`: orders of a person at the box to the gateway that runs there.
 
-use super::{CommandOutcome, CommandResult, data_dir_of, print, print_json};
+use super::gateway_options::GatewayOptions;
+use super::{CommandOutcome, CommandResult, print, print_json};
 use crate::control::{self, Order};
 use clap::Args;
-use std::path::PathBuf;
 
 /// Which gateway, and who orders.
 #[derive(Debug, Args)]
@@ -11,15 +11,8 @@ pub(super) struct OrderOptions {
     /// Who answers for it; stands in the audit.
     #[arg(long, value_name = "NAME")]
     by: String,
-    /// Configuration of the running gateway, for its data directory.
-    #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
-    config: Option<PathBuf>,
-    /// Data directory of the running gateway.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
-    /// Print the answer as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    at: GatewayOptions,
 }
 
 /// Arguments of `arm`.
@@ -70,8 +63,8 @@ pub(super) fn acknowledge(OrderArguments { to }: OrderArguments) -> CommandResul
 }
 
 fn send(to: &OrderOptions, order: &Order) -> CommandResult {
-    let reply = control::order(&data_dir_of(to.config.as_deref(), to.data_dir.as_deref())?, order)?;
-    match to.json {
+    let reply = control::order(&to.at.data_dir()?, order)?;
+    match to.at.json {
         true => print_json(&serde_json::json!({ "schema": "order/1", "done": reply.done, "text": reply.text })),
         false => print(&format!("{}\n", reply.text)),
     }

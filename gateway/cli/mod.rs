@@ -16,6 +16,7 @@ mod doctor;
 mod effects;
 #[cfg(feature = "fleet")]
 mod fleet;
+mod gateway_options;
 mod help;
 mod history;
 mod identify;
@@ -36,7 +37,7 @@ use crate::reload::read_directory;
 use ::rules::script::{Host, ScriptProblem, shipped};
 use clap::{Args, Parser, Subcommand};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// How a command ended when it could run.
@@ -228,15 +229,6 @@ fn configuration(file: Option<&Path>) -> Result<crate::config::Config, CannotRun
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
         CannotRun::new(lines.join("\n"), "")
     })
-}
-
-/// The data directory that is meant: the one that is named, or that of a configuration, or the usual one.
-fn data_dir_of(config: Option<&Path>, data_dir: Option<&Path>) -> Result<PathBuf, CannotRun> {
-    if let Some(directory) = data_dir {
-        return Ok(directory.to_owned());
-    }
-    let config = configuration(config)?;
-    Ok(config.gateway.data_dir)
 }
 
 /// The operations recipe in a file.

@@ -1,7 +1,8 @@
 //! `cnc-gateway person`: who may do more than read on the page. Works on the box itself, whether the gateway runs or not; one
 //! that runs follows within a second and writes every difference into the audit.
 
-use super::{CannotRun, CommandOutcome, CommandResult, data_dir_of, print, print_json};
+use super::gateway_options::GatewayOptions;
+use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
 use crate::access::{self, Persons, PersonsError, Role};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
@@ -12,20 +13,6 @@ use std::path::PathBuf;
 pub(super) struct PersonArguments {
     #[command(subcommand)]
     what: PersonCommand,
-}
-
-/// Which gateway, and how the answer is printed.
-#[derive(Debug, Args)]
-struct GatewayOptions {
-    /// Configuration of the gateway, for its data directory.
-    #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
-    config: Option<PathBuf>,
-    /// Data directory of the gateway.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
-    /// Print the answer as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Who makes the change; stands in the audit.
@@ -102,7 +89,7 @@ pub(super) fn run(arguments: PersonArguments) -> CommandResult {
 }
 
 fn file(at: &GatewayOptions) -> Result<PathBuf, CannotRun> {
-    Ok(access::path(&data_dir_of(at.config.as_deref(), at.data_dir.as_deref())?))
+    Ok(access::path(&at.data_dir()?))
 }
 
 fn list(at: &GatewayOptions) -> CommandResult {

@@ -5,7 +5,7 @@ use super::nats::NatsSinkTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
-use adapters::address::{AddressError, Keys};
+use adapters::address::{self, AddressError, Keys};
 use adapters::channel::nearest;
 use std::fmt;
 use std::str::FromStr;
@@ -106,20 +106,8 @@ impl FromStr for SinkAddress {
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let text = text.trim();
-        let fail = |problems| AddressError { address: text.to_owned(), problems };
-        let (scheme, rest) = text.split_once(':').ok_or_else(|| fail(vec![no_scheme()]))?;
-        let (body, query) = rest.rsplit_once('?').unwrap_or((rest, ""));
-        let mut keys = Keys::of(query);
-        let target = parse(scheme, body, &mut keys);
-        let mut problems = keys.finish();
-        match target {
-            Ok(target) if problems.is_empty() => Ok(Self { text: text.to_owned(), target }),
-            Ok(_) => Err(fail(problems)),
-            Err(problem) => {
-                problems.insert(0, problem);
-                Err(fail(problems))
-            }
-        }
+        let target = address::parse(text, |_| no_scheme(), parse)?;
+        Ok(Self { text: text.to_owned(), target })
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a recording excites: levels, visits, boundaries and the grids of shapes worth trying in it.
 
-use super::{Form, Scene};
+use super::{Effect, Form, Scene};
 use std::collections::BTreeSet;
 
 /// Greatest magnitude; at least the smallest positive number, so that it can divide.
@@ -11,6 +11,12 @@ pub(crate) fn greatest(values: &[f64]) -> f64 {
 /// Do the values differ by more than a thousandth of the greatest?
 pub(crate) fn varies(values: &[f64]) -> bool {
     spread(values) > 1e-3 * greatest(values)
+}
+
+/// The plain form of an effect where its first column varies in the recording; no form where nothing could tell it.
+pub(crate) fn plain_where_it_varies(effect: &dyn Effect, scene: &Scene) -> Vec<Form> {
+    let columns = effect.columns(scene, &Form::plain());
+    columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
 }
 
 /// Separate stretches of rows in which `holds`; a new run starts a new stretch.

@@ -45,6 +45,32 @@ pub struct ParameterDoc {
     pub zh: &'static str,
 }
 
+impl ParameterDoc {
+    /// A parameter that the contribution is proportional to: name, unit, range, and what it is in both languages.
+    #[must_use]
+    pub const fn linear(
+        name: &'static str,
+        unit: &'static str,
+        range: (f64, f64),
+        en: &'static str,
+        zh: &'static str,
+    ) -> Self {
+        Self { name, unit, entry: Entry::Linear, range, en, zh }
+    }
+
+    /// A parameter that bends the shape of the contribution: name, unit, range, and what it is in both languages.
+    #[must_use]
+    pub const fn shape(
+        name: &'static str,
+        unit: &'static str,
+        range: (f64, f64),
+        en: &'static str,
+        zh: &'static str,
+    ) -> Self {
+        Self { name, unit, entry: Entry::Shape, range, en, zh }
+    }
+}
+
 /// The texts of an effect in one language.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Texts {

@@ -20,7 +20,7 @@ use crate::statistics::{count, median, robust_deviation};
 use adapters::Recording;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rows below which nothing is claimed.
+/// Rows below which nothing is claimed: the verdict is `cannot_tell`.
 const ROWS_MIN: usize = 60;
 /// Kinds that change over minutes to hours, whatever tool is in use.
 const CREEPING: [&str; 3] = ["zero_drift", "bearing_warm_up", "preload_growth"];

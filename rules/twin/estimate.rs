@@ -29,7 +29,7 @@ use crate::statistics::count;
 /// By how much of its value a parameter may be off because no machine follows a law to the letter, with a certainty of
 /// 95 %: a share that no amount of rows makes smaller (GUM, type B).
 const LAW_SHARE: f64 = 0.05;
-/// Normal quantile of a 95 % interval.
+/// Normal quantile of a 95 % interval: 2.5 % lie beyond it on either side.
 const INTERVAL: f64 = 1.96;
 /// Levels at which a coefficient is compared with itself; each carries the same sum of squares of its column.
 const LEVELS: usize = 4;

@@ -15,7 +15,8 @@ use adapters::recording::Numbers;
 const OUTSIDE_SHARE_MAX: f64 = 0.01;
 /// Share of rows without progress of time beyond which the time stamps are useless.
 const STANDING_SHARE_MAX: f64 = 0.2;
-/// Recorded over simulated, or the inverse, that means another prefix of the unit (kW for W).
+/// Recorded over simulated, or the inverse, that means another prefix of the unit (kW for W): a
+/// thousand, with a factor of about three to either side because the model is not exact.
 const PREFIX: (f64, f64) = (300.0, 3000.0);
 /// Celsius that no part of a machine tool has, but the air has in kelvin.
 const KELVIN: (f64, f64) = (270.0, 330.0);

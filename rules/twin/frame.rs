@@ -66,7 +66,7 @@ pub fn held_out(units: &[Unit], fold: usize) -> BTreeSet<usize> {
 }
 
 /// Groups of rows that take part.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Frame {
     groups: Vec<Range<usize>>,
     /// Unbroken stretches of groups, within a unit.
@@ -222,14 +222,7 @@ impl Frame {
     /// The usable rows of the units that `takes` accepts, in groups of `size`.
     #[must_use]
     pub fn new(scene: &Scene, units: &[Unit], size: usize, takes: impl Fn(usize) -> bool) -> Self {
-        let mut frame = Self {
-            groups: Vec::new(),
-            stretches: Vec::new(),
-            unit: Vec::new(),
-            weights: Vec::new(),
-            quiet: Vec::new(),
-            levels: None,
-        };
+        let mut frame = Self::default();
         for (index, unit) in units.iter().enumerate().filter(|(index, _)| takes(*index)) {
             for stretch in unbroken(scene, unit.rows.clone()) {
                 frame.add_stretch(index, stretch, size);
@@ -253,14 +246,7 @@ impl Frame {
     /// The groups of the units that `takes` accepts, as they weigh here; levels of their own are left out.
     #[must_use]
     pub(super) fn only(&self, takes: impl Fn(usize) -> bool) -> Self {
-        let mut some = Self {
-            groups: Vec::new(),
-            stretches: Vec::new(),
-            unit: Vec::new(),
-            weights: Vec::new(),
-            quiet: Vec::new(),
-            levels: None,
-        };
+        let mut some = Self::default();
         for stretch in self.stretches.iter().filter(|stretch| takes(self.unit[stretch.start])) {
             let first = some.groups.len();
             some.groups.extend(self.groups[stretch.clone()].iter().cloned());

@@ -11,9 +11,11 @@ use crate::statistics::count;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Replicates of the search.
+/// Replicates of the search: the least p-value that they can give is 1/100, half of what a finding may have
+/// ([`super::search::P_MAX`]). With fewer than 49 nothing could ever be found.
 const REPLICATES: usize = 99;
-/// Replicates that may be as good before the answer is settled.
+/// Replicates that may be as good before the answer is settled: 5 of at most 99 are a p-value of 0.05 or more, which no
+/// finding may have.
 const EXCEEDED_ENOUGH: usize = 5;
 /// Rows whose signs flip together.
 const BLOCK_ROWS: usize = 40;

@@ -3,7 +3,7 @@
 
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
-use rules::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
+use rules::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::collections::BTreeMap;
 
 /// The spindle counts as turning above this speed, rpm. Encoders show a few turns at rest; no spindle cuts this slowly.
@@ -17,14 +17,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "work_lamp",
     family: "auxiliary",
     law: "P = level while the spindle turns",
-    parameters: &[ParameterDoc {
-        name: "level",
-        unit: "output",
-        entry: Entry::Linear,
-        range: (0.0, f64::INFINITY),
-        en: "power of the lamp",
-        zh: "灯的功率",
-    }],
+    parameters: &[ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "power of the lamp", "灯的功率")],
     needs: &["speed"],
     source: "a constant consumer, switched with the spindle",
     experiment_minutes: 2.0,

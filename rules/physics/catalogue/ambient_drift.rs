@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Displacement that follows the shop.
@@ -15,22 +15,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = per_k * w; dw/dt = ((T - T0) - w) / tau, T0 at the start; without tau: w = T - T0; two_masses: the same once more behind w, with half the tau",
     parameters: &[
-        ParameterDoc {
-            name: "per_k",
-            unit: "output/K",
-            entry: Entry::Linear,
-            range: (-100.0, 100.0),
-            en: "displacement per kelvin of the shop",
-            zh: "环境每变化1 K的位移",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (60.0, 43200.0),
-            en: "time the machine takes to follow",
-            zh: "机床跟随环境的时间常数",
-        },
+        ParameterDoc::linear(
+            "per_k",
+            "output/K",
+            (-100.0, 100.0),
+            "displacement per kelvin of the shop",
+            "环境每变化1 K的位移",
+        ),
+        ParameterDoc::shape(
+            "tau_s",
+            "s",
+            (60.0, 43200.0),
+            "time the machine takes to follow",
+            "机床跟随环境的时间常数",
+        ),
     ],
     needs: &["ambient"],
     source: "ISO 230-3 environmental variation: 1-6 um/K, 1-4 h",

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_axis_output, is_power};
 use crate::physics::excitation::{ln_count, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
 #[derive(Debug, Clone, Copy)]
@@ -12,14 +12,13 @@ static DOC: EffectDoc = EffectDoc {
     kind: "auxiliary_switch",
     family: "auxiliary",
     law: "P = level while the consumer runs",
-    parameters: &[ParameterDoc {
-        name: "level",
-        unit: "output",
-        entry: Entry::Linear,
-        range: (0.0, f64::INFINITY),
-        en: "power of the consumer",
-        zh: "该用电设备的功率",
-    }],
+    parameters: &[ParameterDoc::linear(
+        "level",
+        "output",
+        (0.0, f64::INFINITY),
+        "power of the consumer",
+        "该用电设备的功率",
+    )],
     needs: &["coolant_on | hydraulics_on | a column ending in _on | the recorded output"],
     source: "coolant 0.3-1.5 kW, high-pressure coolant 2-7 kW, hydraulics 0.5-2 kW in cycles of 5-60 s",
     experiment_minutes: 4.0,

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{axis_velocities, is_axis_output, is_power};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Power to move the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = force * sum |v|; viscous: P = per_speed * sum v^2; v in m/s",
     parameters: &[
-        ParameterDoc {
-            name: "force",
-            unit: "output/(m/s)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "friction force of the axes; newtons when the output is in watts",
-            zh: "进给轴摩擦力；输出为W时单位为N",
-        },
-        ParameterDoc {
-            name: "per_speed",
-            unit: "output/(m/s)2",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "friction force per speed",
-            zh: "单位速度的摩擦力",
-        },
+        ParameterDoc::linear(
+            "force",
+            "output/(m/s)",
+            (0.0, f64::INFINITY),
+            "friction force of the axes; newtons when the output is in watts",
+            "进给轴摩擦力；输出为W时单位为N",
+        ),
+        ParameterDoc::linear(
+            "per_speed",
+            "output/(m/s)2",
+            (0.0, f64::INFINITY),
+            "friction force per speed",
+            "单位速度的摩擦力",
+        ),
     ],
     needs: &["feed_mm_min | axis velocities"],
     source: "guideways, screws and wipers: 20-300 W at rapid traverse",

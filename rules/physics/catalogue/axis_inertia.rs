@@ -1,8 +1,8 @@
 //! Force and power that accelerate a feed axis.
 
 use crate::physics::drive::{axis_velocities, in_si, is_axis_output, is_displacement, is_power, rate};
-use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::excitation::plain_where_it_varies;
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of the feed axes.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = mass_kg * sum v a; of a single axis in a force or current: F = per_m_s2 * a; v in m/s, a in m/s2",
     parameters: &[
-        ParameterDoc {
-            name: "mass_kg",
-            unit: "kg",
-            entry: Entry::Linear,
-            range: (0.0, 1000000.0),
-            en: "moved mass, with the inertia of motor and screw",
-            zh: "移动质量，包括电机和丝杠惯量",
-        },
-        ParameterDoc {
-            name: "per_m_s2",
-            unit: "output/(m/s2)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "output per acceleration",
-            zh: "单位加速度的输出",
-        },
+        ParameterDoc::linear(
+            "mass_kg",
+            "kg",
+            (0.0, 1000000.0),
+            "moved mass, with the inertia of motor and screw",
+            "移动质量，包括电机和丝杠惯量",
+        ),
+        ParameterDoc::linear(
+            "per_m_s2",
+            "output/(m/s2)",
+            (0.0, f64::INFINITY),
+            "output per acceleration",
+            "单位加速度的输出",
+        ),
     ],
     needs: &["acceleration | velocity | axis velocities"],
     source: "Newton; P = m v a",
@@ -56,8 +54,7 @@ impl Effect for AxisInertia {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+        plain_where_it_varies(self, scene)
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {

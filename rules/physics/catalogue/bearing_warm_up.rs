@@ -3,7 +3,7 @@
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, STILL, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, STILL, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]
@@ -14,38 +14,28 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), of a feed drive (v / 1 m/s)^(5/3), dw/dt = (g - w) / tau; in a force g / v; measured: P = -drop_per_k * g * (T - T0)",
     parameters: &[
-        ParameterDoc {
-            name: "drop",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "fall of power at 1000 rpm once warm from 1000 rpm; of a feed drive, of power or force at 1 m/s",
-            zh: "在1000 rpm下热透后功率的下降量；进给轴按1 m/s的功率或力",
-        },
-        ParameterDoc {
-            name: "initial",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "what the warmth at the start of the recording changes at 1000 rpm or 1 m/s",
-            zh: "记录开始时的热状态在1000 rpm或1 m/s下的影响",
-        },
-        ParameterDoc {
-            name: "drop_per_k",
-            unit: "output/K",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "fall at 1000 rpm or 1 m/s per kelvin of the bearing",
-            zh: "轴承温度每升高1 K，1000 rpm或1 m/s下的下降量",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (60.0, 14400.0),
-            en: "time constant of warming",
-            zh: "升温时间常数",
-        },
+        ParameterDoc::linear(
+            "drop",
+            "output",
+            (0.0, f64::INFINITY),
+            "fall of power at 1000 rpm once warm from 1000 rpm; of a feed drive, of power or force at 1 m/s",
+            "在1000 rpm下热透后功率的下降量；进给轴按1 m/s的功率或力",
+        ),
+        ParameterDoc::linear(
+            "initial",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "what the warmth at the start of the recording changes at 1000 rpm or 1 m/s",
+            "记录开始时的热状态在1000 rpm或1 m/s下的影响",
+        ),
+        ParameterDoc::linear(
+            "drop_per_k",
+            "output/K",
+            (0.0, f64::INFINITY),
+            "fall at 1000 rpm or 1 m/s per kelvin of the bearing",
+            "轴承温度每升高1 K，1000 rpm或1 m/s下的下降量",
+        ),
+        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of warming", "升温时间常数"),
     ],
     needs: &["speed | velocity"],
     source: "Palmgren: friction moment grows with (viscosity * n)^(2/3), viscosity falls with temperature (Walther); idle power 10-40 % lower warm",

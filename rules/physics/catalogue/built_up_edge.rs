@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::visits;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Built-up edge at low cutting speed.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = -drop * L * exp(-((vc - centre) / 15 m/min)^2)",
     parameters: &[
-        ParameterDoc {
-            name: "drop",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 0.5),
-            en: "share by which the built-up edge lowers the force",
-            zh: "积屑瘤使切削力降低的比例",
-        },
-        ParameterDoc {
-            name: "centre_m_min",
-            unit: "m/min",
-            entry: Entry::Shape,
-            range: (15.0, 70.0),
-            en: "cutting speed at which it is strongest",
-            zh: "最强时的切削速度",
-        },
+        ParameterDoc::linear(
+            "drop",
+            "1",
+            (0.0, 0.5),
+            "share by which the built-up edge lowers the force",
+            "积屑瘤使切削力降低的比例",
+        ),
+        ParameterDoc::shape(
+            "centre_m_min",
+            "m/min",
+            (15.0, 70.0),
+            "cutting speed at which it is strongest",
+            "最强时的切削速度",
+        ),
     ],
     needs: &["load | engaged", "cutting_speed_m_min"],
     source: "built-up edge in steel at 20-60 m/min: sharper effective rake, force lower and noisier",

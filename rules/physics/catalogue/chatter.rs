@@ -1,7 +1,7 @@
 //! Self-excited vibration above a depth of cut: noise grows, the mean hardly.
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Self-excited vibration in the cut.
@@ -13,22 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = gain * L * (ap / limit - 1) where ap > limit; mostly the scatter grows, the mean by 0-10 %",
     parameters: &[
-        ParameterDoc {
-            name: "gain",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.0),
-            en: "growth of the mean cut at twice the limit",
-            zh: "切深为极限两倍时平均切削量的增长",
-        },
-        ParameterDoc {
-            name: "limit_mm",
-            unit: "mm",
-            entry: Entry::Shape,
-            range: (0.05, 20.0),
-            en: "depth of cut above which it chatters",
-            zh: "开始颤振的切深",
-        },
+        ParameterDoc::linear(
+            "gain",
+            "1",
+            (0.0, 1.0),
+            "growth of the mean cut at twice the limit",
+            "切深为极限两倍时平均切削量的增长",
+        ),
+        ParameterDoc::shape("limit_mm", "mm", (0.05, 20.0), "depth of cut above which it chatters", "开始颤振的切深"),
     ],
     needs: &["load | engaged", "depth_of_cut_mm"],
     source: "stability lobes; above the limit the cutting force grows with the vibration",

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::{varies, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Thinner chips at small depth.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = gain * L * max(0, 1 - ap / r)",
     parameters: &[
-        ParameterDoc {
-            name: "gain",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "share by which the cut is heavier at vanishing depth",
-            zh: "切深趋近零时切削负载增加的比例",
-        },
-        ParameterDoc {
-            name: "r_mm",
-            unit: "mm",
-            entry: Entry::Shape,
-            range: (0.1, 3.0),
-            en: "nose radius of the insert",
-            zh: "刀尖圆弧半径",
-        },
+        ParameterDoc::linear(
+            "gain",
+            "1",
+            (0.0, 1.5),
+            "share by which the cut is heavier at vanishing depth",
+            "切深趋近零时切削负载增加的比例",
+        ),
+        ParameterDoc::shape("r_mm", "mm", (0.1, 3.0), "nose radius of the insert", "刀尖圆弧半径"),
     ],
     needs: &["load | engaged", "depth_of_cut_mm"],
     source: "h = f sin(kappa), with kappa falling where ap is below the nose radius 0.4-1.2 mm",

@@ -3,7 +3,7 @@
 use crate::physics::drive::rate;
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
 #[derive(Debug, Clone, Copy)]
@@ -14,30 +14,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
     parameters: &[
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "one, when the delay explains all",
-            zh: "为1时延时可完全解释",
-        },
-        ParameterDoc {
-            name: "lag_s",
-            unit: "s",
-            entry: Entry::Linear,
-            range: (-2.0, 5.0),
-            en: "how late the recording is, where it is small against the ramps",
-            zh: "记录滞后的时间（相对斜坡较小时）",
-        },
-        ParameterDoc {
-            name: "delay_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (-3.0, 10.0),
-            en: "how late the recording is; negative when early",
-            zh: "记录滞后的时间；超前为负",
-        },
+        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
+        ParameterDoc::linear(
+            "lag_s",
+            "s",
+            (-2.0, 5.0),
+            "how late the recording is, where it is small against the ramps",
+            "记录滞后的时间（相对斜坡较小时）",
+        ),
+        ParameterDoc::shape(
+            "delay_s",
+            "s",
+            (-3.0, 10.0),
+            "how late the recording is; negative when early",
+            "记录滞后的时间；超前为负",
+        ),
     ],
     needs: &["the simulated output"],
     source: "definition; 0.1-3 s and 10-100 ppm between a power meter and a controller",

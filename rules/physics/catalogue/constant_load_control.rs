@@ -3,7 +3,7 @@
 use crate::physics::cut::{cutting_rows, engaged};
 use crate::physics::excitation::varies;
 use crate::physics::state::first_order_in_each_pass;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, quantile};
 
 /// Feed that a load controller turns down.
@@ -15,38 +15,22 @@ static DOC: EffectDoc = EffectDoc {
     family: "control",
     law: "of a feed or its override: y = -response * ln(L / L0) * y0 in the cut; unseen, of a power: y = share * L * g, g = (L / L0)^-exponent - 1 in the cut behind a lag tau, zero when the cut begins; L0, y0 medians in the cut",
     parameters: &[
-        ParameterDoc {
-            name: "response",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 2.0),
-            en: "relative fall of the feed per relative rise of the load",
-            zh: "负载相对上升时进给的相对下降",
-        },
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 2.0),
-            en: "1: the controller acts as a whole",
-            zh: "1：控制器完全起作用",
-        },
-        ParameterDoc {
-            name: "exponent",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (0.01, 1.5),
-            en: "relative fall of the load per relative rise of the load that the program asks for",
-            zh: "程序要求的负载相对上升时实际负载的相对下降",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.2, 30.0),
-            en: "time constant of the controller",
-            zh: "控制器时间常数",
-        },
+        ParameterDoc::linear(
+            "response",
+            "1",
+            (0.0, 2.0),
+            "relative fall of the feed per relative rise of the load",
+            "负载相对上升时进给的相对下降",
+        ),
+        ParameterDoc::linear("share", "1", (0.0, 2.0), "1: the controller acts as a whole", "1：控制器完全起作用"),
+        ParameterDoc::shape(
+            "exponent",
+            "1",
+            (0.01, 1.5),
+            "relative fall of the load per relative rise of the load that the program asks for",
+            "程序要求的负载相对上升时实际负载的相对下降",
+        ),
+        ParameterDoc::shape("tau_s", "s", (0.2, 30.0), "time constant of the controller", "控制器时间常数"),
     ],
     needs: &["load", "engaged"],
     source: "f = f0 (P0 / P)^(1 / (1 - mc)): adaptive feed control at constant power",

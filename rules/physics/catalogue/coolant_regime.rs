@@ -3,7 +3,7 @@
 use crate::physics::cut::{cut, cut_times, cutting_rows};
 use crate::physics::excitation::{varies, visits};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::median;
 
 /// Cut that differs wet and dry.
@@ -15,30 +15,27 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = change * L * w, w = coolant_on; arriving: dw/dt = (coolant_on - w) / tau; fading: w = coolant_on * (vm / vc)^fading, vm the median cutting speed of the wet cuts",
     parameters: &[
-        ParameterDoc {
-            name: "change",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.3, 0.3),
-            en: "share by which the cut changes with coolant, where it fades at the usual cutting speed; negative is lighter",
-            zh: "有冷却液时切削变化的比例（作用随速度减弱时指常用切速下），负值为变轻",
-        },
-        ParameterDoc {
-            name: "fading",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (0.0, 4.0),
-            en: "exponent by which it does less at higher cutting speed",
-            zh: "切速升高时作用减弱的指数",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.05, 8.0),
-            en: "time the coolant takes to reach the cut and to leave it",
-            zh: "冷却液到达和离开切削区的时间",
-        },
+        ParameterDoc::linear(
+            "change",
+            "1",
+            (-0.3, 0.3),
+            "share by which the cut changes with coolant, where it fades at the usual cutting speed; negative is lighter",
+            "有冷却液时切削变化的比例（作用随速度减弱时指常用切速下），负值为变轻",
+        ),
+        ParameterDoc::shape(
+            "fading",
+            "1",
+            (0.0, 4.0),
+            "exponent by which it does less at higher cutting speed",
+            "切速升高时作用减弱的指数",
+        ),
+        ParameterDoc::shape(
+            "tau_s",
+            "s",
+            (0.05, 8.0),
+            "time the coolant takes to reach the cut and to leave it",
+            "冷却液到达和离开切削区的时间",
+        ),
     ],
     needs: &["load | engaged", "coolant_on"],
     source: "friction on rake and flank wet against dry: 5-15 % of cutting power; less gets to the chip the faster it runs \

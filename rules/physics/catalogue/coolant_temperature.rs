@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::{lag_forms, spread, varies};
 use crate::physics::state::first_order_behind;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Displacement that follows the coolant.
 #[derive(Debug, Clone, Copy)]
@@ -16,22 +16,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = per_k * w; dw/dt = ((Tc - Tc0) - w) / tau, Tc0 at the start; without tau: w = Tc - Tc0; flowing: w = (Tc - Tc0) while the coolant is on",
     parameters: &[
-        ParameterDoc {
-            name: "per_k",
-            unit: "output/K",
-            entry: Entry::Linear,
-            range: (-100.0, 100.0),
-            en: "displacement per kelvin of the coolant",
-            zh: "冷却液每变化1 K的位移",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (30.0, 14400.0),
-            en: "time bed and work take to follow",
-            zh: "床身和工件跟随的时间常数",
-        },
+        ParameterDoc::linear(
+            "per_k",
+            "output/K",
+            (-100.0, 100.0),
+            "displacement per kelvin of the coolant",
+            "冷却液每变化1 K的位移",
+        ),
+        ParameterDoc::shape(
+            "tau_s",
+            "s",
+            (30.0, 14400.0),
+            "time bed and work take to follow",
+            "床身和工件跟随的时间常数",
+        ),
     ],
     needs: &[COOLANT],
     source: "expansion of what the coolant washes: 11.5 um/(m K) for steel",

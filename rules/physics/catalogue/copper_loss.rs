@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Heat in the motor windings.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = per_load2 * (L / (n / 1000 rpm))^2; L load, n at least 50 rpm; weakened: times (n / base_speed_rpm)^2 above that speed",
     parameters: &[
-        ParameterDoc {
-            name: "per_load2",
-            unit: "1/output",
-            entry: Entry::Linear,
-            range: (0.0, 1.0),
-            en: "loss per squared load at 1000 rpm",
-            zh: "1000 rpm下单位负载平方的损耗",
-        },
-        ParameterDoc {
-            name: "base_speed_rpm",
-            unit: "rpm",
-            entry: Entry::Shape,
-            range: (10.0, 100_000.0),
-            en: "speed above which the field is weakened, so that a torque takes more current",
-            zh: "弱磁起始转速，超过后同样转矩需要更大电流",
-        },
+        ParameterDoc::linear(
+            "per_load2",
+            "1/output",
+            (0.0, 1.0),
+            "loss per squared load at 1000 rpm",
+            "1000 rpm下单位负载平方的损耗",
+        ),
+        ParameterDoc::shape(
+            "base_speed_rpm",
+            "rpm",
+            (10.0, 100_000.0),
+            "speed above which the field is weakened, so that a torque takes more current",
+            "弱磁起始转速，超过后同样转矩需要更大电流",
+        ),
     ],
     needs: &["load", "speed"],
     source: "3 R I^2 with I = T / kt; R 0.05-1 ohm, kt 0.5-3 N m/A",
@@ -64,8 +62,8 @@ impl Effect for CopperLoss {
         let columns = turns.as_ref().and_then(|_| self.columns(scene, &Form::plain()));
         let (Some(krpm), Some(_)) = (turns, columns.filter(|columns| varies(&columns[0].1))) else { return Vec::new() };
         let top_rpm = 1000.0 * krpm.iter().copied().fold(0.0, f64::max);
-        let weakened = BASE_SHARES
-            .map(|share| Form { name: WEAKENED, ..Form::of(&[("base_speed_rpm", share * top_rpm)]) });
+        let weakened =
+            BASE_SHARES.map(|share| Form { name: WEAKENED, ..Form::of(&[("base_speed_rpm", share * top_rpm)]) });
         std::iter::once(Form::plain()).chain(weakened).collect()
     }
 

@@ -1,7 +1,7 @@
 //! Power of the cut after Kienzle: specific force times the section of the chip, falling with its thickness.
 
 use crate::physics::cut::{engaged, in_output};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Cutting power after Kienzle.
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "model",
     law: "turning: P = kc11 ap f^(1-mc) vc / 60; milling and drilling: P = kc11 hm^(-mc) Q / 60; times engaged. A force output takes ap f^(1-mc), a torque output D / 2000 of it",
     parameters: &[
-        ParameterDoc {
-            name: "kc11_n_per_mm2",
-            unit: "N/mm2",
-            entry: Entry::Linear,
-            range: (0.0, 20000.0),
-            en: "specific cutting force of a chip 1 mm thick and 1 mm wide",
-            zh: "单位切削力（切屑厚、宽各1 mm）",
-        },
-        ParameterDoc {
-            name: "mc",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (0.0, 0.6),
-            en: "how much the specific force falls with chip thickness",
-            zh: "切削力随切屑厚度下降的指数",
-        },
+        ParameterDoc::linear(
+            "kc11_n_per_mm2",
+            "N/mm2",
+            (0.0, 20000.0),
+            "specific cutting force of a chip 1 mm thick and 1 mm wide",
+            "单位切削力（切屑厚、宽各1 mm）",
+        ),
+        ParameterDoc::shape(
+            "mc",
+            "1",
+            (0.0, 0.6),
+            "how much the specific force falls with chip thickness",
+            "切削力随切屑厚度下降的指数",
+        ),
     ],
     needs: &["depth_of_cut_mm", "feed_per_rev_mm | removal_rate_cm3_min", "cutting_speed_m_min | removal_rate_cm3_min"],
     source: "Kienzle; kc1.1 1400-2600 N/mm2 and mc 0.13-0.30 for steels (workholding maker's kc table)",

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times, way_mm};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -15,22 +15,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (slope * s + curve * (s^2 - 1/12)) * L; s from -1/2 to 1/2 along the pass, by axis position where it moves, else by feed or time; distance: y = (slope * d + curve * d^2) * L, d from the start of the pass in lengths of the longest one",
     parameters: &[
-        ParameterDoc {
-            name: "slope",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.5, 0.5),
-            en: "change of the cut from one end of the pass to the other, as a share",
-            zh: "走刀两端之间切削量变化的比例",
-        },
-        ParameterDoc {
-            name: "curve",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-2.0, 2.0),
-            en: "how much the ends differ from the middle",
-            zh: "两端与中部之差的比例",
-        },
+        ParameterDoc::linear(
+            "slope",
+            "1",
+            (-0.5, 0.5),
+            "change of the cut from one end of the pass to the other, as a share",
+            "走刀两端之间切削量变化的比例",
+        ),
+        ParameterDoc::linear(
+            "curve",
+            "1",
+            (-2.0, 2.0),
+            "how much the ends differ from the middle",
+            "两端与中部之差的比例",
+        ),
     ],
     needs: &["load | engaged"],
     source: "ap(z) = ap0 (1 + k1 z + k2 z^2), 2-15 % over a pass",

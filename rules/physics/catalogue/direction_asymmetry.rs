@@ -1,7 +1,7 @@
 //! Friction differs between the two directions of motion.
 
 use crate::physics::drive::{directions, goes_both_ways, is_power, motion, rest_width};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::{count, mean};
 
 /// Friction that differs between directions.
@@ -13,30 +13,27 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "F = level * |sign(v)|; viscous: F = slope * (|v| - about); in a power: P = slope * v, step: P = level * sign(v); v in m/s, of a spindle in rad/s",
     parameters: &[
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "half the difference between the directions",
-            zh: "两个方向之差的一半",
-        },
-        ParameterDoc {
-            name: "slope",
-            unit: "output/velocity",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "half the difference per speed; of a spindle per rad/s",
-            zh: "单位速度下两方向之差的一半；主轴按rad/s",
-        },
-        ParameterDoc {
-            name: "about",
-            unit: "velocity",
-            entry: Entry::Shape,
-            range: (0.0, 3000.0),
-            en: "speed at which the slope adds nothing: zero, or the mean speed of an axis that is never at rest, for which a difference at that speed is an offset",
-            zh: "斜率不起作用的速度：零；轴从不静止时为平均速度，该速度下的差值即为偏置",
-        },
+        ParameterDoc::linear(
+            "level",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "half the difference between the directions",
+            "两个方向之差的一半",
+        ),
+        ParameterDoc::linear(
+            "slope",
+            "output/velocity",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "half the difference per speed; of a spindle per rad/s",
+            "单位速度下两方向之差的一半；主轴按rad/s",
+        ),
+        ParameterDoc::shape(
+            "about",
+            "velocity",
+            (0.0, 3000.0),
+            "speed at which the slope adds nothing: zero, or the mean speed of an axis that is never at rest, for which a difference at that speed is an offset",
+            "斜率不起作用的速度：零；轴从不静止时为平均速度，该速度下的差值即为偏置",
+        ),
     ],
     needs: &["velocity | speed"],
     source: "preload of nut and wipers, fans and belts that act one way",

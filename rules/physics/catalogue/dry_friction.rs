@@ -3,7 +3,7 @@
 use crate::physics::drive::{RAD_PER_S_OF_RPM, motion, soft_sign, turns};
 use crate::physics::excitation::greatest;
 use crate::physics::state::{bent_over_the_way, strokes};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Coulomb friction of a drive.
 #[derive(Debug, Clone, Copy)]
@@ -15,30 +15,27 @@ static DOC: EffectDoc = EffectDoc {
     law: "F = level * tanh(v / v0); presliding: F = level * z, dz = (sign(v) - z) |dx| / way, held at rest; \
           in a power: P = level * |v| / (1 m/s), of a spindle / (1000 rpm)",
     parameters: &[
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "friction level; in a power its loss at 1 m/s or 1000 rpm",
-            zh: "摩擦力大小；功率输出时为1 m/s或1000 rpm下的损耗",
-        },
-        ParameterDoc {
-            name: "reversal_share",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (1e-5, 0.2),
-            en: "speed at which the level is reached, as a share of the greatest speed",
-            zh: "达到摩擦力的速度与最大速度之比",
-        },
-        ParameterDoc {
-            name: "presliding_way",
-            unit: "m",
-            entry: Entry::Shape,
-            range: (1e-7, 10.0),
-            en: "way after a reversal in which two thirds of the change of friction build up; rad where the drive turns",
-            zh: "换向后摩擦力变化建立三分之二所经过的位移；旋转驱动时单位为rad",
-        },
+        ParameterDoc::linear(
+            "level",
+            "output",
+            (0.0, f64::INFINITY),
+            "friction level; in a power its loss at 1 m/s or 1000 rpm",
+            "摩擦力大小；功率输出时为1 m/s或1000 rpm下的损耗",
+        ),
+        ParameterDoc::shape(
+            "reversal_share",
+            "1",
+            (1e-5, 0.2),
+            "speed at which the level is reached, as a share of the greatest speed",
+            "达到摩擦力的速度与最大速度之比",
+        ),
+        ParameterDoc::shape(
+            "presliding_way",
+            "m",
+            (1e-7, 10.0),
+            "way after a reversal in which two thirds of the change of friction build up; rad where the drive turns",
+            "换向后摩擦力变化建立三分之二所经过的位移；旋转驱动时单位为rad",
+        ),
     ],
     needs: &["velocity | speed"],
     source: "Coulomb; smoothed at reversal so that rows at rest carry no sign of noise; presliding: Dahl, A solid friction \
@@ -144,7 +141,11 @@ mod tests {
         let form = Form { name: "presliding", ..Form::of(&[("presliding_way", 0.01)]) };
         let friction = column(&DryFriction, &scene(&recording, "axis_force_n"), &form);
         assert!((friction[10] - (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "one way forwards: {}", friction[10]);
-        assert!((friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199], "held at rest: {}", friction[150]);
+        assert!(
+            (friction[150] - 1.0).abs() < 1e-3 && friction[150] == friction[199],
+            "held at rest: {}",
+            friction[150]
+        );
         // Half a millimetre while it starts, then one a row: turned about after ln 2 of the way.
         assert!(friction[206] > 0.0 && friction[208] < 0.0, "{:?}", &friction[205..210]);
         assert!((friction[299] + 1.0).abs() < 1e-3, "slips backwards: {}", friction[299]);

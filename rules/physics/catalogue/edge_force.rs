@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{engaged, in_output, teeth_in_cut};
 use crate::physics::drive::{is_axis_output, is_displacement};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Force along the cutting edge.
 #[derive(Debug, Clone, Copy)]
@@ -14,22 +14,20 @@ static DOC: EffectDoc = EffectDoc {
     law: "P = kte * (ap + nose) * vc / 60 * engaged; milled: times the teeth that are in the work at once, \
           z * arccos(1 - 2 ae / D) / (2 pi); a force output takes kte * (ap + nose), a torque output D / 2000 of it",
     parameters: &[
-        ParameterDoc {
-            name: "kte_n_per_mm",
-            unit: "N/mm",
-            entry: Entry::Linear,
-            range: (0.0, 500.0),
-            en: "force per length of edge in the cut",
-            zh: "单位切削刃长度的力",
-        },
-        ParameterDoc {
-            name: "nose_mm",
-            unit: "mm",
-            entry: Entry::Shape,
-            range: (0.0, 3.0),
-            en: "length of edge around the nose that is in the cut besides the depth",
-            zh: "除切深外刀尖圆弧参与切削的刃长",
-        },
+        ParameterDoc::linear(
+            "kte_n_per_mm",
+            "N/mm",
+            (0.0, 500.0),
+            "force per length of edge in the cut",
+            "单位切削刃长度的力",
+        ),
+        ParameterDoc::shape(
+            "nose_mm",
+            "mm",
+            (0.0, 3.0),
+            "length of edge around the nose that is in the cut besides the depth",
+            "除切深外刀尖圆弧参与切削的刃长",
+        ),
     ],
     needs: &["depth_of_cut_mm", "cutting_speed_m_min"],
     source: "edge-force model F = kt b h + kte b; kte 10-80 N/mm for steel and aluminium",

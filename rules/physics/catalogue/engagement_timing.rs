@@ -3,7 +3,7 @@
 use crate::physics::cut::cut;
 use crate::physics::excitation::delays;
 use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
 #[derive(Debug, Clone, Copy)]
@@ -14,22 +14,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut, losses included; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
     parameters: &[
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "one, when the timing explains all",
-            zh: "为1时时序可完全解释",
-        },
-        ParameterDoc {
-            name: "delay_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (-10.0, 10.0),
-            en: "how much later than flagged the tool cuts; negative when earlier",
-            zh: "实际切削比标志晚的时间；提前为负",
-        },
+        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the timing explains all", "为1时时序可完全解释"),
+        ParameterDoc::shape(
+            "delay_s",
+            "s",
+            (-10.0, 10.0),
+            "how much later than flagged the tool cuts; negative when earlier",
+            "实际切削比标志晚的时间；提前为负",
+        ),
     ],
     needs: &["load", "engaged"],
     source: "definition; approach and overrun distances over the feed",

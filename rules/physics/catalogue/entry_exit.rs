@@ -1,7 +1,7 @@
 //! The cut builds up when the tool enters and fades when it leaves.
 
 use crate::physics::cut::{cut, cut_times, way_mm};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::count;
 use std::ops::Range;
 
@@ -14,62 +14,37 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L; travel: the same over the way s at the feed, from entry and to exit, in place of the time",
     parameters: &[
-        ParameterDoc {
-            name: "entry",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-1.0, 0.0),
-            en: "share by which the cut differs on entry",
-            zh: "切入时的差异比例",
-        },
-        ParameterDoc {
-            name: "exit",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-1.0, 0.0),
-            en: "share by which it differs on exit",
-            zh: "切出时的差异比例",
-        },
-        ParameterDoc {
-            name: "settling",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-1.0, 1.0),
-            en: "share by which the cut differs at first and then settles",
-            zh: "走刀初期的差异比例，随后稳定",
-        },
-        ParameterDoc {
-            name: "length_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.05, 120.0),
-            en: "how long entry and exit last",
-            zh: "切入切出持续时间",
-        },
-        ParameterDoc {
-            name: "exit_length_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.05, 120.0),
-            en: "how long the exit lasts where it differs from the entry",
-            zh: "切出持续时间（与切入不同时）",
-        },
-        ParameterDoc {
-            name: "length_mm",
-            unit: "mm",
-            entry: Entry::Shape,
-            range: (0.02, 200.0),
-            en: "way at the feed over which the cut builds up",
-            zh: "切削建立所经进给行程",
-        },
-        ParameterDoc {
-            name: "exit_length_mm",
-            unit: "mm",
-            entry: Entry::Shape,
-            range: (0.02, 200.0),
-            en: "way at the feed over which it fades",
-            zh: "切削消退所经进给行程",
-        },
+        ParameterDoc::linear("entry", "1", (-1.0, 0.0), "share by which the cut differs on entry", "切入时的差异比例"),
+        ParameterDoc::linear("exit", "1", (-1.0, 0.0), "share by which it differs on exit", "切出时的差异比例"),
+        ParameterDoc::linear(
+            "settling",
+            "1",
+            (-1.0, 1.0),
+            "share by which the cut differs at first and then settles",
+            "走刀初期的差异比例，随后稳定",
+        ),
+        ParameterDoc::shape("length_s", "s", (0.05, 120.0), "how long entry and exit last", "切入切出持续时间"),
+        ParameterDoc::shape(
+            "exit_length_s",
+            "s",
+            (0.05, 120.0),
+            "how long the exit lasts where it differs from the entry",
+            "切出持续时间（与切入不同时）",
+        ),
+        ParameterDoc::shape(
+            "length_mm",
+            "mm",
+            (0.02, 200.0),
+            "way at the feed over which the cut builds up",
+            "切削建立所经进给行程",
+        ),
+        ParameterDoc::shape(
+            "exit_length_mm",
+            "mm",
+            (0.02, 200.0),
+            "way at the feed over which it fades",
+            "切削消退所经进给行程",
+        ),
     ],
     needs: &["engaged"],
     source: "the engagement ramps over (ap / tan kappa) / (f n); first and last 1-3 s of a pass",

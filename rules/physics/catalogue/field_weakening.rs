@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, is_power};
 use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Change of losses above base speed.
 #[derive(Debug, Clone, Copy)]
@@ -13,30 +13,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = magnetising * (n - nb) / 1000 rpm + per_load2 * L^2 * 1 / nb^2, both for n > nb only; in excess of a copper loss that is known below nb: 1 / nb^2 - 1 / n^2; n, nb in 1000 rpm",
     parameters: &[
-        ParameterDoc {
-            name: "magnetising",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "change of no-load power per 1000 rpm above base speed",
-            zh: "基速以上每1000 rpm空载功率的变化",
-        },
-        ParameterDoc {
-            name: "per_load2",
-            unit: "1/output",
-            entry: Entry::Linear,
-            range: (-1.0, 1.0),
-            en: "loss per squared load above base speed",
-            zh: "基速以上单位负载平方的损耗",
-        },
-        ParameterDoc {
-            name: "base_speed_rpm",
-            unit: "rpm",
-            entry: Entry::Shape,
-            range: (200.0, 20000.0),
-            en: "base speed of the motor",
-            zh: "电机基速",
-        },
+        ParameterDoc::linear(
+            "magnetising",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "change of no-load power per 1000 rpm above base speed",
+            "基速以上每1000 rpm空载功率的变化",
+        ),
+        ParameterDoc::linear(
+            "per_load2",
+            "1/output",
+            (-1.0, 1.0),
+            "loss per squared load above base speed",
+            "基速以上单位负载平方的损耗",
+        ),
+        ParameterDoc::shape("base_speed_rpm", "rpm", (200.0, 20000.0), "base speed of the motor", "电机基速"),
     ],
     needs: &["speed"],
     source: "torque constant proportional to nb / n above base speed, so that copper loss grows from T^2 to T^2 (n / nb)^2; nb 750-3000 rpm",

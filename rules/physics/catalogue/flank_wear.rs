@@ -3,7 +3,7 @@
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::greatest;
 use crate::physics::tool_load;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use crate::statistics::count;
 use std::borrow::Cow;
 
@@ -16,38 +16,34 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "P = k * ap * vc * W^p; W minutes in the cut since the edge was new; of a drill D / 2 in place of ap; without ap or D and vc: y = k * engaged * W^p; break_in: P = (k_break_in * (1 - exp(-W / W0)) + k * W) * ap * vc; edges: every edge its own k_i, another one their mean; followed: P = k_load * ap * vc * (0.15 W^(1/2) + g); g growth of the feed drive's load since the edge was new",
     parameters: &[
-        ParameterDoc {
-            name: "k",
-            unit: "output/(mm m/min min^p)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "growth of power per depth, cutting speed and cutting time",
-            zh: "单位切深、切速、切削时间的功率增长",
-        },
-        ParameterDoc {
-            name: "p",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (0.3, 4.0),
-            en: "exponent of the cutting time: below 1 break-in, above 1 accelerating wear",
-            zh: "切削时间指数：小于1为初期磨损，大于1为加速磨损",
-        },
-        ParameterDoc {
-            name: "k_break_in",
-            unit: "output/(mm m/min)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "power per depth and cutting speed of an edge that has broken in",
-            zh: "初期磨损结束后，单位切深、切速的功率增量",
-        },
-        ParameterDoc {
-            name: "break_in_min",
-            unit: "min",
-            entry: Entry::Shape,
-            range: (0.05, 60.0),
-            en: "cutting time in which an edge breaks in",
-            zh: "初期磨损的切削时间常数",
-        },
+        ParameterDoc::linear(
+            "k",
+            "output/(mm m/min min^p)",
+            (0.0, f64::INFINITY),
+            "growth of power per depth, cutting speed and cutting time",
+            "单位切深、切速、切削时间的功率增长",
+        ),
+        ParameterDoc::shape(
+            "p",
+            "1",
+            (0.3, 4.0),
+            "exponent of the cutting time: below 1 break-in, above 1 accelerating wear",
+            "切削时间指数：小于1为初期磨损，大于1为加速磨损",
+        ),
+        ParameterDoc::linear(
+            "k_break_in",
+            "output/(mm m/min)",
+            (0.0, f64::INFINITY),
+            "power per depth and cutting speed of an edge that has broken in",
+            "初期磨损结束后，单位切深、切速的功率增量",
+        ),
+        ParameterDoc::shape(
+            "break_in_min",
+            "min",
+            (0.05, 60.0),
+            "cutting time in which an edge breaks in",
+            "初期磨损的切削时间常数",
+        ),
         rate(
             "k_1",
             "growth of the first edge, per depth, cutting speed and cutting time",
@@ -60,14 +56,13 @@ static DOC: EffectDoc = EffectDoc {
         rate("k_6", "the same of the sixth edge", "第6个刀刃的功率增长"),
         rate("k_7", "the same of the seventh edge", "第7个刀刃的功率增长"),
         rate("k_8", "the same of the eighth edge", "第8个刀刃的功率增长"),
-        ParameterDoc {
-            name: "k_load",
-            unit: "output/(mm m/min)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "power per depth and cutting speed of an edge so worn that the feed drive's load has doubled",
-            zh: "进给轴负载因磨损翻倍时，单位切深、切速的功率增量",
-        },
+        ParameterDoc::linear(
+            "k_load",
+            "output/(mm m/min)",
+            (0.0, f64::INFINITY),
+            "power per depth and cutting speed of an edge so worn that the feed drive's load has doubled",
+            "进给轴负载因磨损翻倍时，单位切深、切速的功率增量",
+        ),
     ],
     needs: &["engaged"],
     source: "patent CHK460: dPc = mu H VB s vc; VB over cutting time in three stages",

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::driven_krpm;
 use crate::physics::excitation::{between_speeds, ln_count};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::collections::BTreeSet;
 
 /// Drag and efficiency of a gear stage.
@@ -14,38 +14,28 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "y = step + share * L in one stage while it turns; without the channel gear_stage: below a switching speed; sloped: and slope * n / (1000 rpm)",
     parameters: &[
-        ParameterDoc {
-            name: "step",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "change of no-load output in this stage",
-            zh: "该档空载输出的变化",
-        },
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "share of the load lost in this stage beyond the others",
-            zh: "该档相对其他档多损失的负载比例",
-        },
-        ParameterDoc {
-            name: "slope",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "change of no-load output in this stage that grows with the speed, at 1000 rpm",
-            zh: "该档空载输出随转速增长的变化（1000 rpm下）",
-        },
-        ParameterDoc {
-            name: "switch_rpm",
-            unit: "rpm",
-            entry: Entry::Shape,
-            range: (20.0, 20000.0),
-            en: "speed below which the stage is engaged",
-            zh: "换档转速",
-        },
+        ParameterDoc::linear(
+            "step",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "change of no-load output in this stage",
+            "该档空载输出的变化",
+        ),
+        ParameterDoc::linear(
+            "share",
+            "1",
+            (-0.4, 0.4),
+            "share of the load lost in this stage beyond the others",
+            "该档相对其他档多损失的负载比例",
+        ),
+        ParameterDoc::linear(
+            "slope",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "change of no-load output in this stage that grows with the speed, at 1000 rpm",
+            "该档空载输出随转速增长的变化（1000 rpm下）",
+        ),
+        ParameterDoc::shape("switch_rpm", "rpm", (20.0, 20000.0), "speed below which the stage is engaged", "换档转速"),
     ],
     needs: &["speed | gear_stage"],
     source: "efficiency differs by 2-6 % between stages",
@@ -94,8 +84,7 @@ impl Effect for GearStage {
         }
         let speeds = between_speeds(scene, SPEEDS_APART, STAGES_TRIED);
         let ln_choices = ln_count(speeds.len());
-        let form =
-            |name| move |speed: &f64| Form { name, ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
+        let form = |name| move |speed: &f64| Form { name, ln_choices, ..Form::of(&[("switch_rpm", *speed)]) };
         speeds.iter().map(form("speed")).chain(speeds.iter().map(form(SLOPED))).collect()
     }
 

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{directions, in_si, is_displacement, is_power, motion, rate};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Weight on a vertical axis.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "P = weight * v, v in m/s, positive up; in a force or current: F = level wherever the drive holds the axis; braked: F = level * |sign(v)|, where a brake holds it at rest",
     parameters: &[
-        ParameterDoc {
-            name: "weight",
-            unit: "output/(m/s)",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "unbalanced weight; newtons when the output is in watts; negative when over-balanced",
-            zh: "未平衡的重量；输出为W时单位为N；过平衡时为负",
-        },
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "output that holds the axis against gravity",
-            zh: "克服重力保持该轴的输出",
-        },
+        ParameterDoc::linear(
+            "weight",
+            "output/(m/s)",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "unbalanced weight; newtons when the output is in watts; negative when over-balanced",
+            "未平衡的重量；输出为W时单位为N；过平衡时为负",
+        ),
+        ParameterDoc::linear(
+            "level",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "output that holds the axis against gravity",
+            "克服重力保持该轴的输出",
+        ),
     ],
     needs: &["vertical"],
     source: "P = m g v; 100-800 W at rapid traverse; the drive carries no weight while the brake holds",

@@ -4,7 +4,7 @@ use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{
     ln_count, run_named, since_run, step_forms, stretch_of_runs, where_word, within_runs, word_forms,
 };
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -15,62 +15,49 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = gain * L in one lot, or from one run on, or in a stretch of runs; lots: y = gain_i * L in lot i against the first",
     parameters: &[
-        ParameterDoc {
-            name: "gain",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "share by which the cut is heavier",
-            zh: "切削负载增加的比例",
-        },
-        ParameterDoc {
-            name: "gain_2",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 2 against the first lot",
-            zh: "第2批相对第一批的比例",
-        },
-        ParameterDoc {
-            name: "gain_3",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 3 against the first lot",
-            zh: "第3批相对第一批的比例",
-        },
-        ParameterDoc {
-            name: "gain_4",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 4 against the first lot",
-            zh: "第4批相对第一批的比例",
-        },
-        ParameterDoc {
-            name: "gain_5",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 5 against the first lot",
-            zh: "第5批相对第一批的比例",
-        },
-        ParameterDoc {
-            name: "gain_6",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 6 against the first lot",
-            zh: "第6批相对第一批的比例",
-        },
-        ParameterDoc {
-            name: "gain_7",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.4, 0.4),
-            en: "the same for lot 7 against the first lot",
-            zh: "第7批相对第一批的比例",
-        },
+        ParameterDoc::linear("gain", "1", (-0.4, 0.4), "share by which the cut is heavier", "切削负载增加的比例"),
+        ParameterDoc::linear(
+            "gain_2",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 2 against the first lot",
+            "第2批相对第一批的比例",
+        ),
+        ParameterDoc::linear(
+            "gain_3",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 3 against the first lot",
+            "第3批相对第一批的比例",
+        ),
+        ParameterDoc::linear(
+            "gain_4",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 4 against the first lot",
+            "第4批相对第一批的比例",
+        ),
+        ParameterDoc::linear(
+            "gain_5",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 5 against the first lot",
+            "第5批相对第一批的比例",
+        ),
+        ParameterDoc::linear(
+            "gain_6",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 6 against the first lot",
+            "第6批相对第一批的比例",
+        ),
+        ParameterDoc::linear(
+            "gain_7",
+            "1",
+            (-0.4, 0.4),
+            "the same for lot 7 against the first lot",
+            "第7批相对第一批的比例",
+        ),
     ],
     needs: &["load | engaged", "lot | run"],
     source: "kc (1 + h) per lot, h 3-12 % either way",

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, krpm, torque_at_1000_rpm};
 use crate::physics::excitation::{greatest, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
 
 /// Losses in the inverter.
@@ -15,30 +15,27 @@ static DOC: EffectDoc = EffectDoc {
     law: "P = conduction * |i| + resistive * i^2; magnetised: P = conduction * (sqrt(i^2 + m^2) - m); i = L / (n / 1000 rpm) \
           stands for the current, L load, n at least 50 rpm, m = magnetising_share times the greatest i",
     parameters: &[
-        ParameterDoc {
-            name: "conduction",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 0.5),
-            en: "loss per current, at 1000 rpm as a share of the load",
-            zh: "单位电流损耗，1000 rpm下相对负载的比例",
-        },
-        ParameterDoc {
-            name: "resistive",
-            unit: "1/output",
-            entry: Entry::Linear,
-            range: (0.0, 1.0),
-            en: "loss per squared current, at 1000 rpm",
-            zh: "单位电流平方损耗，1000 rpm下",
-        },
-        ParameterDoc {
-            name: "magnetising_share",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (0.0, 1.0),
-            en: "magnetising current as a share of the greatest load current; flows without load, too",
-            zh: "励磁电流与最大负载电流之比，空载时也存在",
-        },
+        ParameterDoc::linear(
+            "conduction",
+            "1",
+            (0.0, 0.5),
+            "loss per current, at 1000 rpm as a share of the load",
+            "单位电流损耗，1000 rpm下相对负载的比例",
+        ),
+        ParameterDoc::linear(
+            "resistive",
+            "1/output",
+            (0.0, 1.0),
+            "loss per squared current, at 1000 rpm",
+            "单位电流平方损耗，1000 rpm下",
+        ),
+        ParameterDoc::shape(
+            "magnetising_share",
+            "1",
+            (0.0, 1.0),
+            "magnetising current as a share of the greatest load current; flows without load, too",
+            "励磁电流与最大负载电流之比，空载时也存在",
+        ),
     ],
     needs: &["load", "speed"],
     source: "a + b I + c I^2; 2-4 % of power; the current of an induction motor is that of the torque and, at right angles \

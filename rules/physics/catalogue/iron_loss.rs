@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Losses in the iron of the motor.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
     parameters: &[
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "loss at 1000 rpm",
-            zh: "1000 rpm时的损耗",
-        },
-        ParameterDoc {
-            name: "p",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (1.0, 2.0),
-            en: "exponent of speed",
-            zh: "转速指数",
-        },
+        ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "loss at 1000 rpm", "1000 rpm时的损耗"),
+        ParameterDoc::shape("p", "1", (1.0, 2.0), "exponent of speed", "转速指数"),
     ],
     needs: &["speed"],
     source: "hysteresis with n^1 to n^1.3, eddy currents with n^2; 50-300 W at base speed",

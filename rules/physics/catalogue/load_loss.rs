@@ -2,7 +2,7 @@
 
 use crate::physics::drive::is_displacement;
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Losses that grow with the load.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = linear * L + quadratic_per_w * L^2; L load of the cut",
     parameters: &[
-        ParameterDoc {
-            name: "linear",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-0.5, 1.0),
-            en: "share of the load that is lost on the way",
-            zh: "负载中沿途损失的比例",
-        },
-        ParameterDoc {
-            name: "quadratic_per_w",
-            unit: "1/output",
-            entry: Entry::Linear,
-            range: (-0.01, 0.01),
-            en: "growth of that share per unit of load; may be negative where efficiency rises with load",
-            zh: "损失比例随负载的增长；效率随负载上升时可为负",
-        },
+        ParameterDoc::linear(
+            "linear",
+            "1",
+            (-0.5, 1.0),
+            "share of the load that is lost on the way",
+            "负载中沿途损失的比例",
+        ),
+        ParameterDoc::linear(
+            "quadratic_per_w",
+            "1/output",
+            (-0.01, 0.01),
+            "growth of that share per unit of load; may be negative where efficiency rises with load",
+            "损失比例随负载的增长；效率随负载上升时可为负",
+        ),
     ],
     needs: &["load"],
     source: "Pad = a1 Pc + a2 Pc^2 with a1 0.15-0.25, a2 about 4e-5 1/W on a lathe; additional power up to 20 % of Pc and sometimes negative",

@@ -2,7 +2,7 @@
 
 use crate::physics::excitation::{delays, varies};
 use crate::physics::state::delayed;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Averaging in the meter.
 #[derive(Debug, Clone, Copy)]
@@ -13,30 +13,21 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * (A(S) - S), S the simulated output; lag: A first order with time constant window_s; mean: A mean over the last window_s; late: lag, delay_s later",
     parameters: &[
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "one, when the window explains all",
-            zh: "为1时平均窗口可完全解释",
-        },
-        ParameterDoc {
-            name: "window_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.01, 30.0),
-            en: "time constant, or length of the window",
-            zh: "时间常数或窗口长度",
-        },
-        ParameterDoc {
-            name: "delay_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.0, 30.0),
-            en: "time by which what was averaged is reported late",
-            zh: "平均之后报告的延迟",
-        },
+        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the window explains all", "为1时平均窗口可完全解释"),
+        ParameterDoc::shape(
+            "window_s",
+            "s",
+            (0.01, 30.0),
+            "time constant, or length of the window",
+            "时间常数或窗口长度",
+        ),
+        ParameterDoc::shape(
+            "delay_s",
+            "s",
+            (0.0, 30.0),
+            "time by which what was averaged is reported late",
+            "平均之后报告的延迟",
+        ),
     ],
     needs: &["the simulated output"],
     source: "power meters average over 0.2-3 s, by a running mean or a first-order filter",

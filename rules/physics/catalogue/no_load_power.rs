@@ -2,7 +2,7 @@
 
 use crate::physics::drive::driven_krpm;
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// No-load power of the spindle.
 #[derive(Debug, Clone, Copy)]
@@ -13,30 +13,27 @@ static DOC: EffectDoc = EffectDoc {
     family: "model",
     law: "P = p0 + p1 n + p2 n^2",
     parameters: &[
-        ParameterDoc {
-            name: "p0_w",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "power with the spindle at rest",
-            zh: "主轴静止时的功率",
-        },
-        ParameterDoc {
-            name: "p1_w_per_rpm",
-            unit: "output/rpm",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth with speed (friction torque)",
-            zh: "随转速线性增长（摩擦转矩）",
-        },
-        ParameterDoc {
-            name: "p2_w_per_rpm2",
-            unit: "output/rpm2",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth with the square of speed (viscous drag)",
-            zh: "随转速平方增长（粘性阻力）",
-        },
+        ParameterDoc::linear(
+            "p0_w",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "power with the spindle at rest",
+            "主轴静止时的功率",
+        ),
+        ParameterDoc::linear(
+            "p1_w_per_rpm",
+            "output/rpm",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth with speed (friction torque)",
+            "随转速线性增长（摩擦转矩）",
+        ),
+        ParameterDoc::linear(
+            "p2_w_per_rpm2",
+            "output/rpm2",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth with the square of speed (viscous drag)",
+            "随转速平方增长（粘性阻力）",
+        ),
     ],
     needs: &["speed"],
     source: "no-load power as a polynomial of speed, fitted to an idle ladder",

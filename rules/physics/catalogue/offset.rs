@@ -1,6 +1,6 @@
 //! A constant that the simulation lacks.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A constant in the output.
 #[derive(Debug, Clone, Copy)]
@@ -10,14 +10,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "offset",
     family: "measurement",
     law: "y = level",
-    parameters: &[ParameterDoc {
-        name: "level",
-        unit: "output",
-        entry: Entry::Linear,
-        range: (f64::NEG_INFINITY, f64::INFINITY),
-        en: "the constant",
-        zh: "常量",
-    }],
+    parameters: &[ParameterDoc::linear("level", "output", (f64::NEG_INFINITY, f64::INFINITY), "the constant", "常量")],
     needs: &[],
     source: "definition",
     experiment_minutes: 1.0,

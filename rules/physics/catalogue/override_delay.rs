@@ -3,7 +3,7 @@
 use crate::physics::cut::{cut, cutting_rows};
 use crate::physics::excitation::{delays, visits};
 use crate::physics::state::delayed;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Feed that follows late.
 #[derive(Debug, Clone, Copy)]
@@ -14,22 +14,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "control",
     law: "y = share * L * ((f(t - delay) / f(t))^0.75 - 1)",
     parameters: &[
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "one, when the delay explains all",
-            zh: "为1时延时可完全解释",
-        },
-        ParameterDoc {
-            name: "delay_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (0.0, 5.0),
-            en: "how late the real feed follows",
-            zh: "实际进给的滞后时间",
-        },
+        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
+        ParameterDoc::shape("delay_s", "s", (0.0, 5.0), "how late the real feed follows", "实际进给的滞后时间"),
     ],
     needs: &["load", "feed_mm_min | feed_programmed_mm_min"],
     source: "f_actual(t) = f_commanded(t - d), 50-500 ms and a ramp",

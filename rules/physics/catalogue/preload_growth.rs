@@ -3,7 +3,7 @@
 use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, STILL, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, STILL, Scene, Texts};
 
 /// Friction that rises with bearing preload.
 #[derive(Debug, Clone, Copy)]
@@ -14,30 +14,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = growth * (n / 1000 rpm)^2 * w; dw/dt = ((n / 1000 rpm)^(5/3) - w) / tau; gradient: w is the difference between a quick and a slow state",
     parameters: &[
-        ParameterDoc {
-            name: "growth",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "rise of power at 1000 rpm once warm from 1000 rpm",
-            zh: "在1000 rpm下热透后功率的上升量",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (20.0, 3600.0),
-            en: "time constant of the inner ring",
-            zh: "内圈时间常数",
-        },
-        ParameterDoc {
-            name: "slow_tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (120.0, 14400.0),
-            en: "time constant of the housing",
-            zh: "轴承座时间常数",
-        },
+        ParameterDoc::linear(
+            "growth",
+            "output",
+            (0.0, f64::INFINITY),
+            "rise of power at 1000 rpm once warm from 1000 rpm",
+            "在1000 rpm下热透后功率的上升量",
+        ),
+        ParameterDoc::shape("tau_s", "s", (20.0, 3600.0), "time constant of the inner ring", "内圈时间常数"),
+        ParameterDoc::shape("slow_tau_s", "s", (120.0, 14400.0), "time constant of the housing", "轴承座时间常数"),
     ],
     needs: &["speed"],
     source: "angular-contact bearings: thermally induced preload, grows with speed squared and the temperature difference of the rings",

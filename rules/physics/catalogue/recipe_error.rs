@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::excitation::{where_word, word_forms};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Depth or width mis-stated for an operation.
 #[derive(Debug, Clone, Copy)]
@@ -12,14 +12,13 @@ static DOC: EffectDoc = EffectDoc {
     kind: "recipe_error",
     family: "measurement",
     law: "y = gain * L in one operation",
-    parameters: &[ParameterDoc {
-        name: "gain",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (-0.8, 3.0),
-        en: "share by which the real cut is heavier than stated",
-        zh: "实际切削比给定值重的比例",
-    }],
+    parameters: &[ParameterDoc::linear(
+        "gain",
+        "1",
+        (-0.8, 3.0),
+        "share by which the real cut is heavier than stated",
+        "实际切削比给定值重的比例",
+    )],
     needs: &["load | engaged", "operation | pass | program"],
     source: "definition; an edited offset or a blank of another size",
     experiment_minutes: 5.0,

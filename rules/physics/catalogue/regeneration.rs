@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::visits;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Braking power that is not fed back.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "drive",
     law: "P = braking_kg_m2 * |w dw/dt| while the spindle slows down; clipped: P = share * |S| where the simulated power S is negative",
     parameters: &[
-        ParameterDoc {
-            name: "braking_kg_m2",
-            unit: "kg m2",
-            entry: Entry::Linear,
-            range: (0.0, 50.0),
-            en: "inertia times the share of braking power that is lost",
-            zh: "惯量乘以损失的制动功率比例",
-        },
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.0),
-            en: "share of the negative power that is not shown",
-            zh: "未显示的负功率比例",
-        },
+        ParameterDoc::linear(
+            "braking_kg_m2",
+            "kg m2",
+            (0.0, 50.0),
+            "inertia times the share of braking power that is lost",
+            "惯量乘以损失的制动功率比例",
+        ),
+        ParameterDoc::linear(
+            "share",
+            "1",
+            (0.0, 1.0),
+            "share of the negative power that is not shown",
+            "未显示的负功率比例",
+        ),
     ],
     needs: &["speed"],
     source: "drives with a braking resistor, and meters that count one direction only: 0-90 % of braking power",

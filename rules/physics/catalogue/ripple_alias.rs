@@ -1,6 +1,6 @@
 //! The ripple of the mains, sampled too slowly, looks like a slow wave.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Mains ripple folded by slow sampling.
@@ -12,38 +12,34 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = cosine * cos(2 pi f t) + sine * sin(2 pi f t), f = |2 f_mains - k f_sampling|; as a candidate: scale * a wave near f whose phase wanders with the mains, followed row by row",
     parameters: &[
-        ParameterDoc {
-            name: "scale",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 3.0),
-            en: "size over that of the wave as it is followed",
-            zh: "相对于跟踪所得波动的比例",
-        },
-        ParameterDoc {
-            name: "cosine",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "part in step with the clock",
-            zh: "与时钟同相部分",
-        },
-        ParameterDoc {
-            name: "sine",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "part a quarter period later",
-            zh: "滞后四分之一周期部分",
-        },
-        ParameterDoc {
-            name: "frequency_hz",
-            unit: "Hz",
-            entry: Entry::Shape,
-            range: (1e-05, 50.0),
-            en: "frequency as it appears in the recording",
-            zh: "记录中的表观频率",
-        },
+        ParameterDoc::linear(
+            "scale",
+            "1",
+            (0.0, 3.0),
+            "size over that of the wave as it is followed",
+            "相对于跟踪所得波动的比例",
+        ),
+        ParameterDoc::linear(
+            "cosine",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "part in step with the clock",
+            "与时钟同相部分",
+        ),
+        ParameterDoc::linear(
+            "sine",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "part a quarter period later",
+            "滞后四分之一周期部分",
+        ),
+        ParameterDoc::shape(
+            "frequency_hz",
+            "Hz",
+            (1e-05, 50.0),
+            "frequency as it appears in the recording",
+            "记录中的表观频率",
+        ),
     ],
     needs: &[],
     source: "three-phase power ripples at twice the mains frequency; 100 Hz sampled at 1 Hz wanders with the mains within 0.05 Hz",

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut, cut_times};
 use crate::physics::drive::RAD_PER_S_OF_RPM;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Cut that swells once per turn.
 #[derive(Debug, Clone, Copy)]
@@ -13,30 +13,15 @@ static DOC: EffectDoc = EffectDoc {
     family: "cutting",
     law: "y = (cosine * cos(phi) + sine * sin(phi)) * L; dphi/dt = 2 pi n / 60, phi = 0 at the start of each run; as a candidate also: scale * a tone of each cut's own size and phase, followed row by row",
     parameters: &[
-        ParameterDoc {
-            name: "scale",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 3.0),
-            en: "size over that of the tone as it is followed",
-            zh: "相对于跟踪所得单音的比例",
-        },
-        ParameterDoc {
-            name: "cosine",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-1.0, 1.0),
-            en: "share of the cut in step with the turn",
-            zh: "与转角同相的比例",
-        },
-        ParameterDoc {
-            name: "sine",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (-1.0, 1.0),
-            en: "share a quarter turn later",
-            zh: "滞后四分之一转的比例",
-        },
+        ParameterDoc::linear(
+            "scale",
+            "1",
+            (0.0, 3.0),
+            "size over that of the tone as it is followed",
+            "相对于跟踪所得单音的比例",
+        ),
+        ParameterDoc::linear("cosine", "1", (-1.0, 1.0), "share of the cut in step with the turn", "与转角同相的比例"),
+        ParameterDoc::linear("sine", "1", (-1.0, 1.0), "share a quarter turn later", "滞后四分之一转的比例"),
     ],
     needs: &["load | engaged", "speed"],
     source: "P (1 + e cos(w t + phi)), e 0.05-0.5; only where the sampling is faster than 2.2 samples per turn",

@@ -1,6 +1,6 @@
 //! The meter or drive shows no more than its ceiling.
 
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Ceiling of the meter.
@@ -12,22 +12,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "y = share * min(0, ceiling - S), S the simulated output",
     parameters: &[
-        ParameterDoc {
-            name: "share",
-            unit: "1",
-            entry: Entry::Linear,
-            range: (0.0, 1.5),
-            en: "one, when the ceiling explains all",
-            zh: "为1时上限可完全解释",
-        },
-        ParameterDoc {
-            name: "ceiling",
-            unit: "output",
-            entry: Entry::Shape,
-            range: (-1000000000.0, 1000000000.0),
-            en: "greatest value that is shown",
-            zh: "显示的最大值",
-        },
+        ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the ceiling explains all", "为1时上限可完全解释"),
+        ParameterDoc::shape(
+            "ceiling",
+            "output",
+            (-1000000000.0, 1000000000.0),
+            "greatest value that is shown",
+            "显示的最大值",
+        ),
     ],
     needs: &["the simulated output"],
     source: "min(P, Pmax): range of meter, transformer or controller display",

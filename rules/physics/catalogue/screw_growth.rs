@@ -3,7 +3,7 @@
 use crate::physics::drive::{axis_velocities, in_si, is_displacement};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::first_order;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the ball screw.
 #[derive(Debug, Clone, Copy)]
@@ -14,22 +14,14 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = growth * w * z; dw/dt = (|v| - w) / tau, v in m/min; z position in m, 1 where none is recorded",
     parameters: &[
-        ParameterDoc {
-            name: "growth",
-            unit: "output/(m m/min)",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "displacement per metre of screw once warm from 1 m/min",
-            zh: "在1 m/min下热透后每米丝杠的位移",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (300.0, 7200.0),
-            en: "time constant of the screw",
-            zh: "丝杠时间常数",
-        },
+        ParameterDoc::linear(
+            "growth",
+            "output/(m m/min)",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "displacement per metre of screw once warm from 1 m/min",
+            "在1 m/min下热透后每米丝杠的位移",
+        ),
+        ParameterDoc::shape("tau_s", "s", (300.0, 7200.0), "time constant of the screw", "丝杠时间常数"),
     ],
     needs: &["feed_mm_min | axis velocities"],
     source: "alpha L = 11.5 um/(m K), 20-60 min, driven by the mean speed of the axis",

@@ -1,7 +1,7 @@
 //! The meter shows a fixed share too much or too little.
 
 use crate::physics::excitation::{recording_share, since_run, step_forms, varies};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
 #[derive(Debug, Clone, Copy)]
@@ -11,14 +11,13 @@ static DOC: EffectDoc = EffectDoc {
     kind: "sensor_gain",
     family: "measurement",
     law: "y = gain * S, S the simulated output; from one run on, or growing as share of the recording - 1/2",
-    parameters: &[ParameterDoc {
-        name: "gain",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (-0.5, 0.5),
-        en: "share by which the meter shows too much",
-        zh: "仪表多显示的比例",
-    }],
+    parameters: &[ParameterDoc::linear(
+        "gain",
+        "1",
+        (-0.5, 0.5),
+        "share by which the meter shows too much",
+        "仪表多显示的比例",
+    )],
     needs: &["the simulated output"],
     source: "current transformers and shunts: 1-3 %",
     experiment_minutes: 5.0,

@@ -2,7 +2,7 @@
 
 use crate::physics::cut::{cut_times, cutting_rows};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use crate::statistics::quantile;
 
 /// Specific force that falls with cutting speed.
@@ -13,14 +13,7 @@ static DOC: EffectDoc = EffectDoc {
     kind: "speed_softening",
     family: "cutting",
     law: "y = -q * L * ln(vc / v0); v0 the nearest of ... 50, 100, 200, 400 ... m/min to the median of the cut",
-    parameters: &[ParameterDoc {
-        name: "q",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (0.0, 0.5),
-        en: "exponent of the cutting speed",
-        zh: "切削速度指数",
-    }],
+    parameters: &[ParameterDoc::linear("q", "1", (0.0, 0.5), "exponent of the cutting speed", "切削速度指数")],
     needs: &["load | engaged", "cutting_speed_m_min"],
     source: "kc proportional to (vc / v0)^(-q), q 0.05-0.2; thermal softening as in Johnson and Cook",
     experiment_minutes: 6.0,

@@ -3,7 +3,7 @@
 use crate::physics::drive::{is_displacement, krpm};
 use crate::physics::excitation::{lag_forms, time_constants, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Growth of the spindle with its own heat.
 #[derive(Debug, Clone, Copy)]
@@ -14,62 +14,43 @@ static DOC: EffectDoc = EffectDoc {
     family: "thermal",
     law: "E = growth * w + initial * exp(-t/tau); dw/dt = ((n / 1000 rpm)^1.5 - w) / tau; two: a second, slower state; measured: E = per_k * (T - T0)",
     parameters: &[
-        ParameterDoc {
-            name: "growth",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth once warm from 1000 rpm",
-            zh: "在1000 rpm下热透后的伸长",
-        },
-        ParameterDoc {
-            name: "initial",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth left over at the start of the recording",
-            zh: "记录开始时残留的伸长",
-        },
-        ParameterDoc {
-            name: "slow_growth",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "the same for the slow state",
-            zh: "慢速状态的伸长",
-        },
-        ParameterDoc {
-            name: "slow_initial",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth of the slow state left over at the start",
-            zh: "记录开始时慢速状态残留的伸长",
-        },
-        ParameterDoc {
-            name: "per_k",
-            unit: "output/K",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "growth per kelvin of the bearing",
-            zh: "轴承每升高1 K的伸长",
-        },
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (60.0, 14400.0),
-            en: "time constant of the nose",
-            zh: "主轴端时间常数",
-        },
-        ParameterDoc {
-            name: "slow_tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (600.0, 43200.0),
-            en: "time constant of the housing",
-            zh: "主轴箱时间常数",
-        },
+        ParameterDoc::linear(
+            "growth",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth once warm from 1000 rpm",
+            "在1000 rpm下热透后的伸长",
+        ),
+        ParameterDoc::linear(
+            "initial",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth left over at the start of the recording",
+            "记录开始时残留的伸长",
+        ),
+        ParameterDoc::linear(
+            "slow_growth",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "the same for the slow state",
+            "慢速状态的伸长",
+        ),
+        ParameterDoc::linear(
+            "slow_initial",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth of the slow state left over at the start",
+            "记录开始时慢速状态残留的伸长",
+        ),
+        ParameterDoc::linear(
+            "per_k",
+            "output/K",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "growth per kelvin of the bearing",
+            "轴承每升高1 K的伸长",
+        ),
+        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of the nose", "主轴端时间常数"),
+        ParameterDoc::shape("slow_tau_s", "s", (600.0, 43200.0), "time constant of the housing", "主轴箱时间常数"),
     ],
     needs: &["speed | temperature"],
     source: "ISO 230-3 tests: two states, 3-10 min and 30-120 min, 10-80 um",

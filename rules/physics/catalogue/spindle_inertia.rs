@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{RAD_PER_S_OF_RPM, driven_krpm, spindle_rate_rpm_per_s};
 use crate::physics::excitation::{greatest, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, OutputKind, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = inertia_kg_m2 * w * dw/dt, w = 2 pi n / 60; a torque, current or load output takes per_rad_s2 * dw/dt",
     parameters: &[
-        ParameterDoc {
-            name: "inertia_kg_m2",
-            unit: "kg m2",
-            entry: Entry::Linear,
-            range: (0.0, 50.0),
-            en: "moment of inertia of spindle, chuck and work that the simulation lacks",
-            zh: "仿真中缺少的主轴、卡盘和工件转动惯量",
-        },
-        ParameterDoc {
-            name: "per_rad_s2",
-            unit: "output/(rad/s2)",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "output per angular acceleration",
-            zh: "单位角加速度的输出",
-        },
+        ParameterDoc::linear(
+            "inertia_kg_m2",
+            "kg m2",
+            (0.0, 50.0),
+            "moment of inertia of spindle, chuck and work that the simulation lacks",
+            "仿真中缺少的主轴、卡盘和工件转动惯量",
+        ),
+        ParameterDoc::linear(
+            "per_rad_s2",
+            "output/(rad/s2)",
+            (0.0, f64::INFINITY),
+            "output per angular acceleration",
+            "单位角加速度的输出",
+        ),
     ],
     needs: &["speed"],
     source: "d(J w^2 / 2)/dt; J 0.005-0.5 kg m2, in turning mostly chuck and blank",

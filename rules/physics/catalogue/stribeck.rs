@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{is_power, motion, soft_sign, turns};
 use crate::physics::excitation::{greatest, varies, visits};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Extra friction at creep speed.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "axis",
     law: "F = level * sign(v) * s, s = exp(-(v / vs)^2), or exp(-|v| / vs) (exponential), or 1 / (1 + (v / vs)^2) (lorentzian), vs = stribeck_speed; in a power: P = level * |v| / vs * s; v in m/s, of a spindle in rad/s",
     parameters: &[
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "extra friction near standstill",
-            zh: "接近静止时的附加摩擦",
-        },
-        ParameterDoc {
-            name: "stribeck_speed",
-            unit: "velocity",
-            entry: Entry::Shape,
-            range: (1e-06, 1000.0),
-            en: "speed at which the film carries; of a spindle in rad/s",
-            zh: "油膜形成速度；主轴单位为rad/s",
-        },
+        ParameterDoc::linear(
+            "level",
+            "output",
+            (0.0, f64::INFINITY),
+            "extra friction near standstill",
+            "接近静止时的附加摩擦",
+        ),
+        ParameterDoc::shape(
+            "stribeck_speed",
+            "velocity",
+            (1e-06, 1000.0),
+            "speed at which the film carries; of a spindle in rad/s",
+            "油膜形成速度；主轴单位为rad/s",
+        ),
     ],
     needs: &["velocity | speed"],
     source: "Stribeck curve F = Fc + (Fs - Fc) s(v / vs): s Gaussian, exponential (Tustin 1947) or Lorentzian (Hess and Soom 1990), see Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994), section 2.1; spindles: vs 50-300 rpm",

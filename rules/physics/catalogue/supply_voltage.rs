@@ -1,7 +1,7 @@
 //! The mains go up and down, and some consumers with them.
 
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Role, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Output that follows the supply voltage.
 #[derive(Debug, Clone, Copy)]
@@ -11,14 +11,13 @@ static DOC: EffectDoc = EffectDoc {
     kind: "supply_voltage",
     family: "measurement",
     law: "y = exponent * (U / U0 - 1) * S, S the simulated output, U0 the mean voltage",
-    parameters: &[ParameterDoc {
-        name: "exponent",
-        unit: "1",
-        entry: Entry::Linear,
-        range: (-2.5, 2.5),
-        en: "exponent of the voltage: 2 for a heater, 0 for a drive with constant power, -1 for its current",
-        zh: "电压指数：电热为2，恒功率驱动为0，其电流为-1",
-    }],
+    parameters: &[ParameterDoc::linear(
+        "exponent",
+        "1",
+        (-2.5, 2.5),
+        "exponent of the voltage: 2 for a heater, 0 for a drive with constant power, -1 for its current",
+        "电压指数：电热为2，恒功率驱动为0，其电流为-1",
+    )],
     needs: &["voltage", "the simulated output"],
     source: "P proportional to (U / U0)^(0..2), mains within 5-10 %",
     experiment_minutes: 15.0,

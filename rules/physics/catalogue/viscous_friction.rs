@@ -1,8 +1,8 @@
 //! Friction that grows in proportion to speed.
 
 use crate::physics::drive::{is_power, motion};
-use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::excitation::plain_where_it_varies;
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction in proportion to speed.
 #[derive(Debug, Clone, Copy)]
@@ -12,14 +12,13 @@ static DOC: EffectDoc = EffectDoc {
     kind: "viscous_friction",
     family: "axis",
     law: "F = coefficient * v; in a power: P = coefficient * v^2; v in m/s, of a spindle in rad/s",
-    parameters: &[ParameterDoc {
-        name: "coefficient",
-        unit: "friction/velocity",
-        entry: Entry::Linear,
-        range: (0.0, f64::INFINITY),
-        en: "friction per speed; of a spindle per rad/s; in a power per squared speed",
-        zh: "单位速度的摩擦；主轴按rad/s；功率输出时按速度平方",
-    }],
+    parameters: &[ParameterDoc::linear(
+        "coefficient",
+        "friction/velocity",
+        (0.0, f64::INFINITY),
+        "friction per speed; of a spindle per rad/s; in a power per squared speed",
+        "单位速度的摩擦；主轴按rad/s；功率输出时按速度平方",
+    )],
     needs: &["velocity | speed"],
     source: "oil film, Stokes; F = b v",
     experiment_minutes: 3.0,
@@ -46,8 +45,7 @@ impl Effect for ViscousFriction {
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
-        let columns = self.columns(scene, &Form::plain());
-        columns.filter(|columns| varies(&columns[0].1)).map(|_| Form::plain()).into_iter().collect()
+        plain_where_it_varies(self, scene)
     }
 
     fn columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::{driven_krpm, speed_to_the};
 use crate::physics::excitation::varies;
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Air drag of what turns.
 #[derive(Debug, Clone, Copy)]
@@ -13,22 +13,8 @@ static DOC: EffectDoc = EffectDoc {
     family: "spindle",
     law: "P = level * (n / 1000 rpm)^p; a torque or current output takes one exponent less",
     parameters: &[
-        ParameterDoc {
-            name: "level",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (0.0, f64::INFINITY),
-            en: "drag at 1000 rpm",
-            zh: "1000 rpm时的风阻",
-        },
-        ParameterDoc {
-            name: "p",
-            unit: "1",
-            entry: Entry::Shape,
-            range: (2.5, 3.2),
-            en: "exponent of speed",
-            zh: "转速指数",
-        },
+        ParameterDoc::linear("level", "output", (0.0, f64::INFINITY), "drag at 1000 rpm", "1000 rpm时的风阻"),
+        ParameterDoc::shape("p", "1", (2.5, 3.2), "exponent of speed", "转速指数"),
     ],
     needs: &["speed"],
     source: "turbulent drag on a rotating body: exponent 2.6 (smooth) to 3 (chuck, fan)",

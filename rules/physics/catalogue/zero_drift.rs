@@ -1,7 +1,7 @@
 //! The zero of the meter creeps, with cabinet temperature or age.
 
 use crate::physics::excitation::{recording_elapsed_s, recording_share};
-use crate::physics::{ParameterColumns, Effect, EffectDoc, Entry, Form, ParameterDoc, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::PI;
 
 /// Zero of the meter that creeps.
@@ -25,22 +25,20 @@ static DOC: EffectDoc = EffectDoc {
     family: "measurement",
     law: "linear: y = drift * (share of the recording - 1/2); bent: the same with other paces from each quarter on; settling: y = settled * (1 - exp(-t/tau)); wander: y = sum of c_k cos(k pi share), k up to 4, restless: up to 8",
     parameters: &[
-        ParameterDoc {
-            name: "drift",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "change over the recording",
-            zh: "整个记录期间的变化量",
-        },
-        ParameterDoc {
-            name: "settled",
-            unit: "output",
-            entry: Entry::Linear,
-            range: (f64::NEG_INFINITY, f64::INFINITY),
-            en: "change once settled",
-            zh: "稳定后的变化量",
-        },
+        ParameterDoc::linear(
+            "drift",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "change over the recording",
+            "整个记录期间的变化量",
+        ),
+        ParameterDoc::linear(
+            "settled",
+            "output",
+            (f64::NEG_INFINITY, f64::INFINITY),
+            "change once settled",
+            "稳定后的变化量",
+        ),
         wave(
             "bend_1",
             "change of pace at a quarter of the recording, over its whole length",
@@ -60,14 +58,7 @@ static DOC: EffectDoc = EffectDoc {
         wave("c6", "wander with 6 half waves over the recording", "整个记录内6个半波的缓变"),
         wave("c7", "wander with 7 half waves over the recording", "整个记录内7个半波的缓变"),
         wave("c8", "wander with 8 half waves over the recording", "整个记录内8个半波的缓变"),
-        ParameterDoc {
-            name: "tau_s",
-            unit: "s",
-            entry: Entry::Shape,
-            range: (60.0, 14400.0),
-            en: "time constant of settling",
-            zh: "稳定时间常数",
-        },
+        ParameterDoc::shape("tau_s", "s", (60.0, 14400.0), "time constant of settling", "稳定时间常数"),
     ],
     needs: &[],
     source: "meter electronics: 5-40 W over 10-60 min with cabinet temperature",

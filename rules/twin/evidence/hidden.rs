@@ -11,7 +11,7 @@ use crate::statistics::{count, median, robust_deviation};
 const STEPS: [f64; 3] = [1.2, 2.2, 3.5];
 /// Rounds of the fit.
 const ROUNDS: usize = 5;
-/// Squared deviations beyond which a row says no more.
+/// Deviations beyond which a row says no more: they are cut off before they are squared.
 const FARTHEST: f64 = 5.0;
 /// Changes below which nothing switches, and rows that each level must have.
 const CHANGES_MIN: usize = 4;

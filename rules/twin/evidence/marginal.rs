@@ -16,7 +16,8 @@ use ndarray::{Array1, Array2, Axis, s};
 /// Sizes of a contribution, in deviations of the output, and their prior probabilities.
 pub(super) const SIZES: [f64; 7] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 const SIZE_PRIORS: [f64; 7] = [0.12, 0.22, 0.24, 0.2, 0.12, 0.07, 0.03];
-/// What a size beyond the largest of its family costs.
+/// What a size beyond the largest of its family costs, as a logarithm: odds of 1 to 3000, so that only a much better fit
+/// makes a law larger than its family is known to be.
 const TOO_LARGE: f64 = -8.0;
 /// Deviation of the random level of a run, as a share of the output: a meter and a machine are never quite the same again.
 const RUN_LEVEL: f64 = 0.004;

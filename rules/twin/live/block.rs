@@ -5,7 +5,7 @@ use super::regime::Regime;
 use crate::statistics::count;
 use std::collections::BTreeMap;
 
-/// Seconds in a block.
+/// Seconds in a block: the threshold of the chart is reckoned for blocks of half a minute.
 pub const BLOCK_SECONDS: usize = 30;
 /// Seconds older than this are no longer put together with new ones.
 const OLDEST_S: f64 = 3600.0;

@@ -19,7 +19,8 @@ const CLIP: f64 = 40.0;
 /// Blocks of half a minute are 86 400 in 30 days, of which two hours of onsets overlap; with white noise and no band at all
 /// 12 would give about one false alarm in 30 days. The rest is for what is learned from few blocks.
 const THRESHOLD: f64 = 14.0;
-/// Onsets whose likelihood is within this of the best one make the 95 % interval.
+/// Onsets whose likelihood is within this of the best one make the 95 % interval: half the 95 % quantile of chi-squared
+/// with one degree of freedom (3.84).
 const INTERVAL: f64 = 1.92;
 /// A change has lasted for at least this many blocks.
 const BLOCKS_MIN: usize = 3;
