@@ -36,7 +36,7 @@ fn numbers(person: &Person<'_>, column: &str) -> Vec<f64> {
 #[test]
 fn the_box_runs_a_thermal_law_that_readings_correct() {
     let directory = tempfile::tempdir().expect("a directory");
-    let person = Person { directory: directory.path(), did: Vec::new() };
+    let person = Person { directory: directory.path(), machine: crate::MACHINES[0], did: Vec::new() };
     let recorded = ThermalMachine::new(5).tests(6, 240);
     let (learned, later) = (recorded.rows_of(0..5 * 240), recorded.rows_of(5 * 240..6 * 240).every_second());
     std::fs::write(directory.path().join("warm.csv"), learned.csv()).expect("written");
