@@ -1,0 +1,126 @@
+//! `opcua://HOST:4840`: a server of OPC UA that can only be read, with the machine laid out after OPC 40501-1 (machine tools).
+//!
+//! Built in with the cargo feature `opcua` only: its library is large and has a licence of its own (MPL-2.0).
+//!
+//! - `Objects/Machines/MACHINE` has `Identification`, `Monitoring`, `Production` and `Notification` with what this box knows;
+//!   `Values` beside them has every series under its own name, with unit and range. Table: `layout`.
+//! - A missing value has no value and the status `BadNoData`. Times are those of the tick.
+//! - Security: `Basic256Sha256`, signed and encrypted, nothing else. The box makes a certificate of its own at the first start. A
+//!   client is known by its certificate: one that is not in `trusted` is refused, and lies in `rejected` for a person to look at.
+//! - Nobody is let in without a password, unless the address says `anonymous=yes`.
+//! - No node can be written and there are no methods: nothing of it reaches the gate.
+//!
+//! OPC UA has a way to tell of old values which this server does not offer: what an outage leaves behind is in the history.
+
+mod layout;
+mod server;
+mod space;
+
+use super::{Batch, Pending, Sink, SinkError};
+use crate::history::{Content, Outbox};
+use adapters::address::{Endpoint, Keys, Login, endpoint};
+use server::Running;
+use std::path::{Path, PathBuf};
+use tokio::net::TcpListener;
+
+/// The port of OPC UA (IANA).
+const PORT: u16 = 4840;
+
+/// Where the box listens, and whom it lets in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpcuaTarget {
+    /// The address of the box on the clients' network, and the port.
+    pub at: Endpoint,
+    /// User and password that clients give.
+    pub login: Login,
+    /// May clients come without them? Their certificate is checked all the same.
+    pub anonymous: bool,
+    /// Directory of the certificates; `None`: `opcua` beside the history.
+    pub certificates: Option<PathBuf>,
+}
+
+impl OpcuaTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+        let login = Login::of(keys);
+        let anonymous = keys.choice("anonymous", &[("no", false), ("yes", true)]);
+        let certificates = keys.text("certificates").map(PathBuf::from);
+        if !anonymous && login.user.is_none() {
+            return Err("nobody could sign in: write user= and password_file=, or anonymous=yes".to_owned());
+        }
+        Ok(Self { at: endpoint(body, Some(PORT))?, login, anonymous, certificates })
+    }
+
+    /// What is wrong with the files that the address names, each with what to do.
+    #[must_use]
+    pub fn check(&self) -> Vec<(String, String)> {
+        super::broker::broker_files(None, &self.login)
+    }
+}
+
+/// See the [module](self).
+pub(super) struct OpcuaSink {
+    target: OpcuaTarget,
+    outbox: Outbox,
+    directory: PathBuf,
+    running: Option<Running>,
+}
+
+impl OpcuaSink {
+    pub(super) fn new(target: OpcuaTarget, outbox: &Outbox, history: &Path) -> Self {
+        let beside = history.parent().unwrap_or(Path::new(".")).join("opcua");
+        let directory = target.certificates.clone().unwrap_or(beside);
+        Self { target, outbox: outbox.clone(), directory, running: None }
+    }
+
+    async fn bind(&self) -> Result<TcpListener, SinkError> {
+        let Endpoint { host, port } = &self.target.at;
+        TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
+            let next =
+                "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
+            SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
+        })
+    }
+
+    async fn begin(&mut self) -> Result<(), SinkError> {
+        self.stop();
+        let listener = self.bind().await?;
+        self.running = Some(Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?);
+        Ok(())
+    }
+
+    fn stop(&mut self) {
+        self.running = None;
+    }
+}
+
+impl Sink for OpcuaSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.begin())
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        let Some(running) = &self.running else {
+            return Box::pin(std::future::ready(Err(SinkError::line("the box does not listen", ""))));
+        };
+        for item in batch.items {
+            if let Content::Sample(readings) = &item.content {
+                running.tell(readings, item.at_ns);
+            }
+        }
+        let result = running.look_after();
+        Box::pin(std::future::ready(result))
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move { self.bind().await.map(drop) })
+    }
+
+    fn close(&mut self) -> Pending<'_, ()> {
+        self.stop();
+        Box::pin(std::future::ready(()))
+    }
+
+    fn takes_history(&self) -> bool {
+        false
+    }
+}
