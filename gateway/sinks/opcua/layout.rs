@@ -52,7 +52,7 @@ pub(super) const OBJECTS: [(&str, u32); 9] = [
 ];
 
 /// How a value of the box becomes one of the specification.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum Form {
     /// The number as it is; percent.
     Percent,

@@ -4,7 +4,8 @@
 //!
 //! - `Objects/Machines/MACHINE` has `Identification`, `Monitoring`, `Production` and `Notification` with what this box knows;
 //!   `Values` beside them has every series under its own name, with unit and range. Table: `layout`.
-//! - A missing value has no value and the status `BadNoData`. Times are those of the tick.
+//! - A missing value has no value and a bad status that says why. Times are those of the tick. When no sample has come for longer
+//!   than the outbox may be silent, every value becomes missing: what is read is never old.
 //! - Security: `Basic256Sha256`, signed and encrypted, nothing else. The box makes a certificate of its own at the first start. A
 //!   client is known by its certificate: one that is not in `trusted` is refused, and lies in `rejected` for a person to look at.
 //! - Nobody is let in without a password, unless the address says `anonymous=yes`.
@@ -12,19 +13,32 @@
 //!
 //! OPC UA has a way to tell of old values which this server does not offer: what an outage leaves behind is in the history.
 
+mod certificates;
 mod layout;
 mod server;
 mod space;
+mod units;
 
 use super::{Batch, Pending, Sink, SinkError};
-use crate::history::{Content, Outbox};
+use crate::history::{Content, Item, Outbox, Record};
 use adapters::address::{Endpoint, Keys, Login, endpoint};
 use server::Running;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 
 /// The port of OPC UA (IANA).
 const PORT: u16 = 4840;
+
+/// What the box calls itself; the URI of the application is made of the second and the name of the box.
+const APPLICATION: &str = "cnc-gateway";
+const PRODUCT: &str = "urn:cnc-gateway";
+/// The server is looked at this often while nothing is sent.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// The outbox repeats every value within `refresh_s`. A commit may be this much later before values count as lost: commits come twice a
+/// second, and a disk that is busy takes seconds. Too long shows an old value, too short hides one that is right.
+const LATE: Duration = Duration::from_secs(10);
 
 /// Where the box listens, and whom it lets in.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,13 +77,27 @@ pub(super) struct OpcuaSink {
     outbox: Outbox,
     directory: PathBuf,
     running: Option<Running>,
+    /// Alarms of the gateway that stand, by code.
+    alarms: BTreeMap<String, String>,
+    /// When the last sample came.
+    heard: Instant,
+    /// Have the values been taken away since?
+    silent: bool,
 }
 
 impl OpcuaSink {
     pub(super) fn new(target: OpcuaTarget, outbox: &Outbox, history: &Path) -> Self {
         let beside = history.parent().unwrap_or(Path::new(".")).join("opcua");
         let directory = target.certificates.clone().unwrap_or(beside);
-        Self { target, outbox: outbox.clone(), directory, running: None }
+        Self {
+            target,
+            outbox: outbox.clone(),
+            directory,
+            running: None,
+            alarms: BTreeMap::new(),
+            heard: Instant::now(),
+            silent: false,
+        }
     }
 
     async fn bind(&self) -> Result<TcpListener, SinkError> {
@@ -84,7 +112,51 @@ impl OpcuaSink {
     async fn begin(&mut self) -> Result<(), SinkError> {
         self.stop();
         let listener = self.bind().await?;
-        self.running = Some(Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?);
+        let running = Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?;
+        self.running = Some(running);
+        (self.heard, self.silent) = (Instant::now(), false);
+        Ok(())
+    }
+
+    fn take(&mut self, item: &Item) {
+        let Some(running) = &self.running else { return };
+        match &item.content {
+            Content::Sample(readings) => {
+                if std::mem::replace(&mut self.silent, false) {
+                    // The item holds only what has changed.
+                    running.tell(&self.outbox.latest(), item.at_ns);
+                    running.tell_alarms(&self.standing(), item.at_ns);
+                }
+                self.heard = Instant::now();
+                running.tell(readings, item.at_ns);
+            }
+            Content::Record(record) => {
+                match &**record {
+                    Record::Alarm(alarm) => {
+                        self.alarms.insert(alarm.code.clone(), format!("{}: {}", alarm.code, alarm.en));
+                    }
+                    Record::AlarmClear(clear) => {
+                        self.alarms.remove(&clear.code);
+                    }
+                    _ => return,
+                }
+                running.tell_alarms(&self.standing(), item.at_ns);
+            }
+        }
+    }
+
+    fn standing(&self) -> Vec<String> {
+        self.alarms.values().cloned().collect()
+    }
+
+    /// Takes the values away when nothing has come for too long; an error when the server has ended.
+    fn look(&mut self) -> Result<(), SinkError> {
+        let Some(running) = &self.running else { return Err(SinkError::line("the box does not listen", "")) };
+        running.look_after()?;
+        if !self.silent && self.heard.elapsed() > self.outbox.settings().refresh + LATE {
+            running.tell_nothing();
+            self.silent = true;
+        }
         Ok(())
     }
 
@@ -99,16 +171,21 @@ impl Sink for OpcuaSink {
     }
 
     fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
-        let Some(running) = &self.running else {
-            return Box::pin(std::future::ready(Err(SinkError::line("the box does not listen", ""))));
-        };
         for item in batch.items {
-            if let Content::Sample(readings) = &item.content {
-                running.tell(readings, item.at_ns);
-            }
+            self.take(item);
         }
-        let result = running.look_after();
-        Box::pin(std::future::ready(result))
+        Box::pin(std::future::ready(self.look()))
+    }
+
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async {
+            tokio::time::sleep(LOOK_EVERY).await;
+            Ok(())
+        })
+    }
+
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(std::future::ready(self.look()))
     }
 
     fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {

@@ -1,17 +1,14 @@
-//! The server: certificates, users, and its task.
+//! The server: users, values, and its task.
 
-use super::OpcuaTarget;
 use super::space::{self, Namespaces, Numbers, Shown};
-use super::{SinkError, layout};
+use super::{APPLICATION, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
 use crate::history::{Outbox, Reading};
 use adapters::clock::TimeNs;
-use opcua::crypto::SecurityPolicy;
+use opcua::crypto::{SecurityPolicy, X509Data};
 use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager_imports};
-use opcua::server::{
-    ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
-};
+use opcua::server::{ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken};
 use opcua::types::{DataValue, MessageSecurityMode, NodeId};
-use std::os::unix::fs::DirBuilderExt;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -20,9 +17,7 @@ use tokio::task::JoinHandle;
 
 /// Clients at the same time; each has subscriptions of its own.
 const SESSIONS_MAX: usize = 16;
-/// Certificates of strangers that are kept for a person to look at: anybody may show as many as he likes.
-const REJECTED_MAX: usize = 32;
-/// They are counted this often.
+/// The certificates of strangers are counted this often.
 const COUNT_EVERY: Duration = Duration::from_secs(10);
 /// Name of the user whose password the address gives.
 const USER: &str = "user";
@@ -44,7 +39,7 @@ impl Drop for Running {
     }
 }
 
-fn failed(what: impl Into<String>) -> SinkError {
+pub(super) fn failed(what: impl Into<String>) -> SinkError {
     SinkError::line(what, "look at the directory of the certificates and at the log")
 }
 
@@ -57,7 +52,7 @@ impl Running {
         listener: TcpListener,
     ) -> Result<Self, SinkError> {
         let (own, box_id) = (target.clone(), outbox.box_id());
-        let rejected = directory.join("rejected");
+        let rejected = certificates::rejected(&directory);
         // Making the first certificate takes a moment of one core.
         let built = tokio::task::spawn_blocking(move || build(&own, &box_id, &directory)).await;
         let (server, handle) = built.map_err(|error| failed(error.to_string()))??;
@@ -81,13 +76,28 @@ impl Running {
         };
         let task = tokio::spawn(server.run_with(listener));
         let running = Self { handle, manager, shown, task, rejected, counted: Mutex::new(Instant::now()) };
-        running.tell(&latest, outbox.head().borrow().newest_ns.unwrap_or(0));
+        let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
+        running.tell(&latest, at_ns);
+        running.tell_alarms(&[], at_ns);
         Ok(running)
     }
 
     /// These values are in force since this moment.
     pub(super) fn tell(&self, readings: &[Reading], at_ns: TimeNs) {
-        let values: Vec<(NodeId, DataValue)> = self.shown.values(readings, at_ns);
+        self.put(&self.shown.values(readings, at_ns));
+    }
+
+    /// No value is known any more: what a client reads is absent instead of old.
+    pub(super) fn tell_nothing(&self) {
+        self.put(&self.shown.nothing());
+    }
+
+    /// These alarms stand since this moment.
+    pub(super) fn tell_alarms(&self, alarms: &[String], at_ns: TimeNs) {
+        self.put(&[self.shown.alarms(alarms, at_ns)]);
+    }
+
+    fn put(&self, values: &[(NodeId, DataValue)]) {
         let each = values.iter().map(|(node, value)| (node, None, value.clone()));
         // Every node of the list was made by `space::build`.
         let _known = self.manager.set_values(self.handle.subscriptions(), each);
@@ -101,44 +111,39 @@ impl Running {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         if counted.elapsed() >= COUNT_EVERY {
             *counted = Instant::now();
-            forget_oldest(&self.rejected);
+            certificates::forget_oldest(&self.rejected);
         }
         Ok(())
     }
 }
 
-/// Leaves the newest certificates of strangers.
-fn forget_oldest(directory: &Path) {
-    let Ok(entries) = std::fs::read_dir(directory) else { return };
-    let dated = |entry: std::fs::DirEntry| Some((entry.metadata().ok()?.modified().ok()?, entry.path()));
-    let mut files: Vec<_> = entries.filter_map(Result::ok).filter_map(dated).collect();
-    files.sort();
-    let beyond = files.len().saturating_sub(REJECTED_MAX);
-    for (_, file) in &files[..beyond] {
-        // What cannot be removed is tried again.
-        let _gone = std::fs::remove_file(file);
-    }
+/// The host that clients are told. An address that stands for all of the box is none to connect to.
+fn told_host(target: &OpcuaTarget) -> String {
+    let host = target.at.host.as_str();
+    let all = host.parse().is_ok_and(|address: IpAddr| address.is_unspecified());
+    let own = || X509Data::computer_hostnames().into_iter().next();
+    Some(host.to_owned()).filter(|_| !all).or_else(own).unwrap_or_else(|| "localhost".to_owned())
 }
 
 fn build(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server, ServerHandle), SinkError> {
-    // The private key lies in it.
-    let made = std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
-    made.map_err(|error| failed(format!("{} cannot be made: {error}", directory.display())))?;
-    let login = target.login.read().map_err(|(file, error)| {
-        failed(format!("the password file {} cannot be read: {error}", file.display()))
-    })?;
-    let mut users: Vec<String> = Vec::new();
+    let (uri, host) = (format!("{PRODUCT}:{box_id}"), told_host(target));
+    certificates::prepare(directory, &uri, &host)?;
+    let login = target
+        .login
+        .read()
+        .map_err(|(file, error)| failed(format!("the password file {} cannot be read: {error}", file.display())))?;
+    let mut users = Vec::new();
     let mut builder = ServerBuilder::new()
-        .application_name("cnc-gateway")
-        .application_uri(format!("urn:cnc-gateway:{box_id}"))
-        .product_uri("urn:cnc-gateway")
-        .create_sample_keypair(true)
-        .certificate_path("own/cert.der")
-        .private_key_path("own/private.pem")
+        .application_name(APPLICATION)
+        .application_uri(uri)
+        .product_uri(PRODUCT)
+        .create_sample_keypair(false)
+        .certificate_path(certificates::OWN)
+        .private_key_path(certificates::KEY)
         .pki_dir(directory)
         .trust_client_certs(false)
         .check_cert_time(true)
-        .host(target.at.host.clone())
+        .host(host)
         .port(target.at.port)
         .max_sessions(SESSIONS_MAX)
         .diagnostics_enabled(false)
@@ -151,11 +156,7 @@ fn build(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server
     if target.anonymous {
         users.push(ANONYMOUS_USER_TOKEN_ID.to_owned());
     }
-    let endpoint = ServerEndpoint::new(
-        "/",
-        SecurityPolicy::Basic256Sha256,
-        MessageSecurityMode::SignAndEncrypt,
-        &users,
-    );
+    let endpoint =
+        ServerEndpoint::new("/", SecurityPolicy::Basic256Sha256, MessageSecurityMode::SignAndEncrypt, &users);
     builder.add_endpoint("encrypted", endpoint).default_endpoint("encrypted").build().map_err(failed)
 }

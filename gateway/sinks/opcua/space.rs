@@ -1,6 +1,7 @@
 //! The nodes of a machine, and the values in them.
 
 use super::layout::{self, Form};
+use super::{PRODUCT, units};
 use crate::history::{Cell, Reading, SeriesInfo, SeriesKind};
 use adapters::clock::TimeNs;
 use opcua::nodes::{
@@ -8,14 +9,12 @@ use opcua::nodes::{
 };
 use opcua::server::address_space::AddressSpace;
 use opcua::types::{
-    DataTypeId, DataValue, DateTime, EUInformation, ExtensionObject, LocalizedText, NodeId, ObjectId, ObjectTypeId,
-    QualifiedName, Range, StatusCode, Variant, VariableTypeId,
+    DataTypeId, DataValue, DateTime, ExtensionObject, LocalizedText, NodeId, ObjectId, ObjectTypeId, QualifiedName,
+    Range, StatusCode, VariableTypeId, Variant,
 };
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Namespace of the units of UN/CEFACT.
-const UNITS: &str = "http://www.opcfoundation.org/UA/units/un/cefact";
 /// Hundred nanoseconds between 1601, where times of OPC UA begin, and 1970.
 const EPOCH_TICKS: i64 = 116_444_736_000_000_000;
 
@@ -51,9 +50,10 @@ pub(super) struct Numbers {
 }
 
 /// Which nodes show a series, each with how.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Shown {
     nodes: HashMap<Arc<str>, Vec<(NodeId, Option<Form>)>>,
+    alarms: NodeId,
 }
 
 impl Shown {
@@ -66,24 +66,59 @@ impl Shown {
         };
         readings.iter().flat_map(of).collect()
     }
+
+    /// All of them without a value: nothing has come for too long.
+    pub(super) fn nothing(&self) -> Vec<(NodeId, DataValue)> {
+        let all = self.nodes.values().flatten().map(|(node, _)| node).chain([&self.alarms]);
+        all.map(|node| (node.clone(), missing(StatusCode::BadNoCommunication))).collect()
+    }
+
+    /// The node of the alarms of the gateway with those that stand.
+    pub(super) fn alarms(&self, standing: &[String], at_ns: TimeNs) -> (NodeId, DataValue) {
+        (self.alarms.clone(), known(Variant::from(standing.to_vec()), at_ns))
+    }
 }
 
 fn value(cell: &Cell, form: Option<Form>, at_ns: TimeNs) -> DataValue {
     let variant = match (cell, form) {
-        (Cell::Number(number), Some(Form::Rotating)) => Some(Variant::from(layout::rotates(*number))),
-        (Cell::Number(number), _) => Some(Variant::from(*number)),
-        (Cell::Text(word), Some(Form::Word(_, number))) => Some(Variant::from(number(word))),
-        (Cell::Text(text), _) => Some(Variant::from(&**text)),
-        (Cell::Missing(_), _) => None,
+        (Cell::Number(number), Some(Form::Rotating)) => Ok(Variant::from(layout::rotates(*number))),
+        (Cell::Number(number), _) => Ok(Variant::from(*number)),
+        (Cell::Text(word), Some(Form::Word(_, number))) => Ok(Variant::from(number(word))),
+        (Cell::Text(text), _) => Ok(Variant::from(&**text)),
+        (Cell::Missing(reason), _) => Err(absent(reason)),
     };
-    let status = if variant.is_some() { StatusCode::Good } else { StatusCode::BadNoData };
-    let at = DateTime::from(at_ns.div_euclid(100).saturating_add(EPOCH_TICKS));
+    match variant {
+        Ok(variant) => known(variant, at_ns),
+        Err(status) => DataValue { source_timestamp: Some(time(at_ns)), ..missing(status) },
+    }
+}
+
+fn known(variant: Variant, at_ns: TimeNs) -> DataValue {
     DataValue {
-        value: variant,
-        status: Some(status),
-        source_timestamp: Some(at),
+        value: Some(variant),
+        status: Some(StatusCode::Good),
+        source_timestamp: Some(time(at_ns)),
         server_timestamp: Some(DateTime::now()),
         ..DataValue::default()
+    }
+}
+
+fn missing(status: StatusCode) -> DataValue {
+    DataValue { status: Some(status), server_timestamp: Some(DateTime::now()), ..DataValue::default() }
+}
+
+fn time(at_ns: TimeNs) -> DateTime {
+    DateTime::from(at_ns.div_euclid(100).saturating_add(EPOCH_TICKS))
+}
+
+/// The status that says why there is no value.
+fn absent(reason: &str) -> StatusCode {
+    match reason {
+        "not_provided" | "not_supported" => StatusCode::BadNotSupported,
+        "machine_off" | "disconnected" | "timeout" | "stale" => StatusCode::BadNoCommunication,
+        "not_yet_read" => StatusCode::BadWaitingForInitialData,
+        "out_of_range" => StatusCode::BadOutOfRange,
+        _ => StatusCode::BadNoData,
     }
 }
 
@@ -114,8 +149,8 @@ pub(super) fn build(
             .component_of(NodeId::new(numbers.own, parent))
             .insert(space);
     }
-    identification(space, numbers, box_id);
-    let mut shown = Shown::default();
+    identification(space, numbers, (machine, box_id));
+    let mut shown = Shown { nodes: HashMap::new(), alarms: alarms(space, numbers) };
     for (object, name, channel, form) in layout::VARIABLES {
         let Some(reading) = series.iter().find(|reading| &*reading.series.name == channel) else { continue };
         let node = NodeId::new(numbers.own, format!("{object}/{name}"));
@@ -178,12 +213,7 @@ fn typed(
 
 /// `EngineeringUnits`, and `EURange` where the range is known.
 fn unit(space: &mut AddressSpace, numbers: Numbers, node: &NodeId, series: &SeriesInfo) {
-    let information = EUInformation {
-        namespace_uri: UNITS.into(),
-        unit_id: -1,
-        display_name: LocalizedText::from(&*series.unit),
-        description: LocalizedText::from(&*series.unit),
-    };
+    let information = units::information(&series.unit);
     let mut property = |name: &str, kind: DataTypeId, value: ExtensionObject| {
         let own = NodeId::new(numbers.own, format!("{}/{name}", node.identifier));
         VariableBuilder::new(&own, name, name)
@@ -199,23 +229,39 @@ fn unit(space: &mut AddressSpace, numbers: Numbers, node: &NodeId, series: &Seri
     }
 }
 
-/// What the box knows of the machine's identity: its own name for it. Maker and serial number are not told by a controller.
-fn identification(space: &mut AddressSpace, numbers: Numbers, box_id: &str) {
-    let uri = format!("urn:cnc-gateway:{box_id}");
-    let missing = || DataValue { status: Some(StatusCode::BadNoData), ..DataValue::default() };
-    for (name, text) in [("Manufacturer", None), ("SerialNumber", None), ("ProductInstanceUri", Some(uri))] {
+/// The alarms of the gateway that stand: the specification has none of a list, so it is in the box's own namespace.
+fn alarms(space: &mut AddressSpace, numbers: Numbers) -> NodeId {
+    let node = NodeId::new(numbers.own, "Notification/Messages/GatewayAlarms");
+    VariableBuilder::new(&node, QualifiedName::new(numbers.own, "GatewayAlarms"), "GatewayAlarms")
+        .data_type(DataTypeId::String)
+        .value_rank(1)
+        .value(Variant::Empty)
+        .has_type_definition(VariableTypeId::BaseDataVariableType)
+        .component_of(NodeId::new(numbers.own, "Notification/Messages"))
+        .insert(space);
+    node
+}
+
+/// What the box knows of the machine's identity: the name that it was given. Maker and serial number are not told by a controller.
+fn identification(space: &mut AddressSpace, numbers: Numbers, (machine, box_id): (&str, &str)) {
+    let uri = format!("{PRODUCT}:{box_id}");
+    let rows = [
+        ("Manufacturer", DataTypeId::LocalizedText, None),
+        ("SerialNumber", DataTypeId::String, None),
+        ("ProductInstanceUri", DataTypeId::String, Some(Variant::from(uri.as_str()))),
+        ("ComponentName", DataTypeId::LocalizedText, Some(Variant::from(LocalizedText::new("", machine)))),
+    ];
+    for (name, kind, value) in rows {
         let node = NodeId::new(numbers.own, format!("Identification/{name}"));
-        let kind = if name == "Manufacturer" { DataTypeId::LocalizedText } else { DataTypeId::String };
-        let value = text.as_deref().map_or(Variant::Empty, Variant::from);
-        let known = value != Variant::Empty;
+        let known = value.is_some();
         VariableBuilder::new(&node, QualifiedName::new(numbers.devices, name), name)
             .data_type(kind)
-            .value(value)
+            .value(value.unwrap_or(Variant::Empty))
             .has_type_definition(VariableTypeId::PropertyType)
             .property_of(NodeId::new(numbers.own, "Identification"))
             .insert(space);
         if let Some(opcua::nodes::NodeType::Variable(variable)) = space.find_mut(&node).filter(|_| !known) {
-            variable.set_data_value(missing());
+            variable.set_data_value(missing(StatusCode::BadNotSupported));
         }
     }
 }
