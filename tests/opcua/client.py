@@ -34,7 +34,7 @@ def uri(name):
 def make(directory, name, days="4000"):
     key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-    began = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(days=400)
+    began = datetime.datetime.now() - datetime.timedelta(days=400)
     usage = x509.KeyUsage(True, True, True, True, False, True, False, False, False)
     names = [x509.UniformResourceIdentifier(uri(name)), x509.DNSName("localhost")]
     builder = x509.CertificateBuilder(subject, subject, key.public_key(), x509.random_serial_number(), began)

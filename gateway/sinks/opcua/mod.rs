@@ -201,3 +201,28 @@ impl Sink for OpcuaSink {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::OutboxSettings;
+
+    #[tokio::test]
+    async fn values_that_are_not_renewed_are_taken_away() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let outbox = Outbox::new("Lathe 7", OutboxSettings::default(), []);
+        let mut keys = Keys::of("anonymous=yes");
+        let target = OpcuaTarget::parse("//127.0.0.1:0", &mut keys).expect("an address");
+        let mut sink = OpcuaSink::new(target, &outbox, &directory.path().join("history.db"));
+        sink.begin().await.expect("it listens");
+        sink.look().expect("it runs");
+        assert!(!sink.silent);
+        let running = sink.running.as_ref().expect("it runs");
+        assert!(running.alarms_status().is_good());
+        let limit = outbox.settings().refresh + LATE;
+        sink.heard = Instant::now().checked_sub(limit + LATE).expect("the computer has run for longer");
+        sink.look().expect("it runs");
+        assert!(sink.silent);
+        assert!(sink.running.as_ref().expect("it runs").alarms_status().is_bad());
+    }
+}

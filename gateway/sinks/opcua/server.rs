@@ -103,6 +103,16 @@ impl Running {
         let _known = self.manager.set_values(self.handle.subscriptions(), each);
     }
 
+    #[cfg(test)]
+    pub(super) fn alarms_status(&self) -> opcua::types::StatusCode {
+        let (none, encoding) = (opcua::types::NumericRange::None, opcua::types::DataEncoding::Binary);
+        let space = self.manager.address_space().read();
+        let node = space.find(&self.shown.alarms(&[], 0).0).expect("made with the others").as_node();
+        let (stamps, value) = (opcua::types::TimestampsToReturn::Both, opcua::types::AttributeId::Value);
+        let found = node.get_attribute(stamps, value, &none, &encoding);
+        found.and_then(|value| value.status).unwrap_or(opcua::types::StatusCode::Good)
+    }
+
     /// An error when the server has ended; keeps the number of strangers' certificates bounded.
     pub(super) fn look_after(&self) -> Result<(), SinkError> {
         if self.task.is_finished() {

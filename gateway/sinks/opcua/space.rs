@@ -104,7 +104,19 @@ fn known(variant: Variant, at_ns: TimeNs) -> DataValue {
 }
 
 fn missing(status: StatusCode) -> DataValue {
-    DataValue { status: Some(status), server_timestamp: Some(DateTime::now()), ..DataValue::default() }
+    DataValue {
+        // Not `None`: a node of the library forgets the status of a value that is not there, and then it would be read as good.
+        value: Some(Variant::Empty),
+        status: Some(status),
+        server_timestamp: Some(DateTime::now()),
+        ..DataValue::default()
+    }
+}
+
+fn set_missing(space: &mut AddressSpace, node: &NodeId, status: StatusCode) {
+    if let Some(opcua::nodes::NodeType::Variable(variable)) = space.find_mut(node) {
+        variable.set_data_value(missing(status));
+    }
 }
 
 fn time(at_ns: TimeNs) -> DateTime {
@@ -209,6 +221,7 @@ fn typed(
             variable.has_type_definition(VariableTypeId::BaseDataVariableType).insert(space);
         }
     }
+    set_missing(space, &node, StatusCode::BadWaitingForInitialData);
 }
 
 /// `EngineeringUnits`, and `EURange` where the range is known.
@@ -260,8 +273,8 @@ fn identification(space: &mut AddressSpace, numbers: Numbers, (machine, box_id):
             .has_type_definition(VariableTypeId::PropertyType)
             .property_of(NodeId::new(numbers.own, "Identification"))
             .insert(space);
-        if let Some(opcua::nodes::NodeType::Variable(variable)) = space.find_mut(&node).filter(|_| !known) {
-            variable.set_data_value(missing(StatusCode::BadNotSupported));
+        if !known {
+            set_missing(space, &node, StatusCode::BadNotSupported);
         }
     }
 }
@@ -279,5 +292,29 @@ fn types(space: &mut AddressSpace, numbers: Numbers) {
         DataTypeBuilder::new(&node, QualifiedName::new(numbers.machine_tool, name), name)
             .subtype_of(DataTypeId::Enumeration)
             .insert(space);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_never_read_as_good() {
+        let mut space = AddressSpace::new();
+        space.add_namespace(layout::OWN, 1);
+        let node = NodeId::new(1, "it");
+        VariableBuilder::new(&node, "it", "it").value(1.0).data_type(DataTypeId::Double).insert(&mut space);
+        for reason in ["not_provided", "timeout", "not_yet_read", "out_of_range", "stale", "not_learned"] {
+            let status = absent(reason);
+            assert!(status.is_bad(), "{reason}");
+            set_missing(&mut space, &node, status);
+            let found = space.find(&node).map(|node| {
+                let (none, encoding) = (opcua::types::NumericRange::None, opcua::types::DataEncoding::Binary);
+                let stamps = opcua::types::TimestampsToReturn::Both;
+                node.as_node().get_attribute(stamps, opcua::types::AttributeId::Value, &none, &encoding)
+            });
+            assert_eq!(found.flatten().and_then(|value| value.status), Some(status), "{reason}");
+        }
     }
 }
