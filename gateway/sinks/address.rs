@@ -156,10 +156,35 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
     }
 }
 
+/// Which build has it. The keys are right there, and are not told as unknown here.
+#[cfg(not(feature = "opcua"))]
+fn without_opcua(keys: &mut Keys) -> String {
+    let _login = adapters::address::Login::of(keys);
+    let _further = (keys.text("anonymous"), keys.text("certificates"));
+    "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
+}
+
 fn unknown(scheme: &str) -> String {
     let hint = match nearest(scheme, SCHEMES.iter().map(|(known, _)| *known)) {
         Some(near) => format!("did you mean {near}:?"),
         None => no_scheme(),
     };
     format!("{scheme}: is no scheme of a sink; {hint}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opc_ua_is_there_or_the_sentence_says_which_build_has_it() {
+        let parsed: Result<SinkAddress, _> = "opcua://0.0.0.0:4840?user=plant&password_file=/etc/cnc/password".parse();
+        #[cfg(feature = "opcua")]
+        assert!(parsed.is_ok_and(|address| address.check().len() == 1), "the password file is not there");
+        #[cfg(not(feature = "opcua"))]
+        assert!(
+            parsed.is_err_and(|error| error.problems.len() == 1 && error.problems[0].contains("--features opcua")),
+            "one sentence"
+        );
+    }
 }
