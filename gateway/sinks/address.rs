@@ -2,6 +2,8 @@
 
 use super::mqtt::MqttTarget;
 use super::nats::NatsSinkTarget;
+#[cfg(feature = "opcua")]
+use super::opcua::OpcuaTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
@@ -11,11 +13,12 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The schemes of the notation, each with how an address of it is written.
-pub const SCHEMES: [(&str, &str); 8] = [
+pub const SCHEMES: [(&str, &str); 9] = [
     ("mqtt", "mqtt://BROKER:1883/PREFIX"),
     ("mqtts", "mqtts://BROKER:8883/PREFIX"),
     ("nats", "nats://SERVER:4222,SERVER:4222/PREFIX"),
     ("natss", "natss://SERVER:4222,SERVER:4222/PREFIX"),
+    ("opcua", "opcua://0.0.0.0:4840?user=USER&password_file=FILE"),
     ("parquet", "parquet:DIRECTORY"),
     ("sparkplug", "sparkplug://BROKER:1883/GROUP/NODE/DEVICE"),
     ("shdr", "shdr://0.0.0.0:7878"),
@@ -29,6 +32,9 @@ pub enum SinkTarget {
     Mqtt(MqttTarget),
     /// A stream of NATS JetStream.
     Nats(NatsSinkTarget),
+    /// A server of OPC UA.
+    #[cfg(feature = "opcua")]
+    Opcua(OpcuaTarget),
     /// A file of columns for each day.
     Parquet(ParquetTarget),
     /// Lines for MTConnect agents.
@@ -63,6 +69,8 @@ impl SinkAddress {
         match &self.target {
             SinkTarget::Mqtt(target) => target.broker.check(),
             SinkTarget::Nats(target) => target.servers.check(),
+            #[cfg(feature = "opcua")]
+            SinkTarget::Opcua(target) => target.check(),
             SinkTarget::Parquet(target) => target.check(),
             SinkTarget::Shdr(_) => Vec::new(),
             SinkTarget::Sparkplug(target) => target.broker.check(),
@@ -120,6 +128,13 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
     match scheme {
         "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
         "nats" | "natss" => NatsSinkTarget::parse(body, keys, scheme == "natss").map(SinkTarget::Nats),
+        #[cfg(feature = "opcua")]
+        "opcua" => OpcuaTarget::parse(body, keys).map(SinkTarget::Opcua),
+        #[cfg(not(feature = "opcua"))]
+        "opcua" => Err(
+            "this program was built without OPC UA, use one that was built with cargo build --release --features opcua"
+                .to_owned(),
+        ),
         "parquet" => ParquetTarget::parse(body, keys).map(SinkTarget::Parquet),
         "shdr" => ShdrTarget::parse(body, keys).map(SinkTarget::Shdr),
         "sparkplug" | "sparkplugs" => {
@@ -129,10 +144,35 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
     }
 }
 
+/// Which build has it. The keys are right there, and are not told as unknown here.
+#[cfg(not(feature = "opcua"))]
+fn without_opcua(keys: &mut Keys) -> String {
+    let _login = adapters::address::Login::of(keys);
+    let _further = (keys.text("anonymous"), keys.text("certificates"));
+    "this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it".to_owned()
+}
+
 fn unknown(scheme: &str) -> String {
     let hint = match nearest(scheme, SCHEMES.iter().map(|(known, _)| *known)) {
         Some(near) => format!("did you mean {near}:?"),
         None => no_scheme(),
     };
     format!("{scheme}: is no scheme of a sink; {hint}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opc_ua_is_there_or_the_sentence_says_which_build_has_it() {
+        let parsed: Result<SinkAddress, _> = "opcua://0.0.0.0:4840?user=plant&password_file=/etc/cnc/password".parse();
+        #[cfg(feature = "opcua")]
+        assert!(parsed.is_ok_and(|address| address.check().len() == 1), "the password file is not there");
+        #[cfg(not(feature = "opcua"))]
+        assert!(
+            parsed.is_err_and(|error| error.problems.len() == 1 && error.problems[0].contains("--features opcua")),
+            "one sentence"
+        );
+    }
 }

@@ -21,6 +21,8 @@ pub mod doctor;
 pub mod drive;
 pub mod mqtt;
 pub mod nats;
+#[cfg(feature = "opcua")]
+pub mod opcua;
 pub mod open;
 pub mod parquet;
 mod requests;

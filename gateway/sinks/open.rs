@@ -2,6 +2,8 @@
 
 use super::mqtt::MqttSink;
 use super::nats::NatsSink;
+#[cfg(feature = "opcua")]
+use super::opcua::OpcuaSink;
 use super::parquet::ParquetSink;
 use super::shdr::ShdrSink;
 use super::sparkplug::SparkplugSink;
@@ -21,6 +23,8 @@ pub fn open(
     match address.target() {
         SinkTarget::Mqtt(target) => Box::new(MqttSink::new(target.clone(), (name, requests), outbox)),
         SinkTarget::Nats(target) => Box::new(NatsSink::new(target.clone(), name, outbox)),
+        #[cfg(feature = "opcua")]
+        SinkTarget::Opcua(target) => Box::new(OpcuaSink::new(target.clone(), outbox, history)),
         SinkTarget::Parquet(target) => Box::new(ParquetSink::new(target.clone(), outbox, history)),
         SinkTarget::Shdr(target) => Box::new(ShdrSink::new(target.clone(), outbox)),
         SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), (name, requests), outbox)),

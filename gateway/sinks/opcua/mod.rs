@@ -1,0 +1,228 @@
+//! `opcua://HOST:4840`: a server of OPC UA that can only be read, with the machine laid out after OPC 40501-1 (machine tools).
+//!
+//! Built in with the cargo feature `opcua` only: its library is large and has a licence of its own (MPL-2.0).
+//!
+//! - `Objects/Machines/MACHINE` has `Identification`, `Monitoring`, `Production` and `Notification` with what this box knows;
+//!   `Values` beside them has every series under its own name, with unit and range. Table: `layout`.
+//! - A missing value has no value and a bad status that says why. Times are those of the tick. When no sample has come for longer
+//!   than the outbox may be silent, every value becomes missing: what is read is never old.
+//! - Security: `Basic256Sha256`, signed and encrypted, nothing else. The box makes a certificate of its own at the first start. A
+//!   client is known by its certificate: one that is not in `trusted` is refused, and lies in `rejected` for a person to look at.
+//! - Nobody is let in without a password, unless the address says `anonymous=yes`.
+//! - No node can be written and there are no methods: nothing of it reaches the gate.
+//!
+//! OPC UA has a way to tell of old values which this server does not offer: what an outage leaves behind is in the history.
+
+mod certificates;
+mod layout;
+mod server;
+mod space;
+mod units;
+
+use super::{Batch, Pending, Sink, SinkError};
+use crate::history::{Content, Item, Outbox, Record};
+use adapters::address::{Endpoint, Keys, Login, endpoint};
+use server::Running;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tokio::net::TcpListener;
+
+/// The port of OPC UA (IANA).
+const PORT: u16 = 4840;
+
+/// What the box calls itself; the URI of the application is made of the second and the name of the box.
+const APPLICATION: &str = "cnc-gateway";
+const PRODUCT: &str = "urn:cnc-gateway";
+/// The server is looked at this often while nothing is sent.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// The outbox repeats every value within `refresh_s`. A commit may be this much later before values count as lost: commits come twice a
+/// second, and a disk that is busy takes seconds. Too long shows an old value, too short hides one that is right.
+const LATE: Duration = Duration::from_secs(10);
+
+/// Where the box listens, and whom it lets in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpcuaTarget {
+    /// The address of the box on the clients' network, and the port.
+    pub at: Endpoint,
+    /// User and password that clients give.
+    pub login: Login,
+    /// May clients come without them? Their certificate is checked all the same.
+    pub anonymous: bool,
+    /// Directory of the certificates; `None`: `opcua` beside the history.
+    pub certificates: Option<PathBuf>,
+}
+
+impl OpcuaTarget {
+    pub(super) fn parse(body: &str, keys: &mut Keys) -> Result<Self, String> {
+        let login = Login::of(keys);
+        let anonymous = keys.choice("anonymous", &[("no", false), ("yes", true)]);
+        let certificates = keys.text("certificates").map(PathBuf::from);
+        if !anonymous && login.user.is_none() {
+            return Err("nobody could sign in: write user= and password_file=, or anonymous=yes".to_owned());
+        }
+        Ok(Self { at: endpoint(body, Some(PORT))?, login, anonymous, certificates })
+    }
+
+    /// What is wrong with the files that the address names, each with what to do.
+    #[must_use]
+    pub fn check(&self) -> Vec<(String, String)> {
+        super::broker::broker_files(None, &self.login)
+    }
+}
+
+/// See the [module](self).
+pub(super) struct OpcuaSink {
+    target: OpcuaTarget,
+    outbox: Outbox,
+    directory: PathBuf,
+    running: Option<Running>,
+    /// Alarms of the gateway that stand, by code.
+    alarms: BTreeMap<String, String>,
+    /// When the last sample came.
+    heard: Instant,
+    /// Have the values been taken away since?
+    silent: bool,
+}
+
+impl OpcuaSink {
+    pub(super) fn new(target: OpcuaTarget, outbox: &Outbox, history: &Path) -> Self {
+        let beside = history.parent().unwrap_or(Path::new(".")).join("opcua");
+        let directory = target.certificates.clone().unwrap_or(beside);
+        Self {
+            target,
+            outbox: outbox.clone(),
+            directory,
+            running: None,
+            alarms: BTreeMap::new(),
+            heard: Instant::now(),
+            silent: false,
+        }
+    }
+
+    async fn bind(&self) -> Result<TcpListener, SinkError> {
+        let Endpoint { host, port } = &self.target.at;
+        TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
+            let next =
+                "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
+            SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
+        })
+    }
+
+    async fn begin(&mut self) -> Result<(), SinkError> {
+        self.stop();
+        let listener = self.bind().await?;
+        let running = Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?;
+        self.running = Some(running);
+        (self.heard, self.silent) = (Instant::now(), false);
+        Ok(())
+    }
+
+    fn take(&mut self, item: &Item) {
+        let Some(running) = &self.running else { return };
+        match &item.content {
+            Content::Sample(readings) => {
+                if std::mem::replace(&mut self.silent, false) {
+                    // The item holds only what has changed.
+                    running.tell(&self.outbox.latest(), item.at_ns);
+                    running.tell_alarms(&self.standing(), item.at_ns);
+                }
+                self.heard = Instant::now();
+                running.tell(readings, item.at_ns);
+            }
+            Content::Record(record) => {
+                match &**record {
+                    Record::Alarm(alarm) => {
+                        self.alarms.insert(alarm.code.clone(), format!("{}: {}", alarm.code, alarm.en));
+                    }
+                    Record::AlarmClear(clear) => {
+                        self.alarms.remove(&clear.code);
+                    }
+                    _ => return,
+                }
+                running.tell_alarms(&self.standing(), item.at_ns);
+            }
+        }
+    }
+
+    fn standing(&self) -> Vec<String> {
+        self.alarms.values().cloned().collect()
+    }
+
+    /// Takes the values away when nothing has come for too long; an error when the server has ended.
+    fn look(&mut self) -> Result<(), SinkError> {
+        let Some(running) = &self.running else { return Err(SinkError::line("the box does not listen", "")) };
+        running.look_after()?;
+        if !self.silent && self.heard.elapsed() > self.outbox.settings().refresh + LATE {
+            running.tell_nothing();
+            self.silent = true;
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self) {
+        self.running = None;
+    }
+}
+
+impl Sink for OpcuaSink {
+    fn connect(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(self.begin())
+    }
+
+    fn send<'a>(&'a mut self, batch: Batch<'a>) -> Pending<'a, Result<(), SinkError>> {
+        for item in batch.items {
+            self.take(item);
+        }
+        Box::pin(std::future::ready(self.look()))
+    }
+
+    fn idle(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async {
+            tokio::time::sleep(LOOK_EVERY).await;
+            Ok(())
+        })
+    }
+
+    fn attend(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(std::future::ready(self.look()))
+    }
+
+    fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
+        Box::pin(async move { self.bind().await.map(drop) })
+    }
+
+    fn close(&mut self) -> Pending<'_, ()> {
+        self.stop();
+        Box::pin(std::future::ready(()))
+    }
+
+    fn takes_history(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::OutboxSettings;
+
+    #[tokio::test]
+    async fn values_that_are_not_renewed_are_taken_away() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let outbox = Outbox::new("Lathe 7", OutboxSettings::default(), []);
+        let mut keys = Keys::of("anonymous=yes");
+        let target = OpcuaTarget::parse("//127.0.0.1:0", &mut keys).expect("an address");
+        let mut sink = OpcuaSink::new(target, &outbox, &directory.path().join("history.db"));
+        sink.begin().await.expect("it listens");
+        sink.look().expect("it runs");
+        assert!(!sink.silent);
+        let running = sink.running.as_ref().expect("it runs");
+        assert!(running.alarms_status().is_good());
+        let limit = outbox.settings().refresh + LATE;
+        sink.heard = Instant::now().checked_sub(limit + LATE).expect("the computer has run for longer");
+        sink.look().expect("it runs");
+        assert!(sink.silent);
+        assert!(sink.running.as_ref().expect("it runs").alarms_status().is_bad());
+    }
+}

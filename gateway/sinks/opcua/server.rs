@@ -1,0 +1,172 @@
+//! The server: users, values, and its task.
+
+use super::space::{self, Namespaces, Numbers, Shown};
+use super::{APPLICATION, OpcuaTarget, PRODUCT, SinkError, certificates, layout};
+use crate::history::{Outbox, Reading};
+use adapters::clock::TimeNs;
+use opcua::crypto::{SecurityPolicy, X509Data};
+use opcua::server::node_manager::memory::{SimpleNodeManager, simple_node_manager_imports};
+use opcua::server::{ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken};
+use opcua::types::{DataValue, MessageSecurityMode, NodeId};
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::net::TcpListener;
+use tokio::task::JoinHandle;
+
+/// Clients at the same time; each has subscriptions of its own.
+const SESSIONS_MAX: usize = 16;
+/// The certificates of strangers are counted this often.
+const COUNT_EVERY: Duration = Duration::from_secs(10);
+/// Name of the user whose password the address gives.
+const USER: &str = "user";
+
+/// A server that runs; it ends when this goes.
+pub(super) struct Running {
+    handle: ServerHandle,
+    manager: Arc<SimpleNodeManager>,
+    shown: Shown,
+    task: JoinHandle<Result<(), String>>,
+    rejected: PathBuf,
+    counted: Mutex<Instant>,
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.handle.cancel();
+        self.task.abort();
+    }
+}
+
+pub(super) fn failed(what: impl Into<String>) -> SinkError {
+    SinkError::line(what, "look at the directory of the certificates and at the log")
+}
+
+impl Running {
+    /// Makes the nodes and begins to serve.
+    pub(super) async fn start(
+        target: &OpcuaTarget,
+        outbox: &Outbox,
+        directory: PathBuf,
+        listener: TcpListener,
+    ) -> Result<Self, SinkError> {
+        let (own, box_id) = (target.clone(), outbox.box_id());
+        let rejected = certificates::rejected(&directory);
+        // Making the first certificate takes a moment of one core.
+        let built = tokio::task::spawn_blocking(move || build(&own, &box_id, &directory)).await;
+        let (server, handle) = built.map_err(|error| failed(error.to_string()))??;
+        let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
+        let manager = manager.ok_or_else(|| failed("the OPC UA server has no nodes"))?;
+        let number = |name: &str| {
+            handle.get_namespace_index(name).ok_or_else(|| failed(format!("the namespace {name} has no number")))
+        };
+        let numbers = Numbers {
+            own: number(layout::OWN)?,
+            devices: number(layout::DEVICES)?,
+            machinery: number(layout::MACHINERY)?,
+            machine_tool: number(layout::MACHINE_TOOL)?,
+        };
+        let (latest, name) = (outbox.latest(), (outbox.machine(), outbox.box_id()));
+        let shown = {
+            let mut space = manager.address_space().write();
+            let shown = space::build(&mut space, numbers, (name.0, &name.1), &latest);
+            space.load_into_type_tree(&mut handle.type_tree().write());
+            shown
+        };
+        let task = tokio::spawn(server.run_with(listener));
+        let running = Self { handle, manager, shown, task, rejected, counted: Mutex::new(Instant::now()) };
+        let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
+        running.tell(&latest, at_ns);
+        running.tell_alarms(&[], at_ns);
+        Ok(running)
+    }
+
+    /// These values are in force since this moment.
+    pub(super) fn tell(&self, readings: &[Reading], at_ns: TimeNs) {
+        self.put(&self.shown.values(readings, at_ns));
+    }
+
+    /// No value is known any more: what a client reads is absent instead of old.
+    pub(super) fn tell_nothing(&self) {
+        self.put(&self.shown.nothing());
+    }
+
+    /// These alarms stand since this moment.
+    pub(super) fn tell_alarms(&self, alarms: &[String], at_ns: TimeNs) {
+        self.put(&[self.shown.alarms(alarms, at_ns)]);
+    }
+
+    fn put(&self, values: &[(NodeId, DataValue)]) {
+        let each = values.iter().map(|(node, value)| (node, None, value.clone()));
+        // Every node of the list was made by `space::build`.
+        let _known = self.manager.set_values(self.handle.subscriptions(), each);
+    }
+
+    #[cfg(test)]
+    pub(super) fn alarms_status(&self) -> opcua::types::StatusCode {
+        let (none, encoding) = (opcua::types::NumericRange::None, opcua::types::DataEncoding::Binary);
+        let space = self.manager.address_space().read();
+        let node = space.find(&self.shown.alarms(&[], 0).0).expect("made with the others").as_node();
+        let (stamps, value) = (opcua::types::TimestampsToReturn::Both, opcua::types::AttributeId::Value);
+        let found = node.get_attribute(stamps, value, &none, &encoding);
+        found.and_then(|value| value.status).unwrap_or(opcua::types::StatusCode::Good)
+    }
+
+    /// An error when the server has ended; keeps the number of strangers' certificates bounded.
+    pub(super) fn look_after(&self) -> Result<(), SinkError> {
+        if self.task.is_finished() {
+            return Err(failed("the OPC UA server has ended"));
+        }
+        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        if counted.elapsed() >= COUNT_EVERY {
+            *counted = Instant::now();
+            certificates::forget_oldest(&self.rejected);
+        }
+        Ok(())
+    }
+}
+
+/// The host that clients are told. An address that stands for all of the box is none to connect to.
+fn told_host(target: &OpcuaTarget) -> String {
+    let host = target.at.host.as_str();
+    let all = host.parse().is_ok_and(|address: IpAddr| address.is_unspecified());
+    let own = || X509Data::computer_hostnames().into_iter().next();
+    Some(host.to_owned()).filter(|_| !all).or_else(own).unwrap_or_else(|| "localhost".to_owned())
+}
+
+fn build(target: &OpcuaTarget, box_id: &str, directory: &Path) -> Result<(Server, ServerHandle), SinkError> {
+    let (uri, host) = (format!("{PRODUCT}:{box_id}"), told_host(target));
+    certificates::prepare(directory, &uri, &host)?;
+    let login = target
+        .login
+        .read()
+        .map_err(|(file, error)| failed(format!("the password file {} cannot be read: {error}", file.display())))?;
+    let mut users = Vec::new();
+    let mut builder = ServerBuilder::new()
+        .application_name(APPLICATION)
+        .application_uri(uri)
+        .product_uri(PRODUCT)
+        .create_sample_keypair(false)
+        .certificate_path(certificates::OWN)
+        .private_key_path(certificates::KEY)
+        .pki_dir(directory)
+        .trust_client_certs(false)
+        .check_cert_time(true)
+        .host(host)
+        .port(target.at.port)
+        .max_sessions(SESSIONS_MAX)
+        .diagnostics_enabled(false)
+        .discovery_urls(vec!["/".to_owned()])
+        .with_node_manager(simple_node_manager_imports(vec![Box::new(Namespaces)], "machine"));
+    if let Some((user, password)) = login {
+        builder = builder.add_user_token(USER, ServerUserToken::user_pass(user, password));
+        users.push(USER.to_owned());
+    }
+    if target.anonymous {
+        users.push(ANONYMOUS_USER_TOKEN_ID.to_owned());
+    }
+    let endpoint =
+        ServerEndpoint::new("/", SecurityPolicy::Basic256Sha256, MessageSecurityMode::SignAndEncrypt, &users);
+    builder.add_endpoint("encrypted", endpoint).default_endpoint("encrypted").build().map_err(failed)
+}
