@@ -212,7 +212,8 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let outbox = Outbox::new("Lathe 7", OutboxSettings::default(), []);
         let mut keys = Keys::of("anonymous=yes");
-        let target = OpcuaTarget::parse("//127.0.0.1:0", &mut keys).expect("an address");
+        let mut target = OpcuaTarget::parse("//127.0.0.1", &mut keys).expect("an address");
+        target.at.port = 0;
         let mut sink = OpcuaSink::new(target, &outbox, &directory.path().join("history.db"));
         sink.begin().await.expect("it listens");
         sink.look().expect("it runs");
