@@ -2,12 +2,14 @@
 
 use super::Shared;
 use super::guard::told;
+use super::history::{reading, trouble};
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::{aside, on_disk};
 use crate::access::Role;
-use crate::settings::{self, Wish};
+use crate::history::Span;
+use crate::settings::{self, Refused, Wish};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -40,6 +42,8 @@ struct Asked {
     tool: Option<String>,
     #[serde(default)]
     operation: Option<String>,
+    #[serde(default)]
+    began_from: Option<String>,
 }
 
 impl Asked {
@@ -57,7 +61,7 @@ impl Asked {
             Given::Text(text) => SettingValue::Text(text),
         });
         let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
-        Ok(Wish { script, name: self.name, place, value })
+        Ok(Wish { script, name: self.name, place, value, began_from: self.began_from })
     }
 }
 
@@ -67,11 +71,38 @@ fn refused(problems: &[Problem]) -> ApiProblem {
     ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
 }
 
+fn not_set(why: Refused) -> ApiProblem {
+    match why {
+        Refused::Problems(problems) => refused(&problems),
+        Refused::Meanwhile { path, now, by } => {
+            let now = if now.is_empty() { "not chosen".to_owned() } else { now };
+            let title = format!("{path} was changed meanwhile by {by}: it is {now} now");
+            ApiProblem::conflict(
+                title,
+                "nothing is lost; look at the value of now, and set yours again if it still holds",
+            )
+        }
+    }
+}
+
+/// Who has changed settings, as far as the history can be read: without it the settings are shown all the same.
+async fn changes(shared: &Shared) -> Vec<Value> {
+    let read = reading(shared.clone(), |reader, _| {
+        let events = reader.events_of(settings::KIND, Span::newest(settings::EVENTS_MAX));
+        events.map(|events| Value::Array(settings::told_changes(&events))).map_err(|error| trouble(&error))
+    });
+    match read.await {
+        Ok(Json(Value::Array(changes))) => changes,
+        _ => Vec::new(),
+    }
+}
+
 /// `GET /api/v1/settings`
 async fn list(State(shared): State<Shared>) -> Result<Json<Value>, ApiProblem> {
+    let changes = changes(&shared).await;
     aside(move || {
         let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
-        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared))))
+        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared), &changes)))
     })
     .await
 }
@@ -83,12 +114,12 @@ async fn change(
     JsonBody(asked): JsonBody<Asked>,
 ) -> Result<Response, ApiProblem> {
     let wish = asked.wish()?;
+    let changes = changes(&shared).await;
     aside(move || {
         let files = on_disk(&shared)?;
-        let words =
-            settings::set(&shared.data_dir, &files, &wish, &person.name).map_err(|problems| refused(&problems))?;
+        let words = settings::set(&shared.data_dir, &files, &wish, &person.name).map_err(not_set)?;
         let declared = declarations(&files).map_err(|problems| refused(&problems))?;
-        let answer = settings::document(declared.iter(), &super::rules::values(&shared));
+        let answer = settings::document(declared.iter(), &super::rules::values(&shared), &changes);
         Ok(told(Json(answer), words))
     })
     .await
