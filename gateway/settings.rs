@@ -3,14 +3,18 @@
 //! The values stand in `settings.toml` in the data directory. A person may edit it; the box reads it again within a second. The page
 //! and the interface change it through [`set`], which tries every script with the new values first and writes the name of the person
 //! into the first line, with a digest of the rest: a file that somebody has edited by hand afterwards is not taken for theirs.
+//!
+//! Two persons may change one setting: each change names the value that it began from, and who comes second is told ([`Refused`]).
 
 use crate::files::{read_text, replace};
+use crate::history::Event;
 use crate::reload::digest;
 use rules::script::{
     DeclarationPlace, Declared, SETTINGS_TEXT_MAX, ScriptFile, ScriptProblem, SettingValue, SettingValues, prepare_with,
 };
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Name of the file in the data directory.
 pub const FILE: &str = "settings.toml";
@@ -18,6 +22,12 @@ pub const FILE: &str = "settings.toml";
 pub const KIND: &str = "setting_changed";
 /// Who has changed a file that no person was signed in for.
 const BY_HAND: &str = "the file settings.toml";
+/// Changes of one setting that the document tells, the newest first.
+const CHANGES_MAX: usize = 5;
+/// Events that are looked through for them, the newest: more changes than a shop makes in years.
+pub const EVENTS_MAX: u32 = 2000;
+/// One change at a time: from reading the file to writing it, nobody else changes it.
+static CHANGING: Mutex<()> = Mutex::new(());
 
 /// Where the values stand.
 #[must_use]
@@ -60,17 +70,52 @@ pub struct NewSetting {
     pub place: DeclarationPlace,
     /// The value; `None`: as everywhere else again, or the default.
     pub value: Option<SettingValue>,
+    /// What stood in the file when the person began, as the document gives it in `written`; `None`: whatever stands there.
+    pub began_from: Option<String>,
+}
+
+/// Why a setting was not changed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Refused {
+    /// Somebody else has changed it since the person began.
+    Meanwhile {
+        /// `constant_load.target_w`
+        path: String,
+        /// What stands in the file now; empty where nothing is chosen.
+        now: String,
+        /// Who has written the file.
+        by: String,
+    },
+    /// The value cannot be used.
+    Problems(Vec<ScriptProblem>),
+}
+
+impl From<Vec<ScriptProblem>> for Refused {
+    fn from(problems: Vec<ScriptProblem>) -> Self {
+        Self::Problems(problems)
+    }
+}
+
+/// A value as the file has it; empty where it has none.
+fn written(value: Option<&SettingValue>) -> String {
+    value.map(ToString::to_string).unwrap_or_default()
 }
 
 /// Changes one setting when every script compiles and every trial passes with it. Tells what was changed, from what to what.
 ///
 /// # Errors
-/// Why the value cannot be used; nothing has been changed then.
-pub fn set(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str) -> Result<String, Vec<ScriptProblem>> {
+/// Why the value cannot be used, or that somebody else was quicker; nothing has been changed then.
+pub fn set(data_dir: &Path, files: &[ScriptFile], wanted: &NewSetting, by: &str) -> Result<String, Refused> {
+    let _one_at_a_time = CHANGING.lock().unwrap_or_else(PoisonError::into_inner);
     let path = path(data_dir);
-    let before = read(&path)?;
+    let before_text = text(&path)?;
+    let before = SettingValues::parse(FILE, &before_text)?;
     let mut after = before.clone();
-    let NewSetting { script, name, place, value } = wanted;
+    let NewSetting { script, name, place, value, began_from } = wanted;
+    let now = written(before.of(script, name, place));
+    if began_from.as_ref().is_some_and(|began| *began != now) {
+        return Err(Refused::Meanwhile { path: format!("{script}.{name}"), now, by: author(&before_text) });
+    }
     after.put(script, name, place, value.clone());
     // Read again, so that a message names the line on which the value would stand.
     let body = after.text();
@@ -161,10 +206,23 @@ pub fn changes(before: &SettingValues, after: &SettingValues, declared: &[&Decla
     found
 }
 
-/// Every declared setting with what is in force: `settings/1`.
+/// What events of [`KIND`] tell, the newest first: when, which setting, for what, from what to what, by whom.
 #[must_use]
-pub fn document<'a>(declared: impl Iterator<Item = &'a Declared>, values: &SettingValues) -> Value {
-    let rows: Vec<Value> = declared.map(|it| row(it, values)).collect();
+pub fn told_changes(events: &[Event]) -> Vec<Value> {
+    let mut newest_first: Vec<&Event> = events.iter().collect();
+    newest_first.sort_by_key(|it| std::cmp::Reverse(it.at_ns));
+    let change = |it: &&Event| {
+        let mut detail: Map<String, Value> = serde_json::from_str(&it.detail).ok()?;
+        detail.insert("at_ms".to_owned(), json!(it.at_ns / 1_000_000));
+        Some(Value::Object(detail))
+    };
+    newest_first.iter().filter_map(change).collect()
+}
+
+/// Every declared setting with what is in force, and who changed it last: `settings/1`. `told` is of [`told_changes`].
+#[must_use]
+pub fn document<'a>(declared: impl Iterator<Item = &'a Declared>, values: &SettingValues, told: &[Value]) -> Value {
+    let rows: Vec<Value> = declared.map(|it| row(it, values, told)).collect();
     json!({ "schema": "settings/1", "settings": rows })
 }
 
@@ -175,7 +233,9 @@ fn json_of(value: &SettingValue) -> Value {
     }
 }
 
-fn row(it: &Declared, values: &SettingValues) -> Value {
+fn row(it: &Declared, values: &SettingValues, told: &[Value]) -> Value {
+    let path = it.path();
+    let changes: Vec<&Value> = told.iter().filter(|change| change["setting"] == path).take(CHANGES_MAX).collect();
     let of = |place: &DeclarationPlace| values.of(it.section(), &it.name, place);
     let special: Vec<Value> = values
         .places(it.section())
@@ -184,15 +244,17 @@ fn row(it: &Declared, values: &SettingValues) -> Value {
             let mut row = Map::new();
             row.insert(place.per()?.word().to_owned(), json!(place.name()));
             row.insert("value".to_owned(), json_of(of(place)?));
+            row.insert("written".to_owned(), json!(written(of(place))));
             Some(Value::Object(row))
         })
         .collect();
     json!({
         "script": it.section(), "name": it.name, "value": json_of(of(&DeclarationPlace::Machine).unwrap_or(&it.default)),
-        "chosen": of(&DeclarationPlace::Machine).is_some(), "default": json_of(&it.default), "unit": it.unit,
+        "chosen": of(&DeclarationPlace::Machine).is_some(), "written": written(of(&DeclarationPlace::Machine)),
+        "default": json_of(&it.default), "unit": it.unit,
         "least": it.range.map(|range| range.0), "greatest": it.range.map(|range| range.1), "whole": it.whole,
         "one_of": it.one_of, "per": it.per.iter().map(|per| per.word()).collect::<Vec<_>>(), "special": special,
-        "en": it.en, "zh": it.zh,
+        "en": it.en, "zh": it.zh, "changes": changes,
     })
 }
 
@@ -229,11 +291,17 @@ mod tests {
             name: "x_w".to_owned(),
             place: DeclarationPlace::Machine,
             value: Some(SettingValue::Number(7.0)),
+            began_from: Some(String::new()),
         };
         assert_eq!(set(directory.path(), &files, &wanted, "Li").as_deref(), Ok("one.x_w: 5.0 -> 7.0 W"));
         let written = std::fs::read_to_string(path(directory.path())).expect("written");
         assert_eq!(author(&written), "Li", "{written}");
         assert_eq!(author(&written.replace("7.0", "8.0")), BY_HAND);
+        wanted.value = Some(SettingValue::Number(6.0));
+        let meanwhile = Refused::Meanwhile { path: "one.x_w".to_owned(), now: "7.0".to_owned(), by: "Li".to_owned() };
+        assert_eq!(set(directory.path(), &files, &wanted, "Wu"), Err(meanwhile), "Wu began before Li was done");
+        assert_eq!(std::fs::read_to_string(path(directory.path())).expect("kept"), written, "nothing is lost");
+        (wanted.value, wanted.began_from) = (Some(SettingValue::Number(7.0)), None);
         wanted.place = DeclarationPlace::Tool("T 1".to_owned());
         assert_eq!(
             set(directory.path(), &files, &wanted, "Wu").as_deref(),
@@ -241,10 +309,23 @@ mod tests {
         );
         wanted.value = Some(SettingValue::Number(11.0));
         let refused = set(directory.path(), &files, &wanted, "Wu").expect_err("out of range");
+        let Refused::Problems(refused) = refused else { panic!("{refused:?}") };
         assert!(refused[0].what.contains("outside 0 to 10 W"), "{refused:?}");
         let values = read(&path(directory.path())).expect("readable");
         let declared = rules::script::declarations(&files).expect("readable");
-        let document = document(declared.iter(), &values);
+        let told = |at_ns, after: &str| Event {
+            at_ns,
+            kind: KIND.to_owned(),
+            source: "scripts".to_owned(),
+            text: String::new(),
+            detail:
+                json!({ "setting": "one.x_w", "place": "this machine", "before": "5.0", "after": after, "by": "Li" })
+                    .to_string(),
+        };
+        let changes = told_changes(&[told(1_000_000, "6.0"), told(2_000_000, "7.0")]);
+        let document = document(declared.iter(), &values, &changes);
+        assert_eq!(document["settings"][0]["changes"][0]["after"], "7.0", "the newest first");
+        assert_eq!(document["settings"][0]["written"], "7.0");
         assert_eq!(document["settings"][0]["special"][0]["tool"], "T 1");
         assert_eq!((&document["settings"][0]["value"], &document["settings"][0]["least"]), (&json!(7.0), &json!(0.0)));
     }

@@ -36,6 +36,7 @@ fn furnish(places: &BackupPaths) {
         name: "target_w".to_owned(),
         place,
         value: Some(SettingValue::Number(1800.0)),
+        began_from: None,
     };
     for place in [DeclarationPlace::Machine, DeclarationPlace::Tool("T3".to_owned())] {
         settings::set(&places.data_dir, &shipped(), &wanted(place), "Li").expect("set");

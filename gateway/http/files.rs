@@ -46,6 +46,7 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "diagnosis.js" from "views/diagnosis.js",
     SCRIPT "system.js" from "views/system.js",
     SCRIPT "rules.js" from "views/rules.js",
+    SCRIPT "settings.js" from "views/settings.js",
     SCRIPT "audit.js" from "views/audit.js",
     SCRIPT "help.js" from "views/help.js",
     CSS "uplot.css" from "vendor/uplot.min.css",

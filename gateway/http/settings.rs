@@ -2,12 +2,14 @@
 
 use super::ServerState;
 use super::guard::told;
+use super::history::{reading, trouble};
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::{aside, on_disk};
 use crate::access::Role;
-use crate::settings::{self, NewSetting};
+use crate::history::Span;
+use crate::settings::{self, NewSetting, Refused};
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -40,6 +42,8 @@ struct SettingRequest {
     tool: Option<String>,
     #[serde(default)]
     operation: Option<String>,
+    #[serde(default)]
+    began_from: Option<String>,
 }
 
 impl SettingRequest {
@@ -57,7 +61,7 @@ impl SettingRequest {
             RequestedValue::Text(text) => SettingValue::Text(text),
         });
         let script = self.script.strip_suffix(".rhai").unwrap_or(&self.script).to_owned();
-        Ok(NewSetting { script, name: self.name, place, value })
+        Ok(NewSetting { script, name: self.name, place, value, began_from: self.began_from })
     }
 }
 
@@ -67,11 +71,38 @@ fn refused(problems: &[ScriptProblem]) -> ApiProblem {
     ApiProblem::request(what.join("; "), next.unwrap_or("GET /api/v1/settings lists every setting with its range"))
 }
 
+fn not_set(why: Refused) -> ApiProblem {
+    match why {
+        Refused::Problems(problems) => refused(&problems),
+        Refused::Meanwhile { path, now, by } => {
+            let now = if now.is_empty() { "not chosen".to_owned() } else { now };
+            let title = format!("{path} was changed meanwhile by {by}: it is {now} now");
+            ApiProblem::conflict(
+                title,
+                "nothing is lost; look at the value of now, and set yours again if it still holds",
+            )
+        }
+    }
+}
+
+/// Who has changed settings, as far as the history can be read: without it the settings are shown all the same.
+async fn changes(shared: &ServerState) -> Vec<Value> {
+    let read = reading(shared.clone(), |reader, _| {
+        let events = reader.events_of(settings::KIND, Span::newest(settings::EVENTS_MAX));
+        events.map(|events| Value::Array(settings::told_changes(&events))).map_err(|error| trouble(&error))
+    });
+    match read.await {
+        Ok(Json(Value::Array(changes))) => changes,
+        _ => Vec::new(),
+    }
+}
+
 /// `GET /api/v1/settings`
 async fn list(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
+    let changes = changes(&shared).await;
     aside(move || {
         let declared = declarations(&on_disk(&shared)?).map_err(|problems| refused(&problems))?;
-        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared))))
+        Ok(Json(settings::document(declared.iter(), &super::rules::values(&shared), &changes)))
     })
     .await
 }
@@ -83,12 +114,12 @@ async fn change(
     JsonBody(asked): JsonBody<SettingRequest>,
 ) -> Result<Response, ApiProblem> {
     let wanted = asked.wanted()?;
+    let changes = changes(&shared).await;
     aside(move || {
         let files = on_disk(&shared)?;
-        let words =
-            settings::set(&shared.data_dir, &files, &wanted, &person.name).map_err(|problems| refused(&problems))?;
+        let words = settings::set(&shared.data_dir, &files, &wanted, &person.name).map_err(not_set)?;
         let declared = declarations(&files).map_err(|problems| refused(&problems))?;
-        let answer = settings::document(declared.iter(), &super::rules::values(&shared));
+        let answer = settings::document(declared.iter(), &super::rules::values(&shared), &changes);
         Ok(told(Json(answer), words))
     })
     .await

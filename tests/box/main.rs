@@ -12,6 +12,7 @@ mod operations;
 mod page;
 mod process;
 mod replay;
+mod settings;
 mod system;
 mod twin;
 mod views;

@@ -21,7 +21,7 @@ const VIEWS: [(&str, &str); 8] = [
 ];
 
 /// The script of axe-core: by `CNC_GATEWAY_AXE`, or of the package that npm has installed for everybody.
-fn axe() -> Option<String> {
+pub(super) fn axe() -> Option<String> {
     let global = || {
         let root = Command::new("npm").args(["root", "-g"]).output().ok()?;
         Some(PathBuf::from(String::from_utf8_lossy(&root.stdout).trim()).join("axe-core/axe.min.js"))
@@ -36,7 +36,7 @@ fn axe() -> Option<String> {
 }
 
 /// What axe finds serious or critical, with the element.
-fn barriers(browser: &mut Browser, axe: &str) -> Vec<String> {
+pub(super) fn barriers(browser: &mut Browser, axe: &str) -> Vec<String> {
     browser.value(&format!("{axe};0"));
     let found = browser.value(
         "axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa'], resultTypes: ['violations'] })
@@ -68,7 +68,7 @@ fn base64(text: &str) -> Vec<u8> {
 }
 
 /// Writes a picture where `CNC_GATEWAY_PICTURES` names a folder.
-fn picture(browser: &mut Browser, name: &str) {
+pub(super) fn picture(browser: &mut Browser, name: &str) {
     let Some(folder) = std::env::var_os("CNC_GATEWAY_PICTURES").map(PathBuf::from) else { return };
     std::fs::create_dir_all(&folder).expect("a folder");
     std::fs::write(folder.join(format!("{name}.png")), base64(&browser.picture())).expect("written");

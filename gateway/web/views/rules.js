@@ -4,13 +4,14 @@ import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { Editor, vocabulary } from "/web/editor.js";
+import { SettingsForm } from "/web/settings.js";
 
 const BACKTESTS = ["1h", "8h", "24h", "7d", "30d"];
 
 export function mount(root, context) {
   const view = new RulesView(root, context);
   view.begin();
-  return { rules: view, update: (status) => view.update(status), session: () => view.enable(), leave: () => view.leave() };
+  return { rules: view, update: (status) => view.update(status), session: () => { view.enable(); view.settings.enable(); }, leave: () => view.leave() };
 }
 
 class RulesView {
@@ -30,6 +31,8 @@ class RulesView {
     const words = make("input", "", null, { type: "search", placeholder: t("search_words"), "aria-label": t("search_words") });
     words.addEventListener("input", () => this.drawWords(words.value.toLowerCase()));
     root.append(make("div", "rules", [card(t("scripts"), [this.list, make("p", "note", t("rules_words"))]), make("section", "card editing", [this.title, tools, this.note, this.host, this.result, make("h3", "", t("earlier_versions")), this.versions]), card(t("words_title"), [words, this.words])]));
+    this.settings = new SettingsForm(context);
+    root.append(this.settings.box);
   }
 
   async begin() {
@@ -50,6 +53,7 @@ class RulesView {
 
   open(name) {
     this.current = name;
+    this.settings.open(name);
     const file = this.file(name);
     // A draft goes before the version in charge: somebody has not finished with it.
     if (!this.texts.has(name) && file.draft) this.texts.set(name, file.draft.text);
@@ -205,5 +209,5 @@ class RulesView {
     if (mine?.error && mine.error !== this.told) { this.told = mine.error; say(this.note, box(mine.error)); }
   }
 
-  leave() { clearTimeout(this.timer); this.editor?.destroy(); }
+  leave() { clearTimeout(this.timer); this.settings.leave(); this.editor?.destroy(); }
 }
