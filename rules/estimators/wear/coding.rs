@@ -7,6 +7,10 @@ use serde::{Deserialize, Serialize};
 
 /// Share of the recorded range by which a condition may lie outside before it counts as extrapolated.
 const MARGIN: f64 = 0.05;
+/// A condition that was held may differ by this share of its value: spindles slip by 1 to 2 % under load, and readings of speed and
+/// feed scatter about what was programmed. The power is then wrong by as much at most. Smaller, a model of a held speed hardly
+/// ever covers the cut that it was learned from.
+const HELD_MARGIN: f64 = 0.02;
 
 /// Least and greatest value of each factor that a model was fitted on, in the order and units of [`FACTORS`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -47,7 +51,7 @@ impl Range {
     pub fn outside(&self, conditions: &Conditions) -> Vec<&'static Factor> {
         let beyond = |at: &usize| {
             let value = conditions.vector()[*at];
-            let margin = MARGIN * self.width(*at).max(MARGIN * self.greatest[*at].abs());
+            let margin = (MARGIN * self.width(*at)).max(HELD_MARGIN * self.greatest[*at].abs());
             value < self.least[*at] - margin || value > self.greatest[*at] + margin
         };
         (0..FACTORS.len()).filter(beyond).map(|at| &FACTORS[at]).collect()

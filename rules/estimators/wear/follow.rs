@@ -120,8 +120,8 @@ impl Follower {
             edge.part_m = if edge.part_m > 0.0 { edge.part_m + weight * (slide_m - edge.part_m) } else { *slide_m };
             let rate = self.joint.mean(edge.rate);
             self.joint.grow(edge.wear, edge.rate, *slide_m);
-            let share = (self.joint.mean(edge.wear) / edge.criterion_mm).clamp(0.0, 1.5);
-            self.joint.scale(edge.rate, 1.0 + ACCELERATION * share * rate * slide_m / edge.criterion_mm);
+            let share = (self.joint.mean(edge.wear) / edge.worn_mm()).clamp(0.0, 1.5);
+            self.joint.scale(edge.rate, 1.0 + ACCELERATION * share * rate * slide_m / edge.worn_mm());
             self.joint.spread(edge.wear, (GROWTH_STEP * rate * slide_m).powi(2));
             self.joint.spread(edge.rate, (RATE_STEP * rate).powi(2));
         }
@@ -165,6 +165,7 @@ impl Follower {
             blind: false,
             odd: 0,
             rates: Vec::new(),
+            changed_mm: Vec::new(),
         });
         Some(self.edges.len() - 1)
     }
@@ -172,11 +173,13 @@ impl Follower {
     /// The edge at this place is a new one; the rate of the one before counts for it.
     fn renew(&mut self, at: usize) {
         let edge = &mut self.edges[at];
-        let grown = self.joint.mean(edge.wear) - NEW_MM.0;
+        let wear_mm = self.joint.mean(edge.wear);
+        let grown = wear_mm - NEW_MM.0;
         if edge.parts >= PARTS_OF_A_LIFE && edge.slide_m > 0.0 && grown > 0.0 {
             edge.rates.push(grown / edge.slide_m);
             let surplus = edge.rates.len().saturating_sub(RATES_MAX);
             edge.rates.drain(..surplus);
+            edge.remember_change(wear_mm);
         }
         (edge.number, edge.slide_m, edge.parts, edge.blind) = (edge.number + 1, 0.0, 0, false);
         let (mean, sd) = pooled(&edge.rates);
@@ -211,7 +214,7 @@ impl Follower {
             return at;
         }
         let (mean, sd) = match work.key.reference {
-            Reference::Model => (0.0, work.reference_doubt().max(MODEL_SD_LEAST)),
+            Reference::Model => (0.0, work.reference_doubt()),
             Reference::Typical => (0.0, OPERATION_SD),
             Reference::Feed => (excess, LEVEL_SD),
         };
@@ -336,7 +339,7 @@ impl Follower {
             rate: self.joint.mean(edge.rate),
             covariance: [of(edge.wear, edge.wear), of(edge.wear, edge.rate), of(edge.rate, edge.rate)],
             part_m: edge.part_m,
-            criterion_mm: edge.criterion_mm,
+            criterion_mm: edge.worn_mm(),
         };
         Some(known.outlook())
     }

@@ -1,5 +1,6 @@
 //! What the filter keeps of edges and operations, and what it tells.
 
+use super::prior::{CHANGE_SHARE, CHANGES_MAX, EARLY_SHARE};
 use super::work::{Reference, WorkKey};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,30 @@ pub(super) struct Edge {
     /// Measurements in a row that no wear of before explains.
     pub(super) odd: u32,
     pub(super) rates: Vec<f64>,
+    /// Wear of earlier edges of this tool when the shop changed them, typical mm.
+    #[serde(default)]
+    pub(super) changed_mm: Vec<f64>,
+}
+
+impl Edge {
+    /// The wear at which this edge counts as worn, mm. Typical millimetres are those of steel on a typical edge; on another machine
+    /// the same wear may take half the power. So without a model the shop's own changes say what worn is, where they come before the
+    /// criterion: the greatest of them, because an edge may also be changed early, and a little before it.
+    pub(super) fn worn_mm(&self) -> f64 {
+        let changed = self.changed_mm.iter().copied().fold(0.0, f64::max);
+        let by_model = self.reference == Reference::Model;
+        if by_model || changed == 0.0 { self.criterion_mm } else { self.criterion_mm.min(CHANGE_SHARE * changed) }
+    }
+
+    /// The shop has changed the edge at this wear. Far before the criterion it was broken, or exchanged for another reason.
+    pub(super) fn remember_change(&mut self, wear_mm: f64) {
+        if self.reference == Reference::Model || wear_mm < EARLY_SHARE * self.criterion_mm {
+            return;
+        }
+        self.changed_mm.push(wear_mm);
+        let surplus = self.changed_mm.len().saturating_sub(CHANGES_MAX);
+        self.changed_mm.drain(..surplus);
+    }
 }
 
 /// An operation of a tool in a program; `at` is the number of its constant.

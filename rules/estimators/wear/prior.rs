@@ -24,6 +24,9 @@ pub(super) const LEVEL_SD: f64 = 0.5;
 /// Least uncertainty of a learned model for one operation, as a share: other tool paths than the cuts it was learned from differ by
 /// 4 to 7 % on the simulated lathe. Too small, the difference is taken for wear and a good edge is alarmed.
 pub(super) const MODEL_SD_LEAST: f64 = 0.05;
+/// The same of a model that names the operation it was learned in: the tool paths are the same. What is left is the lot that it was
+/// learned in against the mean of all lots (`HARDNESS_SD` over the lots of several days).
+pub(super) const SAME_OPERATION_SD: f64 = 0.02;
 /// The same of a model that names no work material: the specific cutting force of steels is 1400 to 2800 N/mm2, so a model of another
 /// material would take a good edge in a hard part for a worn one. Its shape over the cut counts, hardly its level; the wear is
 /// followed by its growth.
@@ -44,6 +47,15 @@ pub(super) const GROWTH_STEP: f64 = 0.2;
 pub(super) const ACCELERATION: f64 = 1.0;
 /// Rates of edges that were used up, remembered for each tool.
 pub(super) const RATES_MAX: usize = 8;
+/// Changes of edges that are remembered for each tool.
+pub(super) const CHANGES_MAX: usize = 8;
+/// Without a model, an edge that is changed with less than this share of the criterion tells nothing of what worn is. Typical
+/// millimetres are wrong by a factor of 2 at most where cutting and flank force lie within their tables. Smaller, a broken edge
+/// makes the next alarm too early; greater, the shop's own practice is not learned.
+pub(super) const EARLY_SHARE: f64 = 0.5;
+/// The alarm comes at this share of the wear at which the shop has changed edges before: early enough to be of use. Smaller
+/// costs a tenth of the life of each edge.
+pub(super) const CHANGE_SHARE: f64 = 0.9;
 /// An edge must have slid so far for its rate to count for the next ones, in parts.
 pub(super) const PARTS_OF_A_LIFE: u32 = 4;
 /// How much likelier than nothing another hardness, or a new edge that nobody announced, must make what was measured

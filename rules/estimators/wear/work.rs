@@ -5,7 +5,7 @@
 //! feed alone. Whatever the reference leaves over is a constant of the operation, which the filter learns.
 
 use super::conditions::{Conditions, cutting_speed_m_min};
-use super::prior::ANY_MATERIAL_SD;
+use super::prior::{ANY_MATERIAL_SD, MODEL_SD_LEAST, SAME_OPERATION_SD};
 use super::record::WearRecord;
 use serde::{Deserialize, Serialize};
 
@@ -91,7 +91,8 @@ impl CutMoment {
         // A model whose power does not rise with the wear here says nothing of it.
         let stands = at_none.power_w > 0.0 && wear_w_per_mm > 0.0;
         let of_material = if record.key.work_material.is_empty() { ANY_MATERIAL_SD } else { 0.0 };
-        let doubt = of_material.hypot(at_worn.observation_sd_w() / at_none.power_w);
+        let of_paths = if record.key.operation.is_empty() { MODEL_SD_LEAST } else { SAME_OPERATION_SD };
+        let doubt = of_material.hypot(at_worn.observation_sd_w() / at_none.power_w).max(of_paths);
         stands.then_some(Expected { reference: Reference::Model, sharp_w: at_none.power_w, wear_w_per_mm, doubt })
     }
 
