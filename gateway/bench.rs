@@ -13,7 +13,7 @@ use adapters::merge::{Delay, Merge, SourceId, SourcePlan};
 use adapters::open::open_pull;
 use adapters::{Address, ChannelId, Pull, Reading, Sample};
 use rules::estimators;
-use rules::script::{Host, shipped};
+use rules::script::{Host, ScriptFile, shipped};
 use serde_json::{Value, json};
 use std::fmt;
 use std::path::Path;
@@ -150,6 +150,8 @@ pub struct BenchFigures {
     pub ticks: u64,
     /// In the order of the stages; the last one is the whole box.
     pub runs: Vec<Figure>,
+    /// Each shipped script by itself: its file, and the processor time that it adds to a tick, us.
+    pub scripts: Vec<(String, f64)>,
     /// Bytes per tick in the history.
     pub bytes_per_tick: f64,
 }
@@ -214,6 +216,7 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Ben
         let estimates = *inferring.infer(sample);
         std::hint::black_box(host.tick(sample, &estimates));
     });
+    let scripts = alone(&course, ticks)?;
     let mut whole = pipeline()?;
     bench.run("gate and records", |sample| whole.step(sample, &mut NoStore));
     let options = Options { when_full: WhenFull::Wait, extras: pipeline()?.series(), ..Options::default() };
@@ -224,12 +227,33 @@ pub fn run(ticks: u64, directory: &Path, allocations: Allocations) -> Result<Ben
     let status = store.0.close();
     #[expect(clippy::cast_precision_loss, reason = "a rate")]
     let bytes_per_tick = status.bytes as f64 / status.rows.max(1) as f64;
-    Ok(BenchFigures { ticks, runs: bench.runs, bytes_per_tick })
+    Ok(BenchFigures { ticks, runs: bench.runs, scripts, bytes_per_tick })
+}
+
+/// Every shipped script by itself, against a host without scripts. A tenth of the ticks of the other runs is enough.
+fn alone(course: &Course, ticks: u64) -> Result<Vec<(String, f64)>, BenchError> {
+    let ticks = (ticks / 10).max(TICKS_MIN);
+    let cost = |files: &[ScriptFile]| -> Result<f64, BenchError> {
+        let mut bench = BenchRun { course, ticks, allocations: None, runs: Vec::new() };
+        let (mut inferring, mut host) = (estimators::Inference::new(estimators::Settings::default()), host_of(files)?);
+        bench.run("script", |sample| {
+            let estimates = *inferring.infer(sample);
+            std::hint::black_box(host.tick(sample, &estimates));
+        });
+        Ok(bench.runs.first().map_or(0.0, |run| run.cpu_us_per_tick))
+    };
+    let without = cost(&[])?;
+    let files = shipped().into_iter();
+    files.map(|file| Ok((file.name.clone(), (cost(std::slice::from_ref(&file))? - without).max(0.0)))).collect()
 }
 
 fn host() -> Result<Host, BenchError> {
+    host_of(&shipped())
+}
+
+fn host_of(files: &[ScriptFile]) -> Result<Host, BenchError> {
     let mut host = Host::new();
-    host.load(&shipped()).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
+    host.load(files).map_err(|problems| BenchError::SetUp(format!("{problems:?}")))?;
     Ok(host)
 }
 
@@ -265,6 +289,7 @@ impl BenchFigures {
         let stages = self.stages().map(|(stage, us)| {
             json!({ "stage": stage, "cpu_us_per_tick": us, "share": us / whole.map_or(1.0, |whole| whole.cpu_us_per_tick) })
         });
+        let scripts = self.scripts.iter().map(|(file, us)| json!({ "script": file, "cpu_us_per_tick": us }));
         json!({
             "schema": "bench/1",
             "ticks": self.ticks,
@@ -272,6 +297,7 @@ impl BenchFigures {
             "ticks_per_s": self.ticks_per_s().round(),
             "undisturbed_ticks_per_s": self.undisturbed_ticks_per_s().round(),
             "stages": stages.collect::<Vec<_>>(),
+            "scripts": scripts.collect::<Vec<_>>(),
             "allocations_per_tick": whole.and_then(|whole| whole.allocations_per_tick),
             "history_bytes_per_tick": self.bytes_per_tick,
         })
@@ -293,6 +319,9 @@ impl fmt::Display for BenchFigures {
                 Some(count) => writeln!(f, "   {count:.3} allocations per tick up to here")?,
                 None => writeln!(f)?,
             }
+        }
+        for (file, us) in &self.scripts {
+            writeln!(f, "    {file:<22} {us:>7.2} us, by itself")?;
         }
         writeln!(f, "  {:.1} bytes per tick in the history", self.bytes_per_tick)
     }

@@ -8,7 +8,7 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::{aside, on_disk};
 use crate::access::Role;
-use crate::history::Span;
+use crate::history::RecordSpan;
 use crate::settings::{self, NewSetting, Refused};
 use axum::Json;
 use axum::extract::State;
@@ -88,7 +88,7 @@ fn not_set(why: Refused) -> ApiProblem {
 /// Who has changed settings, as far as the history can be read: without it the settings are shown all the same.
 async fn changes(shared: &ServerState) -> Vec<Value> {
     let read = reading(shared.clone(), |reader, _| {
-        let events = reader.events_of(settings::KIND, Span::newest(settings::EVENTS_MAX));
+        let events = reader.events_of(settings::KIND, RecordSpan::newest(settings::EVENTS_MAX));
         events.map(|events| Value::Array(settings::told_changes(&events))).map_err(|error| trouble(&error))
     });
     match read.await {

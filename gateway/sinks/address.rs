@@ -131,10 +131,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, String
         #[cfg(feature = "opcua")]
         "opcua" => OpcuaTarget::parse(body, keys).map(SinkTarget::Opcua),
         #[cfg(not(feature = "opcua"))]
-        "opcua" => Err(
-            "this program was built without OPC UA, use one that was built with cargo build --release --features opcua"
-                .to_owned(),
-        ),
+        "opcua" => Err(without_opcua(keys)),
         "parquet" => ParquetTarget::parse(body, keys).map(SinkTarget::Parquet),
         "shdr" => ShdrTarget::parse(body, keys).map(SinkTarget::Shdr),
         "sparkplug" | "sparkplugs" => {

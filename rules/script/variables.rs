@@ -10,15 +10,16 @@ use super::examine::Findings;
 use super::vocabulary::{View, WordValue};
 use rhai::{AST, ASTFlags, Dynamic, Engine, ImmutableString, Map, ParseError, Scope, Stmt};
 
-/// The variables that the body and every handler find, in the order of [`scope_of`].
+/// The variables that the body and every handler find, in the order of [`scope_of`]: what never changes first. The interpreter looks
+/// a name up from the last one, so that those which are set before every run are found at once.
 pub(super) fn names(found: &Findings, constants: &[(String, Dynamic)], live: &LiveValues) -> Vec<String> {
-    let mut names = vec!["memory".to_owned()];
-    names.extend(found.reads.iter().filter(|word| !word.writable()).map(|word| word.name.to_owned()));
+    let mut names: Vec<String> = constants.iter().map(|(name, _)| name.clone()).collect();
+    names.extend(live.constants.iter().map(|(name, _)| name.clone()));
+    names.extend(found.foreign.iter().map(ToString::to_string));
     let records = super::fields::RECORDS.iter().map(|record| record.name);
     names.extend(records.filter(|name| found.fields.iter().any(|it| it.record.name == *name)).map(str::to_owned));
-    names.extend(found.foreign.iter().map(ToString::to_string));
-    names.extend(live.constants.iter().map(|(name, _)| name.clone()));
-    names.extend(constants.iter().map(|(name, _)| name.clone()));
+    names.extend(found.reads.iter().filter(|word| !word.writable()).map(|word| word.name.to_owned()));
+    names.push("memory".to_owned());
     names
 }
 
@@ -62,9 +63,14 @@ fn is_constant(stmt: &Stmt) -> bool {
 /// Only what the script reads; a variable that nobody looks at costs nothing. Its constants stand here too, for handlers.
 pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
     let mut scope = Scope::with_capacity(16 + script.reads.len() + script.constants.len());
-    scope.push("memory", memory);
-    for word in script.reads.iter().filter(|word| !word.writable()) {
-        scope.push_dynamic(word.name, Dynamic::UNIT);
+    for (name, value) in &script.constants {
+        scope.push_constant_dynamic(name.clone(), value.clone());
+    }
+    for (name, _) in &script.live.constants {
+        scope.push_dynamic(name.clone(), Dynamic::UNIT);
+    }
+    for name in &script.foreign {
+        scope.push_dynamic(name.clone(), Dynamic::UNIT);
     }
     for record in super::fields::RECORDS {
         let fields = script.fields.iter().filter(|field| field.record.name == record.name);
@@ -73,15 +79,10 @@ pub(super) fn scope_of(script: &Script, memory: Map) -> Scope<'static> {
             scope.push(record.name, map);
         }
     }
-    for name in &script.foreign {
-        scope.push_dynamic(name.clone(), Dynamic::UNIT);
+    for word in script.reads.iter().filter(|word| !word.writable()) {
+        scope.push_dynamic(word.name, Dynamic::UNIT);
     }
-    for (name, _) in &script.live.constants {
-        scope.push_dynamic(name.clone(), Dynamic::UNIT);
-    }
-    for (name, value) in &script.constants {
-        scope.push_constant_dynamic(name.clone(), value.clone());
-    }
+    scope.push("memory", memory);
     scope
 }
 

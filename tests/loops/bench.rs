@@ -3,7 +3,7 @@
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
-use adapters::{Actuator, LadderRule, Pull, Sample};
+use adapters::{Actuator, ChannelId, LadderRule, Pull, Sample, Slot, Value};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder};
 use gateway::gate::{AskOutcome, Gate, Reaction, ScriptRequest};
@@ -13,6 +13,7 @@ use gateway::run::actuator_worker::{ActuatorReport, ActuatorWorker, Tools};
 use rules::estimators;
 use rules::script::{Host, ScriptFile};
 use std::path::Path;
+use std::sync::Arc;
 use tempfile::TempDir;
 
 pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
@@ -52,6 +53,12 @@ impl Store for Finished {
     }
 }
 
+/// As a recipe fills it in.
+fn name_material(sample: &mut Sample, material: &Arc<str>) {
+    let channel = ChannelId::of("work_material").expect("a channel");
+    sample.set(channel, Slot { value: Ok(Value::Text(material.clone())), age_ns: 0 });
+}
+
 /// A machine, and the gateway beside it.
 pub(crate) struct Bench {
     pub(crate) machine: Simulated,
@@ -60,6 +67,8 @@ pub(crate) struct Bench {
     actuator_worker: ActuatorWorker,
     sample: Sample,
     now_ns: TimeNs,
+    /// What the recipe of the shop names as work material.
+    pub(crate) work_material: Option<Arc<str>>,
     /// Time between two ticks.
     pub(crate) period_ns: i64,
     /// Steps seen in force.
@@ -108,6 +117,7 @@ impl Bench {
             machine,
             sample: Sample::empty(0),
             now_ns: 0,
+            work_material: None,
             period_ns: TICK_NS,
             reactions: Vec::new(),
             moves: Vec::new(),
@@ -125,6 +135,9 @@ impl Bench {
     pub(crate) fn tick(&mut self) -> &Sample {
         self.now_ns += self.period_ns;
         self.lockstep.sample_into(&mut self.sample, self.now_ns);
+        if let Some(material) = &self.work_material {
+            name_material(&mut self.sample, material);
+        }
         let mut finished = Finished::default();
         self.pipeline.step(&self.sample, &mut finished);
         self.parts.append(&mut finished.0);

@@ -3,13 +3,16 @@
 
 use super::bench::{Bench, limits};
 use adapters::address::SimulatedMachine;
-use adapters::simulated::SimulatedSettings;
-use rules::estimators::wear::{WearKey, WearModel, WearRecord};
+use adapters::simulated::{DaySettings, SimulatedSettings};
+use rules::estimators::State;
+use rules::estimators::wear::{Cut, CutConditions, WearKey, WearModel, WearRecord, fit_physical};
 use rules::script::shipped;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 const CRITERION_MM: f64 = 0.30;
+/// Work material of the learned models, as the recipe of the shop names it.
+const MATERIAL: &str = "C45";
 /// An alarm on an edge with less than half the criterion is false.
 const FALSE_BELOW_MM: f64 = 0.5 * CRITERION_MM;
 
@@ -29,13 +32,13 @@ struct Shift {
     requests: usize,
 }
 
-fn shift(machine: SimulatedMachine, seed: u64, hours: f64, model: Option<&WearRecord>) -> Shift {
+fn shift(machine: SimulatedMachine, seed: u64, hours: f64, models: &[WearRecord]) -> Shift {
     let scripts: Vec<_> = shipped().into_iter().filter(|file| file.name == "tool_wear.rhai").collect();
-    let settings = SimulatedSettings { machine, seed, ..SimulatedSettings::default() };
+    let day = DaySettings { shift_s: hours * 3600.0, ..DaySettings::default() };
+    let settings = SimulatedSettings { machine, seed, day, ..SimulatedSettings::default() };
     let mut bench = Bench::at_work(settings, &scripts, &limits(50.0, 120.0));
-    if let Some(record) = model {
-        bench.pipeline.wear_mut().set_models("", vec![Arc::new(record.clone())]);
-    }
+    bench.pipeline.wear_mut().set_models("", models.iter().cloned().map(Arc::new).collect());
+    bench.work_material = (!models.is_empty()).then(|| MATERIAL.into());
     let (mut shift, mut in_use) = (Shift::default(), BTreeMap::<u8, Edge>::new());
     let mut asked = false;
     while bench.now_s() < hours * 3600.0 {
@@ -104,11 +107,75 @@ fn score(name: &str, shifts: &[Shift]) -> usize {
 
 fn record() -> WearRecord {
     let model = WearModel::Physical(super::wear::model());
-    WearRecord::new(WearKey::default(), CRITERION_MM, ("test".to_owned(), 36, 1.0), model)
+    let key = WearKey { work_material: MATERIAL.to_owned(), ..WearKey::default() };
+    WearRecord::new(key, CRITERION_MM, ("test".to_owned(), 36, 1.0), model)
 }
 
+/// Tools of the mill that a shop would learn: face mill, rougher, finisher.
+const LEARNED_TOOLS: [u8; 3] = [1, 2, 3];
+/// The first lot of the day, s: its material has the hardness of the plan.
+const FIRST_LOT_S: f64 = 1800.0;
+
+/// What a shop learns on the mill: for each tool a model of the cut that it makes, from the first lots of four days with edges of
+/// known wear. Speed, feed and depth are held, because production never changes them.
+fn mill_records() -> Vec<WearRecord> {
+    let mut cuts = BTreeMap::<u8, Vec<Cut>>::new();
+    for (day, wear_mm) in [0.02, 0.10, 0.19, 0.27].into_iter().enumerate() {
+        let seed = 1000 + day as u64;
+        let settings =
+            SimulatedSettings { machine: SimulatedMachine::Mill, seed, wear_mm, ..SimulatedSettings::default() };
+        let mut bench = Bench::at_work(settings, &[], &limits(50.0, 120.0));
+        let mut sums = BTreeMap::<(u8, u32), (f64, f64, f64)>::new();
+        let mut conditions = BTreeMap::<u8, CutConditions>::new();
+        while bench.now_s() < FIRST_LOT_S {
+            bench.tick();
+            let moment = bench.machine.moment((bench.now_s() * 1e9) as i64);
+            let estimates = bench.pipeline.estimates();
+            let Ok(power) = estimates.cutting_power_w else { continue };
+            let settled = estimates.at_ns - estimates.since_ns > 1_500_000_000;
+            let panel = moment.panel;
+            if estimates.state == State::Cutting && settled && LEARNED_TOOLS.contains(&panel.tool) {
+                let sum = sums.entry((panel.tool, panel.part_count)).or_default();
+                *sum = (sum.0 + 1.0, sum.1 + power.value, sum.2 + moment.truth.flank_wear_mm);
+                let (speed, feed) = MILL_CUTS[usize::from(panel.tool) - 1];
+                let metres_min = std::f64::consts::PI * panel.diameter_mm * speed / 1000.0;
+                conditions.entry(panel.tool).or_insert(CutConditions::of([
+                    0.0,
+                    metres_min,
+                    feed / speed,
+                    panel.depth_of_cut_mm,
+                ]));
+            }
+        }
+        for ((tool, _), (count, power, wear)) in sums.into_iter().filter(|(_, sum)| sum.0 > 50.0) {
+            let cut = conditions[&tool].with_wear(wear / count);
+            cuts.entry(tool).or_default().push(Cut { conditions: cut, cutting_power_w: power / count });
+        }
+    }
+    let held = ["cutting_speed_m_min", "feed_per_rev_mm", "depth_of_cut_mm"].map(str::to_owned);
+    let record = |(tool, cuts): (u8, Vec<Cut>)| {
+        let found = fit_physical(&cuts, &held).expect("a fit");
+        let operation = ["face milling", "roughing", "finishing"][usize::from(tool) - 1].to_owned();
+        let key =
+            WearKey { tool: format!("T{tool}"), work_material: MATERIAL.to_owned(), operation, ..WearKey::default() };
+        let origin = ("test".to_owned(), cuts.len(), found.r2);
+        let slope = found.physical.wear_slope_w_per_mm(&cuts[0].conditions) / found.physical.cutting_power_w;
+        println!(
+            "T{tool}: {} cuts, {:.0} W sharp, {slope:.2} more per mm of wear, residual {:.1} W",
+            cuts.len(),
+            found.physical.cutting_power_w,
+            found.physical.residual_sd_w
+        );
+        WearRecord::new(key, CRITERION_MM, origin, WearModel::Physical(found.physical))
+    };
+    cuts.into_iter().map(record).collect()
+}
+
+/// Spindle speed and feed that the mill's programs use with T1 to T3, rpm and mm/min.
+const MILL_CUTS: [(f64, f64); 3] = [(1200.0, 720.0), (3600.0, 1150.0), (5500.0, 900.0)];
+
 /// Runs so many seeds on both cores.
-fn shifts(machine: SimulatedMachine, seeds: u64, hours: f64, model: Option<&WearRecord>) -> Vec<Shift> {
+fn shifts(machine: SimulatedMachine, seeds: u64, hours: f64, model: &[WearRecord]) -> Vec<Shift> {
     std::thread::scope(|scope| {
         let lane = |from: u64| {
             move || (from..=seeds).step_by(2).map(|seed| shift(machine, seed, hours, model)).collect::<Vec<_>>()
@@ -120,29 +187,40 @@ fn shifts(machine: SimulatedMachine, seeds: u64, hours: f64, model: Option<&Wear
 
 #[test]
 fn new_edges_raise_no_alarm() {
-    let first = shifts(SimulatedMachine::Lathe, 1, 0.75, None);
+    let first = shifts(SimulatedMachine::Lathe, 1, 0.75, &[]);
     assert_eq!((score("lathe, 45 minutes", &first), first[0].requests), (0, 0));
 }
 
 fn campaign(seeds: u64) {
-    let lathe = shifts(SimulatedMachine::Lathe, seeds, 8.0, None);
-    let mill = shifts(SimulatedMachine::Mill, seeds, 8.0, None);
-    let learned = shifts(SimulatedMachine::Lathe, seeds, 8.0, Some(&record()));
-    let found =
-        [score("lathe, no model", &lathe), score("mill, no model", &mill), score("lathe, learned model", &learned)];
-    assert_eq!(found, [0, 0, 0]);
+    let (lathe, mill) = (SimulatedMachine::Lathe, SimulatedMachine::Mill);
+    let unnamed = |mut record: WearRecord| {
+        record.key.work_material.clear();
+        record
+    };
+    let runs: [(&str, SimulatedMachine, f64, Vec<WearRecord>); 6] = [
+        ("lathe, no model", lathe, 8.0, Vec::new()),
+        ("mill, no model", mill, 8.0, Vec::new()),
+        ("mill, no model, three shifts on end", mill, 24.0, Vec::new()),
+        ("lathe, learned model of any material", lathe, 8.0, vec![unnamed(record())]),
+        ("lathe, learned model of its material", lathe, 8.0, vec![record()]),
+        ("mill, learned models of its operations", mill, 8.0, mill_records()),
+    ];
+    let chosen = std::env::var("WEAR_RUNS").unwrap_or_default();
+    for (name, machine, hours, models) in runs.into_iter().filter(|run| run.0.contains(&chosen)) {
+        assert_eq!(score(name, &shifts(machine, seeds, hours, &models)), 0, "{name}: a false alarm");
+    }
 }
 
 /// `cargo test --release --test loops fifty_shifts -- --ignored --nocapture`
 #[test]
-#[ignore = "90 minutes: false wear alarms and true wear at the alarm in 150 shifts"]
+#[ignore = "200 minutes: false wear alarms and true wear at the alarm in 400 shifts"]
 fn fifty_shifts() {
     campaign(50);
 }
 
 /// `cargo test --release --test loops three_shifts -- --ignored --nocapture`
 #[test]
-#[ignore = "6 minutes: the same in 9 shifts"]
+#[ignore = "12 minutes: the same in 24 shifts"]
 fn three_shifts() {
     campaign(3);
 }
