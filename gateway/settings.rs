@@ -212,7 +212,9 @@ pub fn told_changes(events: &[Event]) -> Vec<Value> {
     let mut newest_first: Vec<&Event> = events.iter().collect();
     newest_first.sort_by_key(|it| std::cmp::Reverse(it.at_ns));
     let change = |it: &&Event| {
-        let mut detail: Map<String, Value> = serde_json::from_str(&it.detail).ok()?;
+        // The detail of an event is JSON: here the text of the notice, which is JSON as well.
+        let text: String = serde_json::from_str(&it.detail).ok()?;
+        let mut detail: Map<String, Value> = serde_json::from_str(&text).ok()?;
         detail.insert("at_ms".to_owned(), json!(it.at_ns / 1_000_000));
         Some(Value::Object(detail))
     };
@@ -318,9 +320,11 @@ mod tests {
             kind: KIND.to_owned(),
             source: "scripts".to_owned(),
             text: String::new(),
-            detail:
+            detail: json!(
                 json!({ "setting": "one.x_w", "place": "this machine", "before": "5.0", "after": after, "by": "Li" })
-                    .to_string(),
+                    .to_string()
+            )
+            .to_string(),
         };
         let changes = told_changes(&[told(1_000_000, "6.0"), told(2_000_000, "7.0")]);
         let document = document(declared.iter(), &values, &changes);
