@@ -18,7 +18,7 @@
 //! A recording of more rows than are fitted one by one gets the answer of the search alone, which looks at an excerpt: the evidence
 //! holds about 750 columns for every row in memory.
 
-use super::diagnosis::{Diagnosis, Verdict};
+use super::diagnosis::{Diagnosis, UNKNOWN, Verdict};
 use super::frame::ROWS_MAX;
 use super::model::Model;
 use super::next_step::{alternative, of_effects};
@@ -27,24 +27,17 @@ use super::{diagnose, evidence};
 use adapters::Recording;
 use std::collections::BTreeSet;
 
-/// What has no name.
-const UNKNOWN: &str = "unknown";
-
 /// Compares a model with a recording; `seed` is that of the resampling.
 ///
 /// # Errors
 /// Everything that makes the input unusable, with what to record instead.
 pub fn compare(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let searched = diagnose(recording, model, seed)?;
-    if is_silent(&searched) || recording.rows() > ROWS_MAX {
+    if searched.verdict.is_silent() || recording.rows() > ROWS_MAX {
         return Ok(searched);
     }
     let weighed = evidence::diagnose(recording, model)?;
-    Ok(if is_silent(&weighed) { weighed } else { both(searched, weighed) })
-}
-
-fn is_silent(diagnosis: &Diagnosis) -> bool {
-    matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::CannotTell)
+    Ok(if weighed.verdict.is_silent() { weighed } else { both(searched, weighed) })
 }
 
 /// What two methods that both report something say together.
@@ -97,7 +90,7 @@ impl Diagnosis {
             let is_known = alternatives.iter().any(|known| known.effect == name);
             if name != UNKNOWN && !told.contains(name) && !is_known {
                 let instead_of = if told.contains(instead_of) { instead_of } else { &replaced };
-                alternatives.push(alternative(name, instead_of));
+                alternatives.push(alternative(name, instead_of, 0.0));
             }
         }
         self.alternatives = alternatives;
@@ -141,7 +134,7 @@ mod tests {
             fit: None,
             mismatch: Vec::new(),
             missing: names.iter().map(missing).collect(),
-            alternatives: beside.iter().map(|name| alternative(name, names[0])).collect(),
+            alternatives: beside.iter().map(|name| alternative(name, names[0], 0.0)).collect(),
             baseline_shift: Vec::new(),
             data_quality: Vec::new(),
             next_experiment: None,

@@ -35,8 +35,7 @@ pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagn
         let first = whole.diagnosed(seed);
         let Some(mut other) = whole.with_the_strange_fitted(&first) else { return Ok(first) };
         let second = other.diagnosed(seed);
-        let silent = matches!(second.verdict, Verdict::NoMismatch | Verdict::CannotTell);
-        return Ok(if silent { first } else { second });
+        return Ok(if second.verdict.is_silent() { first } else { second });
     }
     let pieces = excerpt::close(&whole.scene, &whole.units);
     let (first, whole) = whole.seen_through(&pieces, seed);

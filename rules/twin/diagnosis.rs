@@ -4,6 +4,9 @@ use super::locate::Region;
 use super::model::Model;
 use super::quality::Fault;
 
+/// The name of what no law of the catalogue explains.
+pub(super) const UNKNOWN: &str = "unknown";
+
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -30,6 +33,12 @@ impl Verdict {
             Self::NoMismatch => "no_mismatch",
             Self::CannotTell => "cannot_tell",
         }
+    }
+
+    /// Does it report nothing?
+    #[must_use]
+    pub fn is_silent(self) -> bool {
+        matches!(self, Self::NoMismatch | Self::CannotTell)
     }
 }
 

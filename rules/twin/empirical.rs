@@ -7,6 +7,7 @@
 
 use super::channel::{ACCELERATION, DIRECTION, channel_values};
 use super::designs::Design;
+use super::diagnosis::UNKNOWN;
 use super::frame::Frame;
 use super::model::{Parameter, Part, PartFunction};
 use crate::physics::{Entry, OutputKind, Role, Scene};
@@ -295,7 +296,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
         unit: "output".to_owned(),
     });
     let part = Part {
-        kind: "unknown".to_owned(),
+        kind: UNKNOWN.to_owned(),
         name: None,
         parameters: parameters.collect(),
         body: PartFunction::Empirical(form),
@@ -303,7 +304,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
     };
     let columns: Vec<Vec<f64>> = columns.iter().map(|(_, column)| frame.reduce(column)).collect();
     Some(Design {
-        kind: "unknown".to_owned(),
+        kind: UNKNOWN.to_owned(),
         ranges: vec![any; columns.len()],
         freedom: columns.len() + chosen,
         ln_choices: crate::statistics::count(among).ln(),

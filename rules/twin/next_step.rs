@@ -38,13 +38,14 @@ pub(super) fn of_effects<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64
     Some(experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
 }
 
-/// Another kind that this data cannot rule out, with the experiment that separates it from the one it would replace.
-pub(super) fn alternative(kind: &str, instead_of: &str) -> Alternative {
+/// Another kind that this data cannot rule out, `delta_ic` units of information behind the one it would replace, with the
+/// experiment that separates them.
+pub(super) fn alternative(kind: &str, instead_of: &str, delta_ic: f64) -> Alternative {
     let experiment = effect(kind).or_else(|| effect(instead_of)).map(|effect| effect.doc().en.experiment);
     Alternative {
         effect: kind.to_owned(),
         instead_of: instead_of.to_owned(),
-        delta_ic: 0.0,
+        delta_ic,
         separating_experiment: experiment.unwrap_or_default().to_owned(),
     }
 }

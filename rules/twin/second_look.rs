@@ -1,7 +1,7 @@
 //! A second look where nothing was found in the units that were fitted, but those that were held out are strange.
 
 use super::diagnose::Case;
-use super::diagnosis::{Diagnosis, Verdict};
+use super::diagnosis::Diagnosis;
 use super::frame::{FOLDS, group_size, held_out};
 use super::linear::dot;
 use crate::statistics::count;
@@ -16,7 +16,7 @@ impl Case<'_> {
     pub(super) fn with_the_strange_fitted(&self, first: &Diagnosis) -> Option<Self> {
         let quality = first.fit.as_ref()?.before;
         let strange = quality.held_out_rmse? > STRANGE * quality.rmse;
-        if !matches!(first.verdict, Verdict::NoMismatch | Verdict::CannotTell) || !strange {
+        if !first.verdict.is_silent() || !strange {
             return None;
         }
         let left =

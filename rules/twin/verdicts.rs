@@ -1,12 +1,13 @@
 //! The verdict: names, intervals, alternatives, regions, the next experiment, and the sentence for the machinist.
 
 use super::diagnose::Case;
-use super::diagnosis::{Alternative, Diagnosis, Experiment, Missing, ParameterEstimate, Rows, Shift, Verdict};
+use super::diagnosis::{Alternative, Diagnosis, Experiment, Missing, ParameterEstimate, Rows, Shift, UNKNOWN, Verdict};
 use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
 use super::misnamed::ENTRY;
 use super::model::{Model, Part, PartFunction, simulate};
+use super::next_step::alternative;
 use super::outcome::Outcome;
 use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
@@ -57,15 +58,15 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     let mut alternatives = alternatives(case, &outcome);
     // Not after all names were found too small to be worth claiming.
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
-        alternatives.push(alternative("unknown", &nameless.instead_of, nameless.delta_ic));
+        alternatives.push(alternative(UNKNOWN, &nameless.instead_of, nameless.delta_ic));
     }
     let doubtful = outcome.fits.carries_little() || outcome.found.leaves_much_unnamed();
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
-        alternatives.extend(missing.first().map(|first| alternative("unknown", &first.effect, 0.0)));
+        alternatives.extend(missing.first().map(|first| alternative(UNKNOWN, &first.effect, 0.0)));
     }
     let is_named = |kind: &&String| missing.iter().any(|named| named.effect == **kind);
     if let Some(doubted) = outcome.doubted.as_ref().filter(is_named).filter(|_| !alternatives.iter().any(is_nameless)) {
-        alternatives.push(alternative("unknown", doubted, 0.0));
+        alternatives.push(alternative(UNKNOWN, doubted, 0.0));
     }
     if let Some(like) = missing.iter().find(|named| outcome.slight_entry && is_like_an_entry(&named.effect)) {
         alternatives.push(alternative(ENTRY, &like.effect, 0.0));
@@ -120,7 +121,7 @@ fn is_hardly_a_window(named: &Missing, period_s: f64) -> bool {
 
 /// Is it a cause without a name?
 fn is_nameless(other: &Alternative) -> bool {
-    other.effect == "unknown"
+    other.effect == UNKNOWN
 }
 
 /// Is a tool that enters or leaves the work confused with this?
@@ -232,7 +233,7 @@ fn alternatives_within(case: &Case<'_>, outcome: &Outcome, class: f64) -> Vec<Al
     let kind = |member: &usize| outcome.designs[*member].kind.as_str();
     let kinds: Vec<&str> = best.members.iter().map(kind).collect();
     if outcome.unknown.is_some() {
-        return kinds.iter().map(|name| alternative(name, "unknown", 0.0)).collect();
+        return kinds.iter().map(|name| alternative(name, UNKNOWN, 0.0)).collect();
     }
     // Where a fit leaves more than noise, likelihoods mean that much less.
     let within = class * best.fit.dispersion(&case.frame);
@@ -270,16 +271,6 @@ fn forgiven(outcome: &Outcome, other: &Hypothesis) -> f64 {
     let new = other.members.iter().filter(|member| !outcome.found.best.members.contains(member));
     let designs = new.map(|member| &outcome.designs[*member]);
     designs.filter(|design| METER.contains(&design.kind.as_str())).map(|design| design.reluctance).sum()
-}
-
-fn alternative(other: &str, instead_of: &str, delta_ic: f64) -> Alternative {
-    let experiment = effect(other).or_else(|| effect(instead_of)).map_or("", |effect| effect.doc().en.experiment);
-    Alternative {
-        effect: other.to_owned(),
-        instead_of: instead_of.to_owned(),
-        delta_ic,
-        separating_experiment: experiment.to_owned(),
-    }
 }
 
 /// One region per added effect, the largest share first.

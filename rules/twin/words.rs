@@ -1,6 +1,6 @@
 //! The diagnosis in plain words.
 
-use super::diagnosis::{Diagnosis, Verdict};
+use super::diagnosis::{Diagnosis, UNKNOWN, Verdict};
 use super::locate::Condition;
 use super::outcome::FailedHoldout;
 
@@ -49,7 +49,7 @@ pub(super) fn withdrawn(withdrawn: &FailedHoldout, unit: &str) -> String {
 
 /// A rival in words; one without a name too.
 fn rival(effect: &str) -> String {
-    if effect == "unknown" { "a cause that is not in the catalogue".to_owned() } else { effect.replace('_', " ") }
+    if effect == UNKNOWN { "a cause that is not in the catalogue".to_owned() } else { effect.replace('_', " ") }
 }
 
 fn improvement(diagnosis: &Diagnosis) -> String {

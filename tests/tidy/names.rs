@@ -41,7 +41,7 @@ const STAY: [(&str, &str, &str); 4] = [
 ];
 
 /// The code of a file without its modules of tests.
-fn production(text: &str) -> Vec<&str> {
+pub(super) fn production(text: &str) -> Vec<&str> {
     let (mut lines, mut in_tests, mut before) = (Vec::new(), false, "");
     for line in text.lines() {
         in_tests |= before == "#[cfg(test)]" && line.starts_with("mod ") && line.ends_with('{');

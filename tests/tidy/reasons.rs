@@ -1,5 +1,6 @@
 //! Named numbers of the twin say where they come from. Those that do not are counted, and may only become fewer.
 
+use super::names::production;
 use super::texts;
 
 /// Named numbers of the twin whose documentation gives no reason. Whoever gives one of them its reason lowers this.
@@ -24,7 +25,7 @@ fn is_number(line: &str) -> bool {
 /// Every named number of these lines, and whether its documentation gives a reason.
 fn reasons(text: &str) -> Vec<bool> {
     let (mut doc, mut found) = (String::new(), Vec::new());
-    for line in text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default().lines() {
+    for line in production(text) {
         let code = line.trim_start();
         if let Some(words) = code.strip_prefix("///") {
             doc += words;

@@ -19,6 +19,7 @@ mod server;
 mod space;
 mod units;
 
+use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::{Content, Item, Outbox, Record};
 use adapters::address::{Endpoint, Keys, Login, endpoint};
@@ -26,7 +27,6 @@ use server::Running;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use tokio::net::TcpListener;
 
 /// The port of OPC UA (IANA).
 const PORT: u16 = 4840;
@@ -100,19 +100,12 @@ impl OpcuaSink {
         }
     }
 
-    async fn bind(&self) -> Result<TcpListener, SinkError> {
-        let Endpoint { host, port } = &self.target.at;
-        TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
-            let next =
-                "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
-            SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
-        })
-    }
-
     async fn begin(&mut self) -> Result<(), SinkError> {
         self.stop();
-        let listener = self.bind().await?;
+        let listener = listen_on(&self.target.at).await?;
         let running = Running::start(&self.target, &self.outbox, self.directory.clone(), listener).await?;
+        // A server that begins again has forgotten which alarms stand.
+        running.tell_alarms(&self.standing(), self.outbox.head().borrow().newest_ns.unwrap_or(0));
         self.running = Some(running);
         (self.heard, self.silent) = (Instant::now(), false);
         Ok(())
@@ -189,7 +182,7 @@ impl Sink for OpcuaSink {
     }
 
     fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(async move { self.bind().await.map(drop) })
+        Box::pin(async move { listen_on(&self.target.at).await.map(drop) })
     }
 
     fn close(&mut self) -> Pending<'_, ()> {
@@ -207,23 +200,41 @@ mod tests {
     use super::*;
     use crate::history::OutboxSettings;
 
-    #[tokio::test]
-    async fn values_that_are_not_renewed_are_taken_away() {
-        let directory = tempfile::tempdir().expect("a directory");
+    /// A server on a free port, for everybody.
+    fn anonymous(directory: &Path) -> OpcuaSink {
         let outbox = Outbox::new("Lathe 7", OutboxSettings::default(), []);
         let mut keys = Keys::of("anonymous=yes");
         let mut target = OpcuaTarget::parse("//127.0.0.1", &mut keys).expect("an address");
         target.at.port = 0;
-        let mut sink = OpcuaSink::new(target, &outbox, &directory.path().join("history.db"));
+        OpcuaSink::new(target, &outbox, &directory.join("history.db"))
+    }
+
+    #[tokio::test]
+    async fn a_server_that_begins_again_tells_the_alarms_that_stand() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let mut sink = anonymous(directory.path());
+        sink.alarms.insert("coolant".to_owned(), "coolant: the level is low".to_owned());
+        for _ in 0..2 {
+            sink.begin().await.expect("it listens");
+            let told = sink.running.as_ref().expect("it runs").alarms().value;
+            assert_eq!(told, Some(opcua::types::Variant::from(sink.standing())));
+        }
+    }
+
+    #[tokio::test]
+    async fn values_that_are_not_renewed_are_taken_away() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let mut sink = anonymous(directory.path());
         sink.begin().await.expect("it listens");
         sink.look().expect("it runs");
         assert!(!sink.silent);
         let running = sink.running.as_ref().expect("it runs");
-        assert!(running.alarms_status().is_good());
-        let limit = outbox.settings().refresh + LATE;
+        assert!(running.alarms().status.is_some_and(|status| status.is_good()));
+        let limit = sink.outbox.settings().refresh + LATE;
         sink.heard = Instant::now().checked_sub(limit + LATE).expect("the computer has run for longer");
         sink.look().expect("it runs");
         assert!(sink.silent);
-        assert!(sink.running.as_ref().expect("it runs").alarms_status().is_bad());
+        let alarms = sink.running.as_ref().expect("it runs").alarms();
+        assert!(alarms.status.is_some_and(|status| status.is_bad()));
     }
 }

@@ -78,7 +78,6 @@ impl Running {
         let running = Self { handle, manager, shown, task, rejected, counted: Mutex::new(Instant::now()) };
         let at_ns = outbox.head().borrow().newest_ns.unwrap_or(0);
         running.tell(&latest, at_ns);
-        running.tell_alarms(&[], at_ns);
         Ok(running)
     }
 
@@ -103,14 +102,11 @@ impl Running {
         let _known = self.manager.set_values(self.handle.subscriptions(), each);
     }
 
+    /// What a client reads of the alarms.
     #[cfg(test)]
-    pub(super) fn alarms_status(&self) -> opcua::types::StatusCode {
-        let (none, encoding) = (opcua::types::NumericRange::None, opcua::types::DataEncoding::Binary);
-        let space = self.manager.address_space().read();
-        let node = space.find(&self.shown.alarms(&[], 0).0).expect("made with the others").as_node();
-        let (stamps, value) = (opcua::types::TimestampsToReturn::Both, opcua::types::AttributeId::Value);
-        let found = node.get_attribute(stamps, value, &none, &encoding);
-        found.and_then(|value| value.status).unwrap_or(opcua::types::StatusCode::Good)
+    pub(super) fn alarms(&self) -> DataValue {
+        let node = self.shown.alarms(&[], 0).0;
+        space::read(&self.manager.address_space().read(), &node).expect("made with the others")
     }
 
     /// An error when the server has ended; keeps the number of strangers' certificates bounded.

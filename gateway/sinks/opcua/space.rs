@@ -295,6 +295,14 @@ fn types(space: &mut AddressSpace, numbers: Numbers) {
     }
 }
 
+/// The value of a node as a client reads it.
+#[cfg(test)]
+pub(super) fn read(space: &AddressSpace, node: &NodeId) -> Option<DataValue> {
+    use opcua::types::{AttributeId, DataEncoding, NumericRange, TimestampsToReturn};
+    let (stamps, encoding) = (TimestampsToReturn::Both, DataEncoding::Binary);
+    space.find(node)?.as_node().get_attribute(stamps, AttributeId::Value, &NumericRange::None, &encoding)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,12 +317,7 @@ mod tests {
             let status = absent(reason);
             assert!(status.is_bad(), "{reason}");
             set_missing(&mut space, &node, status);
-            let found = space.find(&node).map(|node| {
-                let (none, encoding) = (opcua::types::NumericRange::None, opcua::types::DataEncoding::Binary);
-                let stamps = opcua::types::TimestampsToReturn::Both;
-                node.as_node().get_attribute(stamps, opcua::types::AttributeId::Value, &none, &encoding)
-            });
-            assert_eq!(found.flatten().and_then(|value| value.status), Some(status), "{reason}");
+            assert_eq!(read(&space, &node).and_then(|value| value.status), Some(status), "{reason}");
         }
     }
 }

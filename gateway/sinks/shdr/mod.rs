@@ -13,6 +13,7 @@ mod model;
 
 pub use devices::devices_xml;
 
+use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
 use crate::history::Outbox;
 use adapters::address::{Endpoint, Keys, endpoint};
@@ -80,18 +81,9 @@ impl ShdrSink {
         self.shared = None;
     }
 
-    async fn bind(&self) -> Result<TcpListener, SinkError> {
-        let Endpoint { host, port } = &self.target.at;
-        TcpListener::bind((host.as_str(), *port)).await.map_err(|error| {
-            let next =
-                "end the program that has the port, write another port, or an address of this box (0.0.0.0: all)";
-            SinkError::line(format!("the box cannot listen on {host}:{port}: {error}"), next)
-        })
-    }
-
     async fn begin(&mut self) -> Result<(), SinkError> {
         self.stop();
-        let listener = self.bind().await?;
+        let listener = listen_on(&self.target.at).await?;
         let at_ns = self.outbox.head().borrow().newest_ns.unwrap_or(0);
         let machine = Machine::new(self.outbox.machine(), &self.outbox.latest(), at_ns);
         let shared = Arc::new(AgentContext {
@@ -175,7 +167,7 @@ impl Sink for ShdrSink {
     }
 
     fn probe(&mut self) -> Pending<'_, Result<(), SinkError>> {
-        Box::pin(async move { self.bind().await.map(drop) })
+        Box::pin(async move { listen_on(&self.target.at).await.map(drop) })
     }
 
     fn close(&mut self) -> Pending<'_, ()> {

@@ -2,10 +2,11 @@
 
 use super::bank::Since;
 use super::follow::Follower;
-use super::judge::{Judge, Named, UNKNOWN};
+use super::judge::{Judge, Named};
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
 use crate::statistics::rms;
+use crate::twin::diagnosis::UNKNOWN;
 use std::ops::Range;
 
 /// Squared deviations gained from which a step is taken to have begun in a held-out run.

@@ -8,11 +8,9 @@ use super::naming::Naming;
 use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
 use crate::statistics::count;
-use crate::twin::diagnosis::Verdict;
+use crate::twin::diagnosis::{UNKNOWN, Verdict};
 use std::collections::BTreeMap;
 
-/// What has no name.
-pub(super) const UNKNOWN: &str = "unknown";
 /// Groups that are looked at.
 const GROUPS: usize = 8;
 

@@ -5,12 +5,12 @@
 
 use super::baseline::Baseline;
 use super::inputs::RecordingInputs;
-use super::judge::{EvidenceAnswer, UNKNOWN, sum_of};
+use super::judge::{EvidenceAnswer, sum_of};
 use crate::physics::{Effect, effect};
 use crate::statistics::{count, rms};
 use crate::twin::diagnose::Case;
 use crate::twin::diagnosis::{
-    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, Verdict,
+    Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
 };
 use crate::twin::estimate::estimates;
 use crate::twin::fit::{Fit, fit};
@@ -180,7 +180,7 @@ impl EvidenceReport<'_, '_> {
     }
 
     fn alternatives(&self) -> Vec<Alternative> {
-        self.answer.alternatives.iter().map(|(other, instead)| alternative(other, instead)).collect()
+        self.answer.alternatives.iter().map(|(other, instead)| alternative(other, instead, 0.0)).collect()
     }
 
     /// What separates what is left; always where the answer is not sure.
