@@ -187,7 +187,7 @@ impl<'a> Case<'a> {
         act(&mut data)
     }
 
-    fn fit_baseline(&mut self) -> Option<Fit> {
+    pub(super) fn fit_baseline(&mut self) -> Option<Fit> {
         let parts = self.parts.clone();
         let plain = self.with_data(|data| fit(data, &parts, Arma { phi: 0.7, theta: -0.2 }))?;
         self.even_out(&plain);

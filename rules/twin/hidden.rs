@@ -31,6 +31,16 @@ const CARRIED: f64 = 1.0;
 /// Finds a switch in a residual of this noise.
 type Finder = fn(&[f64], &Frame, Arma) -> Option<Switching>;
 
+/// A wave whose size and phase nobody records.
+pub(super) struct FollowedWave {
+    /// The kind of effect.
+    pub(super) kind: &'static str,
+    /// Its value in every row: as found where the rows were fitted, expected from earlier rows in those held out.
+    pub(super) values: Vec<f64>,
+    /// Logarithm of the choices that it seems to have had ([`Case::seeming_choices`]).
+    pub(super) ln_choices: f64,
+}
+
 impl Case<'_> {
     /// A consumer that goes on and off unseen, as a hypothesis, where what the baseline leaves has two levels.
     pub(super) fn hidden_switch(&mut self, base: &Fit) -> Option<Design> {
@@ -155,6 +165,18 @@ impl Case<'_> {
         }
         self.ripple = Some(found);
         Some(design)
+    }
+
+    /// Waves that the baseline leaves: the ripple of the mains and run-out, followed over every row.
+    pub(super) fn followed_waves(&mut self) -> Vec<FollowedWave> {
+        let Some(base) = self.fit_baseline() else { return Vec::new() };
+        self.simulate_baseline(&base);
+        let designs = [self.hidden_ripple(&base), self.hidden_tone(&base)].into_iter().flatten();
+        let wave = |design: Design| {
+            let kind = crate::physics::effect(&design.kind)?.doc().kind;
+            Some(FollowedWave { kind, values: self.scene.latent(kind)?.to_vec(), ln_choices: design.ln_choices })
+        };
+        designs.filter_map(wave).collect()
     }
 
     /// Logarithm of the choices that a state seems to have had, which is read from the residual that it explains: what it

@@ -4,7 +4,8 @@
 //! 2. Every family of laws, named by the catalogue or nameless, is columns in one bank (`bank.rs`, `families/`).
 //! 3. One Gram matrix for each likely noise, a Schur complement away from every hypothesis (`gram.rs`, `noise.rs`).
 //! 4. The evidence of a set of variants is a Schur complement of it, all sizes summed out (`marginal.rs`, `search.rs`),
-//!    first for the forms as they are, then for the leading ones with their form widened (`second.rs`).
+//!    first for the forms as they are, then for the leading ones with their form widened (`second.rs`), beside hidden
+//!    switches (`hidden.rs`) and the waves that the search follows as well (`Case::followed_waves`).
 //! 5. A nameless curve that is the curve of a named law gets its name (`naming.rs`).
 //! 6. One rule decides what is reported (`decision.rs`, `judge.rs`): improbable that there is nothing, better on inner
 //!    parts of the fitted rows; rows that are held out only withdraw.
@@ -34,6 +35,7 @@ mod told;
 
 use super::diagnose::Case;
 use super::diagnosis::Diagnosis;
+use super::hidden::FollowedWave;
 use super::model::Model;
 use super::verdicts::cannot_tell;
 use adapters::Recording;
@@ -67,6 +69,7 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
         return Ok(cannot_tell(&case, needed));
     }
     let parts = case.parts.clone();
+    let waves = Case::new(recording, model)?.followed_waves();
     let fitted: Vec<usize> = (0..case.frame.len()).flat_map(|group| case.frame.rows(group)).collect();
     let mut scene = case.scene.clone();
     let Some(baseline) = refit(&mut scene, &parts, &fitted) else {
@@ -75,7 +78,7 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
     let inputs = RecordingInputs::new(&scene, &case.units, &case.held, comparable(&scene, &baseline));
     let bank = families::bank(&inputs, model);
     let outliers = outliers(&inputs, &bank, &baseline.tangents);
-    let answer = answer(&inputs, &bank, &baseline, &outliers);
+    let answer = answer(&inputs, &bank, &baseline, &outliers, &waves);
     let ordinary = outliers.ordinary;
     Ok(told::EvidenceReport { case: &mut case, inputs: &inputs, baseline: &baseline, answer, ordinary }.diagnosis())
 }
@@ -93,6 +96,7 @@ fn answer(
     bank: &VariantBank,
     baseline: &Baseline,
     outliers: &Outliers,
+    waves: &[FollowedWave],
 ) -> EvidenceAnswer {
     let compared =
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
@@ -103,6 +107,7 @@ fn answer(
     let mut second = SecondStage::of(inputs, bank, &own, &found);
     let comparison = Comparison::new(inputs, bank, &compared);
     add_sequences(inputs, &comparison, &prepared, &found, outliers, &noises, &mut second);
+    waves.iter().for_each(|wave| add_wave(inputs, wave, &mut second));
     let wide = Comparison::new(inputs, &second.bank, &compared);
     let settings: Vec<NoiseSetting> = noises
         .likely
@@ -223,6 +228,16 @@ fn is_more_than_slow_noise(
         switching = switching.max(first.likelihood_of(&less, noise));
     }
     switching - slow > SWITCH_NATS
+}
+
+/// A wave that was followed, of size one in the fitted rows.
+fn add_wave(inputs: &RecordingInputs<'_>, wave: &FollowedWave, second: &mut SecondStage) {
+    let size = crate::statistics::rms(&inputs.taken(false).map(|row| wave.values[row]).collect::<Vec<_>>());
+    if size > 0.0 {
+        let column = wave.values.iter().map(|x| x / size).collect();
+        let family = Family::of(wave.kind).wide().signed(1.0);
+        second.add(inputs, Owner::Named(family), "followed".to_owned(), column, -wave.ln_choices);
+    }
 }
 
 fn is_same(inputs: &RecordingInputs<'_>, a: &[f64], b: &[f64]) -> bool {
