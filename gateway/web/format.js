@@ -61,3 +61,6 @@ export const weekday = (ms) => time({ weekday: "short", month: "short", day: "nu
 
 /** The clock alone for today (of the box), with the date otherwise. */
 export const when = (ms, nowMs) => (day(ms) === day(nowMs) ? clock(ms) : dateTime(ms));
+
+/** The data directory of `DIR/identified/tool-wear.json`. */
+export const folder = (file) => file?.replace(/\/identified\/[^/]*$/, "") ?? "";

@@ -1,6 +1,6 @@
 // Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets proposed and written.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
-import { number, quantity } from "/web/format.js";
+import { folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
@@ -72,7 +72,7 @@ export function mount(root, context) {
 async function drawPoints(root, context) {
   const found = await ask("/api/v1/identified/thermal").catch((error) => ({ error: error.message }));
   const selection = found.identified?.learned?.selection;
-  if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", found.file))]);
+  if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", folder(found.file)))]);
   const cell = (value, unit) => ({ num: value === null || value === undefined ? "–" : quantity(value, unit) });
   const rows = selection.sensors.map((s) => [context.name(s.sensor), t(s.chosen ? "chosen" : "not_chosen"), s.reason, cell(s.correlation), cell(s.grade_initial_image), cell(s.variance_inflation), cell(s.held_out_rms_um, "um")]);
   const head = [t("temperatures"), "", t("why"), ...["correlation", "grade", "inflation", "held_out_error"].map((key) => ({ num: t(key) }))];

@@ -2,7 +2,7 @@
 // part; how worn the edge is, and how many parts are left.
 import uPlot from "/web/uplot.js";
 import { ask, card, colour, fill, make, row, say, table } from "/web/parts.js";
-import { dateTime, number, quantity } from "/web/format.js";
+import { dateTime, folder, number, quantity } from "/web/format.js";
 import { box, t } from "/web/words.js";
 
 const PARTS = 400;
@@ -116,7 +116,7 @@ function drawModels(root, models) {
 async function drawVariance(root) {
   const found = await ask("/api/v1/identified/tool-wear").catch((error) => ({ error: error.message }));
   const anova = found.identified?.learned?.surface?.anova;
-  if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", found.file))]);
+  if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", folder(found.file)))]);
   const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
   const percent = (share) => (share === null ? "–" : number(100 * share));
   const rows = anova.sources.map((s) => [s.source, cell(s.sum_of_squares), { num: String(s.degrees_of_freedom) }, cell(s.mean_square), cell(s.f), { num: s.p === null || s.p === undefined ? "–" : s.p < 0.0001 ? "< 0.0001" : s.p.toFixed(4) }]);
