@@ -34,6 +34,7 @@ export function mount(root, context) {
       if (!known.includes(state.tool)) state.tool = context.quantity("tool")?.value ?? null;
       if (!known.includes(state.tool)) state.tool = known[0] ?? null;
       fill(tools, known.map((tool) => make("option", "", tool, { value: tool, selected: tool === state.tool })));
+      tools.hidden = !known.length;
       drawModels(models, state.models);
       draw();
     } catch (error) { say(below, error.message); }
@@ -63,7 +64,7 @@ function drawEdge(lamp, facts, status, context, state) {
     row(t("wear_limit"), wear.limit_w === null ? "–" : `${number(wear.limit_w, "W")} ± ${quantity(wear.limit_uncertainty_w, "W")}`, wear.observability === "not_observable_here" ? t("not_observable") : wear.extrapolated?.length ? t("outside_model", wear.extrapolated.join(", ")) : null),
     row(t("wear_form"), t(`form_${wear.form}`))] : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
   const cutting = context.quantity("cutting_power_w");
-  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided")));
+  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"), t("wear_judged")));
   rows.push(row(t("remaining_parts"), left === null ? "–" : t("about", number(Math.round(left.parts))), left === null ? t("remaining_unknown") : t("remaining_words", left.from)));
   fill(facts, rows);
 }
@@ -116,6 +117,8 @@ function drawModels(root, models) {
 async function drawVariance(root) {
   const found = await ask("/api/v1/identified/tool-wear").catch((error) => ({ error: error.message }));
   const anova = found.identified?.learned?.surface?.anova;
+  const refused = found.identified?.learned?.surface?.refused;
+  if (refused) return fill(root, [make("p", "empty", `${t("anova_refused")}: ${[refused.what, refused.next].filter(Boolean).join("; ")}`)]);
   if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", folder(found.file)))]);
   const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
   const percent = (share) => (share === null ? "–" : number(100 * share));
