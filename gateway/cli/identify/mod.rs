@@ -75,7 +75,8 @@ impl ShownBy {
             (None, None) => history.and_then(Path::parent).map(Path::to_owned),
         };
         let Some(directory) = named else { return Ok(()) };
-        let path = identified::keep(&directory, subject, &learned.json).map_err(|problem| CannotRun::new(problem, ""))?;
+        let path =
+            identified::keep(&directory, subject, &learned.json).map_err(|problem| CannotRun::new(problem, ""))?;
         learned.text += &format!("\nfor the page of the box: {}\n", path.display());
         Ok(())
     }

@@ -7,9 +7,7 @@ use crate::identified::{self, THERMAL};
 use adapters::Recording;
 use clap::Args;
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{
-    LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalModel, collect, learn,
-};
+use rules::estimators::thermal::{LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalModel, collect, learn};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
