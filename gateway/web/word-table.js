@@ -42,7 +42,7 @@ export const WORDS = {
   parts_title: ["Finished parts", "已完成工件"], use_title: ["Use of the machine", "机床利用率"], marks_title: ["Alarms and overrides", "报警与倍率"],
   no_parts: ["No part was finished in this time. Choose a longer one.", "该时段内无完成的工件，请选择更长时段。"], no_marks: ["No alarm and no override in this time.", "该时段内无报警与倍率记录。"], no_data_here: ["No data in this time.", "该时段内无数据。"],
   finished: ["Finished", "完成时间"], pieces: ["Pieces", "件数"], duration: ["Duration", "用时"], time_per_state: ["Time in each state", "各状态时间"], cutting_time: ["Cutting", "切削时间"], energy: ["Energy", "能耗"], peak_power: ["Peak power", "峰值功率"],
-  parts_sum: ["{0} parts, {1} of cutting, {2}: {3} for each", "{0} 件，切削 {1}，共 {2}，每件 {3}"], newest_only: ["the newest {0} are shown", "仅显示最新 {0} 条"],
+  parts_sum: ["{0} finished, {1} of cutting, {2}: {3} for each", "{0} 件，切削 {1}，共 {2}，每件 {3}"], newest_only: ["the newest {0} are shown", "仅显示最新 {0} 条"],
   by_hour: ["Hour", "小时"], by_shift: ["Shift", "班次"], by_day: ["Day", "日"], by_week: ["Week", "周"], week_of: ["week of {0}", "{0} 起的一周"], recorded: ["Recorded", "已记录"], recorded_value: ["Recorded", "实测"], switched_on: ["Switched on", "开机"], cutting_share: ["Cutting of switched on", "切削/开机"],
   use_words: ["Shifts begin at {0} of this browser's time zone ([http] shifts).", "班次按浏览器时区 {0} 开始（[http] shifts）。"],
   time: ["Time", "时间"], kind: ["Kind", "类别"], what: ["What", "内容"], still_there: ["still there", "仍存在"], until_clock: ["until {0}", "至 {0}"], override: ["override", "倍率"],
