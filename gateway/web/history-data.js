@@ -16,7 +16,7 @@ export class HistoryData {
   }
 
   /** Everything about a time; null where a newer question was asked meanwhile. `early` is given the samples as soon as they are there:
-      the charts do not wait for sums over a year of states. */
+      the charts do not wait for sums over a year of states, nor share a processor with them. */
   async read(from, to, channels, { first, last }, early) {
     const turn = ++this.turn;
     this.abort?.abort();
@@ -34,7 +34,7 @@ export class HistoryData {
       const [samples, states, shares, parts, alarms, audit] = await Promise.all([
         charts,
         long ? { rows: [] } : list(`states?${range}&limit=10000`),
-        long ? list(`utilisation?${range}&by=${width > 40 * 86400 ? "day" : "hour"}&offset_min=${-new Date(from * 1000).getTimezoneOffset()}`) : { rows: [] },
+        long ? charts.then(() => list(`utilisation?${range}&by=${width > 40 * 86400 ? "day" : "hour"}&offset_min=${-new Date(from * 1000).getTimezoneOffset()}`)) : { rows: [] },
         list(`parts?${range}&limit=${width > 30 * 86400 ? 1 : 2000}`), list(`alarms?${range}&limit=500`), long ? { rows: [] } : list(`audit?${range}&limit=500`),
       ]);
       if (turn !== this.turn) return null;
