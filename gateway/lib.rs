@@ -24,6 +24,7 @@ pub mod gate;
 pub mod handbook;
 pub mod history;
 pub mod http;
+pub mod identified;
 pub mod log;
 pub mod moment;
 pub mod monitoring;

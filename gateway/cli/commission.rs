@@ -9,6 +9,7 @@ use crate::commission::plan::{self, Limits, Which};
 use crate::config::Config;
 use crate::diagnosis::put;
 use crate::history::{Reader, store_wear_model};
+use crate::identified;
 use crate::moment;
 use adapters::clock::{Clock, SystemClock};
 use clap::Args;
@@ -171,6 +172,10 @@ fn write(config: &Config, learned: &Learned) -> Result<Vec<String>, CannotRun> {
         let id = store_wear_model(&config.history.path, now_ns, record)
             .map_err(|error| CannotRun::new(error.to_string(), ""))?;
         written.push(format!("wear model {id} in {}", config.history.path.display()));
+    }
+    for (subject, found) in &learned.found {
+        let path = identified::keep(&config.gateway.data_dir, subject, found);
+        written.push(path.map_err(|problem| CannotRun::new(problem, ""))?.display().to_string());
     }
     written.push(config.gateway.data_dir.join("commission.html").display().to_string());
     Ok(written)

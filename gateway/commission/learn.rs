@@ -3,6 +3,7 @@
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
 use crate::history::STATE_SERIES;
+use crate::identified::{self, THERMAL, TOOL_WEAR};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
 use rules::estimators::balance;
@@ -10,10 +11,11 @@ use rules::estimators::power_separation::{
     LoadLossLearned, NoLoadLearned, ReferenceChoice, identify_load_loss, identify_no_load,
 };
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{SelectionSettings, ThermalLearned, ThermalModel, collect, learn};
+use rules::estimators::thermal::{SelectionSettings, ThermalModel, collect, learn};
 use rules::estimators::wear::{
     Cut, CutColumns, LearnedWear, WearKey, WearOptions, WearRecord, gather, identify_tool_wear,
 };
+use serde_json::Value;
 
 /// One part of the job.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +44,8 @@ pub struct Learned {
     pub thermal: Option<ThermalModel>,
     /// The fits.
     pub pictures: Vec<Picture>,
+    /// How the models were found, by subject: what the page of the box shows.
+    pub found: Vec<(&'static str, Value)>,
     /// What became of torque files.
     pub merged: Vec<Merged>,
 }
@@ -56,6 +60,7 @@ pub fn all(recording: &Recording, merged: Vec<Merged>, machine: &str, criterion_
         wear: None,
         thermal: None,
         pictures: Vec::new(),
+        found: Vec::new(),
         merged,
     };
     learned.no_load(recording);
@@ -141,6 +146,7 @@ impl Learned {
             25.0,
         );
         let Ok(learned) = found else { return };
+        self.found.push((TOOL_WEAR, learned.json()));
         let predicted = |cut: &Cut| learned.model.predict(&cut.conditions).power_w;
         let dots = learned.cuts.iter().map(|cut| Dot { x: cut.cutting_power_w, y: predicted(cut), sd: 0.0 });
         self.pictures.push(Picture::agreement("Cutting power of the wear model 磨损模型", "W", dots.collect()));
@@ -187,9 +193,11 @@ impl Learned {
     }
 
     fn thermal(&mut self, recording: &Recording, machine: &str) {
-        let found =
-            collect(recording).and_then(|collected| learn(&collected.course, SelectionSettings::default(), None));
-        let known = found.as_ref().map(|learned: &ThermalLearned| {
+        let found = collect(recording).and_then(|collected| {
+            let learned = learn(&collected.course, SelectionSettings::default(), None)?;
+            Ok((learned, collected.left_out))
+        });
+        let known = found.as_ref().map(|(learned, _)| {
             let best = learned.best();
             format!("{} terms, {:.2} um in blocks left out", best.fit.law.terms.len(), best.held_out.rms_um)
         });
@@ -201,7 +209,8 @@ impl Learned {
              error predicted",
             180.0,
         );
-        let Ok(learned) = found else { return };
+        let Ok((learned, left_out)) = found else { return };
+        self.found.push((THERMAL, identified::of_thermal(&learned, &left_out)));
         self.thermal = Some(ThermalModel::new(machine.to_owned(), learned.best().fit.law.clone()));
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! At real time its whole day takes five minutes: off, power-up, warm-up, parts, an alarm, a pause. It begins in a cut. A tool is
 //! nearly worn: the wear model that comes with the demonstration says so within minutes. Estimators and twin remember earlier
-//! days (`demo/estimators.json`, `demo/twin.json`): on those the same machine ran through this program, healthy for sixteen hours
+//! days (`demo/estimators.json`, `demo/wear.json`, `demo/twin.json`): on those the same machine ran through this program, healthy for sixteen hours
 //! and then with more friction in the spindle, which the twin has noticed and still tells. Their times are moved so that those
-//! days ended an hour before the start. Faster than real time the machine works in shifts with short nights.
+//! days ended an hour before the start. What is known of the wear (`demo/wear.json`) is from one whole life of an edge and most of the
+//! next, 11,100 s of the same machine at `--speed max`; the edges then got the names that the machine gives to its first ones. The wear
+//! model counts only for the work material that it was learned with, which the recipe of the demonstration names. Faster than real time the machine works in shifts with short nights.
 
 use crate::config::Config;
 use crate::files::replace;
@@ -23,9 +25,15 @@ const MODEL: &str = include_str!("lathe.toml");
 const LEARNED: &str = include_str!("twin.json");
 /// What the estimators have learned.
 const ESTIMATED: &str = include_str!("estimators.json");
+/// What is known of the wear of the edges.
+const WORN: &str = include_str!("wear.json");
+/// What is cut: no controller can be asked for the material.
+const RECIPE: &str = include_str!("operations.toml");
 /// Cutting power over the wear, in the cuts of the short part.
 pub(crate) const WEAR: &str = include_str!("wear.toml");
 
+/// The recipe, in the data directory.
+const RECIPE_FILE: &str = "demo-operations.toml";
 const HOUR_S: i64 = 3600;
 /// 2017 to 2096, in seconds since 1970.
 const DECADES_S: Range<f64> = 1.5e9..4e9;
@@ -34,7 +42,7 @@ const DECADES_S: Range<f64> = 1.5e9..4e9;
 #[must_use]
 pub fn text(speed: MachineSpeed) -> String {
     let day = match speed {
-        MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.235&change_h=0&change_friction_pct=150&dropouts_per_h=0",
+        MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0",
         MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
     };
     format!("[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe?{day}\"\n")
@@ -48,7 +56,10 @@ pub fn furnish(config: &mut Config, speed: MachineSpeed) {
     }
     let data_dir = config.gateway.data_dir.clone();
     match models(&data_dir, &config.history.path) {
-        Ok(()) => config.twin.model = Some(data_dir.join("demo-lathe.toml")),
+        Ok(()) => {
+            config.twin.model = Some(data_dir.join("demo-lathe.toml"));
+            config.operations.path.get_or_insert(data_dir.join(RECIPE_FILE));
+        }
         Err(error) => {
             let text = format!("the demonstration runs without its models: {error}");
             Notice::new(Severity::Warning, "demo", text).say();
@@ -64,9 +75,14 @@ fn models(data_dir: &Path, history: &Path) -> Result<(), String> {
     if !model.exists() {
         let ended_s = (now_ns / SECOND_NS - HOUR_S) as f64;
         replace(&data_dir.join("twin.json"), &moved(LEARNED, ended_s)?).map_err(words)?;
+        replace(&data_dir.join("wear.json"), &moved(WORN, ended_s)?).map_err(words)?;
         // The state that the estimators remember would otherwise seem to have lasted since then.
         replace(&data_dir.join("estimators.json"), &moved(ESTIMATED, (now_ns / SECOND_NS) as f64)?).map_err(words)?;
         replace(&model, MODEL).map_err(words)?;
+    }
+    let recipe = data_dir.join(RECIPE_FILE);
+    if !recipe.exists() {
+        replace(&recipe, RECIPE).map_err(words)?;
     }
     let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);
     if !known {
@@ -125,6 +141,9 @@ mod tests {
         }
         let library = Reader::open(&history).and_then(|reader| reader.wear_models()).expect("readable");
         assert_eq!(library.len(), 1, "stored once");
+        let recipe = rules::operations::parse("demo-operations.toml", RECIPE).expect("a recipe");
+        let materials: Vec<_> = recipe.operations().iter().filter_map(|it| it.work_material.as_deref()).collect();
+        assert_eq!(materials, [library[0].record.key.work_material.as_str()], "the model is for what is cut");
         let learned: Value = serde_json::from_str(LEARNED).expect("JSON");
         assert_eq!(learned["toml"], MODEL, "what was learned belongs to the model");
     }

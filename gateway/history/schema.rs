@@ -8,12 +8,12 @@ use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
 /// Newest schema this version knows; stored as `user_version`.
-pub(crate) const SCHEMA: i64 = 3;
+pub(crate) const SCHEMA: i64 = 4;
 /// `cncg`, stored as `application_id`.
 const APPLICATION: i64 = 0x636e_6367;
 const TABLES: &str = include_str!("schema.sql");
 /// What each schema adds to the one before, beginning with 2. A new file gets all of it.
-const ADDED: [&str; 2] = [include_str!("schema_2.sql"), include_str!("schema_3.sql")];
+const ADDED: [&str; 3] = [include_str!("schema_2.sql"), include_str!("schema_3.sql"), include_str!("schema_4.sql")];
 
 /// Opens the file for writing and creates the tables in a new one.
 pub(crate) fn open_for_writing(path: &Path) -> Result<Connection, HistoryError> {

@@ -1,20 +1,18 @@
 //! `GET /api/v1/identified/{subject}`: what `identify tool-wear` and `identify thermal` have found, for the tables beside the figures.
 //!
-//! The model in the library holds what is needed to use it, not how it was found. Whoever identifies keeps the whole answer with
-//! `cnc-gateway identify thermal ... --json > DATA_DIR/identified/thermal.json`.
+//! `identify` and `commission --write` keep these answers: see [`crate::identified`].
 
 use super::ServerState;
 use super::problem::ApiProblem;
 use super::route::Route;
 use super::rules::aside;
 use crate::files::read_text;
+use crate::identified::{SUBJECTS, path};
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::routing::get;
 use serde_json::{Value, json};
 
-/// What can be identified and is shown.
-const SUBJECTS: [&str; 2] = ["tool-wear", "thermal"];
 /// Such a document is some ten kilobytes.
 const BYTES_MAX: usize = 4 << 20;
 
@@ -25,14 +23,14 @@ async fn identified(State(shared): State<ServerState>, Path(subject): Path<Strin
         return Err(ApiProblem::not_found(&format!("/api/v1/identified/{subject}; known are {}", SUBJECTS.join(", "))));
     }
     aside(move || {
-        let path = shared.data_dir.join("identified").join(format!("{subject}.json"));
+        let path = path(&shared.data_dir, &subject);
         let found = match read_text(&path, BYTES_MAX) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Value::Null,
             Err(error) => {
                 return Err(ApiProblem::unavailable(format!("{}: {error}", path.display()), "look at the file"));
             }
             Ok(text) => serde_json::from_str(&text).map_err(|error| {
-                let next = "write it anew with `cnc-gateway identify ... --json`";
+                let next = "write it anew with `cnc-gateway identify ... --data-dir DIR`";
                 ApiProblem::unavailable(format!("{} is not JSON: {error}", path.display()), next)
             })?,
         };

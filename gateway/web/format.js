@@ -4,7 +4,7 @@ import { language, t } from "./words.js";
 const locale = () => (language() === "zh" ? "zh-CN" : "en-GB");
 /** Decimal places by unit. A meter's noise is larger than what is left out. */
 const PLACES = { rpm: 0, "mm/min": 0, "%": 0, W: 0, A: 1, V: 0, "°C": 1, mm: 3, um: 1, "µm": 1, "mm/rev": 3, N: 0, s: 1, ms: 1, "cm3/min": 1 };
-const UNITS = { um: "µm", "cm3/min": "cm³/min", rpm: "min⁻¹", "1": "" };
+const UNITS = { um: "µm", "cm3/min": "cm³/min", rpm: "min⁻¹", degC: "°C", "1": "" };
 
 export const unitName = (unit) => (unit === "rpm" ? t("rpm") : UNITS[unit] ?? unit ?? "");
 
@@ -61,3 +61,6 @@ export const weekday = (ms) => time({ weekday: "short", month: "short", day: "nu
 
 /** The clock alone for today (of the box), with the date otherwise. */
 export const when = (ms, nowMs) => (day(ms) === day(nowMs) ? clock(ms) : dateTime(ms));
+
+/** The data directory of `DIR/identified/tool-wear.json`. */
+export const folder = (file) => file?.replace(/\/identified\/[^/]*$/, "") ?? "";

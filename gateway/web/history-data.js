@@ -15,8 +15,9 @@ export class HistoryData {
     this.turn = 0;
   }
 
-  /** Everything about a time; null where a newer question was asked meanwhile. */
-  async read(from, to, channels, { first, last }) {
+  /** Everything about a time; null where a newer question was asked meanwhile. `early` is given the samples as soon as they are there:
+      the charts do not wait for sums over a year of states, nor share a processor with them. */
+  async read(from, to, channels, { first, last }, early) {
     const turn = ++this.turn;
     this.abort?.abort();
     this.abort = new AbortController();
@@ -28,10 +29,12 @@ export class HistoryData {
     const long = width > 2.5 * 86400;
     const list = (path) => ask(`/api/v1/${path}`, options).catch((error) => { if (error.name === "AbortError") throw error; return { rows: [] }; });
     try {
+      const asked = channels.length ? ask(`/api/v1/samples?${range}&channels=${channels.join(",")}&resolution_s=${resolution}`, options) : Promise.resolve({ series: [] });
+      const charts = asked.then((samples) => { if (turn === this.turn) early({ series: samples.series, resolution }); return samples; });
       const [samples, states, shares, parts, alarms, audit] = await Promise.all([
-        channels.length ? ask(`/api/v1/samples?${range}&channels=${channels.join(",")}&resolution_s=${resolution}`, options) : { series: [] },
+        charts,
         long ? { rows: [] } : list(`states?${range}&limit=10000`),
-        long ? list(`utilisation?${range}&by=${width > 40 * 86400 ? "day" : "hour"}&offset_min=${-new Date(from * 1000).getTimezoneOffset()}`) : { rows: [] },
+        long ? charts.then(() => list(`utilisation?${range}&by=${width > 40 * 86400 ? "day" : "hour"}&offset_min=${-new Date(from * 1000).getTimezoneOffset()}`)) : { rows: [] },
         list(`parts?${range}&limit=${width > 30 * 86400 ? 1 : 2000}`), list(`alarms?${range}&limit=500`), long ? { rows: [] } : list(`audit?${range}&limit=500`),
       ]);
       if (turn !== this.turn) return null;

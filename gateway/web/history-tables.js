@@ -26,9 +26,12 @@ export function partsTable(root, found, range, context, go) {
   const seen = found.parts.filter((p) => p.to_ms >= from && p.from_ms <= to).reverse();
   if (!seen.length) return fill(root, [make("p", "empty", t("no_parts"))]);
   const head = [t("finished"), t("program"), t("part"), { num: t("pieces") }, { num: t("duration") }, t("time_per_state"), { num: t("cutting_time") }, { num: t("energy") }, { num: t("peak_power") }];
+  // A machine whose parts have no names needs no column for them.
+  const named = seen.some((p) => p.part);
+  if (!named) head.splice(2, 1);
   const rows = seen.slice(0, ROWS_MAX).map((p) => [
     { text: make("button", "link-button", when(p.to_ms, to), { type: "button", onclick: () => go(p.from_ms / 1000, p.to_ms / 1000) }) },
-    p.program ?? "–", p.part ? plainName(p.part) : "–", { num: String(p.count) }, { num: duration((p.to_ms - p.from_ms) / 1000) },
+    p.program ?? "–", ...(named ? [p.part ? plainName(p.part) : "–"] : []), { num: String(p.count) }, { num: duration((p.to_ms - p.from_ms) / 1000) },
     { text: p.seconds ? shareBar(p.seconds, context) : "–" }, { num: p.cutting_s === null ? "–" : duration(p.cutting_s) }, { num: energy(p.energy_j) }, { num: p.peak_power_w == null ? "–" : quantity(p.peak_power_w, "W") }]);
   const total = seen.reduce((sum, p) => ({ count: sum.count + p.count, energy: sum.energy + (p.energy_j ?? 0), cutting: sum.cutting + (p.cutting_s ?? 0) }), { count: 0, energy: 0, cutting: 0 });
   const words = t("parts_sum", total.count, duration(total.cutting), energy(total.energy), total.count ? energy(total.energy / total.count) : "–");

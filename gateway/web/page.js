@@ -8,6 +8,8 @@ import { language, own, setLanguage, t } from "./words.js";
 const VIEWS = ["now", "history", "wear", "thermal", "twin", "rules", "audit", "help"];
 const at = (id) => document.getElementById(id);
 const live = new Live();
+// The view is loaded while the words of the box are asked for.
+import(`/web/${viewOf(location.pathname)}.js`).catch(() => {});
 
 /** What every view can use. */
 const context = {
@@ -61,9 +63,11 @@ function drawFrame() {
   at("views").setAttribute("aria-label", t("views"));
   at("views").replaceChildren(...VIEWS.map((word) =>
     make("a", "", t(`view_${word}`), { href: `/${word}`, "data-view": word, "aria-current": word === view ? "page" : null })));
+  // On a narrow screen the row of views is wider than the window.
+  at("views").querySelector("[aria-current]").scrollIntoView({ block: "nearest", inline: "center" });
   say(at("language"), language() === "zh" ? "English" : "中文");
   at("language").setAttribute("lang", language() === "zh" ? "en" : "zh-CN");
-  const links = [["/api/v1/status", "status"], ["/openapi.json", "OpenAPI"], ["/metrics", "Prometheus"]];
+  const links = [["/api/v1/status", t("status_link")], ["/openapi.json", "OpenAPI"], ["/metrics", "Prometheus"]];
   at("footer").replaceChildren(make("span", "", `cnc-gateway ${live.status?.version ?? ""}`), ...links.map(([href, name]) => make("a", "", name, { href })));
   drawPerson();
 }

@@ -7,6 +7,8 @@ import { clock, clockMinute, dayShort, number, unitName } from "./format.js";
 /** Width of the value axis: the same everywhere, so that charts and ribbons stand exactly above each other. */
 export const AXIS_PX = 64;
 export const RIGHT_PX = 12;
+/** Room for the unit, so that it never lies on the greatest number of the axis. */
+const TOP_PX = 20;
 export const LINES = ["line-a", "line-b", "line-c", "line-d", "line-e", "line-f"];
 
 const timeSplits = [1, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 21600, 43200, 86400, 172800, 604800, 1209600, 2678400, 7776000, 31536000];
@@ -63,7 +65,7 @@ export class TimePlot {
     });
     const { low, high } = this;
     this.u = new uPlot({
-      width: this.width(), height: this.height, padding: [10, RIGHT_PX, 0, 0], legend: { show: false }, tzDate: localDate,
+      width: this.width(), height: this.height, padding: [TOP_PX, RIGHT_PX, 0, 0], legend: { show: false }, tzDate: localDate,
       cursor: { drag: { x: false, y: false }, sync: this.sync ? { key: this.sync, setSeries: false } : undefined, points: { size: 7 }, y: false },
       scales: { x: { time: true }, y: { range: (_, least, most) => span(least, most, low, high) } },
       axes: [{ ...axis, values: this.times ? timeLabels : (_, splits) => splits.map(() => ""), space: 84, size: this.times ? 34 : 8, incrs: timeSplits }, { ...axis, size: AXIS_PX, gap: 6, space: 34, values: (_, splits) => splits.map((v) => number(v, Math.abs(splits.at(-1) - splits[0]) < 4 ? "" : unit)) }],
@@ -98,6 +100,13 @@ export class TimePlot {
     this.u.destroy();
     this.box.remove();
   }
+}
+
+/** From where a chart of this time is to be drawn: where the data begins, if that is later, so that a young history fills its chart
+    and is no line at the right edge. At least a minute is shown. */
+export function drawnFrom(data, from, to) {
+  const first = data[0].find((_, at) => data.some((column, of) => of > 0 && typeof column[at] === "number"));
+  return first === undefined ? from : Math.max(from, Math.min(first, to - 60));
 }
 
 /** A little room above and below; zero in sight where it is near. */

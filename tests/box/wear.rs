@@ -86,3 +86,58 @@ fn the_limit_and_the_wear_are_shown_and_a_model_stored_meanwhile_is_taken() {
     gateway.signal("TERM");
     assert!(gateway.wait().success(), "{}", gateway.said());
 }
+
+/// Three of each condition, all with all, as a table with one row for each cut.
+fn table() -> String {
+    let mut text =
+        "time_s,flank_wear_mm,cutting_speed_m_min,feed_per_rev_mm,depth_of_cut_mm,cutting_power_w\n".to_owned();
+    let mut rows = 0;
+    for wear in [0.05, 0.2, 0.35] {
+        for speed in [120.0, 190.0, 260.0] {
+            for feed in [0.09, 0.16, 0.26] {
+                for depth in [0.3, 1.0, 2.0] {
+                    let scatter = f64::from(rows * 7 % 5 - 2) * 2.0;
+                    let power = law(&CutConditions::of([wear, speed, feed, depth])) + scatter;
+                    text.push_str(&format!("{rows},{wear},{speed},{feed},{depth},{power}\n"));
+                    rows += 1;
+                }
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn identify_tells_the_page_how_the_model_was_found() {
+    let directory = tempfile::tempdir().expect("a directory");
+    furnish(directory.path(), 0.25);
+    let (data, cuts) = (directory.path().join("data"), directory.path().join("cuts.csv"));
+    fs::write(&cuts, table()).expect("written");
+    let config = directory.path().join("cnc-gateway.toml");
+    let mut gateway = Gateway::start(&data, &["--config", text(&config)]);
+    let address = gateway.address();
+    let asked = || get(&address, "/api/v1/identified/tool-wear").json();
+    assert!(asked()["identified"].is_null(), "nothing has been identified yet");
+    let learn = ["identify", "tool-wear", "--recording", text(&cuts), "--each-row"];
+    let store = ["--store", text(&data.join("history.db"))].map(str::to_owned);
+    // Recordings of any machine: nothing is kept where no box is named.
+    assert!(run(&learn).status.success());
+    assert!(asked()["identified"].is_null(), "kept for nobody");
+    let named = learn.iter().map(|it| (*it).to_owned()).chain(store).collect::<Vec<String>>();
+    let output = run(&named.iter().map(String::as_str).collect::<Vec<&str>>());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let kept = data.join("identified").join("tool-wear.json");
+    assert!(String::from_utf8_lossy(&output.stdout).contains(text(&kept)), "it says where the answer stands");
+    let found = asked();
+    let sources = found["identified"]["learned"]["surface"]["anova"]["sources"].as_array().cloned().unwrap_or_default();
+    assert!(sources.len() >= 4 && sources[0]["f"].is_number(), "{found:#}");
+    // The same with the data directory in words, and refused cuts do not take its place.
+    fs::remove_file(&kept).expect("it is there");
+    let by_name: Vec<&str> = learn.into_iter().chain(["--data-dir", text(&data)]).collect();
+    assert!(run(&by_name).status.success());
+    let answer = fs::read(&kept).expect("kept again");
+    fs::write(&cuts, table().lines().take(4).collect::<Vec<&str>>().join("\n")).expect("written");
+    assert_eq!(run(&by_name).status.code(), Some(1), "three cuts are refused");
+    assert_eq!(fs::read(&kept).expect("still there"), answer);
+    gateway.stop();
+}

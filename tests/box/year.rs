@@ -5,7 +5,7 @@
 //! quantities; 100 makes the whole year at 10 Hz, which takes an hour and 5 GB.
 
 use super::browser::{self, Browser};
-use super::process::{Gateway, get, request};
+use super::process::{Gateway, get, request, wait_for};
 use adapters::clock::SECOND_NS;
 use adapters::{ChannelId, Sample, Slot, Value};
 use gateway::history::{Options, Part, StateChange, WhenFull, Writer};
@@ -233,7 +233,10 @@ fn a_year_is_drawn_at_once() {
     let data = directory.path().join("data");
     let mut gateway = Gateway::start(&data, &["--config", config.to_str().expect("a path")]);
     let address = gateway.address();
-    let known: Json = get(&address, "/api/v1/series").json();
+    let known: Json = wait_for("a started box", Duration::from_secs(60), || {
+        Some(get(&address, "/api/v1/series")).filter(|answer| answer.status == 200)
+    })
+    .json();
     assert!(known["last_ms"].as_i64() > known["first_ms"].as_i64(), "{known}");
     assert_eq!(request(&address, &format!("GET /api/v1/series HTTP/1.0\r\nHost: {address}\r\n\r\n")).status, 200);
     ranges(&address, now_ns);

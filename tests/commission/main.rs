@@ -167,6 +167,9 @@ fn commissioned(machine: &'static str) -> f64 {
     assert!(told["next"].as_str().expect("a text").contains("warm the machine up"), "thermal is left: {told:#}");
     let page = std::fs::read_to_string(directory.path().join("data/commission.html")).expect("a page");
     assert!(page.matches("<svg").count() >= 3);
+    let found = std::fs::read_to_string(directory.path().join("data/identified/tool-wear.json")).expect("for the page");
+    let found: Value = serde_json::from_str(&found).expect("JSON");
+    assert!(found["learned"]["surface"]["anova"]["sources"].is_array(), "{found:#}");
 
     let (alarm_s, text) = alarm(&mut person);
     let true_mm = true_wear_mm(machine, alarm_s);

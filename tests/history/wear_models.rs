@@ -37,7 +37,8 @@ fn older(path: &Path) {
     let db = rusqlite::Connection::open(path).expect("opens");
     db.execute_batch(
         "DROP VIEW wear_model_list; DROP TABLE wear_models;
-        DROP VIEW audit_list; DROP TABLE audit; DROP VIEW reaction_list; DROP TABLE reactions; PRAGMA user_version = 1;",
+        DROP VIEW audit_list; DROP TABLE audit; DROP VIEW reaction_list; DROP TABLE reactions;
+        DROP INDEX events_kind; PRAGMA user_version = 1;",
     )
     .expect("older");
 }
@@ -54,7 +55,14 @@ fn an_older_file_is_read_as_it_is_and_gets_the_table_when_it_is_written() {
     let version: i64 = rusqlite::Connection::open(&path)
         .and_then(|db| db.query_row("PRAGMA user_version", [], |row| row.get(0)))
         .expect("a number");
-    assert_eq!(version, 3);
+    assert_eq!(version, 4);
+    let plan: String = rusqlite::Connection::open(&path)
+        .and_then(|db| {
+            let question = "EXPLAIN QUERY PLAN SELECT at_ns FROM events WHERE kind = 'x' AND at_ns >= 0 ORDER BY at_ns DESC, id DESC";
+            db.query_row(question, [], |row| row.get(3))
+        })
+        .expect("a plan");
+    assert!(plan.contains("events_kind"), "events of a kind are found by their index: {plan}");
     store_wear_model(&path, 1, &record("T1", 0.3)).expect("stored");
     assert_eq!(Reader::open(&path).expect("opens").wear_models().expect("read").len(), 1);
 }

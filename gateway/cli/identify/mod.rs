@@ -10,13 +10,14 @@ mod thermal;
 mod tool_wear;
 
 use super::diagnose::cannot_use;
-use super::{CannotRun, CommandOutcome, CommandResult, print, print_json};
+use super::{CannotRun, CommandOutcome, CommandResult, configuration, print, print_json};
 use crate::diagnosis::{put, read_recordings};
+use crate::identified;
 use adapters::Recording;
 use clap::{Args, Subcommand};
 use rules::estimators::regression::Refusal;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
@@ -53,6 +54,34 @@ struct IdentifyFiles {
     out: Option<PathBuf>,
 }
 
+/// The box whose page shows how the model was found.
+#[derive(Debug, Args)]
+struct ShownBy {
+    /// Configuration of the box whose page is to show the answer, for its data directory.
+    #[arg(long, value_name = "FILE", conflicts_with = "data_dir")]
+    config: Option<PathBuf>,
+    /// Data directory of the box whose page is to show the answer: it is kept there under identified/.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+impl ShownBy {
+    /// Keeps the answer on this subject, and says where. Without a box that is named nothing is kept: recordings may be of any machine.
+    /// `history`: a history that the model is stored in; its directory is that of the box where none is named.
+    fn keep(&self, subject: &str, learned: &mut IdentifyOutput, history: Option<&Path>) -> Result<(), CannotRun> {
+        let named = match (&self.data_dir, &self.config) {
+            (Some(directory), _) => Some(directory.clone()),
+            (None, Some(config)) => Some(configuration(Some(config))?.gateway.data_dir),
+            (None, None) => history.and_then(Path::parent).map(Path::to_owned),
+        };
+        let Some(directory) = named else { return Ok(()) };
+        let path =
+            identified::keep(&directory, subject, &learned.json).map_err(|problem| CannotRun::new(problem, ""))?;
+        learned.text += &format!("\nfor the page of the box: {}\n", path.display());
+        Ok(())
+    }
+}
+
 /// What a subcommand learned.
 struct IdentifyOutput {
     /// For the reader.
@@ -83,8 +112,7 @@ impl IdentifyFiles {
                     ),
                     (None, _) => {}
                 }
-                let document =
-                    json!({ "schema": "identify/1", "what": what, "refused": null, "learned": learned.json });
+                let document = identified::answer(what, &learned.json);
                 if self.json {
                     print_json(&document)
                 } else {

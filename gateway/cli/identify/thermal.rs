@@ -1,21 +1,21 @@
 //! `identify thermal`: thermal error from temperatures, which sensors and which law.
 
-use super::{IdentifyFiles, IdentifyOutput};
+use super::{IdentifyFiles, IdentifyOutput, ShownBy};
 use crate::cli::{CannotRun, CommandResult};
 use crate::diagnosis::put;
+use crate::identified::{self, THERMAL};
 use adapters::Recording;
 use clap::Args;
 use rules::estimators::regression::{Refusal, RefusalKind};
-use rules::estimators::thermal::{
-    LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalLearned, ThermalModel, collect, learn,
-};
-use serde_json::{Value, json};
+use rules::estimators::thermal::{LeftOut, POINTS_MAX, RHO_USUAL, SelectionSettings, ThermalModel, collect, learn};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct ThermalArguments {
     #[command(flatten)]
     reading: IdentifyFiles,
+    #[command(flatten)]
+    shown_by: ShownBy,
     /// Use these sensors instead of choosing, e.g. bearing_temperature_c,temperature_3_c.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     sensors: Option<Vec<String>>,
@@ -45,8 +45,11 @@ pub(super) fn run(arguments: &ThermalArguments) -> CommandResult {
     if let (Some(path), Ok((_, model))) = (&arguments.model, &learned) {
         put(path, model).map_err(|problem| CannotRun::new(problem, ""))?;
     }
-    let learned = learned.map(|(learned, _)| learned);
-    arguments.reading.finish("thermal", learned)
+    let mut learned = learned.map(|(learned, _)| learned);
+    if let Ok(learned) = &mut learned {
+        arguments.shown_by.keep(THERMAL, learned, None)?;
+    }
+    arguments.reading.finish(THERMAL, learned)
 }
 
 fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(IdentifyOutput, ThermalModel), Refusal> {
@@ -55,7 +58,7 @@ fn identify(recording: &Recording, arguments: &ThermalArguments) -> Result<(Iden
     let learned = learn(&collected.course, settings, arguments.sensors.as_deref())?;
     let text = format!("{}{learned}", left_out(&collected.left_out));
     let model = ThermalModel::new(arguments.machine.clone(), learned.best().fit.law.clone());
-    let json = document(&learned, &collected.left_out);
+    let json = identified::of_thermal(&learned, &collected.left_out);
     Ok((IdentifyOutput { text, json, file: Some(learned.script()) }, model))
 }
 
@@ -90,12 +93,4 @@ fn left_out(left_out: &LeftOut) -> String {
         text.push_str(&format!("{} mostly have no value and are left out\n", left_out.sensors.join(", ")));
     }
     text
-}
-
-fn document(learned: &ThermalLearned, left_out: &LeftOut) -> Value {
-    let mut document = json!(learned);
-    document["left_out"] = json!(left_out);
-    document["law"] = json!(learned.best().fit.law);
-    document["coefficients"] = json!(learned.best().fit.coefficients);
-    document
 }

@@ -75,7 +75,7 @@ function drawRows(list, state, context) {
   const rows = groups.slice(0, state.most).flatMap((g) => {
     const [first, last] = [g.rows[0], g.rows.at(-1)];
     const ramp = g.rows.length > 1;
-    const figures = g.unit ? (ramp ? `${value(first.asked, g.unit)} … ${value(last.asked, g.unit)} → ${value(last.after, g.unit)}` : `${value(g.asked, g.unit)} → ${value(g.after, g.unit)}`) : "";
+    const figures = g.unit ? (ramp ? `${value(first.asked, g.unit)} … ${value(last.asked, g.unit)} → ${value(last.after, g.unit)}` : g.asked === null && g.after === null ? "" : `${value(g.asked, g.unit)} → ${value(g.after, g.unit)}`) : "";
     const time = ramp ? `${when(first.at_ns / 1e6, now)} – ${clock(last.at_ns / 1e6)}` : when(first.at_ns / 1e6, now);
     const words = ramp ? `${t("steps", g.rows.length)} · ${box(last.reason)}` : box(g.reason);
     const tone = ["failed", "refused"].includes(g.outcome) ? "bad" : g.kind === "armed" ? "warn" : "";

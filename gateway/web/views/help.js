@@ -1,13 +1,13 @@
 // Help: the handbook of the box, offline.
 import { ask, fill, make } from "/web/parts.js";
-import { t } from "/web/words.js";
+import { language, t } from "/web/words.js";
 import { marked } from "/web/marked.js";
 
 export function mount(root, context) {
   const menu = make("nav", "chapters", null, { "aria-label": t("chapters") });
   const text = make("article", "card handbook", null, { tabindex: "-1" });
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
-  root.append(make("div", "help", [make("div", "card", [search, menu]), text]));
+  root.append(make("div", "help", [make("div", "card", [search, language() === "en" ? null : make("p", "note", t("handbook_english")), menu]), text]));
   const chapters = new Map();
   const read = async (name) => {
     if (!chapters.get(name)?.text) {

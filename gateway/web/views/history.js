@@ -63,13 +63,17 @@ class HistoryView {
     const names = this.known.filter((s) => s.kind === "number").map((s) => s.name);
     this.channels = (asked.get("channels")?.split(",") ?? USUAL).filter((name) => names.includes(name));
     if (!this.channels.length) this.channels = names.slice(0, 3);
-    this.drawChooser();
-    this.ribbon = new StateRibbon(this.ribbonBox, this.context);
-    this.drawPlots();
-    this.drawOverview();
+    // The question is on its way while the charts are made.
     const [from, to] = [time("from"), time("to")];
     if (from !== null && to !== null && from < to) this.look(from, to, true);
     else this.last(3600);
+    this.drawChooser();
+    this.ribbon = new StateRibbon(this.ribbonBox, this.context);
+    this.drawPlots();
+    for (const plot of this.plots) plot.show(this.from, this.to);
+    this.drawRibbon();
+    this.drawOverview();
+    this.drawWindow();
   }
 
   edge() {
@@ -89,27 +93,33 @@ class HistoryView {
     this.drawRibbon();
     this.drawFrame();
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.read(), now ? 0 : 90);
+    if (now) this.read();
+    else this.timer = setTimeout(() => this.read(), 90);
   }
 
   async read() {
     this.busy.classList.add("on");
     const began = performance.now();
     try {
-      const found = await this.data.read(this.from, this.to, this.channels, { first: this.first, last: this.edge() });
+      const found = await this.data.read(this.from, this.to, this.channels, { first: this.first, last: this.edge() }, (early) => this.drawCharts(early, began));
       if (!found) return;
       this.found = found;
-      const empty = found.series.every((s) => !s.points.some((p) => typeof p[1] === "number"));
-      say(this.note, empty ? t("nothing_in_range") : "");
-      for (const plot of this.plots) plot.give(columns(found.series, plot.names));
-      this.read_out(null, null);
       this.drawRibbon();
       this.drawTab();
-      this.address();
-      this.root.dataset.drawnMs = String(Math.round(performance.now() - began));
-      this.root.dataset.resolution = String(found.resolution);
+      if (!this.whole) this.drawWhole();
     } catch (error) { say(this.note, error.message); }
     this.busy.classList.remove("on");
+  }
+
+  /** The charts, as soon as their samples are there. */
+  drawCharts({ series, resolution }, began) {
+    const empty = series.every((s) => !s.points.some((p) => typeof p[1] === "number"));
+    say(this.note, empty ? t("nothing_in_range") : "");
+    for (const plot of this.plots) plot.give(columns(series, plot.names));
+    this.read_out(null, null);
+    this.address();
+    this.root.dataset.drawnMs = String(Math.round(performance.now() - began));
+    this.root.dataset.resolution = String(resolution);
   }
 
   address() {
@@ -204,16 +214,10 @@ class HistoryView {
   }
 
   /** The whole history as a band; what is looked at is a window in it. Dragging in it looks at any time, of any length. */
-  async drawOverview() {
+  drawOverview() {
     this.canvas = make("canvas", "");
     this.window = make("div", "window");
     this.overview.append(this.canvas, this.window);
-    this.overviewBox.className = "overview ends-box";
-    const by = this.edge() - this.first > 30 * 86400 ? "day" : "hour";
-    const utc = (s) => new Date(s * 1000).toISOString();
-    const found = await ask(`/api/v1/utilisation?from=${utc(this.first)}&to=${utc(this.edge())}&by=${by}`).catch(() => ({ rows: [] }));
-    this.whole = found.rows.map((r) => ({ from: r.from_ms / 1000, to: r.from_ms / 1000 + (by === "day" ? 86400 : 3600), seconds: r.seconds }));
-    this.overviewBox.className = "";
     fill(this.overviewBox, [make("div", "note whole-words", t("whole_words", dateTime(this.first * 1000), dateTime(this.edge() * 1000)))]);
     new ResizeObserver(() => this.paintOverview()).observe(this.overview);
     const place = (event) => { const b = this.overview.getBoundingClientRect(); return this.first + Math.min(1, Math.max(0, (event.clientX - b.left - AXIS_PX) / (b.width - AXIS_PX - RIGHT_PX))) * (this.edge() - this.first); };
@@ -224,6 +228,15 @@ class HistoryView {
       if (Math.abs(at - this.dragged) <= 0.004 * (this.edge() - this.first)) { const half = (this.before[1] - this.before[0]) / 2; this.move.apply(at - half, at + half); }
       this.dragged = undefined;
     });
+  }
+
+  /** What the band is painted with: sums over the whole history. Asked for after the charts, which are what was opened. */
+  async drawWhole() {
+    this.whole = [];
+    const by = this.edge() - this.first > 30 * 86400 ? "day" : "hour";
+    const utc = (s) => new Date(s * 1000).toISOString();
+    const found = await ask(`/api/v1/utilisation?from=${utc(this.first)}&to=${utc(this.edge())}&by=${by}`).catch(() => ({ rows: [] }));
+    this.whole = found.rows.map((r) => ({ from: r.from_ms / 1000, to: r.from_ms / 1000 + (by === "day" ? 86400 : 3600), seconds: r.seconds }));
     this.paintOverview();
   }
 

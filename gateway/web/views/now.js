@@ -2,12 +2,15 @@
 import { ask, card, fill, make, row, say, send } from "/web/parts.js";
 import { clock, duration, number, plainName, quantity as shown, unitName, when } from "/web/format.js";
 import { box, language, t } from "/web/words.js";
-import { TimePlot } from "/web/plot.js";
+import { TimePlot, drawnFrom } from "/web/plot.js";
 import { StateRibbon } from "/web/ribbon.js";
 
 const JOB = ["program", "operation", "tool", "part"];
 /** The trend behind the big numbers. */
 const TREND_S = 600;
+/** Power that flows back is called braking from here on: more than the noise of a power meter about zero. Too low, a standing spindle is
+    said to brake. */
+const BRAKING_W = 20;
 /** A value that is older than this is marked as old on its own. */
 const OLD_S = 2;
 /** Not worth a line in "absent": nobody expects them on every machine. */
@@ -43,7 +46,10 @@ function stateCard() {
     say(since, `${t("since_clock", when(status.state.since_ms, status.at_ms))} · ${duration(status.state.seconds)}${why}`);
     for (const key of JOB) {
       const found = context.quantity(key);
-      const text = !found || found.missing || found.value === "" ? "–" : plainName(String(found.value));
+      const count = context.quantity("part_count");
+      const none = !found || found.missing || found.value === "";
+      // Where nobody names the part, how many were finished says more than a dash.
+      const text = !none ? plainName(String(found.value)) : key === "part" && count && !count.missing ? t("finished_count", number(count.value)) : "–";
       say(values[key], text);
       values[key].title = text;
     }
@@ -220,7 +226,9 @@ function strip() {
     }
     bar.setAttribute("aria-label", t("strip_label", number(power, "W"), number(value("no_load_power_w") ?? NaN, "W"), number(value("cutting_power_w") ?? NaN, "W")));
     const whole = context.quantity("total_power_w");
-    say(machine, whole && !whole.missing ? t("machine_power", shown(whole.value, "W")) : "");
+    // A braking spindle is a generator: without a word its negative power looks like a fault of the meter.
+    const braking = (value("spindle_power_w") ?? 0) < -BRAKING_W ? `${t("braking")} · ` : "";
+    say(machine, braking + (whole && !whole.missing ? t("machine_power", shown(whole.value, "W")) : ""));
   };
   return { box: section, update };
 }
@@ -241,9 +249,11 @@ function trend(context) {
     }
     const x = points.map((p) => p[0]);
     const nothing = points.map(() => null);
-    plot.give([x, points.map((p) => p[1]), nothing, nothing, points.map((p) => p[2]), nothing, nothing]);
-    plot.show(to - TREND_S, to);
-    ribbon.show(to - TREND_S, to, states);
+    const data = [x, points.map((p) => p[1]), nothing, nothing, points.map((p) => p[2]), nothing, nothing];
+    const from = drawnFrom(data, to - TREND_S, to);
+    plot.give(data);
+    plot.show(from, to);
+    ribbon.show(from, to, states);
   };
   const past = async (status) => {
     const utc = (ms) => new Date(ms).toISOString();

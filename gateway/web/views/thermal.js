@@ -1,8 +1,8 @@
 // Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets proposed and written.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
-import { number, quantity } from "/web/format.js";
+import { folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
-import { TimePlot } from "/web/plot.js";
+import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
 
 const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
@@ -46,12 +46,13 @@ export function mount(root, context) {
       const drawn = names.map((name, at) => ({ label: t(name === measured ? "thermal_measured" : "thermal_predicted"), unit: "um", line: at ? "line-b" : "line-a" }));
       if (m >= 0 && p >= 0) { const left = data[0].map((_, i) => (data[1 + 3 * m][i] === null || data[1 + 3 * p][i] === null ? null : data[1 + 3 * m][i] - data[1 + 3 * p][i])); data.push(left, left.map(() => null), left.map(() => null)); drawn.push({ label: t("thermal_left"), unit: "um", line: "line-c" }); }
       const plot = new TimePlot(error, { series: drawn, height: 240, label: t("thermal_error_figure"), low: 0, sync: "thermal" });
-      plot.give(data); plot.show(...range);
+      plot.give(data); plot.show(drawnFrom(data, ...range), range[1]);
       plots.push(plot);
       say(note, drawn.map((d) => d.label).join(" · "));
     } else say(note, t("no_thermal"));
     const plot = new TimePlot(warmth, { series: wanted.map((name) => ({ label: context.name(name), unit: "°C" })), height: 240, label: t("temperatures"), sync: "thermal" });
-    plot.give(columns(series, wanted)); plot.show(...range);
+    const warm = columns(series, wanted);
+    plot.give(warm); plot.show(drawnFrom(warm, ...range), range[1]);
     plots.push(plot);
     fill(list, wanted.map((name, at) => { const mark = make("i"); mark.style.background = `var(--line-${"abcdef"[at]})`; return make("span", "", [mark, `${context.name(name)} ${last(name) === null ? "–" : quantity(last(name), "°C")}`]); }));
   };
@@ -72,7 +73,7 @@ export function mount(root, context) {
 async function drawPoints(root, context) {
   const found = await ask("/api/v1/identified/thermal").catch((error) => ({ error: error.message }));
   const selection = found.identified?.learned?.selection;
-  if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", found.file))]);
+  if (!selection) return fill(root, [make("p", "empty", found.error ?? t("no_thermal_points", folder(found.file)))]);
   const cell = (value, unit) => ({ num: value === null || value === undefined ? "–" : quantity(value, unit) });
   const rows = selection.sensors.map((s) => [context.name(s.sensor), t(s.chosen ? "chosen" : "not_chosen"), s.reason, cell(s.correlation), cell(s.grade_initial_image), cell(s.variance_inflation), cell(s.held_out_rms_um, "um")]);
   const head = [t("temperatures"), "", t("why"), ...["correlation", "grade", "inflation", "held_out_error"].map((key) => ({ num: t(key) }))];

@@ -2,7 +2,7 @@
 import { ask, card, fill, make, row, say } from "/web/parts.js";
 import { clock, number, quantity } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
-import { TimePlot } from "/web/plot.js";
+import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
 import { Asking, drawDiagnoses, ticked } from "/web/diagnosis.js";
 
@@ -43,8 +43,10 @@ export function mount(root, context) {
       const unit = status.twin.unit;
       const both = new TimePlot(figure, { height: 230, low: 0, sync: "twin", label: t("twin_figure"), series: [{ label: t("recorded_value"), unit, line: "line-a" }, { label: t("simulated_value"), unit, line: "line-c" }] });
       const rest = new TimePlot(left, { height: 150, sync: "twin", label: t("twin_residual"), series: [{ label: t("twin_residual"), unit, line: "line-d" }] });
-      both.give(columns(found.series, names.slice(0, 2))); both.show(from, to);
-      rest.give(columns(found.series, names.slice(2))); rest.show(from, to);
+      const [pair, difference] = [columns(found.series, names.slice(0, 2)), columns(found.series, names.slice(2))];
+      const shown = drawnFrom(pair, from, to);
+      both.give(pair); both.show(shown, to);
+      rest.give(difference); rest.show(shown, to);
       state.plots = [both, rest];
     } catch (error) { say(note, error.message); }
   };

@@ -2,13 +2,14 @@
 // part; how worn the edge is, and how many parts are left.
 import uPlot from "/web/uplot.js";
 import { ask, card, colour, fill, make, row, say, table } from "/web/parts.js";
-import { dateTime, number, quantity } from "/web/format.js";
+import { dateTime, folder, number, quantity } from "/web/format.js";
 import { box, t } from "/web/words.js";
 
 const PARTS = 400;
 const READ_EVERY_MS = 15000;
-/** Parts from which the trend of the wear is drawn to the criterion. */
-const TREND_PARTS = 30;
+/** The box counts no further. */
+const PARTS_MOST = 9999;
+const parts = (count) => (count >= PARTS_MOST ? t("many") : number(Math.round(count)));
 
 export function mount(root, context) {
   const state = { tool: null, parts: [], models: [] };
@@ -34,6 +35,7 @@ export function mount(root, context) {
       if (!known.includes(state.tool)) state.tool = context.quantity("tool")?.value ?? null;
       if (!known.includes(state.tool)) state.tool = known[0] ?? null;
       fill(tools, known.map((tool) => make("option", "", tool, { value: tool, selected: tool === state.tool })));
+      tools.hidden = !known.length;
       drawModels(models, state.models);
       draw();
     } catch (error) { say(below, error.message); }
@@ -41,43 +43,32 @@ export function mount(root, context) {
   read();
   drawVariance(variance);
   const timer = setInterval(read, READ_EVERY_MS);
-  return { update: (status) => drawEdge(lamp, facts, status, context, state), leave() { clearInterval(timer); plot?.destroy(); } };
+  return { update: (status) => drawEdge(lamp, facts, status, context), leave() { clearInterval(timer); plot?.destroy(); } };
 }
 
 function legend() {
   return make("div", "legend", [["bad", "wear_limit"], ["good", "measured_power"], ["line-d", "flank_wear"]].map(([name, key]) => { const mark = make("i"); mark.style.background = `var(--${name})`; return make("span", "", [mark, t(key)]); }));
 }
 
-function drawEdge(lamp, facts, status, context, state) {
+function drawEdge(lamp, facts, status, context) {
   const wear = status.wear;
   const tool = context.quantity("tool");
   const name = tool && !tool.missing ? tool.value : "–";
-  // Of the model: the alarm names its tool. Of a script: it is about the tool in use.
-  const about = (code) => status.alarms.some((a) => a.code === `${code} ${name}` || a.code.startsWith(`${code} (`));
+  // The alarm of a script names edges in its text: another one may be worn than the one in use.
+  const named = (text) => text.split(/[^\w-]+/).includes(name);
+  const about = (code) => status.alarms.some((a) => a.code === `${code} ${name}` || (a.code.startsWith(`${code} (`) && named(a.text)));
   const [worn, look] = [about("tool_worn"), about("tool_wear")];
   lamp.dataset.tone = worn ? "bad" : look ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
   say(lamp, `${name}: ${t(worn ? "lamp_worn" : look ? "lamp_look" : wear?.flank_wear_mm != null ? "lamp_good" : "lamp_unknown")}`);
-  const left = remaining(state);
+  const left = wear?.parts_left ?? null;
   const rows = wear ? [
     row(t("flank_wear"), wear.flank_wear_mm === null ? "–" : `${number(wear.flank_wear_mm, "mm")} ± ${quantity(wear.flank_wear_uncertainty_mm, "mm")}`, wear.why ? box(wear.why) : t("criterion", quantity(wear.criterion_mm, "mm"))),
     row(t("wear_limit"), wear.limit_w === null ? "–" : `${number(wear.limit_w, "W")} ± ${quantity(wear.limit_uncertainty_w, "W")}`, wear.observability === "not_observable_here" ? t("not_observable") : wear.extrapolated?.length ? t("outside_model", wear.extrapolated.join(", ")) : null),
     row(t("wear_form"), t(`form_${wear.form}`))] : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
   const cutting = context.quantity("cutting_power_w");
-  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided")));
-  rows.push(row(t("remaining_parts"), left === null ? "–" : t("about", number(Math.round(left.parts))), left === null ? t("remaining_unknown") : t("remaining_words", left.from)));
+  rows.unshift(row(t("short_cutting_power_w"), cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"), t("wear_judged")));
+  rows.push(row(t("remaining_parts"), left === null ? "–" : parts(left[0]), left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2]))));
   fill(facts, rows);
-}
-
-/** The line through the wear of the newest parts, drawn to the criterion. */
-function remaining(state) {
-  const use = state.parts.map((p) => p.tools.find((u) => u.tool === state.tool)).filter((u) => u && u.wear_mm !== null).slice(-TREND_PARTS);
-  const limit = state.models.find((m) => m.in_force)?.criterion_mm ?? 0.3;
-  if (use.length < 5) return null;
-  const n = use.length;
-  const [mx, my] = [(n - 1) / 2, use.reduce((s, u) => s + u.wear_mm, 0) / n];
-  const slope = use.reduce((s, u, i) => s + (i - mx) * (u.wear_mm - my), 0) / use.reduce((s, _, i) => s + (i - mx) ** 2, 0);
-  const now = my + slope * (n - 1 - mx);
-  return slope > 1e-6 && now < limit ? { parts: (limit - now) / slope, from: n } : null;
 }
 
 function drawFigure(figure, below, state) {
@@ -116,7 +107,9 @@ function drawModels(root, models) {
 async function drawVariance(root) {
   const found = await ask("/api/v1/identified/tool-wear").catch((error) => ({ error: error.message }));
   const anova = found.identified?.learned?.surface?.anova;
-  if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", found.file))]);
+  const refused = found.identified?.learned?.surface?.refused;
+  if (refused) return fill(root, [make("p", "empty", `${t("anova_refused")}: ${[refused.what, refused.next].filter(Boolean).join("; ")}`)]);
+  if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", folder(found.file)))]);
   const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
   const percent = (share) => (share === null ? "–" : number(100 * share));
   const rows = anova.sources.map((s) => [s.source, cell(s.sum_of_squares), { num: String(s.degrees_of_freedom) }, cell(s.mean_square), cell(s.f), { num: s.p === null || s.p === undefined ? "–" : s.p < 0.0001 ? "< 0.0001" : s.p.toFixed(4) }]);

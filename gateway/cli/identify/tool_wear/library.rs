@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub(super) struct LibraryArguments {
     /// Store the model in this history; the newest model of machine, tool, material and operation is in force.
     #[arg(long, value_name = "DB")]
-    store: Option<PathBuf>,
+    pub(super) store: Option<PathBuf>,
     /// List the models of the history given with --history.
     #[arg(long, conflicts_with_all = ["recording", "design", "store"])]
     pub(super) list: bool,

@@ -4,8 +4,9 @@
 mod design;
 mod library;
 
-use super::{IdentifyFiles, IdentifyOutput};
+use super::{IdentifyFiles, IdentifyOutput, ShownBy};
 use crate::cli::{CommandResult, recipe_from};
+use crate::identified::TOOL_WEAR;
 use adapters::Recording;
 use clap::{Args, ValueEnum};
 use rules::estimators::regression::{Refusal, RefusalKind};
@@ -35,6 +36,8 @@ pub(super) struct ToolWearArguments {
     design: design::DesignArguments,
     #[command(flatten)]
     model_library: library::LibraryArguments,
+    #[command(flatten)]
+    shown_by: ShownBy,
 }
 
 /// Where the numbers stand.
@@ -109,11 +112,12 @@ pub(super) fn run(arguments: &ToolWearArguments) -> CommandResult {
     let learned = match learn(arguments, &recording) {
         Ok((mut learned, record)) => {
             learned.text += &library::store(&arguments.model_library, &record)?.unwrap_or_default();
+            arguments.shown_by.keep(TOOL_WEAR, &mut learned, arguments.model_library.store.as_deref())?;
             Ok(learned)
         }
         Err(refusal) => Err(refusal),
     };
-    arguments.reading().finish("tool-wear", learned)
+    arguments.reading().finish(TOOL_WEAR, learned)
 }
 
 fn learn(arguments: &ToolWearArguments, recording: &Recording) -> Result<(IdentifyOutput, WearRecord), Refusal> {
