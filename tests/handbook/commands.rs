@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A command line as words: quotes hold a word together, a comment or a pipe ends the line.
-fn words(line: &str) -> Vec<String> {
+pub(crate) fn words(line: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None::<char>);
     for letter in line.chars() {
         match (letter, quote) {
@@ -26,15 +26,15 @@ fn words(line: &str) -> Vec<String> {
 }
 
 /// A command line, with its line in the document.
-struct Line {
-    number: usize,
-    text: String,
+pub(crate) struct Line {
+    pub(crate) number: usize,
+    pub(crate) text: String,
     /// It stands in running text, where a command may be named without what it needs.
-    mentioned: bool,
+    pub(crate) mentioned: bool,
 }
 
 /// Every command line of a document; a line that ends in `\` goes on in the next.
-fn lines(document: &Document) -> Vec<Line> {
+pub(crate) fn lines(document: &Document) -> Vec<Line> {
     let mut lines = Vec::new();
     for block in document.blocks() {
         let mut whole = String::new();
@@ -52,13 +52,13 @@ fn lines(document: &Document) -> Vec<Line> {
 }
 
 /// Does it stand for several commands, or leave something out?
-fn is_a_pattern(line: &str) -> bool {
+pub(crate) fn is_a_pattern(line: &str) -> bool {
     let choice = line.split(' ').any(|word| word.len() > 1 && word.contains('|'));
     choice || ["...", "[", "…"].iter().any(|mark| line.contains(mark))
 }
 
 /// The words behind `program`, when the line calls it; assignments before it are left out.
-fn arguments<'a>(words: &'a [String], program: &str) -> Option<&'a [String]> {
+pub(crate) fn arguments<'a>(words: &'a [String], program: &str) -> Option<&'a [String]> {
     let assigned = |word: &&String| word.contains('=') && !word.starts_with('-');
     let before = words.iter().take_while(assigned).count();
     let rest = words.get(before..)?;
