@@ -94,6 +94,8 @@ fn look(browser: &mut Browser, address: &str, axe: Option<&str>, (view, drawn): 
     browser.open(&format!("http://{address}/{view}?lang={language}"));
     browser.wait_until("document.body?.dataset.fresh === 'yes'");
     browser.wait_until(&format!("document.body.dataset.view === '{view}' && Boolean({drawn})"));
+    // What fades in has its colours only at the end of that.
+    browser.wait_until("document.getAnimations().every(fade => fade.playState !== 'running')");
     let told = browser.value(
         "({ lang: document.documentElement.lang, wide: document.documentElement.scrollWidth - innerWidth,
             nav: document.querySelector('nav a').textContent, text: document.body.innerText })",
