@@ -7,7 +7,6 @@
 //! | one says | the other says | told |
 //! |---|---|---|
 //! | nothing | anything | nothing |
-//! | something that its held-out rows withdraw | sure names | `ambiguous`: these names, or a cause without a name |
 //! | names | the same names | these names; the weaker of both verdicts |
 //! | names | the same names and more | `ambiguous`: what both name; the rest beside it, in place of something without a name |
 //! | names | other names | `ambiguous`: names of the one, those of the other beside them |
@@ -34,21 +33,11 @@ use std::collections::BTreeSet;
 /// Everything that makes the input unusable, with what to record instead.
 pub fn compare(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let searched = diagnose(recording, model, seed)?;
-    if searched.verdict == Verdict::NoMismatch || recording.rows() > ROWS_MAX {
+    if searched.verdict.is_silent() || recording.rows() > ROWS_MAX {
         return Ok(searched);
     }
     let weighed = evidence::diagnose(recording, model)?;
-    Ok(joined(searched, weighed))
-}
-
-/// The table above, where the search sees something.
-fn joined(searched: Diagnosis, weighed: Diagnosis) -> Diagnosis {
-    match (searched.verdict, weighed.verdict) {
-        (Verdict::CannotTell, Verdict::Explained) => weighed.doubted(),
-        (Verdict::CannotTell, _) => searched,
-        (_, verdict) if verdict.is_silent() => weighed,
-        _ => both(searched, weighed),
-    }
+    Ok(if weighed.verdict.is_silent() { weighed } else { both(searched, weighed) })
 }
 
 /// What two methods that both report something say together.
@@ -86,17 +75,6 @@ fn weaker(a: Verdict, b: Verdict) -> Verdict {
 }
 
 impl Diagnosis {
-    /// The same names, unsure: another method sees that something is there, and no law of its own carries over.
-    fn doubted(mut self) -> Self {
-        if let Some(first) = self.missing.first() {
-            self.alternatives.push(alternative(UNKNOWN, &first.effect, 0.0));
-            self.next_experiment = of_effects([first.effect.as_str()].into_iter(), first.delta_ic);
-        }
-        self.verdict = Verdict::Ambiguous;
-        self.summary = summary(&self);
-        self
-    }
-
     /// This one with the names of another beside its own, and the verdict of both.
     fn beside(mut self, other: Self, verdict: Verdict) -> Self {
         let told = names(&self);
@@ -193,17 +171,6 @@ mod tests {
         assert_eq!(told(&more), wanted);
         assert_eq!(more.alternatives[0].instead_of, UNKNOWN, "it takes the place of nothing that both name");
         assert_eq!(told(&both(two, one)), wanted);
-    }
-
-    #[test]
-    fn what_the_search_withdraws_leaves_a_sure_name_unsure() {
-        let withdrawn = || said(Verdict::CannotTell, &[], &[]);
-        let doubted = joined(withdrawn(), said(Explained, &["stribeck"], &[]));
-        assert_eq!(told(&doubted), (Ambiguous, vec!["stribeck"], vec![UNKNOWN]));
-        assert!(doubted.next_experiment.is_some(), "who is not sure asks for an experiment");
-        for other in [said(Ambiguous, &["stribeck"], &["offset"]), said(Verdict::NoMismatch, &[], &[])] {
-            assert_eq!(joined(withdrawn(), other).verdict, Verdict::CannotTell);
-        }
     }
 
     #[test]
