@@ -6,10 +6,10 @@
 
 use crate::commands::{arguments, is_a_pattern, lines, words};
 use crate::documents::{Document, documents};
-use crate::process::Gateway;
+use crate::process::{Gateway, program, stderr, stdout};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 /// The documents in the order of somebody who begins: a history must be there before it is asked.
 const ORDER: [&str; 11] = [
@@ -63,7 +63,7 @@ struct Served {
 
 impl Served {
     fn start(arguments: &[&str], of_the_shop: &'static str) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_cnc-gateway"));
+        let mut command = program();
         command.arg("serve").args(arguments).args(["--listen", "127.0.0.1:0"]);
         let (process, said) = serving(command, arguments[0]);
         let own = said.split_whitespace().find(|word| word.contains("://")).expect("its address").to_owned();
@@ -73,7 +73,7 @@ impl Served {
 
 /// The program in this directory, with the addresses of the shop replaced.
 fn command(directory: &Path, step: &Step, served: &[Served]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_cnc-gateway"));
+    let mut command = program();
     command.current_dir(directory).stdin(Stdio::null());
     for word in &step.given {
         let here = word.replace("/var/lib/cnc-gateway/", "./");
@@ -106,20 +106,16 @@ fn tried(directory: &Path, step: &Step, served: &[Served]) -> Result<(), String>
         serving(command, step.given.get(1).map_or("", String::as_str));
         return Ok(());
     }
-    let Output { status, stdout, stderr } = command.output().map_err(|error| error.to_string())?;
+    let output = command.output().map_err(|error| error.to_string())?;
     if let Some(into) = &step.into {
-        fs::write(directory.join(into), &stdout).map_err(|error| error.to_string())?;
+        fs::write(directory.join(into), &output.stdout).map_err(|error| error.to_string())?;
     }
     let line = step.given.join(" ");
     let wanted = OTHER_CODES.iter().find(|(begin, ..)| line.starts_with(begin)).map_or(0, |(_, code, _)| *code);
-    if status.code() == Some(wanted) {
+    if output.status.code() == Some(wanted) {
         return Ok(());
     }
-    Err(format!(
-        "{status} instead of {wanted}: {}{}",
-        String::from_utf8_lossy(&stdout),
-        String::from_utf8_lossy(&stderr)
-    ))
+    Err(format!("{} instead of {wanted}: {}{}", output.status, stdout(&output), stderr(&output)))
 }
 
 /// What a reader has who comes with a model, recordings and own scripts.

@@ -69,6 +69,7 @@ pub fn diagnose(recording: &Recording, model: &Model) -> Result<Diagnosis, Vec<S
         return Ok(cannot_tell(&case, needed));
     }
     let parts = case.parts.clone();
+    // In a case of its own: who looks for waves weighs the rows by what a fit leaves, and `told` fits all rows alike.
     let waves = Case::new(recording, model)?.followed_waves();
     let fitted: Vec<usize> = (0..case.frame.len()).flat_map(|group| case.frame.rows(group)).collect();
     let mut scene = case.scene.clone();
