@@ -199,6 +199,9 @@ pub struct Diagnosis {
     pub missing: Vec<Missing>,
     /// What else it could be.
     pub alternatives: Vec<Alternative>,
+    /// What was found in the fitted rows and not confirmed by those held out; `unknown` where it had no name, empty where
+    /// nothing was found.
+    pub withdrawn: Vec<String>,
     /// Baseline parameters that had been bent.
     pub baseline_shift: Vec<Shift>,
     /// Faults of the recording.

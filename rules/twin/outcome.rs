@@ -3,7 +3,7 @@
 use super::confirmed::Totals;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
-use super::diagnosis::{Fits, Rows, Verdict};
+use super::diagnosis::{Fits, Rows, UNKNOWN, Verdict};
 use super::fit::Fit;
 use super::holdout::Prediction;
 use super::inner_split::Left;
@@ -41,6 +41,13 @@ pub struct FailedHoldout {
     pub information: f64,
     /// What it would have added to every row, by label.
     pub added: Vec<(String, Vec<f64>)>,
+}
+
+impl FailedHoldout {
+    /// Names of what had been found; `unknown` where it had none.
+    pub(super) fn names(&self) -> Vec<String> {
+        if self.kinds.is_empty() { vec![UNKNOWN.to_owned()] } else { self.kinds.clone() }
+    }
 }
 
 /// Everything the verdict is made from.
@@ -134,7 +141,8 @@ impl Outcome {
         if best.members.is_empty() && self.unknown.is_none() {
             return None;
         }
-        let kinds = best.members.iter().map(|member| self.designs[*member].kind.clone()).collect();
+        let named = best.members.iter().filter(|_| self.unknown.is_none());
+        let kinds = named.map(|member| self.designs[*member].kind.clone()).collect();
         let held_out = self.fits.before.held_out_rmse.zip(self.fits.after.held_out_rmse);
         let inner = self.inner.filter(|(before, after)| after.exceeds(*before));
         let inner = inner.map(|(before, after)| (true, (before.error(), after.error())));

@@ -8,7 +8,7 @@ use super::locate::{Region, region};
 use super::misnamed::ENTRY;
 use super::model::{Model, Part, PartFunction, simulate};
 use super::next_step::alternative;
-use super::outcome::Outcome;
+use super::outcome::{FailedHoldout, Outcome};
 use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
 use crate::physics::effect;
@@ -37,6 +37,7 @@ pub fn cannot_tell(case: &Case<'_>, needed: String) -> Diagnosis {
         mismatch: Vec::new(),
         missing: Vec::new(),
         alternatives: Vec::new(),
+        withdrawn: Vec::new(),
         baseline_shift: Vec::new(),
         data_quality: case.faults.clone(),
         next_experiment: Some(Experiment {
@@ -102,6 +103,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         alternatives,
         data_quality: case.faults.clone(),
         model: extended(case, outcome.last()),
+        withdrawn: outcome.withdrawn.as_ref().map_or_else(Vec::new, FailedHoldout::names),
         debug: debug(case, &outcome),
         rows: outcome.rows.clone(),
         unit,

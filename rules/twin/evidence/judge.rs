@@ -9,6 +9,7 @@ use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
 use crate::statistics::count;
 use crate::twin::diagnosis::{UNKNOWN, Verdict};
+use crate::twin::outcome::FailedHoldout;
 use std::collections::BTreeMap;
 
 /// Groups that are looked at.
@@ -47,6 +48,8 @@ pub(super) struct EvidenceAnswer {
     pub(super) remaining: Vec<(String, Vec<f64>)>,
     /// Twice the logarithm of the evidence over nothing.
     pub(super) information: f64,
+    /// What rows held out did not confirm, where that is why nothing is told.
+    pub(super) withdrawn: Option<FailedHoldout>,
     /// For engineers.
     pub(super) debug: String,
 }
@@ -81,8 +84,12 @@ impl Judge<'_> {
                 continue;
             }
             let information = 2.0 * (group.ln - nothing);
-            let Some(best) = self.not_withdrawn(self.less(of, &kept)) else {
-                return self.nothing(format!("{debug}; withdrawn: the held-out error does not fall"));
+            let best = match self.not_withdrawn(self.less(of, &kept), information) {
+                Ok(best) => best,
+                Err(withdrawn) => {
+                    let silent = self.nothing(format!("{debug}; withdrawn: the held-out error does not fall"));
+                    return EvidenceAnswer { verdict: Verdict::CannotTell, withdrawn: Some(withdrawn), ..silent };
+                }
             };
             let mut answer = self.named(&best, &groups, information, debug);
             if best.members.len() < kept.len() && answer.verdict == Verdict::Explained {
@@ -107,25 +114,31 @@ impl Judge<'_> {
     }
 
     /// Rows that took no part only withdraw: as long as their error does not fall, the member goes whose absence leaves the
-    /// least; `None` where nothing is left.
-    fn not_withdrawn(&self, mut best: Explanation) -> Option<Explanation> {
+    /// least. An error where nothing is left.
+    fn not_withdrawn(&self, mut best: Explanation, information: f64) -> Result<Explanation, FailedHoldout> {
         let before = self.held_out_square(&self.inputs.simulated);
         let after = |of: &Explanation| self.held_out_square(&self.contributions(of).0);
         if before <= 0.0 {
-            return Some(best);
+            return Ok(best);
         }
-        while after(&best) >= before {
+        let kinds: Vec<String> = best.names.iter().flatten().cloned().collect();
+        let mut errors = (before, after(&best));
+        while errors.1 >= before {
             let size = best.members.len();
             if size < 2 {
-                return None;
+                let rows = count((0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]).count());
+                let errors = ((errors.0 / rows).sqrt(), (errors.1 / rows).sqrt());
+                return Err(FailedHoldout { kinds, among_fitted: false, errors, information, added: Vec::new() });
             }
             let one_less = (0..size).map(|gone| {
                 let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
                 self.less(&best, &kept)
             });
-            best = one_less.map(|less| (after(&less), less)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+            if let Some((left, less)) = one_less.map(|less| (after(&less), less)).min_by(|a, b| a.0.total_cmp(&b.0)) {
+                (errors.1, best) = (left, less);
+            }
         }
-        Some(best)
+        Ok(best)
     }
 
     fn held_out_square(&self, total: &[f64]) -> f64 {
@@ -156,6 +169,7 @@ impl Judge<'_> {
             contributions: Vec::new(),
             remaining: Vec::new(),
             information: 0.0,
+            withdrawn: None,
             debug,
         }
     }
@@ -190,6 +204,7 @@ impl Judge<'_> {
             contributions,
             remaining,
             information,
+            withdrawn: None,
             debug,
         };
         if answer.names.is_empty() || unknown > THRESHOLDS.unknown_share {

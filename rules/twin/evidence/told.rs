@@ -20,7 +20,9 @@ use crate::twin::locate::{Region, conditions, spans};
 use crate::twin::model::{Model, Part};
 use crate::twin::next_step::{alternative, experiment, of_effects};
 use crate::twin::noise::Arma;
+use crate::twin::outcome::FailedHoldout;
 use crate::twin::verdicts::unit_of;
+use crate::twin::words;
 
 /// Noise from which the fit of the textbook laws starts.
 const START: Arma = Arma { phi: 0.4, theta: 0.0 };
@@ -62,11 +64,15 @@ impl EvidenceReport<'_, '_> {
             baseline_shift: shift,
             missing,
             alternatives,
+            withdrawn: self.answer.withdrawn.as_ref().map_or_else(Vec::new, FailedHoldout::names),
             data_quality: self.case.faults.clone(),
             model,
             debug: self.answer.debug.clone(),
         };
-        diagnosis.summary = crate::twin::words::summary(&diagnosis);
+        diagnosis.summary = match &self.answer.withdrawn {
+            Some(withdrawn) => words::withdrawn(withdrawn, &diagnosis.unit),
+            None => words::summary(&diagnosis),
+        };
         diagnosis
     }
 
@@ -189,7 +195,8 @@ impl EvidenceReport<'_, '_> {
             return None;
         }
         let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
-        let kinds = open.chain(self.answer.names.iter().map(String::as_str));
+        let gone = self.answer.withdrawn.iter().flat_map(|withdrawn| &withdrawn.kinds);
+        let kinds = open.chain(self.answer.names.iter().chain(gone).map(String::as_str));
         let gain = self.answer.information;
         of_effects(kinds, gain).or_else(|| Some(experiment(self.sweep(), SWEEP_MINUTES, gain, "")))
     }
