@@ -24,6 +24,13 @@ const MACHINES: [&str; 5] = [
     "lathe?seed=14&change_h=0&change_cut_pct=110&change_friction_pct=100&dropouts_per_h=2",
 ];
 
+/// Three more of other coefficients.
+const MORE: [&str; 3] = [
+    "lathe?seed=21&change_h=0&change_cut_pct=90&change_friction_pct=120&dropouts_per_h=0",
+    "lathe?seed=22&change_h=0&change_cut_pct=125&change_friction_pct=95&dropouts_per_h=1",
+    "lathe?seed=23&change_h=0&change_cut_pct=105&change_friction_pct=85&dropouts_per_h=0",
+];
+
 /// What the shop cuts, and what its gear stage allows.
 const LEVELS: [&str; 8] = [
     "--cutting-speeds-m-min",
@@ -131,6 +138,15 @@ fn five_machines_are_commissioned() {
     println!("true wear at the alarm over the criterion: {off:.3?}, {near} of {} within 10 %", off.len());
     // Measured: 3 of 5. The aim is all of them (chapter `not-proven`).
     assert!(near >= 3, "fewer than measured: {off:?}");
+}
+
+#[test]
+#[ignore = "temporary"]
+fn more_machines() {
+    for machine in MORE {
+        let told = std::panic::catch_unwind(|| commissioned(machine));
+        println!("{machine}: {:?}", told.ok());
+    }
 }
 
 /// From an empty data directory to the first wear alarm in production; true wear at the alarm over the criterion.

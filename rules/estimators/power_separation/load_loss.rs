@@ -1,16 +1,16 @@
-//! Load loss per gear stage: `Pi = Pu(n) + (1 + a0) Pc + a1 Pc^2`, by least squares on steady cuts and idle stretches.
+//! Load loss per gear stage: `Pi = Pu(n) + (1 + a0) Pc + a1(n) Pc^2`, by least squares on steady cuts and idle stretches.
 //!
-//! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals.
+//! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals. Over several
+//! speeds a1 has one of two [`forms`](super::forms); from one speed alone, nothing tells which, and the result says so.
 
 use super::accuracy::{Accuracy, accuracy};
 use super::cuts::{SteadyPoint, points};
+use super::forms::{Fitted, FormResiduals, fitted, regression};
 use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
-use crate::estimators::STAGES;
-use crate::estimators::regression::{
-    CONFIDENCE, Column, FTest, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile,
-};
+use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, t_quantile};
+use crate::estimators::{LoadLoss, STAGES};
 use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
@@ -45,7 +45,12 @@ pub struct StageLearned {
     pub linear: IntervalEstimate,
     /// a1, 1/W.
     pub quadratic_per_w: IntervalEstimate,
-    /// Load loss over cutting power at the mean cut, and its standard error.
+    /// Spindle speed at which a1 is as stated, where it goes with 1/n^2; `None` where it is the same at every speed, or where the cuts
+    /// were made at one speed, so that nothing tells.
+    pub speed_rpm: Option<f64>,
+    /// What both forms of a1 over the speed leave; `None` for cuts at one speed.
+    pub form_residuals: Option<FormResiduals>,
+    /// Load loss over cutting power at the mean cut (at `speed_rpm` where a1 goes with the speed), and its standard error.
     pub share_at_mean: IntervalEstimate,
     /// Cutting powers from, to and mean, W.
     pub cutting_power_w: (f64, f64, f64),
@@ -63,6 +68,14 @@ pub struct StageLearned {
     pub by_speed: Option<FTest>,
     /// Accuracy of the separation in cuts that were left out; `None` for too few cuts.
     pub accuracy: Option<Accuracy>,
+}
+
+impl StageLearned {
+    /// The coefficients, to separate cutting power with.
+    #[must_use]
+    pub fn load_loss(&self) -> LoadLoss {
+        LoadLoss { linear: self.linear.value, quadratic_per_w: self.quadratic_per_w.value, speed_rpm: self.speed_rpm }
+    }
 }
 
 /// What a recording tells about load loss.
@@ -126,14 +139,17 @@ fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageL
     let speeds = speeds(points);
     check_span(&cuts)?;
     check_idle(points, &speeds)?;
-    let regression = regression(points, &speeds, false)?;
-    check_share(points, &regression, &speeds)?;
+    let fitted = fitted(points, &speeds)?;
+    let regression = &fitted.regression;
+    check_share(points, regression, &speeds)?;
     let mean = cuts.iter().sum::<f64>() / count(cuts.len());
-    let own = Widening::of(&regression, speeds.len(), reference);
+    let own = Widening::of(regression, speeds.len(), reference);
     let stage = StageLearned {
         stage: points[0].stage,
         linear: own.told(-1.0, 1.0, 0.0),
         quadratic_per_w: own.told(0.0, 0.0, 1.0),
+        speed_rpm: fitted.speed_rpm,
+        form_residuals: fitted.residuals,
         share_at_mean: own.told(-1.0, 1.0, mean),
         cutting_power_w: (least(&cuts), greatest(&cuts), mean),
         speeds_rpm: speeds.clone(),
@@ -141,7 +157,7 @@ fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageL
         idle: points.len() - cuts.len(),
         residual_sd_w: regression.residual_sd,
         variance_inflation: regression.coefficients[speeds.len()].variance_inflation.unwrap_or(1.0),
-        by_speed: by_speed(points, &speeds, &regression),
+        by_speed: by_speed(points, &speeds, &fitted),
         accuracy: accuracy(points, &speeds),
     };
     credible(&stage)?;
@@ -203,26 +219,6 @@ fn check_idle(points: &[&SteadyPoint], speeds: &[f64]) -> Result<(), Refusal> {
     }
 }
 
-/// Columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each.
-pub(super) fn regression(points: &[&SteadyPoint], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
-    let used: Vec<&&SteadyPoint> =
-        points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
-    let column =
-        |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
-    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
-    let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
-    let mut columns: Vec<Column> =
-        speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();
-    let groups: Vec<Option<f64>> = if each { speeds.iter().copied().map(Some).collect() } else { vec![None] };
-    for group in groups {
-        let inside = |point: &SteadyPoint| group.map_or(1.0, |speed| at(speed, point));
-        let name = group.map_or_else(String::new, |speed| format!(" {speed:.0} rpm"));
-        columns.push(column(format!("Pc{name}"), &|point| inside(point) * point.cutting_power_w));
-        columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * point.cutting_power_w.powi(2)));
-    }
-    fit(&y, &columns, Intercept::None)
-}
-
 /// Cutting power and spindle power must be of one size.
 fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
     let no_load = |point: &SteadyPoint| {
@@ -282,11 +278,11 @@ impl Widening {
     }
 }
 
-fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Regression) -> Option<FTest> {
+fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Fitted) -> Option<FTest> {
     if speeds.len() < 2 {
         return None;
     }
-    regression(points, speeds, true).ok()?.against(together)
+    regression(points, speeds, None, true).ok()?.against(&together.regression)
 }
 
 fn credible(stage: &StageLearned) -> Result<(), Refusal> {
@@ -300,7 +296,23 @@ fn credible(stage: &StageLearned) -> Result<(), Refusal> {
 }
 
 fn notes(stage: &StageLearned) -> impl Iterator<Item = String> {
-    by_speed_told(stage).into_iter().chain(negative(stage))
+    by_speed_told(stage).into_iter().chain(one_speed(stage)).chain(negative(stage))
+}
+
+/// a1 from one speed holds at this speed; what it is elsewhere depends on what loses the power.
+fn one_speed(stage: &StageLearned) -> Option<String> {
+    let [speed_rpm] = stage.speeds_rpm[..] else { return None };
+    let own = stage.load_loss();
+    let mean_w = stage.cutting_power_w.2;
+    let with_torque = LoadLoss { speed_rpm: Some(speed_rpm), ..own };
+    let slower_rpm = 0.7 * speed_rpm;
+    let share = |loss: &LoadLoss| 100.0 * (loss.linear + loss.quadratic_at(slower_rpm) * mean_w);
+    Some(format!(
+        "gear stage {}: a1 is known at {speed_rpm:.0} rpm only and is taken as the same at every speed. Where it comes from the windings it          goes with 1/n^2: at {slower_rpm:.0} rpm the mean cut of {mean_w:.0} W would lose {:.1} % instead of {:.1} %. Cut at two more          speeds, a slow and a fast one (commission --plan load-loss writes the list)",
+        stage.stage,
+        share(&with_torque),
+        share(&own)
+    ))
 }
 
 /// A load takes power; a loss below 0 means that the cutting power of the reference is too great. Its doubt is not in the interval,
