@@ -172,8 +172,15 @@ fn commissioned(machine: &'static str) -> f64 {
     let fixed = loss["accuracy"]["mean_fixed"].as_array().expect("two");
     let mean = loss["accuracy"]["mean"].as_f64().expect("a number");
     println!(
-        "torque {:#}\na0 {} a1 {}\nE {mean}, with 0.15 {}, with 0.25 {}",
-        told["torque"], loss["linear"]["value"], loss["quadratic_per_w"]["value"], fixed[0], fixed[1]
+        "torque {:#}\na0 {} a1 {} at {} rpm, residuals {}, own by speed {}\nE {mean}, with 0.15 {}, with 0.25 {}",
+        told["torque"],
+        loss["linear"]["value"],
+        loss["quadratic_per_w"]["value"],
+        loss["speed_rpm"],
+        loss["form_residuals"],
+        loss["by_speed"],
+        fixed[0],
+        fixed[1]
     );
     assert!(mean < 0.02 && fixed.iter().all(|it| it.as_f64().expect("a number") > mean), "{loss:#}");
 

@@ -109,7 +109,7 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
         notes: Vec::new(),
     };
     for stage in 0..STAGES {
-        let own: Vec<&SteadyPoint> = points.iter().filter(|point| point.stage == stage).collect();
+        let own = beside_cuts(&points.iter().filter(|point| point.stage == stage).collect::<Vec<_>>());
         if own.iter().any(|point| point.cut) {
             match of_stage(&own, reference.reference) {
                 Ok(found) => learned.stages.push(found),
@@ -123,6 +123,18 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
     learned.notes = learned.stages.iter().flat_map(notes).collect();
     learned.points = points;
     Ok(learned)
+}
+
+/// The cuts, and of the idle stretches those nearest to a cut of the same speed, before and after it. No-load power drifts with warmth: a
+/// history also holds warm-ups and idling at this speed hours away, which would stand for the power under these cuts.
+fn beside_cuts<'a>(points: &[&'a SteadyPoint]) -> Vec<&'a SteadyPoint> {
+    let mut used = vec![false; points.len()];
+    for (at, cut) in points.iter().enumerate().filter(|(_, point)| point.cut) {
+        let idle = |other: &usize| !points[*other].cut && near(points[*other].speed_rpm, cut.speed_rpm);
+        let (before, after) = ((0..at).rev().find(idle), (at + 1..points.len()).find(idle));
+        [Some(at), before, after].into_iter().flatten().for_each(|kept| used[kept] = true);
+    }
+    points.iter().zip(used).filter_map(|(point, used)| used.then_some(*point)).collect()
 }
 
 fn nothing() -> Refusal {
@@ -308,7 +320,9 @@ fn one_speed(stage: &StageLearned) -> Option<String> {
     let slower_rpm = 0.7 * speed_rpm;
     let share = |loss: &LoadLoss| 100.0 * (loss.linear + loss.quadratic_at(slower_rpm) * mean_w);
     Some(format!(
-        "gear stage {}: a1 is known at {speed_rpm:.0} rpm only and is taken as the same at every speed. Where it comes from the windings it          goes with 1/n^2: at {slower_rpm:.0} rpm the mean cut of {mean_w:.0} W would lose {:.1} % instead of {:.1} %. Cut at two more          speeds, a slow and a fast one (commission --plan load-loss writes the list)",
+        "gear stage {}: a1 is known at {speed_rpm:.0} rpm only and is taken as the same at every speed. Where it comes from the windings it \
+         goes with 1/n^2: at {slower_rpm:.0} rpm the mean cut of {mean_w:.0} W would lose {:.1} % instead of {:.1} %. Cut at two more \
+         speeds, a slow and a fast one (commission --plan load-loss writes the list)",
         stage.stage,
         share(&with_torque),
         share(&own)
