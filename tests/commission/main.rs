@@ -24,7 +24,7 @@ const MACHINES: [&str; 5] = [
     "lathe?seed=14&change_h=0&change_cut_pct=110&change_friction_pct=100&dropouts_per_h=2",
 ];
 
-/// Three more of other coefficients.
+/// Three more, which nobody looked at before the method stood as it is.
 const MORE: [&str; 3] = [
     "lathe?seed=21&change_h=0&change_cut_pct=90&change_friction_pct=120&dropouts_per_h=0",
     "lathe?seed=22&change_h=0&change_cut_pct=125&change_friction_pct=95&dropouts_per_h=1",
@@ -136,17 +136,18 @@ fn five_machines_are_commissioned() {
     let off: Vec<f64> = MACHINES.into_iter().map(commissioned).collect();
     let near = off.iter().filter(|share| (**share - 1.0).abs() <= 0.1).count();
     println!("true wear at the alarm over the criterion: {off:.3?}, {near} of {} within 10 %", off.len());
-    // Measured: 3 of 5. The aim is all of them (chapter `not-proven`).
-    assert!(near >= 3, "fewer than measured: {off:?}");
+    // Measured: 4 of 5. The aim is all of them (chapter `not-proven`).
+    assert!(near >= 4, "fewer than measured: {off:?}");
 }
 
+/// `cargo test --test commission three_more -- --ignored --nocapture`
 #[test]
-#[ignore = "temporary"]
-fn more_machines() {
-    for machine in MORE {
-        let told = std::panic::catch_unwind(|| commissioned(machine));
-        println!("{machine}: {:?}", told.ok());
-    }
+#[ignore = "4 minutes: the same with three machines that the method was not made on"]
+fn three_more_machines_are_commissioned() {
+    let off: Vec<f64> = MORE.into_iter().map(commissioned).collect();
+    let near = off.iter().filter(|share| (**share - 1.0).abs() <= 0.1).count();
+    println!("true wear at the alarm over the criterion: {off:.3?}, {near} of {} within 10 %", off.len());
+    assert!(near >= 3, "fewer than measured: {off:?}");
 }
 
 /// From an empty data directory to the first wear alarm in production; true wear at the alarm over the criterion.

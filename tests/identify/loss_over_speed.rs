@@ -20,7 +20,8 @@ fn true_quadratic_per_w(rpm: f64) -> f64 {
     0.86 / (rpm * TAU / 60.0).powi(2)
 }
 
-/// Four depths at each of three speeds, in an order that chance gives, with idling between; the machine is warm.
+/// Four depths at each of three speeds, in an order that chance gives, with idling between; before them a warm-up at one of the speeds,
+/// over which the no-load power falls by more than the cuts need to be told apart.
 fn cuts(seed: u64) -> Recorded {
     let mut dice = Pcg64Mcg::seed_from_u64(seed);
     let mut passes: Vec<(f64, f64)> =

@@ -19,6 +19,9 @@ use serde::Serialize;
 const SPAN_MIN: f64 = 2.0;
 /// Different cutting powers that are needed.
 const LEVELS_MIN: usize = 3;
+/// Longer idling is looked at in pieces of this length, s: of a warm-up only the end tells the power under the cut that follows. At a drift
+/// of 4 % in ten minutes, which is usual (`no_load_drift`), a piece is at most 0.4 % off; shorter ones would be noisier than that.
+const IDLE_S: f64 = 60.0;
 /// Cutting power over power above no-load power that is credible.
 const CREDIBLE: (f64, f64) = (0.4, 1.5);
 /// Values that the gateway takes.
@@ -100,7 +103,7 @@ pub struct LoadLossLearned {
 pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Result<LoadLossLearned, Refusal> {
     let rows = rows(recording)?;
     let reference = referenced(recording, &rows, choice)?;
-    let points = points(recording, &rows, &stretches(&rows), &reference);
+    let points = points(recording, &rows, &stretches(&rows, IDLE_S), &reference);
     let mut learned = LoadLossLearned {
         reference: reference.reference,
         stages: Vec::new(),
