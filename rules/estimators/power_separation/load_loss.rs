@@ -5,7 +5,7 @@
 
 use super::accuracy::{Accuracy, accuracy};
 use super::cuts::{SteadyPoint, points};
-use super::forms::{Fitted, FormResiduals, fitted, regression};
+use super::forms::{Fitted, FormResiduals, by_speed, fitted};
 use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
@@ -158,7 +158,7 @@ fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageL
     let regression = &fitted.regression;
     check_share(points, regression, &speeds)?;
     let mean = cuts.iter().sum::<f64>() / count(cuts.len());
-    let own = Widening::of(regression, speeds.len(), reference);
+    let own = Widening::of(&fitted, speeds.len(), reference);
     let stage = StageLearned {
         stage: points[0].stage,
         linear: own.told(-1.0, 1.0, 0.0),
@@ -257,14 +257,14 @@ fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64])
 struct Widening {
     gain: f64,
     quadratic: f64,
-    gain_variance: f64,
-    covariance: f64,
-    quadratic_variance: f64,
+    /// Widened covariances of `1 + a0` and a1; the wider one counts.
+    covariances: [[[f64; 2]; 2]; 2],
     t: f64,
 }
 
 impl Widening {
-    fn of(regression: &Regression, at: usize, reference: PowerReference) -> Self {
+    fn of(fitted: &Fitted, at: usize, reference: PowerReference) -> Self {
+        let regression = &fitted.regression;
         let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
         let scale = match reference {
             PowerReference::Removal { relative_sd } => relative_sd * relative_sd,
@@ -273,9 +273,13 @@ impl Widening {
         Self {
             gain,
             quadratic,
-            gain_variance: regression.covariance(at, at) + scale * gain * gain,
-            covariance: regression.covariance(at, at + 1) + 2.0 * scale * gain * quadratic,
-            quadratic_variance: regression.covariance(at + 1, at + 1) + 4.0 * scale * quadratic * quadratic,
+            covariances: fitted.covariances.map(|[[of_gain, of_both], [_, of_quadratic]]| {
+                let of_both = of_both + 2.0 * scale * gain * quadratic;
+                [
+                    [of_gain + scale * gain * gain, of_both],
+                    [of_both, of_quadratic + 4.0 * scale * quadratic * quadratic],
+                ]
+            }),
             t: t_quantile(0.5 + 0.5 * CONFIDENCE, regression.degrees_of_freedom),
         }
     }
@@ -283,21 +287,16 @@ impl Widening {
     /// `offset + a (1 + a0) + b a1`.
     fn told(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
         let value = offset + a * self.gain + b * self.quadratic;
-        let variance = a * a * self.gain_variance + 2.0 * a * b * self.covariance + b * b * self.quadratic_variance;
-        let standard_error = variance.max(0.0).sqrt();
+        let variances = self
+            .covariances
+            .map(|[[gain, both], [_, quadratic]]| a * a * gain + 2.0 * a * b * both + b * b * quadratic);
+        let standard_error = variances.into_iter().fold(0.0, f64::max).sqrt();
         IntervalEstimate {
             value,
             standard_error,
             interval: (value - self.t * standard_error, value + self.t * standard_error),
         }
     }
-}
-
-fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Fitted) -> Option<FTest> {
-    if speeds.len() < 2 {
-        return None;
-    }
-    regression(points, speeds, None, true).ok()?.against(&together.regression)
 }
 
 fn credible(stage: &StageLearned) -> Result<(), Refusal> {
