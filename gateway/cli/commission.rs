@@ -52,10 +52,7 @@ struct PlanArguments {
     /// Speeds to idle at.
     #[arg(long, value_name = "RPM,RPM,..", value_delimiter = ',', default_value = "300,450,600,750,900,1000")]
     speeds_rpm: Vec<f64>,
-    /// Speed of the cuts with the torque sensor.
-    #[arg(long, value_name = "RPM", default_value_t = 800.0)]
-    cut_rpm: f64,
-    /// Three cutting speeds of the L27, m/min.
+    /// Three cutting speeds, m/min: of the L27 and of the cuts with the torque sensor.
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', default_value = "100,140,180")]
     cutting_speeds_m_min: Vec<f64>,
     /// Three feeds of the L27, mm/rev.
@@ -120,7 +117,6 @@ fn span(history: &Path) -> Result<Option<(i64, i64)>, CannotRun> {
 fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
     let limits = Limits {
         speeds_rpm: arguments.speeds_rpm.clone(),
-        cut_rpm: arguments.cut_rpm,
         cutting_speeds_m_min: arguments.cutting_speeds_m_min.clone(),
         feeds_mm: arguments.feeds_mm.clone(),
         depths_mm: arguments.depths_mm.clone(),
@@ -129,7 +125,7 @@ fn list(which: Which, arguments: &PlanArguments) -> CommandResult {
     };
     let numbers = [&limits.speeds_rpm, &limits.cutting_speeds_m_min, &limits.feeds_mm, &limits.depths_mm];
     let usable = |number: &f64| number.is_finite() && *number > 0.0;
-    if numbers.into_iter().flatten().chain([&limits.cut_rpm, &limits.diameter_mm]).any(|number| !usable(number)) {
+    if numbers.into_iter().flatten().chain([&limits.diameter_mm]).any(|number| !usable(number)) {
         return Err(CannotRun::new("a speed, feed, depth or diameter of the list is not greater than 0", ""));
     }
     let steps = plan::steps(which, &limits).map_err(|problem| CannotRun::new(problem, ""))?;

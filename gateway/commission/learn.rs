@@ -6,7 +6,6 @@ use crate::history::STATE_SERIES;
 use crate::identified::{self, THERMAL, TOOL_WEAR};
 use adapters::Recording;
 use adapters::recording::{Cells, Numbers};
-use rules::estimators::balance;
 use rules::estimators::power_separation::{
     LoadLossLearned, NoLoadLearned, ReferenceChoice, identify_load_loss, identify_no_load,
 };
@@ -110,8 +109,10 @@ impl Learned {
             let each = learned.stages.iter().map(|stage| {
                 let accuracy =
                     stage.accuracy.as_ref().map_or_else(String::new, |it| format!(", E {:.2} %", 100.0 * it.mean));
+                let speed =
+                    stage.speed_rpm.map_or_else(String::new, |rpm| format!(" at {rpm:.0} rpm, elsewhere with 1/n^2"));
                 format!(
-                    "stage {}: a0 {:.4}, a1 {:.2e} 1/W{accuracy}",
+                    "stage {}: a0 {:.4}, a1 {:.2e} 1/W{speed}{accuracy}",
                     stage.stage, stage.linear.value, stage.quadratic_per_w.value
                 )
             });
@@ -120,10 +121,10 @@ impl Learned {
         self.part(
             "load-loss",
             known.map_err(Clone::clone),
-            "mount a torque sensor at the spindle for this one run, cut five depths twice with idling between, then give its file: \
-             `annotate torque --file sensor.csv --unit Nm`. Without it cutting power is off by what the drive loses under load, 10 to 25 %. \
-             `commission --plan load-loss` writes the list",
-            8.0,
+            "mount a torque sensor at the spindle for this one run, cut four depths at each of three speeds with idling between, then give its file: \
+             `annotate torque --file sensor.csv --unit Nm`. Without it cutting power is off by what the drive loses under load, 10 to 25 %, \
+             and how the loss goes with the speed is told by slow and fast cuts only. `commission --plan load-loss` writes the list",
+            9.0,
         );
         let Ok(learned) = found else { return };
         let groups = learned.stages.iter().filter_map(|stage| stage.accuracy.as_ref()).flat_map(|it| &it.groups);
@@ -184,7 +185,7 @@ impl Learned {
             let excess_w = column("spindle_power_w", row)? - column("no_load_power_w", row)?;
             let stage = column("gear_stage", row).unwrap_or(0.0);
             let own = loss.stages.iter().find(|it| (it.stage as f64 - stage).abs() < 0.5).or(loss.stages.first())?;
-            let split = balance(excess_w, own.linear.value, own.quadratic_per_w.value)?;
+            let split = own.load_loss().split(excess_w, column("spindle_speed_rpm", row)?)?;
             inner[row].then_some(split.cutting_power_w)
         };
         let cutting = (0..recording.rows()).map(one).collect::<Numbers>();

@@ -29,9 +29,7 @@ pub enum Which {
 pub struct Limits {
     /// Spindle speeds to idle at, rpm.
     pub speeds_rpm: Vec<f64>,
-    /// Speed of the cuts with the torque sensor, rpm.
-    pub cut_rpm: f64,
-    /// Three cutting speeds, m/min.
+    /// Three cutting speeds, m/min: of the L27 and, as spindle speeds, of the cuts with the torque sensor.
     pub cutting_speeds_m_min: Vec<f64>,
     /// Three feeds, mm/rev.
     pub feeds_mm: Vec<f64>,
@@ -57,51 +55,70 @@ pub struct CommissionStep {
 const IDLE_S: f64 = 30.0;
 const WARM_UP_S: f64 = 600.0;
 const BETWEEN_S: f64 = 12.0;
+/// Idling after the last cut of a visit of a speed, s.
+const AFTER_S: f64 = 7.0;
+
+/// Visits of a speed in the list with the torque sensor: 0 the lowest, 1 the middle, 2 the highest; then its two cuts:
+/// where the depth lies among the depths, and how long, s. Lengths all differ, so that the sensor's file fits in one place only.
+const SENSED: [(usize, [(f64, f64); 2]); 6] = [
+    (1, [(0.0, 11.0), (0.7, 15.0)]),
+    (0, [(1.0, 12.0), (0.3, 19.0)]),
+    (2, [(0.65, 14.0), (0.0, 20.0)]),
+    (2, [(0.3, 16.0), (1.0, 10.0)]),
+    (0, [(0.65, 18.0), (0.0, 13.0)]),
+    (1, [(0.35, 17.0), (1.0, 21.0)]),
+];
+
+fn idle(seconds: f64, rpm: f64) -> CommissionStep {
+    CommissionStep { seconds, rpm, cut: None }
+}
+
+/// Spindle speed of a cutting speed in m/min, rpm.
+fn spindle_rpm(cutting_speed_m_min: f64, diameter_mm: f64) -> f64 {
+    (1000.0 * cutting_speed_m_min / (PI * diameter_mm)).round()
+}
 
 /// The steps of a list.
 ///
 /// # Errors
 /// Levels that make no design.
 pub fn steps(which: Which, limits: &Limits) -> Result<Vec<CommissionStep>, String> {
-    let idle = |seconds: f64, rpm: f64| CommissionStep { seconds, rpm, cut: None };
     Ok(match which {
         Which::NoLoad => {
-            let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied().unwrap_or(limits.cut_rpm);
+            let warm_rpm = limits.speeds_rpm.get(limits.speeds_rpm.len() / 2).copied();
+            let warm_up = warm_rpm.map(|rpm| idle(WARM_UP_S, rpm));
             let each = limits.speeds_rpm.iter().map(|rpm| idle(IDLE_S, *rpm));
             // There and back: what drifts with warmth shows as a difference of the two visits.
             let back = limits.speeds_rpm.iter().rev().map(|rpm| idle(IDLE_S, *rpm));
-            std::iter::once(idle(WARM_UP_S, warm_rpm)).chain(each).chain(back).collect()
+            warm_up.into_iter().chain(each).chain(back).collect()
         }
-        Which::LoadLoss => {
-            let feed_mm = limits.feeds_mm.get(1).copied().unwrap_or(0.2);
-            let (least, greatest) = ends(&limits.depths_mm);
-            // Lengths differ, so that the sensor's file fits in one place only.
-            let cuts = [
-                (0.0, 11.0),
-                (0.6, 15.0),
-                (1.0, 12.0),
-                (0.3, 19.0),
-                (0.8, 14.0),
-                (0.45, 23.0),
-                (0.15, 13.0),
-                (0.9, 17.0),
-                (0.5, 10.0),
-                (0.7, 21.0),
-            ];
-            let pass = |(share, seconds): (f64, f64)| {
-                let depth = least + share * (greatest - least);
-                [
-                    idle(BETWEEN_S, limits.cut_rpm),
-                    CommissionStep { seconds, rpm: limits.cut_rpm, cut: Some((feed_mm * limits.cut_rpm, depth)) },
-                ]
-            };
-            let last = idle(BETWEEN_S, limits.cut_rpm);
-            cuts.into_iter().flat_map(pass).chain([last]).collect()
-        }
+        Which::LoadLoss => load_loss(limits),
         Which::Wear1 => l27(limits, 1)?,
         Which::Wear2 => l27(limits, 2)?,
         Which::Wear3 => l27(limits, 3)?,
     })
+}
+
+/// Cuts with the torque sensor: how the loss goes with the power is told by the depths, how it goes with the speed by the speeds. Each
+/// speed comes twice, the second time in reverse order, so that a drive that warms up over the list does not pass for one that
+/// loses less at the later speeds; each visit has a light and a heavy cut.
+fn load_loss(limits: &Limits) -> Vec<CommissionStep> {
+    let feed_mm = limits.feeds_mm.get(1).copied().unwrap_or(0.2);
+    let (least, greatest) = ends(&limits.depths_mm);
+    let mut speeds = limits.cutting_speeds_m_min.clone();
+    speeds.sort_by(f64::total_cmp);
+    let Some(last) = speeds.len().checked_sub(1) else { return Vec::new() };
+    let three = [0, last / 2, last].map(|at| spindle_rpm(speeds[at], limits.diameter_mm));
+    let visit = |(speed, cuts): (usize, [(f64, f64); 2])| {
+        let rpm = three[speed];
+        let pass = move |(depth, seconds): (f64, f64)| {
+            let depth = least + depth * (greatest - least);
+            [idle(BETWEEN_S, rpm), CommissionStep { seconds, rpm, cut: Some((feed_mm * rpm, depth)) }]
+        };
+        // The sensor's zero and the power without the cut are those before and after it.
+        cuts.into_iter().flat_map(pass).chain([idle(AFTER_S, rpm)])
+    };
+    SENSED.into_iter().flat_map(visit).collect()
 }
 
 fn ends(values: &[f64]) -> (f64, f64) {
@@ -125,9 +142,9 @@ fn l27(limits: &Limits, wear: usize) -> Result<Vec<CommissionStep>, String> {
     let design = plan(Array::L27, &factors, limits.seed).map_err(|problems| problems.join("; "))?;
     let own = design.cuts.iter().filter(|cut| cut.levels.first() == Some(&wear));
     let pass = |values: &[f64]| {
-        let rpm = (1000.0 * values[1] / (PI * limits.diameter_mm)).round();
+        let rpm = spindle_rpm(values[1], limits.diameter_mm);
         let cut = Some((values[2] * rpm, values[3]));
-        [CommissionStep { seconds: BETWEEN_S, rpm, cut: None }, CommissionStep { seconds: BETWEEN_S, rpm, cut }]
+        [idle(BETWEEN_S, rpm), CommissionStep { seconds: BETWEEN_S, rpm, cut }]
     };
     Ok(own.flat_map(|cut| pass(&cut.values)).collect())
 }

@@ -4,6 +4,12 @@
 //! Source: power separation on a lathe (CJK6136), equations 3 and 7; the root is taken in the form that stays exact as
 //! a1 goes to 0: `Pc = 2 D / ((1 + a0) + sqrt((1 + a0)^2 + 4 a1 D))` with `D = Pi - Pu`.
 //! Valid for one gear or belt stage; a0 and a1 may be negative (motor efficiency rises with load).
+//!
+//! The source takes a1 as the same at every speed. Where it comes from the windings it is not: their loss goes with the square of
+//! the current, hence below the drive's base speed with the square of the torque `Pc / omega`, so that a1 goes with `1 / n^2`.
+//! [`LoadLoss`] knows both; whoever separates cutting power asks it, so that the law stands in one place.
+
+use serde::Serialize;
 
 /// Cutting power and the loss that comes with it, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,9 +36,67 @@ pub fn balance(excess_w: f64, linear: f64, quadratic_per_w: f64) -> Option<Balan
     Some(Balance { cutting_power_w, load_loss_w: excess_w - cutting_power_w, slope: 1.0 / root })
 }
 
+/// Load loss of one gear stage, `Pad = a0 Pc + a1(n) Pc^2`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LoadLoss {
+    /// a0, 1.
+    pub linear: f64,
+    /// a1 at [`speed_rpm`](Self::speed_rpm), 1/W.
+    pub quadratic_per_w: f64,
+    /// Spindle speed at which a1 is as stated, rpm, positive: elsewhere it goes with `1 / n^2`. `None`: the same at every speed.
+    pub speed_rpm: Option<f64>,
+}
+
+impl LoadLoss {
+    /// Below this share of the speed at which a1 was learned it grows no further, so that a spindle that hardly turns has no
+    /// infinite loss: a1 is then 16 times as great. The drive limits its current, so a cut cannot have any torque; and the cutting
+    /// speeds of one gear stage span less than 1 to 4 to either side of their middle. A bound that is too high takes part of the loss of the
+    /// slowest cuts for cutting power; without one, a watt of error in the no-load power would hide any cut at a creep.
+    const SLOWEST: f64 = 0.25;
+
+    /// The same coefficients at every speed, as the source of the method has them.
+    #[must_use]
+    pub const fn constant(linear: f64, quadratic_per_w: f64) -> Self {
+        Self { linear, quadratic_per_w, speed_rpm: None }
+    }
+
+    /// a1 at a spindle speed in rpm of either sign, 1/W.
+    #[must_use]
+    pub fn quadratic_at(&self, speed_rpm: f64) -> f64 {
+        self.quadratic_per_w * self.share_at(speed_rpm)
+    }
+
+    /// a1 at a spindle speed over the stated one.
+    pub(super) fn share_at(&self, speed_rpm: f64) -> f64 {
+        self.speed_rpm.map_or(1.0, |learned| (learned / speed_rpm.abs().max(Self::SLOWEST * learned)).powi(2))
+    }
+
+    /// Splits the power above no-load power at a spindle speed; see [`balance`].
+    #[must_use]
+    pub fn split(&self, excess_w: f64, speed_rpm: f64) -> Option<Balance> {
+        balance(excess_w, self.linear, self.quadratic_at(speed_rpm))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_loss_that_goes_with_the_torque_is_split_at_any_speed() {
+        let loss = LoadLoss { linear: 0.11, quadratic_per_w: 1.2e-4, speed_rpm: Some(800.0) };
+        for (rpm, a1) in [(800.0, 1.2e-4), (-400.0, 4.8e-4), (1600.0, 3e-5), (200.0, 1.92e-3)] {
+            let excess_w = 1.11 * 900.0 + a1 * 900.0 * 900.0;
+            let split = loss.split(excess_w, rpm).expect("a real root");
+            assert!((split.cutting_power_w - 900.0).abs() < 1e-9, "{rpm}: {split:?}");
+            let same = LoadLoss::constant(0.11, 1.2e-4).split(excess_w, rpm);
+            assert_eq!(same, balance(excess_w, 0.11, 1.2e-4), "one a1 for every speed");
+        }
+        for rpm in [0.0, 10.0, -199.0] {
+            assert!((loss.quadratic_at(rpm) - 1.92e-3).abs() < 1e-12, "bounded at {rpm} rpm");
+        }
+        assert_eq!(loss.split(100.0, f64::NAN), loss.split(100.0, 0.0), "no speed is a slow one");
+    }
 
     #[test]
     fn the_published_cut_splits_as_published() {

@@ -1,5 +1,6 @@
 //! Every tolerance and length the estimators use: one table that scripts, configuration and documentation read.
 
+use super::cutting::LoadLoss;
 use super::no_load::NoLoadPoint;
 use adapters::channel::nearest;
 use serde::{Deserialize, Serialize};
@@ -71,6 +72,7 @@ macro_rules! settings {
             $(#[doc = $en] pub(super) $name: f64,)*
             pub(super) stage_load_loss_linear: [Option<f64>; STAGES],
             pub(super) stage_load_loss_quadratic_per_w: [Option<f64>; STAGES],
+            pub(super) stage_load_loss_speed_rpm: [Option<f64>; STAGES],
             pub(super) no_load_table: Vec<NoLoadPoint>,
         }
 
@@ -80,6 +82,7 @@ macro_rules! settings {
                     $($name: $default,)*
                     stage_load_loss_linear: [None; STAGES],
                     stage_load_loss_quadratic_per_w: [None; STAGES],
+                    stage_load_loss_speed_rpm: [None; STAGES],
                     no_load_table: Vec::new(),
                 }
             }
@@ -152,23 +155,26 @@ settings! {
     "a0: load loss per watt of cutting power, for gear stages without a value of their own"
     load_loss_quadratic_per_w "1/W" -0.001 0.01 0.0 false
     "a1: growth of the load loss coefficient per watt of cutting power, for gear stages without a value of their own"
+    load_loss_speed_rpm "rpm" 0.0 100000.0 0.0 false
+    "Spindle speed at which a1 is as given, and goes with 1/n^2 elsewhere (copper losses); 0 = a1 is the same at every speed; for gear stages without a value of their own"
     load_loss_sd "1" 0.0 0.5 0.05 false
     "Uncertainty of a0, one standard deviation"
 }
 
 impl Settings {
-    /// The value of a setting, also `load_loss_linear_stage_3` and `load_loss_quadratic_per_w_stage_3`.
+    /// The value of a setting, also `load_loss_linear_stage_3` and the like.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<f64> {
         match staged(name) {
-            Some(("load_loss_linear", stage)) => Some(self.load_loss(stage).0),
-            Some(("load_loss_quadratic_per_w", stage)) => Some(self.load_loss(stage).1),
+            Some(("load_loss_linear", stage)) => Some(self.load_loss(stage).linear),
+            Some(("load_loss_quadratic_per_w", stage)) => Some(self.load_loss(stage).quadratic_per_w),
+            Some(("load_loss_speed_rpm", stage)) => Some(self.load_loss(stage).speed_rpm.unwrap_or(0.0)),
             _ => row(name).map(|setting| (setting.get)(self)),
         }
     }
 
     /// Sets a value by name. The names of [`SETTINGS`], and `load_loss_linear_stage_N`,
-    /// `load_loss_quadratic_per_w_stage_N` for one gear stage.
+    /// `load_loss_quadratic_per_w_stage_N`, `load_loss_speed_rpm_stage_N` for one gear stage.
     ///
     /// # Errors
     /// An unknown name or a value outside the range; the settings are unchanged then.
@@ -180,6 +186,7 @@ impl Settings {
         match stage {
             Some(("load_loss_linear", stage)) => self.stage_load_loss_linear[stage] = Some(value),
             Some(("load_loss_quadratic_per_w", stage)) => self.stage_load_loss_quadratic_per_w[stage] = Some(value),
+            Some(("load_loss_speed_rpm", stage)) => self.stage_load_loss_speed_rpm[stage] = Some(value),
             Some(_) => return Err(unknown(name)),
             None => (setting.set)(self, value),
         }
@@ -222,14 +229,16 @@ impl Settings {
         found
     }
 
-    /// a0 and a1 (1/W) of a gear stage.
+    /// The load loss of a gear stage.
     #[must_use]
-    pub fn load_loss(&self, stage: usize) -> (f64, f64) {
+    pub fn load_loss(&self, stage: usize) -> LoadLoss {
         let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
-        (
-            own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
-            own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
-        )
+        LoadLoss {
+            linear: own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
+            quadratic_per_w: own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
+            speed_rpm: Some(own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm))
+                .filter(|rpm| *rpm > 0.0),
+        }
     }
 }
 
@@ -290,7 +299,14 @@ mod tests {
     fn a_gear_stage_may_have_its_own_load_loss() {
         let mut settings = Settings::default();
         settings.set("load_loss_linear_stage_2", 0.25).expect("in range");
-        assert_eq!((settings.load_loss(2), settings.load_loss(1)), ((0.25, 0.0), (0.18, 0.0)));
+        settings.set("load_loss_speed_rpm_stage_2", 640.0).expect("in range");
+        settings.set("load_loss_speed_rpm", 800.0).expect("in range");
+        settings.set("load_loss_speed_rpm_stage_3", 0.0).expect("the same at every speed");
+        let of = |linear: f64, speed_rpm: Option<f64>| LoadLoss { linear, quadratic_per_w: 0.0, speed_rpm };
+        assert_eq!(settings.load_loss(2), of(0.25, Some(640.0)));
+        assert_eq!(settings.load_loss(1), of(0.18, Some(800.0)));
+        assert_eq!(settings.load_loss(3), of(0.18, None));
+        assert_eq!(settings.get("load_loss_speed_rpm_stage_2"), Some(640.0));
     }
 
     #[test]

@@ -24,6 +24,13 @@ const MACHINES: [&str; 5] = [
     "lathe?seed=14&change_h=0&change_cut_pct=110&change_friction_pct=100&dropouts_per_h=2",
 ];
 
+/// Three more, which nobody looked at before the method stood as it is.
+const MORE: [&str; 3] = [
+    "lathe?seed=21&change_h=0&change_cut_pct=90&change_friction_pct=120&dropouts_per_h=0",
+    "lathe?seed=22&change_h=0&change_cut_pct=125&change_friction_pct=95&dropouts_per_h=1",
+    "lathe?seed=23&change_h=0&change_cut_pct=105&change_friction_pct=85&dropouts_per_h=0",
+];
+
 /// What the shop cuts, and what its gear stage allows.
 const LEVELS: [&str; 8] = [
     "--cutting-speeds-m-min",
@@ -129,7 +136,17 @@ fn five_machines_are_commissioned() {
     let off: Vec<f64> = MACHINES.into_iter().map(commissioned).collect();
     let near = off.iter().filter(|share| (**share - 1.0).abs() <= 0.1).count();
     println!("true wear at the alarm over the criterion: {off:.3?}, {near} of {} within 10 %", off.len());
-    // Measured: 3 of 5. The aim is all of them (chapter `not-proven`).
+    // Measured: 4 of 5. The aim is all of them (chapter `not-proven`).
+    assert!(near >= 4, "fewer than measured: {off:?}");
+}
+
+/// `cargo test --test commission three_more -- --ignored --nocapture`
+#[test]
+#[ignore = "4 minutes: the same with three machines that the method was not made on"]
+fn three_more_machines_are_commissioned() {
+    let off: Vec<f64> = MORE.into_iter().map(commissioned).collect();
+    let near = off.iter().filter(|share| (**share - 1.0).abs() <= 0.1).count();
+    println!("true wear at the alarm over the criterion: {off:.3?}, {near} of {} within 10 %", off.len());
     assert!(near >= 3, "fewer than measured: {off:?}");
 }
 
@@ -156,8 +173,15 @@ fn commissioned(machine: &'static str) -> f64 {
     let fixed = loss["accuracy"]["mean_fixed"].as_array().expect("two");
     let mean = loss["accuracy"]["mean"].as_f64().expect("a number");
     println!(
-        "torque {:#}\na0 {} a1 {}\nE {mean}, with 0.15 {}, with 0.25 {}",
-        told["torque"], loss["linear"]["value"], loss["quadratic_per_w"]["value"], fixed[0], fixed[1]
+        "torque {:#}\na0 {} a1 {} at {} rpm, residuals {}, own by speed {}\nE {mean}, with 0.15 {}, with 0.25 {}",
+        told["torque"],
+        loss["linear"]["value"],
+        loss["quadratic_per_w"]["value"],
+        loss["speed_rpm"],
+        loss["form_residuals"],
+        loss["by_speed"],
+        fixed[0],
+        fixed[1]
     );
     assert!(mean < 0.02 && fixed.iter().all(|it| it.as_f64().expect("a number") > mean), "{loss:#}");
 

@@ -6,6 +6,7 @@
 #[path = "../support/command.rs"]
 mod command;
 mod current;
+mod loss_over_speed;
 mod machine;
 mod power;
 mod thermal;

@@ -161,10 +161,10 @@ fn cuts(seed: u64, stage: u8, rpm: f64, depths_mm: [f64; 5]) -> Recorded {
 
 /// A torque sensor: zero error, noise of mean zero about it, and whether it counts with the drive.
 #[derive(Clone, Copy)]
-struct Sensor {
-    offset_nm: f64,
-    noise_nm: f64,
-    sign: f64,
+pub(crate) struct Sensor {
+    pub(crate) offset_nm: f64,
+    pub(crate) noise_nm: f64,
+    pub(crate) sign: f64,
 }
 
 fn sensed(seed: u64, stage: u8, rpm: f64, depths_mm: [f64; 5], sensor: Sensor) -> Recorded {
@@ -177,7 +177,12 @@ fn sensed(seed: u64, stage: u8, rpm: f64, depths_mm: [f64; 5], sensor: Sensor) -
         [idle(12.0, rpm, stage), cut]
     };
     let steps: Vec<ExperimentStep> = depths.into_iter().flat_map(pass).collect();
-    let mut recorded = record(lathe(seed), &steps, 5.0);
+    with_torque(&mut dice, seed, &steps, sensor)
+}
+
+/// The steps on the lathe of this seed, with what the sensor shows.
+pub(crate) fn with_torque(dice: &mut Pcg64Mcg, seed: u64, steps: &[ExperimentStep], sensor: Sensor) -> Recorded {
+    let mut recorded = record(lathe(seed), steps, 5.0);
     let torque = |truth: &Truth| {
         let rad_s = truth.spindle_speed_rpm.abs() * TAU / 60.0;
         let noise: f64 = dice.sample(StandardNormal);
@@ -281,13 +286,18 @@ fn load_loss_is_written_as_a_script_can_say_it_and_separates_what_it_was_learned
     let arguments = ["identify", "load-loss", "--recording", "cuts.csv", "--out", "load_loss.rhai"];
     let told = gateway(directory.path(), &arguments);
     assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
-    assert!(String::from_utf8_lossy(&told.stdout).contains("a0 = "));
+    let said = String::from_utf8_lossy(&told.stdout);
+    assert!(
+        said.contains("a0 = ") && said.contains("known at 800 rpm only") && said.contains("two more speeds"),
+        "{said}"
+    );
     let text = std::fs::read_to_string(directory.path().join("load_loss.rhai")).expect("written");
     let set = compile(&[ScriptFile { name: "load_loss.rhai".to_owned(), text }]).expect("a script of settings");
-    let (a0, a1) = set.settings().load_loss(1);
+    let loss = set.settings().load_loss(1);
     let learned = identify_load_loss(&recorded.recording, &ReferenceChoice::default()).expect("coefficients");
-    assert!((a0 - learned.stages[0].linear.value).abs() < 1e-5);
-    assert!((a1 - learned.stages[0].quadratic_per_w.value).abs() < 1e-9);
+    assert!((loss.linear - learned.stages[0].linear.value).abs() < 1e-5);
+    assert!((loss.quadratic_per_w - learned.stages[0].quadratic_per_w.value).abs() < 1e-9);
+    assert_eq!(loss.speed_rpm, None, "nothing tells how it goes with the speed");
 }
 
 #[test]

@@ -20,11 +20,13 @@ fn methods_give_their_numbers() {
         const TABLE = [[600, 365.0], [700.0, 440.0], [900.0, 545.0]];
         note("Pc " + separated_cutting_power_w(spindle_power_w, 500, 0.1807, 0.00004));
         note("Pad " + separated_load_loss_w(1460.0, 500.0, 0.1807, 0.00004));
+        note("a1 " + load_loss_quadratic_at_per_w(0.0001, 800.0, 400.0));
         note("Pu " + interpolated_no_load_power_w(TABLE, 800.0) + " " + no_load_noise_gain(TABLE, 700));
     "#;
     let notes = notes(script, &[("spindle_power_w", 1460.0)]);
     assert!(notes[0].starts_with("Pc 791.83") && notes[1].starts_with("Pad 168.16"), "{notes:?}");
-    assert!(notes[2].starts_with("Pu 500") && notes[2].ends_with(" 1.0"), "{notes:?}");
+    assert_eq!(notes[2], "a1 0.0004");
+    assert!(notes[3].starts_with("Pu 500") && notes[3].ends_with(" 1.0"), "{notes:?}");
 }
 
 #[test]

@@ -5,7 +5,6 @@ mod stand_in;
 mod stored;
 mod voltage;
 
-use super::cutting::balance;
 use super::detector::{Detected, Detector};
 use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 use super::inputs::{InputChannels, TickInputs};
@@ -259,7 +258,9 @@ impl Inference {
             (_, known) => known,
         }
         .map(|known| self.at_voltage(known, inputs));
-        let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference));
+        // Where a no-load power is known, a speed is.
+        let speed_rpm = inputs.speed.unwrap_or(0.0);
+        let (cutting_power_w, load_loss_w) = self.split(filtered, steady.and(reference), speed_rpm);
         let estimates = Estimates {
             at_ns: inputs.at_ns,
             state: verdict.state,
@@ -271,7 +272,7 @@ impl Inference {
             no_load_power_w: reference.map(|known| Estimate { value: known.power_w, sd: known.sd_w }),
             cutting_power_w,
             load_loss_w,
-            visible_cutting_power_w: self.least_visible(reference.and(no_load)),
+            visible_cutting_power_w: self.least_visible(reference.and(no_load), speed_rpm),
             wear_limit_w: Err(NoEstimate::NoModel),
             tool_wear_mm: Err(NoEstimate::NoPartYet),
             tool_growth_pct: Err(NoEstimate::NoPartYet),
@@ -306,22 +307,27 @@ impl Inference {
         }
     }
 
-    fn split(&self, filtered: Estimated, no_load: Result<NoLoad, NoEstimate>) -> (Estimated, Estimated) {
+    fn split(
+        &self,
+        filtered: Estimated,
+        no_load: Result<NoLoad, NoEstimate>,
+        speed_rpm: f64,
+    ) -> (Estimated, Estimated) {
         match no_load.and_then(|known| Ok((known, filtered?))) {
             Err(reason) => (Err(reason), Err(reason)),
-            Ok((known, filtered)) => self.split_known(filtered, known),
+            Ok((known, filtered)) => self.split_known(filtered, known, speed_rpm),
         }
     }
 
-    fn split_known(&self, filtered: Estimate, known: NoLoad) -> (Estimated, Estimated) {
-        let (linear, quadratic) = self.settings.load_loss(self.memory.signals.stage());
+    fn split_known(&self, filtered: Estimate, known: NoLoad, speed_rpm: f64) -> (Estimated, Estimated) {
+        let load_loss = self.settings.load_loss(self.memory.signals.stage());
         let excess_w = filtered.value - known.power_w;
         let excess_sd_w = filtered.sd.hypot(known.sd_w);
         if excess_w < -BELOW_NO_LOAD_SD * excess_sd_w {
             return (Err(NoEstimate::BelowNoLoad), Err(NoEstimate::BelowNoLoad));
         }
         // Noise below no-load power is no negative cutting power.
-        let Some(split) = balance(excess_w.max(0.0), linear, quadratic) else {
+        let Some(split) = load_loss.split(excess_w.max(0.0), speed_rpm) else {
             return (Err(NoEstimate::Imbalance), Err(NoEstimate::Imbalance));
         };
         let by_linear_w = split.slope * split.cutting_power_w * self.settings.load_loss_sd;
@@ -334,14 +340,14 @@ impl Inference {
     }
 
     /// Cutting power that would be noticed within one window.
-    fn least_visible(&self, no_load: Result<NoLoad, NoEstimate>) -> Estimated {
+    fn least_visible(&self, no_load: Result<NoLoad, NoEstimate>, speed_rpm: f64) -> Estimated {
         let known = no_load?;
         let signals = &self.memory.signals;
-        let (linear, quadratic) = self.settings.load_loss(signals.stage());
         let noise_w = signals.noise.sd() * known.power_w;
         let excess_w = visible_excess_w(known, signals, &self.settings)
             + self.settings.cutting_evidence * noise_w / self.settings.window_samples;
-        let split = balance(excess_w, linear, quadratic).ok_or(NoEstimate::Imbalance)?;
+        let load_loss = self.settings.load_loss(signals.stage());
+        let split = load_loss.split(excess_w, speed_rpm).ok_or(NoEstimate::Imbalance)?;
         Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
     }
 

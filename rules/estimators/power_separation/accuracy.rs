@@ -1,12 +1,13 @@
 //! Accuracy of the separation, as its source defines it: `E = |Pc estimated - Pc measured| / Pc measured`, per group of cuts.
 //!
 //! A group is one steady cut; its means stand for it, as in the source's own numbers. Coefficients for a group are learned from
-//! the other cuts, so that no cut judges numbers that were made of it. Beside it stands what the fixed load losses of
+//! the other cuts, and with them the form of a1 over the speed, so that no cut judges numbers that were made of it. Beside it stands what the fixed load losses of
 //! practice, 0.15 and 0.25 of the cutting power, would have told from the same power and the same no-load power.
 
 use super::cuts::SteadyPoint;
-use super::load_loss::{near, regression};
-use crate::estimators::cutting::balance;
+use super::forms::fitted;
+use super::load_loss::near;
+use crate::estimators::LoadLoss;
 use crate::statistics::count;
 use serde::Serialize;
 
@@ -68,20 +69,17 @@ fn group(points: &[&SteadyPoint], speeds: &[f64], cut: &SteadyPoint) -> Option<G
     }
     let idle: Vec<f64> = others.iter().filter(at_speed).filter(|it| !it.cut).map(|it| it.power.mean).collect();
     let no_load_w = idle.iter().sum::<f64>() / count(idle.len());
-    let learned = regression(&others, speeds, false).ok()?;
-    let (gain, quadratic) = (learned.coefficients[speeds.len()].value, learned.coefficients[speeds.len() + 1].value);
-    let estimated = |linear: f64, quadratic: f64| {
-        balance(cut.power.mean - no_load_w, linear, quadratic).map(|split| split.cutting_power_w)
-    };
+    let estimated =
+        |loss: LoadLoss| loss.split(cut.power.mean - no_load_w, cut.speed_rpm).map(|split| split.cutting_power_w);
     let error = |estimated_w: f64| (estimated_w - cut.cutting_power_w).abs() / cut.cutting_power_w;
-    let estimated_w = estimated(gain - 1.0, quadratic)?;
-    let [first, second] = FIXED_LOSSES;
+    let estimated_w = estimated(fitted(&others, speeds).ok()?.load_loss())?;
+    let [first, second] = FIXED_LOSSES.map(|share| LoadLoss::constant(share, 0.0));
     Some(GroupAccuracy {
         at_s: cut.at_s,
         speed_rpm: cut.speed_rpm,
         measured_w: cut.cutting_power_w,
         estimated_w,
         error: error(estimated_w),
-        error_fixed: [error(estimated(first, 0.0)?), error(estimated(second, 0.0)?)],
+        error_fixed: [error(estimated(first)?), error(estimated(second)?)],
     })
 }

@@ -1,16 +1,16 @@
-//! Load loss per gear stage: `Pi = Pu(n) + (1 + a0) Pc + a1 Pc^2`, by least squares on steady cuts and idle stretches.
+//! Load loss per gear stage: `Pi = Pu(n) + (1 + a0) Pc + a1(n) Pc^2`, by least squares on steady cuts and idle stretches.
 //!
-//! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals.
+//! Every speed has a no-load power of its own, fitted along with a0 and a1, so that its error is in their intervals. Over several
+//! speeds a1 has one of two [`forms`](super::forms); from one speed alone, nothing tells which, and the result says so.
 
 use super::accuracy::{Accuracy, accuracy};
 use super::cuts::{SteadyPoint, points};
+use super::forms::{Fitted, FormResiduals, by_speed, fitted};
 use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
-use crate::estimators::STAGES;
-use crate::estimators::regression::{
-    CONFIDENCE, Column, FTest, Intercept, Refusal, RefusalKind, Regression, fit, t_quantile,
-};
+use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, t_quantile};
+use crate::estimators::{LoadLoss, STAGES};
 use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
@@ -19,6 +19,9 @@ use serde::Serialize;
 const SPAN_MIN: f64 = 2.0;
 /// Different cutting powers that are needed.
 const LEVELS_MIN: usize = 3;
+/// Longer idling is looked at in pieces of this length, s: of a warm-up only the end tells the power under the cut that follows. At a drift
+/// of 4 % in ten minutes, which is usual (`no_load_drift`), a piece is at most 0.4 % off; shorter ones would be noisier than that.
+const IDLE_S: f64 = 60.0;
 /// Cutting power over power above no-load power that is credible.
 const CREDIBLE: (f64, f64) = (0.4, 1.5);
 /// Values that the gateway takes.
@@ -45,7 +48,12 @@ pub struct StageLearned {
     pub linear: IntervalEstimate,
     /// a1, 1/W.
     pub quadratic_per_w: IntervalEstimate,
-    /// Load loss over cutting power at the mean cut, and its standard error.
+    /// Spindle speed at which a1 is as stated, where it goes with 1/n^2; `None` where it is the same at every speed, or where the cuts
+    /// were made at one speed, so that nothing tells.
+    pub speed_rpm: Option<f64>,
+    /// What both forms of a1 over the speed leave; `None` for cuts at one speed.
+    pub form_residuals: Option<FormResiduals>,
+    /// Load loss over cutting power at the mean cut (at `speed_rpm` where a1 goes with the speed), and its standard error.
     pub share_at_mean: IntervalEstimate,
     /// Cutting powers from, to and mean, W.
     pub cutting_power_w: (f64, f64, f64),
@@ -63,6 +71,14 @@ pub struct StageLearned {
     pub by_speed: Option<FTest>,
     /// Accuracy of the separation in cuts that were left out; `None` for too few cuts.
     pub accuracy: Option<Accuracy>,
+}
+
+impl StageLearned {
+    /// The coefficients, to separate cutting power with.
+    #[must_use]
+    pub fn load_loss(&self) -> LoadLoss {
+        LoadLoss { linear: self.linear.value, quadratic_per_w: self.quadratic_per_w.value, speed_rpm: self.speed_rpm }
+    }
 }
 
 /// What a recording tells about load loss.
@@ -87,7 +103,7 @@ pub struct LoadLossLearned {
 pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Result<LoadLossLearned, Refusal> {
     let rows = rows(recording)?;
     let reference = referenced(recording, &rows, choice)?;
-    let points = points(recording, &rows, &stretches(&rows), &reference);
+    let points = points(recording, &rows, &stretches(&rows, IDLE_S), &reference);
     let mut learned = LoadLossLearned {
         reference: reference.reference,
         stages: Vec::new(),
@@ -96,7 +112,7 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
         notes: Vec::new(),
     };
     for stage in 0..STAGES {
-        let own: Vec<&SteadyPoint> = points.iter().filter(|point| point.stage == stage).collect();
+        let own = beside_cuts(&points.iter().filter(|point| point.stage == stage).collect::<Vec<_>>());
         if own.iter().any(|point| point.cut) {
             match of_stage(&own, reference.reference) {
                 Ok(found) => learned.stages.push(found),
@@ -110,6 +126,18 @@ pub fn identify_load_loss(recording: &Recording, choice: &ReferenceChoice) -> Re
     learned.notes = learned.stages.iter().flat_map(notes).collect();
     learned.points = points;
     Ok(learned)
+}
+
+/// The cuts, and of the idle stretches those nearest to a cut of the same speed, before and after it. No-load power drifts with warmth: a
+/// history also holds warm-ups and idling at this speed hours away, which would stand for the power under these cuts.
+fn beside_cuts<'a>(points: &[&'a SteadyPoint]) -> Vec<&'a SteadyPoint> {
+    let mut used = vec![false; points.len()];
+    for (at, cut) in points.iter().enumerate().filter(|(_, point)| point.cut) {
+        let idle = |other: &usize| !points[*other].cut && near(points[*other].speed_rpm, cut.speed_rpm);
+        let (before, after) = ((0..at).rev().find(idle), (at + 1..points.len()).find(idle));
+        [Some(at), before, after].into_iter().flatten().for_each(|kept| used[kept] = true);
+    }
+    points.iter().zip(used).filter_map(|(point, used)| used.then_some(*point)).collect()
 }
 
 fn nothing() -> Refusal {
@@ -126,14 +154,17 @@ fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageL
     let speeds = speeds(points);
     check_span(&cuts)?;
     check_idle(points, &speeds)?;
-    let regression = regression(points, &speeds, false)?;
-    check_share(points, &regression, &speeds)?;
+    let fitted = fitted(points, &speeds)?;
+    let regression = &fitted.regression;
+    check_share(points, regression, &speeds)?;
     let mean = cuts.iter().sum::<f64>() / count(cuts.len());
-    let own = Widening::of(&regression, speeds.len(), reference);
+    let own = Widening::of(&fitted, speeds.len(), reference);
     let stage = StageLearned {
         stage: points[0].stage,
         linear: own.told(-1.0, 1.0, 0.0),
         quadratic_per_w: own.told(0.0, 0.0, 1.0),
+        speed_rpm: fitted.speed_rpm,
+        form_residuals: fitted.residuals,
         share_at_mean: own.told(-1.0, 1.0, mean),
         cutting_power_w: (least(&cuts), greatest(&cuts), mean),
         speeds_rpm: speeds.clone(),
@@ -141,7 +172,7 @@ fn of_stage(points: &[&SteadyPoint], reference: PowerReference) -> Result<StageL
         idle: points.len() - cuts.len(),
         residual_sd_w: regression.residual_sd,
         variance_inflation: regression.coefficients[speeds.len()].variance_inflation.unwrap_or(1.0),
-        by_speed: by_speed(points, &speeds, &regression),
+        by_speed: by_speed(points, &speeds, &fitted),
         accuracy: accuracy(points, &speeds),
     };
     credible(&stage)?;
@@ -203,26 +234,6 @@ fn check_idle(points: &[&SteadyPoint], speeds: &[f64]) -> Result<(), Refusal> {
     }
 }
 
-/// Columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each.
-pub(super) fn regression(points: &[&SteadyPoint], speeds: &[f64], each: bool) -> Result<Regression, Refusal> {
-    let used: Vec<&&SteadyPoint> =
-        points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
-    let column =
-        |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
-    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
-    let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
-    let mut columns: Vec<Column> =
-        speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();
-    let groups: Vec<Option<f64>> = if each { speeds.iter().copied().map(Some).collect() } else { vec![None] };
-    for group in groups {
-        let inside = |point: &SteadyPoint| group.map_or(1.0, |speed| at(speed, point));
-        let name = group.map_or_else(String::new, |speed| format!(" {speed:.0} rpm"));
-        columns.push(column(format!("Pc{name}"), &|point| inside(point) * point.cutting_power_w));
-        columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * point.cutting_power_w.powi(2)));
-    }
-    fit(&y, &columns, Intercept::None)
-}
-
 /// Cutting power and spindle power must be of one size.
 fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64]) -> Result<(), Refusal> {
     let no_load = |point: &SteadyPoint| {
@@ -246,14 +257,14 @@ fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64])
 struct Widening {
     gain: f64,
     quadratic: f64,
-    gain_variance: f64,
-    covariance: f64,
-    quadratic_variance: f64,
+    /// Widened covariances of `1 + a0` and a1; the wider one counts.
+    covariances: [[[f64; 2]; 2]; 2],
     t: f64,
 }
 
 impl Widening {
-    fn of(regression: &Regression, at: usize, reference: PowerReference) -> Self {
+    fn of(fitted: &Fitted, at: usize, reference: PowerReference) -> Self {
+        let regression = &fitted.regression;
         let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
         let scale = match reference {
             PowerReference::Removal { relative_sd } => relative_sd * relative_sd,
@@ -262,9 +273,13 @@ impl Widening {
         Self {
             gain,
             quadratic,
-            gain_variance: regression.covariance(at, at) + scale * gain * gain,
-            covariance: regression.covariance(at, at + 1) + 2.0 * scale * gain * quadratic,
-            quadratic_variance: regression.covariance(at + 1, at + 1) + 4.0 * scale * quadratic * quadratic,
+            covariances: fitted.covariances.map(|[[of_gain, of_both], [_, of_quadratic]]| {
+                let of_both = of_both + 2.0 * scale * gain * quadratic;
+                [
+                    [of_gain + scale * gain * gain, of_both],
+                    [of_both, of_quadratic + 4.0 * scale * quadratic * quadratic],
+                ]
+            }),
             t: t_quantile(0.5 + 0.5 * CONFIDENCE, regression.degrees_of_freedom),
         }
     }
@@ -272,21 +287,16 @@ impl Widening {
     /// `offset + a (1 + a0) + b a1`.
     fn told(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
         let value = offset + a * self.gain + b * self.quadratic;
-        let variance = a * a * self.gain_variance + 2.0 * a * b * self.covariance + b * b * self.quadratic_variance;
-        let standard_error = variance.max(0.0).sqrt();
+        let variances = self
+            .covariances
+            .map(|[[gain, both], [_, quadratic]]| a * a * gain + 2.0 * a * b * both + b * b * quadratic);
+        let standard_error = variances.into_iter().fold(0.0, f64::max).sqrt();
         IntervalEstimate {
             value,
             standard_error,
             interval: (value - self.t * standard_error, value + self.t * standard_error),
         }
     }
-}
-
-fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Regression) -> Option<FTest> {
-    if speeds.len() < 2 {
-        return None;
-    }
-    regression(points, speeds, true).ok()?.against(together)
 }
 
 fn credible(stage: &StageLearned) -> Result<(), Refusal> {
@@ -300,7 +310,25 @@ fn credible(stage: &StageLearned) -> Result<(), Refusal> {
 }
 
 fn notes(stage: &StageLearned) -> impl Iterator<Item = String> {
-    by_speed_told(stage).into_iter().chain(negative(stage))
+    by_speed_told(stage).into_iter().chain(one_speed(stage)).chain(negative(stage))
+}
+
+/// a1 from one speed holds at this speed; what it is elsewhere depends on what loses the power.
+fn one_speed(stage: &StageLearned) -> Option<String> {
+    let [speed_rpm] = stage.speeds_rpm[..] else { return None };
+    let own = stage.load_loss();
+    let mean_w = stage.cutting_power_w.2;
+    let with_torque = LoadLoss { speed_rpm: Some(speed_rpm), ..own };
+    let slower_rpm = 0.7 * speed_rpm;
+    let share = |loss: &LoadLoss| 100.0 * (loss.linear + loss.quadratic_at(slower_rpm) * mean_w);
+    Some(format!(
+        "gear stage {}: a1 is known at {speed_rpm:.0} rpm only and is taken as the same at every speed. Where it comes from the windings it \
+         goes with 1/n^2: at {slower_rpm:.0} rpm the mean cut of {mean_w:.0} W would lose {:.1} % instead of {:.1} %. Cut at two more \
+         speeds, a slow and a fast one (commission --plan load-loss writes the list)",
+        stage.stage,
+        share(&with_torque),
+        share(&own)
+    ))
 }
 
 /// A load takes power; a loss below 0 means that the cutting power of the reference is too great. Its doubt is not in the interval,

@@ -57,7 +57,7 @@ pub struct NoLoadLearned {
 /// # Errors
 /// A [`Refusal`] where the recording has no settled idling, or a column or unit is wrong.
 pub fn identify_no_load(recording: &Recording) -> Result<NoLoadLearned, Refusal> {
-    let stretches = stretches(&rows(recording)?);
+    let stretches = stretches(&rows(recording)?, f64::INFINITY);
     if stretches.is_empty() {
         return Err(Refusal::new(
             RefusalKind::TooFew,

@@ -49,8 +49,8 @@ impl Stretch {
     }
 }
 
-/// The settled idle stretches of a recording, in the order of time.
-pub(super) fn stretches(rows: &[MachineRow]) -> Vec<Stretch> {
+/// The settled idle stretches of a recording, in the order of time; what idles for longer than `longest_s` comes in pieces.
+pub(super) fn stretches(rows: &[MachineRow], longest_s: f64) -> Vec<Stretch> {
     let mut found = Vec::new();
     let mut open: Vec<(f64, f64, f64)> = Vec::new();
     let mut stage = 0;
@@ -58,7 +58,9 @@ pub(super) fn stretches(rows: &[MachineRow]) -> Vec<Stretch> {
         let idle = idle(row);
         let goes_on = idle.is_some_and(|(speed_rpm, _)| {
             open.last().is_none_or(|last| row.time_s - last.0 < 30.0 && stage == row.stage)
-                && open.first().is_none_or(|first| (speed_rpm / first.1 - 1.0).abs() <= 0.5 * SAME_SPEED)
+                && open.first().is_none_or(|first| {
+                    row.time_s - first.0 < longest_s && (speed_rpm / first.1 - 1.0).abs() <= 0.5 * SAME_SPEED
+                })
         });
         if !goes_on {
             found.extend(close(&open, stage));

@@ -65,15 +65,33 @@ impl LoadLossLearned {
     #[must_use]
     pub fn script(&self) -> String {
         let mut text = String::from(
-            "// Load loss by gear stage, identified from recordings: Pad = a0 Pc + a1 Pc^2. 附加载荷损耗系数\n\nfn settings() {\n    #{\n",
+            "// Load loss by gear stage, identified from recordings: Pad = a0 Pc + a1 Pc^2. 附加载荷损耗系数\n\
+             // load_loss_speed_rpm: the speed at which a1 is as given; elsewhere it goes with 1/n^2. 0: the same at every speed. a1 对应的转速\n\n\
+             fn settings() {\n    #{\n",
         );
-        for StageLearned { stage, linear, quadratic_per_w, .. } in &self.stages {
+        for StageLearned { stage, linear, quadratic_per_w, speed_rpm, .. } in &self.stages {
             let _ = writeln!(text, "        load_loss_linear_stage_{stage}: {:.6},", linear.value);
             let _ = writeln!(text, "        load_loss_quadratic_per_w_stage_{stage}: {:.10},", quadratic_per_w.value);
+            let _ = writeln!(text, "        load_loss_speed_rpm_stage_{stage}: {:.1},", speed_rpm.unwrap_or(0.0));
         }
         let sd = self.stages.iter().map(|stage| stage.share_at_mean.standard_error).fold(0.0, f64::max);
         let _ = writeln!(text, "        load_loss_sd: {:.6},", sd.min(0.5));
         text + "    }\n}\n"
+    }
+}
+
+/// How a1 goes with the speed, and what the other form would leave.
+fn form(stage: &StageLearned) -> String {
+    match (stage.form_residuals, stage.speed_rpm) {
+        (None, _) => "not known, the cuts were made at one speed; taken as the same at every speed".to_owned(),
+        (Some(left), Some(speed_rpm)) => format!(
+            "({speed_rpm:.0} rpm / n)^2, residual {:.2} W; the same at every speed would leave {:.2} W",
+            left.with_torque_squared_w, left.same_at_every_speed_w
+        ),
+        (Some(left), None) => format!(
+            "the same at every speed, residual {:.2} W; with 1/n^2 it would leave {:.2} W",
+            left.same_at_every_speed_w, left.with_torque_squared_w
+        ),
     }
 }
 
@@ -116,6 +134,7 @@ impl fmt::Display for LoadLossLearned {
             ] {
                 writeln!(f, "  {name} = {:.6e}   95 % {:.6e} to {:.6e}", told.value, told.interval.0, told.interval.1)?;
             }
+            writeln!(f, "  a1 over speed: {}", form(stage))?;
             stage.accuracy.iter().try_for_each(|accuracy| table(f, accuracy))?;
         }
         self.refused.iter().try_for_each(|refusal| writeln!(f, "cannot tell: {refusal}"))?;

@@ -1,7 +1,7 @@
 //! From a recording or a table to cuts: one row per cut, its conditions and its mean cutting power.
 
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS};
-use crate::estimators::balance;
+use crate::estimators::LoadLoss;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use adapters::Recording;
 use adapters::recording::{Numbers, with_derived};
@@ -25,9 +25,9 @@ pub struct CutColumns {
     pub conditions: [String; 4],
     /// Column of the cutting power.
     pub power: String,
-    /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power where it has no column: from
-    /// `spindle_power_w` and `no_load_power_w`.
-    pub load_loss: Option<(f64, f64)>,
+    /// Load loss, to separate the cutting power where it has no column: from `spindle_power_w` and `no_load_power_w`, and
+    /// `spindle_speed_rpm` where the loss goes with the speed.
+    pub load_loss: Option<LoadLoss>,
     /// Every row is a cut of its own; otherwise consecutive rows of one cut are averaged.
     pub each_row: bool,
 }
@@ -97,13 +97,21 @@ fn cutting_power(recording: &Recording, columns: &CutColumns) -> Result<Numbers,
     }
     let (total, idle) = (recording.numbers("spindle_power_w"), recording.numbers("no_load_power_w"));
     match (total, idle, columns.load_loss) {
-        (Some(total), Some(idle), Some((linear, quadratic))) => {
-            let each = total.iter().zip(idle.iter());
-            Ok(each.map(|(total, idle)| Some(balance(total? - idle?, linear, quadratic)?.cutting_power_w)).collect())
+        (Some(total), Some(idle), Some(load_loss)) => {
+            let speed = recording.numbers("spindle_speed_rpm");
+            if load_loss.speed_rpm.is_some() && speed.is_none() {
+                return Err("there is no column spindle_speed_rpm, with which the load loss goes".to_owned());
+            }
+            let at = |row: usize| match load_loss.speed_rpm {
+                Some(_) => speed.and_then(|speed| speed.get(row)),
+                None => Some(0.0),
+            };
+            let split = |row: usize| load_loss.split(total.get(row)? - idle.get(row)?, at(row)?);
+            Ok((0..recording.rows()).map(|row| split(row).map(|it| it.cutting_power_w)).collect())
         }
         (Some(_), _, _) => Err(format!(
             "there is no column {}; spindle_power_w alone holds the no-load power: add no_load_power_w (an export of the \
-             history has it) and --load-loss A0 A1 (identify load-loss)",
+             history has it) and --load-loss A0 A1 RPM (identify load-loss)",
             columns.power
         )),
         _ => Err(format!("there is no column {}", columns.power)),
@@ -286,7 +294,7 @@ mod tests {
     #[test]
     fn the_cutting_power_is_separated_where_it_has_no_column() {
         let columns = [&CONDITIONS[..], &[("spindle_power_w", 1460.0), ("no_load_power_w", 500.0)]].concat();
-        let known = CutColumns { load_loss: Some((0.1807, 4e-5)), ..CutColumns::default() };
+        let known = CutColumns { load_loss: Some(LoadLoss::constant(0.1807, 4e-5)), ..CutColumns::default() };
         let gathered = gather(&recording(3, &columns), &known).expect("a cut");
         assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
         let told = gather(&recording(3, &columns), &CutColumns::default()).expect_err("refused").to_string();

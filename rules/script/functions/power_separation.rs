@@ -2,7 +2,7 @@
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::estimators::{balance, lagrange, noise_gain, triple};
+use crate::estimators::{LoadLoss, balance, lagrange, noise_gain, triple};
 
 /// Extrapolation that amplifies noise more than this is refused, as the estimators do.
 const GAIN_MAX: f64 = 3.0 + 1e-9;
@@ -54,6 +54,22 @@ static METHODS: &[Method] = &[
         en: "Additional load loss Pad = a0 Pc + a1 Pc^2 that belongs to this cutting power",
         zh: "附加载荷损耗功率",
         run: |given| split(given).map(|split| MethodResult::Number(split.load_loss_w)),
+    },
+    Method {
+        name: "load_loss_quadratic_at_per_w",
+        parameters: &[
+            takes("load_loss_quadratic_per_w", "1/W"),
+            takes("load_loss_speed_rpm", "rpm"),
+            takes("speed_rpm", "rpm"),
+        ],
+        returns: "1/W",
+        en: "Coefficient a1 at a spindle speed where it was learned at another and goes with 1/n^2; a learned speed of 0: the same at every speed",
+        zh: "由标定转速换算到当前转速的载荷损耗二次系数 a1",
+        run: |given| {
+            let speed_rpm = Some(given.number(1)).filter(|rpm| *rpm > 0.0);
+            let loss = LoadLoss { linear: 0.0, quadratic_per_w: given.number(0), speed_rpm };
+            Ok(MethodResult::Number(loss.quadratic_at(given.number(2))))
+        },
     },
 ];
 

@@ -9,6 +9,7 @@ use crate::cli::{CommandResult, recipe_from};
 use crate::identified::TOOL_WEAR;
 use adapters::Recording;
 use clap::{Args, ValueEnum};
+use rules::estimators::LoadLoss;
 use rules::estimators::regression::{Refusal, RefusalKind};
 use rules::estimators::wear::{
     ConditionFactor, CutColumns, FACTORS, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
@@ -46,8 +47,9 @@ struct TableArguments {
     /// Column of a quantity under another name: VB, vc, f, ap or power, as in --column power=pc_w.
     #[arg(long, value_name = "WHAT=COLUMN", value_parser = pair)]
     column: Vec<(String, String)>,
-    /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power from spindle_power_w and no_load_power_w.
-    #[arg(long, num_args = 2, value_names = ["A0", "A1"], allow_hyphen_values = true)]
+    /// Coefficients a0 and a1 (1/W) of the load loss, to separate the cutting power from spindle_power_w and no_load_power_w; with the
+    /// spindle speed of a1 where it goes with 1/n^2, as identify load-loss says.
+    #[arg(long, num_args = 2..=3, value_names = ["A0", "A1", "RPM"], allow_hyphen_values = true)]
     load_loss: Vec<f64>,
     /// Operations recipe: gives depth of cut and diameter where the recording lacks them.
     #[arg(long, value_name = "FILE")]
@@ -148,8 +150,9 @@ impl TableArguments {
                 None => columns.power.clone_from(column),
             }
         }
-        if let [linear, quadratic] = self.load_loss[..] {
-            columns.load_loss = Some((linear, quadratic));
+        if let [linear, quadratic_per_w, ref speed @ ..] = self.load_loss[..] {
+            let speed_rpm = speed.first().copied().filter(|rpm| *rpm > 0.0);
+            columns.load_loss = Some(LoadLoss { linear, quadratic_per_w, speed_rpm });
         }
         columns
     }

@@ -1,0 +1,138 @@
+//! How a1 goes with the spindle speed, found in cuts at two or more speeds of a gear stage.
+//!
+//! Two forms, each with one a0 and one a1 for all speeds: a1 the same at every speed, as the source of the method has it, and a1 with
+//! `1 / n^2`, which is what the windings lose below the drive's base speed (the square of the torque `Pc / omega`). They have the same number of
+//! parameters, so the one that leaves less is taken, without a test. Neither need be right: above the base speed, where the current goes
+//! with the power again, or with iron losses that fall, each speed wants coefficients of its own, and the F test of
+//! [`super::load_loss`] says so.
+//!
+//! A heavy cut scatters ten times as much as idling does, in watts. One residual for all would make what rests on the cuts look better known than
+//! it is. Therefore the F test is made on the cuts alone, and beside the usual covariance stands one that takes every point's own
+//! residual for its scatter (White 1980, in the form HC3 of MacKinnon and White 1985); the wider of both counts, as Angrist and
+//! Pischke (2009) advise for few points.
+
+use super::cuts::SteadyPoint;
+use super::load_loss::near;
+use crate::estimators::LoadLoss;
+use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, fit};
+use crate::statistics::count;
+use serde::Serialize;
+
+/// What each form leaves, residual standard deviation, W.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FormResiduals {
+    /// a1 the same at every speed.
+    pub same_at_every_speed_w: f64,
+    /// a1 with 1/n^2.
+    pub with_torque_squared_w: f64,
+}
+
+/// The form that leaves less, fitted.
+pub(super) struct Fitted {
+    pub(super) regression: Regression,
+    /// Speed at which a1 is as fitted; `None` where it is the same at every speed, or only one is known.
+    pub(super) speed_rpm: Option<f64>,
+    /// Of both forms, where there are two speeds to tell them apart.
+    pub(super) residuals: Option<FormResiduals>,
+    /// Covariance of `1 + a0` and a1: the usual one, and the one by each point's own residual.
+    pub(super) covariances: [[[f64; 2]; 2]; 2],
+    /// Where a0 stands among the coefficients; a1 follows.
+    at: usize,
+}
+
+impl Fitted {
+    /// The coefficients.
+    pub(super) fn load_loss(&self) -> LoadLoss {
+        LoadLoss {
+            linear: self.regression.coefficients[self.at].value - 1.0,
+            quadratic_per_w: self.regression.coefficients[self.at + 1].value,
+            speed_rpm: self.speed_rpm,
+        }
+    }
+}
+
+/// Fits both forms and takes the one that leaves less; a1 that goes with 1/n^2 is that at the mean of the speeds.
+///
+/// # Errors
+/// Columns that cannot be told apart, too few points.
+pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<Fitted, Refusal> {
+    let at = speeds.len();
+    let of_form = |speed_rpm: Option<f64>| {
+        let (power, columns) = design(points, speeds, speed_rpm, false);
+        let regression = fit(&power, &columns, Intercept::None)?;
+        let covariances = [usual(&regression, at), by_own_residuals(&regression, &columns, at)];
+        Ok::<_, Refusal>(Fitted { regression, speed_rpm, residuals: None, covariances, at })
+    };
+    let same = of_form(None)?;
+    if at < 2 {
+        return Ok(same);
+    }
+    let torque = of_form(Some(speeds.iter().sum::<f64>() / count(at)))?;
+    let (same_sd_w, torque_sd_w) = (same.regression.residual_sd, torque.regression.residual_sd);
+    let residuals = Some(FormResiduals { same_at_every_speed_w: same_sd_w, with_torque_squared_w: torque_sd_w });
+    // Where both leave the same, the source's form holds.
+    let better = if torque_sd_w < same_sd_w { torque } else { same };
+    Ok(Fitted { residuals, ..better })
+}
+
+fn usual(regression: &Regression, at: usize) -> [[f64; 2]; 2] {
+    [at, at + 1].map(|a| [at, at + 1].map(|b| regression.covariance(a, b)))
+}
+
+fn by_own_residuals(regression: &Regression, columns: &[Column], at: usize) -> [[f64; 2]; 2] {
+    let mut sum = [[0.0; 2]; 2];
+    for (row, (residual, leverage)) in regression.residuals.iter().zip(&regression.leverage).enumerate() {
+        let influence = [at, at + 1].map(|coefficient| {
+            let inverse = &regression.inverse[coefficient];
+            inverse.iter().zip(columns).map(|(entry, column)| entry * column.values[row]).sum::<f64>()
+        });
+        // A point that alone determines a coefficient has no residual to speak of.
+        let own = (residual / (1.0 - leverage).max(1e-6)).powi(2);
+        for (a, entries) in sum.iter_mut().enumerate() {
+            for (b, entry) in entries.iter_mut().enumerate() {
+                *entry += influence[a] * influence[b] * own;
+            }
+        }
+    }
+    sum
+}
+
+/// Do the speeds want coefficients of their own? On the cuts alone, each less the no-load power of its speed. `None` for one speed,
+/// or for too few cuts.
+pub(super) fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Fitted) -> Option<FTest> {
+    if speeds.len() < 2 {
+        return None;
+    }
+    let cuts: Vec<&SteadyPoint> = points.iter().copied().filter(|point| point.cut).collect();
+    let (mut power, shorter) = design(&cuts, speeds, together.speed_rpm, false);
+    let (_, longer) = design(&cuts, speeds, None, true);
+    for (power_w, cut) in power.values.iter_mut().zip(&cuts) {
+        let at = speeds.iter().position(|speed| near(*speed, cut.speed_rpm))?;
+        *power_w -= together.regression.coefficients[at].value;
+    }
+    let fit_of = |columns: &[Column]| fit(&power, &columns[speeds.len()..], Intercept::None).ok();
+    fit_of(&longer)?.against(&fit_of(&shorter)?)
+}
+
+/// The spindle power, and the columns: no-load power of each speed, then Pc and Pc^2, for all speeds together or for each. `speed_rpm`: where a1 is stated, if it
+/// goes with 1/n^2.
+fn design(points: &[&SteadyPoint], speeds: &[f64], speed_rpm: Option<f64>, each: bool) -> (Column, Vec<Column>) {
+    let used: Vec<&&SteadyPoint> =
+        points.iter().filter(|point| speeds.iter().any(|it| near(*it, point.speed_rpm))).collect();
+    let column =
+        |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
+    let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
+    let unit = LoadLoss { linear: 0.0, quadratic_per_w: 1.0, speed_rpm };
+    let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
+    let mut columns: Vec<Column> =
+        speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();
+    let groups: Vec<Option<f64>> = if each { speeds.iter().copied().map(Some).collect() } else { vec![None] };
+    for group in groups {
+        let inside = |point: &SteadyPoint| group.map_or(1.0, |speed| at(speed, point));
+        let name = group.map_or_else(String::new, |speed| format!(" {speed:.0} rpm"));
+        columns.push(column(format!("Pc{name}"), &|point| inside(point) * point.cutting_power_w));
+        let square = |point: &SteadyPoint| point.cutting_power_w.powi(2) * unit.quadratic_at(point.speed_rpm);
+        columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * square(point)));
+    }
+    (y, columns)
+}
