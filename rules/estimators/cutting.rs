@@ -7,7 +7,7 @@
 //!
 //! The source takes a1 as the same at every speed. Where it comes from the windings it is not: their loss goes with the square of
 //! the current, hence below the drive's base speed with the square of the torque `Pc / omega`, so that a1 goes with `1 / n^2`.
-//! [`LoadLoss`] knows both; whoever separates cutting power asks it, so that the law stands in one place.
+//! [`LoadLossLaw`] knows both; whoever separates cutting power asks it, so that the law stands in one place.
 
 use serde::Serialize;
 
@@ -38,7 +38,7 @@ pub fn balance(excess_w: f64, linear: f64, quadratic_per_w: f64) -> Option<Balan
 
 /// Load loss of one gear stage, `Pad = a0 Pc + a1(n) Pc^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LoadLoss {
+pub struct LoadLossLaw {
     /// a0, 1.
     pub linear: f64,
     /// a1 at [`speed_rpm`](Self::speed_rpm), 1/W.
@@ -47,7 +47,7 @@ pub struct LoadLoss {
     pub speed_rpm: Option<f64>,
 }
 
-impl LoadLoss {
+impl LoadLossLaw {
     /// Below this share of the speed at which a1 was learned it grows no further, so that a spindle that hardly turns has no
     /// infinite loss: a1 is then 16 times as great. The drive limits its current, so a cut cannot have any torque; and the cutting
     /// speeds of one gear stage span less than 1 to 4 to either side of their middle. A bound that is too high takes part of the loss of the
@@ -84,12 +84,12 @@ mod tests {
 
     #[test]
     fn a_loss_that_goes_with_the_torque_is_split_at_any_speed() {
-        let loss = LoadLoss { linear: 0.11, quadratic_per_w: 1.2e-4, speed_rpm: Some(800.0) };
+        let loss = LoadLossLaw { linear: 0.11, quadratic_per_w: 1.2e-4, speed_rpm: Some(800.0) };
         for (rpm, a1) in [(800.0, 1.2e-4), (-400.0, 4.8e-4), (1600.0, 3e-5), (200.0, 1.92e-3)] {
             let excess_w = 1.11 * 900.0 + a1 * 900.0 * 900.0;
             let split = loss.split(excess_w, rpm).expect("a real root");
             assert!((split.cutting_power_w - 900.0).abs() < 1e-9, "{rpm}: {split:?}");
-            let same = LoadLoss::constant(0.11, 1.2e-4).split(excess_w, rpm);
+            let same = LoadLossLaw::constant(0.11, 1.2e-4).split(excess_w, rpm);
             assert_eq!(same, balance(excess_w, 0.11, 1.2e-4), "one a1 for every speed");
         }
         for rpm in [0.0, 10.0, -199.0] {

@@ -54,7 +54,7 @@ pub use basis::StateBasis;
 pub use evidence::Evidence;
 pub use window::{Means, PowerWindow, stationary};
 
-pub use cutting::{Balance, LoadLoss, balance};
+pub use cutting::{Balance, LoadLossLaw, balance};
 pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
 pub use inference::{Inference, RestoreError};

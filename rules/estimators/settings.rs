@@ -1,6 +1,6 @@
 //! Every tolerance and length the estimators use: one table that scripts, configuration and documentation read.
 
-use super::cutting::LoadLoss;
+use super::cutting::LoadLossLaw;
 use super::no_load::NoLoadPoint;
 use adapters::channel::nearest;
 use serde::{Deserialize, Serialize};
@@ -231,9 +231,9 @@ impl Settings {
 
     /// The load loss of a gear stage.
     #[must_use]
-    pub fn load_loss(&self, stage: usize) -> LoadLoss {
+    pub fn load_loss(&self, stage: usize) -> LoadLossLaw {
         let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
-        LoadLoss {
+        LoadLossLaw {
             linear: own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
             quadratic_per_w: own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
             speed_rpm: Some(own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm))
@@ -302,7 +302,7 @@ mod tests {
         settings.set("load_loss_speed_rpm_stage_2", 640.0).expect("in range");
         settings.set("load_loss_speed_rpm", 800.0).expect("in range");
         settings.set("load_loss_speed_rpm_stage_3", 0.0).expect("the same at every speed");
-        let of = |linear: f64, speed_rpm: Option<f64>| LoadLoss { linear, quadratic_per_w: 0.0, speed_rpm };
+        let of = |linear: f64, speed_rpm: Option<f64>| LoadLossLaw { linear, quadratic_per_w: 0.0, speed_rpm };
         assert_eq!(settings.load_loss(2), of(0.25, Some(640.0)));
         assert_eq!(settings.load_loss(1), of(0.18, Some(800.0)));
         assert_eq!(settings.load_loss(3), of(0.18, None));

@@ -7,7 +7,7 @@
 use super::cuts::SteadyPoint;
 use super::forms::fitted;
 use super::load_loss::near;
-use crate::estimators::LoadLoss;
+use crate::estimators::LoadLossLaw;
 use crate::statistics::count;
 use serde::Serialize;
 
@@ -70,10 +70,10 @@ fn group(points: &[&SteadyPoint], speeds: &[f64], cut: &SteadyPoint) -> Option<G
     let idle: Vec<f64> = others.iter().filter(at_speed).filter(|it| !it.cut).map(|it| it.power.mean).collect();
     let no_load_w = idle.iter().sum::<f64>() / count(idle.len());
     let estimated =
-        |loss: LoadLoss| loss.split(cut.power.mean - no_load_w, cut.speed_rpm).map(|split| split.cutting_power_w);
+        |loss: LoadLossLaw| loss.split(cut.power.mean - no_load_w, cut.speed_rpm).map(|split| split.cutting_power_w);
     let error = |estimated_w: f64| (estimated_w - cut.cutting_power_w).abs() / cut.cutting_power_w;
     let estimated_w = estimated(fitted(&others, speeds).ok()?.load_loss())?;
-    let [first, second] = FIXED_LOSSES.map(|share| LoadLoss::constant(share, 0.0));
+    let [first, second] = FIXED_LOSSES.map(|share| LoadLossLaw::constant(share, 0.0));
     Some(GroupAccuracy {
         at_s: cut.at_s,
         speed_rpm: cut.speed_rpm,

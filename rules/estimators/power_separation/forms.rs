@@ -13,7 +13,7 @@
 
 use super::cuts::SteadyPoint;
 use super::load_loss::near;
-use crate::estimators::LoadLoss;
+use crate::estimators::LoadLossLaw;
 use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, fit};
 use crate::statistics::count;
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub struct FormResiduals {
 }
 
 /// The form that leaves less, fitted.
-pub(super) struct Fitted {
+pub(super) struct FittedLoss {
     pub(super) regression: Regression,
     /// Speed at which a1 is as fitted; `None` where it is the same at every speed, or only one is known.
     pub(super) speed_rpm: Option<f64>,
@@ -40,10 +40,10 @@ pub(super) struct Fitted {
     at: usize,
 }
 
-impl Fitted {
+impl FittedLoss {
     /// The coefficients.
-    pub(super) fn load_loss(&self) -> LoadLoss {
-        LoadLoss {
+    pub(super) fn load_loss(&self) -> LoadLossLaw {
+        LoadLossLaw {
             linear: self.regression.coefficients[self.at].value - 1.0,
             quadratic_per_w: self.regression.coefficients[self.at + 1].value,
             speed_rpm: self.speed_rpm,
@@ -55,13 +55,13 @@ impl Fitted {
 ///
 /// # Errors
 /// Columns that cannot be told apart, too few points.
-pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<Fitted, Refusal> {
+pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLoss, Refusal> {
     let at = speeds.len();
     let of_form = |speed_rpm: Option<f64>| {
         let (power, columns) = design(points, speeds, speed_rpm, false);
         let regression = fit(&power, &columns, Intercept::None)?;
         let covariances = [usual(&regression, at), by_own_residuals(&regression, &columns, at)];
-        Ok::<_, Refusal>(Fitted { regression, speed_rpm, residuals: None, covariances, at })
+        Ok::<_, Refusal>(FittedLoss { regression, speed_rpm, residuals: None, covariances, at })
     };
     let same = of_form(None)?;
     if at < 2 {
@@ -72,7 +72,7 @@ pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<Fitted, 
     let residuals = Some(FormResiduals { same_at_every_speed_w: same_sd_w, with_torque_squared_w: torque_sd_w });
     // Where both leave the same, the source's form holds.
     let better = if torque_sd_w < same_sd_w { torque } else { same };
-    Ok(Fitted { residuals, ..better })
+    Ok(FittedLoss { residuals, ..better })
 }
 
 fn usual(regression: &Regression, at: usize) -> [[f64; 2]; 2] {
@@ -99,7 +99,7 @@ fn by_own_residuals(regression: &Regression, columns: &[Column], at: usize) -> [
 
 /// Do the speeds want coefficients of their own? On the cuts alone, each less the no-load power of its speed. `None` for one speed,
 /// or for too few cuts.
-pub(super) fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &Fitted) -> Option<FTest> {
+pub(super) fn by_speed(points: &[&SteadyPoint], speeds: &[f64], together: &FittedLoss) -> Option<FTest> {
     if speeds.len() < 2 {
         return None;
     }
@@ -122,7 +122,7 @@ fn design(points: &[&SteadyPoint], speeds: &[f64], speed_rpm: Option<f64>, each:
     let column =
         |name: String, of: &dyn Fn(&SteadyPoint) -> f64| Column::new(name, used.iter().map(|it| of(it)).collect());
     let at = |speed: f64, point: &SteadyPoint| f64::from(u8::from(near(speed, point.speed_rpm)));
-    let unit = LoadLoss { linear: 0.0, quadratic_per_w: 1.0, speed_rpm };
+    let unit = LoadLossLaw { linear: 0.0, quadratic_per_w: 1.0, speed_rpm };
     let y = column("spindle_power_w".to_owned(), &|point| point.power.mean);
     let mut columns: Vec<Column> =
         speeds.iter().map(|speed| column(format!("no-load {speed:.0} rpm"), &|point| at(*speed, point))).collect();

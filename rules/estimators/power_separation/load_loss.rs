@@ -5,12 +5,12 @@
 
 use super::accuracy::{Accuracy, accuracy};
 use super::cuts::{SteadyPoint, points};
-use super::forms::{Fitted, FormResiduals, by_speed, fitted};
+use super::forms::{FittedLoss, FormResiduals, by_speed, fitted};
 use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
 use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, t_quantile};
-use crate::estimators::{LoadLoss, STAGES};
+use crate::estimators::{LoadLossLaw, STAGES};
 use crate::statistics::count;
 use adapters::Recording;
 use serde::Serialize;
@@ -76,8 +76,12 @@ pub struct StageLearned {
 impl StageLearned {
     /// The coefficients, to separate cutting power with.
     #[must_use]
-    pub fn load_loss(&self) -> LoadLoss {
-        LoadLoss { linear: self.linear.value, quadratic_per_w: self.quadratic_per_w.value, speed_rpm: self.speed_rpm }
+    pub fn load_loss(&self) -> LoadLossLaw {
+        LoadLossLaw {
+            linear: self.linear.value,
+            quadratic_per_w: self.quadratic_per_w.value,
+            speed_rpm: self.speed_rpm,
+        }
     }
 }
 
@@ -263,7 +267,7 @@ struct Widening {
 }
 
 impl Widening {
-    fn of(fitted: &Fitted, at: usize, reference: PowerReference) -> Self {
+    fn of(fitted: &FittedLoss, at: usize, reference: PowerReference) -> Self {
         let regression = &fitted.regression;
         let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
         let scale = match reference {
@@ -318,9 +322,9 @@ fn one_speed(stage: &StageLearned) -> Option<String> {
     let [speed_rpm] = stage.speeds_rpm[..] else { return None };
     let own = stage.load_loss();
     let mean_w = stage.cutting_power_w.2;
-    let with_torque = LoadLoss { speed_rpm: Some(speed_rpm), ..own };
+    let with_torque = LoadLossLaw { speed_rpm: Some(speed_rpm), ..own };
     let slower_rpm = 0.7 * speed_rpm;
-    let share = |loss: &LoadLoss| 100.0 * (loss.linear + loss.quadratic_at(slower_rpm) * mean_w);
+    let share = |loss: &LoadLossLaw| 100.0 * (loss.linear + loss.quadratic_at(slower_rpm) * mean_w);
     Some(format!(
         "gear stage {}: a1 is known at {speed_rpm:.0} rpm only and is taken as the same at every speed. Where it comes from the windings it \
          goes with 1/n^2: at {slower_rpm:.0} rpm the mean cut of {mean_w:.0} W would lose {:.1} % instead of {:.1} %. Cut at two more \

@@ -1,7 +1,7 @@
 //! From a recording or a table to cuts: one row per cut, its conditions and its mean cutting power.
 
 use super::conditions::{CUTTING_POWER, Cut, CutConditions, FACTORS};
-use crate::estimators::LoadLoss;
+use crate::estimators::LoadLossLaw;
 use crate::estimators::regression::{Refusal, RefusalKind};
 use adapters::Recording;
 use adapters::recording::{Numbers, with_derived};
@@ -27,7 +27,7 @@ pub struct CutColumns {
     pub power: String,
     /// Load loss, to separate the cutting power where it has no column: from `spindle_power_w` and `no_load_power_w`, and
     /// `spindle_speed_rpm` where the loss goes with the speed.
-    pub load_loss: Option<LoadLoss>,
+    pub load_loss: Option<LoadLossLaw>,
     /// Every row is a cut of its own; otherwise consecutive rows of one cut are averaged.
     pub each_row: bool,
 }
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn the_cutting_power_is_separated_where_it_has_no_column() {
         let columns = [&CONDITIONS[..], &[("spindle_power_w", 1460.0), ("no_load_power_w", 500.0)]].concat();
-        let known = CutColumns { load_loss: Some(LoadLoss::constant(0.1807, 4e-5)), ..CutColumns::default() };
+        let known = CutColumns { load_loss: Some(LoadLossLaw::constant(0.1807, 4e-5)), ..CutColumns::default() };
         let gathered = gather(&recording(3, &columns), &known).expect("a cut");
         assert!((gathered.cuts[0].cutting_power_w - 791.84).abs() < 0.01, "the published cut");
         let told = gather(&recording(3, &columns), &CutColumns::default()).expect_err("refused").to_string();

@@ -2,7 +2,7 @@
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, takes};
 use crate::estimators::regression::{Refusal, RefusalKind};
-use crate::estimators::{LoadLoss, balance, lagrange, noise_gain, triple};
+use crate::estimators::{LoadLossLaw, balance, lagrange, noise_gain, triple};
 
 /// Extrapolation that amplifies noise more than this is refused, as the estimators do.
 const GAIN_MAX: f64 = 3.0 + 1e-9;
@@ -67,7 +67,7 @@ static METHODS: &[Method] = &[
         zh: "由标定转速换算到当前转速的载荷损耗二次系数 a1",
         run: |given| {
             let speed_rpm = Some(given.number(1)).filter(|rpm| *rpm > 0.0);
-            let loss = LoadLoss { linear: 0.0, quadratic_per_w: given.number(0), speed_rpm };
+            let loss = LoadLossLaw { linear: 0.0, quadratic_per_w: given.number(0), speed_rpm };
             Ok(MethodResult::Number(loss.quadratic_at(given.number(2))))
         },
     },

@@ -9,7 +9,7 @@ use crate::cli::{CommandResult, recipe_from};
 use crate::identified::TOOL_WEAR;
 use adapters::Recording;
 use clap::{Args, ValueEnum};
-use rules::estimators::LoadLoss;
+use rules::estimators::LoadLossLaw;
 use rules::estimators::regression::{Refusal, RefusalKind};
 use rules::estimators::wear::{
     ConditionFactor, CutColumns, FACTORS, Order, SurfaceOptions, WearOptions, WearRecord, gather, identify_tool_wear,
@@ -152,7 +152,7 @@ impl TableArguments {
         }
         if let [linear, quadratic_per_w, ref speed @ ..] = self.load_loss[..] {
             let speed_rpm = speed.first().copied().filter(|rpm| *rpm > 0.0);
-            columns.load_loss = Some(LoadLoss { linear, quadratic_per_w, speed_rpm });
+            columns.load_loss = Some(LoadLossLaw { linear, quadratic_per_w, speed_rpm });
         }
         columns
     }
