@@ -24,7 +24,7 @@ const MACHINES: [&str; 5] = [
     "lathe?seed=14&change_h=0&change_cut_pct=110&change_friction_pct=100&dropouts_per_h=2",
 ];
 
-/// Three more, which nobody looked at before the method stood as it is.
+/// Three more, chosen before the law over the speed was tried on them.
 const MORE: [&str; 3] = [
     "lathe?seed=21&change_h=0&change_cut_pct=90&change_friction_pct=120&dropouts_per_h=0",
     "lathe?seed=22&change_h=0&change_cut_pct=125&change_friction_pct=95&dropouts_per_h=1",

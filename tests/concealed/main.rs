@@ -100,7 +100,7 @@ fn effects_have_the_wished_size() {
 
 /// The whole table. `CONCEALED_SEEDS` (default 10), `CONCEALED_FILTER`, `CONCEALED_THREADS` (default 2).
 #[test]
-#[ignore = "120 minutes: the table of concealed physics for one seed (459 cases)"]
+#[ignore = "7 minutes: the table of concealed physics for one seed (459 cases), on an idle machine with two cores"]
 fn campaign() {
     let threads = std::env::var("CONCEALED_THREADS").ok().and_then(|t| t.parse().ok()).unwrap_or(2);
     let outcomes = score::run(&wanted("10"), threads);
