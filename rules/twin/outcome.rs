@@ -31,8 +31,11 @@ impl SearchAnswer {
 /// What does not hold in runs that took no part in fitting it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FailedHoldout {
-    /// The kinds that had been named; empty where there was no name.
+    /// The kinds that were left at the end; empty where there was no name.
     pub kinds: Vec<String>,
+    /// Everything that had been found in the fitted rows, before one name after the other was taken away; `unknown` where it
+    /// had no name.
+    pub found: Vec<String>,
     /// Were they fitted runs (the inner split), or those held out?
     pub among_fitted: bool,
     /// Root mean square errors there, without it and with it.
@@ -43,11 +46,9 @@ pub struct FailedHoldout {
     pub added: Vec<(String, Vec<f64>)>,
 }
 
-impl FailedHoldout {
-    /// Names of what had been found; `unknown` where it had none.
-    pub(super) fn names(&self) -> Vec<String> {
-        if self.kinds.is_empty() { vec![UNKNOWN.to_owned()] } else { self.kinds.clone() }
-    }
+/// The names, or the word for something that has none.
+pub(super) fn or_unknown(kinds: &[String]) -> Vec<String> {
+    if kinds.is_empty() { vec![UNKNOWN.to_owned()] } else { kinds.to_vec() }
 }
 
 /// Everything the verdict is made from.
@@ -142,13 +143,14 @@ impl Outcome {
             return None;
         }
         let named = best.members.iter().filter(|_| self.unknown.is_none());
-        let kinds = named.map(|member| self.designs[*member].kind.clone()).collect();
+        let kinds: Vec<String> = named.map(|member| self.designs[*member].kind.clone()).collect();
         let held_out = self.fits.before.held_out_rmse.zip(self.fits.after.held_out_rmse);
         let inner = self.inner.filter(|(before, after)| after.exceeds(*before));
         let inner = inner.map(|(before, after)| (true, (before.error(), after.error())));
         let held_out = held_out.filter(|(before, after)| after >= before).map(|errors| (false, errors));
         let (among_fitted, errors) = inner.or(held_out)?;
-        Some(FailedHoldout { kinds, among_fitted, errors, information: self.information(), added: self.added.clone() })
+        let (found, information, added) = (or_unknown(&kinds), self.information(), self.added.clone());
+        Some(FailedHoldout { kinds, found, among_fitted, errors, information, added })
     }
 
     /// Units of information of what is told or was withdrawn.
@@ -166,7 +168,11 @@ impl Outcome {
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
             let doubt = Doubt { unknown: None, nameless };
-            return Self::new(case, SearchAnswer { base, found, designs, doubt, slight_entry }).confirmed(case);
+            let mut fewer = Self::new(case, SearchAnswer { base, found, designs, doubt, slight_entry }).confirmed(case);
+            if let Some(last) = &mut fewer.withdrawn {
+                last.found = withdrawn.found;
+            }
+            return fewer;
         }
         found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
         let nothing = SearchAnswer { base, found, designs, doubt: Doubt::NONE, slight_entry: false };

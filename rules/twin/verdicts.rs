@@ -8,7 +8,7 @@ use super::locate::{Region, region};
 use super::misnamed::ENTRY;
 use super::model::{Model, Part, PartFunction, simulate};
 use super::next_step::alternative;
-use super::outcome::{FailedHoldout, Outcome};
+use super::outcome::Outcome;
 use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
 use crate::physics::effect;
@@ -103,7 +103,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
         alternatives,
         data_quality: case.faults.clone(),
         model: extended(case, outcome.last()),
-        withdrawn: outcome.withdrawn.as_ref().map_or_else(Vec::new, FailedHoldout::names),
+        withdrawn: outcome.withdrawn.as_ref().map_or_else(Vec::new, |withdrawn| withdrawn.found.clone()),
         debug: debug(case, &outcome),
         rows: outcome.rows.clone(),
         unit,

@@ -9,7 +9,7 @@ use super::posterior::{Explanation, Group, NoiseSetting, grouped};
 use super::second::SecondStage;
 use crate::statistics::count;
 use crate::twin::diagnosis::{UNKNOWN, Verdict};
-use crate::twin::outcome::FailedHoldout;
+use crate::twin::outcome::{FailedHoldout, or_unknown};
 use std::collections::BTreeMap;
 
 /// Groups that are looked at.
@@ -121,14 +121,23 @@ impl Judge<'_> {
         if before <= 0.0 {
             return Ok(best);
         }
-        let kinds: Vec<String> = best.names.iter().flatten().cloned().collect();
+        let kinds = |of: &Explanation| of.names.iter().flatten().cloned().collect::<Vec<String>>();
+        let found = or_unknown(&kinds(&best));
         let mut errors = (before, after(&best));
         while errors.1 >= before {
             let size = best.members.len();
             if size < 2 {
                 let rows = count((0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]).count());
                 let errors = ((errors.0 / rows).sqrt(), (errors.1 / rows).sqrt());
-                return Err(FailedHoldout { kinds, among_fitted: false, errors, information, added: Vec::new() });
+                let kinds = kinds(&best);
+                return Err(FailedHoldout {
+                    kinds,
+                    found,
+                    among_fitted: false,
+                    errors,
+                    information,
+                    added: Vec::new(),
+                });
             }
             let one_less = (0..size).map(|gone| {
                 let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();

@@ -20,7 +20,6 @@ use crate::twin::locate::{Region, conditions, spans};
 use crate::twin::model::{Model, Part};
 use crate::twin::next_step::{alternative, experiment, of_effects};
 use crate::twin::noise::Arma;
-use crate::twin::outcome::FailedHoldout;
 use crate::twin::verdicts::unit_of;
 use crate::twin::words;
 
@@ -64,7 +63,7 @@ impl EvidenceReport<'_, '_> {
             baseline_shift: shift,
             missing,
             alternatives,
-            withdrawn: self.answer.withdrawn.as_ref().map_or_else(Vec::new, FailedHoldout::names),
+            withdrawn: self.answer.withdrawn.as_ref().map_or_else(Vec::new, |withdrawn| withdrawn.found.clone()),
             data_quality: self.case.faults.clone(),
             model,
             debug: self.answer.debug.clone(),
