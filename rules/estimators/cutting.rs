@@ -54,6 +54,12 @@ impl LoadLossLaw {
     /// slowest cuts for cutting power; without one, a watt of error in the no-load power would hide any cut at a creep.
     const SLOWEST: f64 = 0.25;
 
+    /// a1 as stated for a spindle speed in rpm, as settings, scripts and the command line give it: 0 is the same at every speed.
+    #[must_use]
+    pub fn stated(linear: f64, quadratic_per_w: f64, speed_rpm: f64) -> Self {
+        Self { linear, quadratic_per_w, speed_rpm: Some(speed_rpm).filter(|rpm| *rpm > 0.0) }
+    }
+
     /// The same coefficients at every speed, as the source of the method has them.
     #[must_use]
     pub const fn constant(linear: f64, quadratic_per_w: f64) -> Self {
@@ -63,12 +69,8 @@ impl LoadLossLaw {
     /// a1 at a spindle speed in rpm of either sign, 1/W.
     #[must_use]
     pub fn quadratic_at(&self, speed_rpm: f64) -> f64 {
-        self.quadratic_per_w * self.share_at(speed_rpm)
-    }
-
-    /// a1 at a spindle speed over the stated one.
-    pub(super) fn share_at(&self, speed_rpm: f64) -> f64 {
-        self.speed_rpm.map_or(1.0, |learned| (learned / speed_rpm.abs().max(Self::SLOWEST * learned)).powi(2))
+        let share = |learned: f64| (learned / speed_rpm.abs().max(Self::SLOWEST * learned)).powi(2);
+        self.quadratic_per_w * self.speed_rpm.map_or(1.0, share)
     }
 
     /// Splits the power above no-load power at a spindle speed; see [`balance`].

@@ -233,12 +233,11 @@ impl Settings {
     #[must_use]
     pub fn load_loss(&self, stage: usize) -> LoadLossLaw {
         let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
-        LoadLossLaw {
-            linear: own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
-            quadratic_per_w: own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
-            speed_rpm: Some(own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm))
-                .filter(|rpm| *rpm > 0.0),
-        }
+        LoadLossLaw::stated(
+            own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
+            own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
+            own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm),
+        )
     }
 }
 

@@ -66,8 +66,7 @@ static METHODS: &[Method] = &[
         en: "Coefficient a1 at a spindle speed where it was learned at another and goes with 1/n^2; a learned speed of 0: the same at every speed",
         zh: "由标定转速换算到当前转速的载荷损耗二次系数 a1",
         run: |given| {
-            let speed_rpm = Some(given.number(1)).filter(|rpm| *rpm > 0.0);
-            let loss = LoadLossLaw { linear: 0.0, quadratic_per_w: given.number(0), speed_rpm };
+            let loss = LoadLossLaw::stated(0.0, given.number(0), given.number(1));
             Ok(MethodResult::Number(loss.quadratic_at(given.number(2))))
         },
     },

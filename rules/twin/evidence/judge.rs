@@ -123,37 +123,29 @@ impl Judge<'_> {
         }
         let kinds = |of: &Explanation| of.names.iter().flatten().cloned().collect::<Vec<String>>();
         let found = or_unknown(&kinds(&best));
-        let mut errors = (before, after(&best));
-        while errors.1 >= before {
+        let mut left = after(&best);
+        while left >= before {
             let size = best.members.len();
-            if size < 2 {
-                let rows = count((0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]).count());
-                let errors = ((errors.0 / rows).sqrt(), (errors.1 / rows).sqrt());
-                let kinds = kinds(&best);
-                return Err(FailedHoldout {
-                    kinds,
-                    found,
-                    among_fitted: false,
-                    errors,
-                    information,
-                    added: Vec::new(),
-                });
-            }
-            let one_less = (0..size).map(|gone| {
+            let without = |gone: usize| {
                 let kept: Vec<usize> = (0..size).filter(|member| *member != gone).collect();
-                self.less(&best, &kept)
-            });
-            if let Some((left, less)) = one_less.map(|less| (after(&less), less)).min_by(|a, b| a.0.total_cmp(&b.0)) {
-                (errors.1, best) = (left, less);
-            }
+                let less = self.less(&best, &kept);
+                (after(&less), less)
+            };
+            let all = (0..size).filter(|_| size > 1).map(without);
+            let Some(fewer) = all.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                let rows = count(self.inputs.left_out().count());
+                let errors = ((before / rows).sqrt(), (left / rows).sqrt());
+                let (kinds, added) = (kinds(&best), Vec::new());
+                return Err(FailedHoldout { kinds, found, among_fitted: false, errors, information, added });
+            };
+            (left, best) = fewer;
         }
         Ok(best)
     }
 
     fn held_out_square(&self, total: &[f64]) -> f64 {
         let recorded = self.inputs.scene.recorded();
-        let rows = (0..self.inputs.rows).filter(|row| self.inputs.held_out[*row]);
-        rows.map(|row| (recorded[row] - total[row]).powi(2)).sum()
+        self.inputs.left_out().map(|row| (recorded[row] - total[row]).powi(2)).sum()
     }
 
     /// An explanation with some of its members only.

@@ -151,8 +151,8 @@ impl TableArguments {
             }
         }
         if let [linear, quadratic_per_w, ref speed @ ..] = self.load_loss[..] {
-            let speed_rpm = speed.first().copied().filter(|rpm| *rpm > 0.0);
-            columns.load_loss = Some(LoadLossLaw { linear, quadratic_per_w, speed_rpm });
+            let speed_rpm = speed.first().copied().unwrap_or(0.0);
+            columns.load_loss = Some(LoadLossLaw::stated(linear, quadratic_per_w, speed_rpm));
         }
         columns
     }
