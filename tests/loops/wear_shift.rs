@@ -27,6 +27,7 @@ struct Edge {
 /// What happened to the edges of one shift.
 #[derive(Debug, Default)]
 struct Shift {
+    seed: u64,
     edges: Vec<Edge>,
     /// How often the request for a tool change began.
     requests: usize,
@@ -39,7 +40,7 @@ fn shift(machine: SimulatedMachine, seed: u64, hours: f64, models: &[WearRecord]
     let mut bench = Bench::at_work(settings, &scripts, &limits(50.0, 120.0));
     bench.pipeline.wear_mut().set_models("", models.iter().cloned().map(Arc::new).collect());
     bench.work_material = (!models.is_empty()).then(|| MATERIAL.into());
-    let (mut shift, mut in_use) = (Shift::default(), BTreeMap::<u8, Edge>::new());
+    let (mut shift, mut in_use) = (Shift { seed, ..Shift::default() }, BTreeMap::<u8, Edge>::new());
     let mut asked = false;
     while bench.now_s() < hours * 3600.0 {
         bench.tick();
@@ -102,6 +103,13 @@ fn score(name: &str, shifts: &[Shift]) -> usize {
         told(of(&later)),
         alarms.len()
     );
+    for shift in shifts {
+        for edge in &shift.edges {
+            if let Some((wear_mm, part)) = edge.alarm.filter(|(wear, _)| *wear < FALSE_BELOW_MM) {
+                println!("  false: seed {}, edge {}, {wear_mm:.3} mm, part {part}", shift.seed, edge.name);
+            }
+        }
+    }
     false_alarms
 }
 

@@ -11,6 +11,10 @@
 //! both; and what was learned of an operation with one edge serves the next. With a learned model the constants are known to be
 //! near 0 and the wear is in its millimetres; without one it is in typical millimetres, relative to the first cuts of the edges.
 //!
+//! A model, or typical numbers, may be far off in one operation: a cut outside of what was learned, a load loss that is not known at
+//! its speed. The first cut of an operation tells (`doubt`); without that, a model that is a third too low in one operation makes
+//! the edge look worn there.
+//!
 //! Source: R. E. Kalman 1960, extended to the logarithm by its slope at the estimate. What happened between two parts is chosen
 //! among a few possibilities by likelihood: nothing, another hardness, a new edge that nobody announced.
 
@@ -148,7 +152,7 @@ impl WearFollower {
         if self.edges.len() >= TOOLS_MAX {
             return None;
         }
-        let (mean, sd) = if work.key.reference == WorkReference::Model { UNKNOWN_MODEL_MM } else { UNKNOWN_MM };
+        let (mean, sd) = UNKNOWN_MM;
         let wear = self.joint.add(mean, sd * sd);
         let rate = self.joint.add(RATE.0, RATE.1 * RATE.1);
         self.edges.push(CuttingEdge {
@@ -187,7 +191,7 @@ impl WearFollower {
     fn measured(&mut self, work: &EdgeWork) -> Option<EdgeMeasurement> {
         let edge = self.edges.iter().position(|edge| edge.tool == work.key.tool)?;
         let excess = work.excess()?;
-        let group = self.group(work, excess);
+        let (group, is_new) = self.group(work, excess);
         let group_path = &mut self.groups[group].path_mm;
         if work.key.reference == WorkReference::Feed && (work.path_mm / *group_path - 1.0).abs() > SAME_PATH {
             // What is longer from now on is learned slowly, what was cut short is left out.
@@ -195,7 +199,7 @@ impl WearFollower {
             return None;
         }
         self.groups[group].used = self.parts;
-        Some(EdgeMeasurement {
+        let one = EdgeMeasurement {
             group: self.groups[group].at,
             edge,
             level: work.key.reference == WorkReference::Typical,
@@ -203,12 +207,28 @@ impl WearFollower {
             rise: work.rise_per_mm(),
             half_m: 0.5 * work.slide_m,
             variance: REPEAT_SD.powi(2) + (CHANGING_SHARE * work.energy_doubt()).powi(2),
-        })
+        };
+        if is_new {
+            self.doubt(&one);
+        }
+        Some(one)
     }
 
-    fn group(&mut self, work: &EdgeWork, excess: f64) -> usize {
+    /// Where the first cut of an operation shows far more or less than was believed, its constant is doubted: neither wear nor
+    /// hardness knows of another tool path. The variance is the one that makes what was measured likeliest.
+    fn doubt(&mut self, first: &EdgeMeasurement) {
+        let (gradient, above) = self.expected(first);
+        let believed = self.joint.variance_of(&gradient, first.variance);
+        let ratio = above.powi(2) / believed.max(f64::MIN_POSITIVE);
+        if ratio > 1.0 && 0.5 * (ratio - 1.0 - ratio.ln()) > OTHER_CONSTANT {
+            self.joint.spread(first.group, above.powi(2) - believed);
+        }
+    }
+
+    /// The number of the operation of this work, and whether it is new.
+    fn group(&mut self, work: &EdgeWork, excess: f64) -> (usize, bool) {
         if let Some(at) = self.groups.iter().position(|group| group.key == work.key) {
-            return at;
+            return (at, false);
         }
         let (mean, sd) = match work.key.reference {
             WorkReference::Model => (0.0, work.reference_doubt().max(MODEL_SD_LEAST)),
@@ -219,13 +239,13 @@ impl WearFollower {
         if self.groups.len() < GROUPS_MAX {
             let at = self.joint.add(mean, sd * sd);
             self.groups.push(OperationGroup { key, at, path_mm, used });
-            return self.groups.len() - 1;
+            return (self.groups.len() - 1, true);
         }
         let oldest = (0..self.groups.len()).min_by_key(|at| self.groups[*at].used).unwrap_or(0);
         let at = self.groups[oldest].at;
         self.joint.reset(at, mean, sd * sd);
         self.groups[oldest] = OperationGroup { key, at, path_mm, used };
-        oldest
+        (oldest, true)
     }
 
     /// What happened between the parts: the likeliest of nothing, another hardness, and a new edge of one tool.

@@ -54,6 +54,25 @@ fn a_harder_lot_is_no_wear() {
 }
 
 #[test]
+fn an_operation_that_the_model_does_not_fit_is_no_wear() {
+    let of_the_model = |program: &str, ratio: f64| {
+        let mut work = work("T1", "T1", program, ratio);
+        work.key.reference = WorkReference::Model;
+        work
+    };
+    let mut follower = WearFollower::default();
+    for part in 1..=4 {
+        follower.part(&[of_the_model("O1", 1.02)], 400.0 * f64::from(part));
+    }
+    let before = outlook(&follower, "T1").wear_mm;
+    for part in 5..=8 {
+        follower.part(&[of_the_model("O2", 1.40)], 400.0 * f64::from(part));
+    }
+    let found = outlook(&follower, "T1");
+    assert!(found.wear_mm < before + 0.06 && found.worn_probability < 0.05, "{before:.3}, then {found:?}");
+}
+
+#[test]
 fn a_chipped_edge_is_believed_after_three_parts_and_one_odd_part_is_not() {
     let mut follower = WearFollower::default();
     parts(&mut follower, "T1", 8, &|_| 1.0);
