@@ -266,6 +266,7 @@ fn noise_of_mean_zero_is_no_cutting_power() {
     let mean = idle.clone().map(|point| point.cutting_power_w).sum::<f64>() / idle.count() as f64;
     assert!(mean.abs() < 1e-9, "rectified noise would show {} W: {mean}", 0.5 * 0.8 * 800.0 * TAU / 60.0);
     let accuracy = learned.stages[0].accuracy.as_ref().expect("enough cuts");
+    println!("error of the cutting power per group: {accuracy:?}");
     assert!(
         accuracy.mean < 0.02 && accuracy.mean_fixed.iter().all(|fixed| *fixed > 2.0 * accuracy.mean),
         "{accuracy:?}"

@@ -7,14 +7,13 @@
 //! [`super::load_loss`] says so.
 //!
 //! A heavy cut scatters ten times as much as idling does, in watts. One residual for all would make what rests on the cuts look better known than
-//! it is. Therefore the F test is made on the cuts alone, and beside the usual covariance stands one that takes every point's own
-//! residual for its scatter (White 1980, in the form HC3 of MacKinnon and White 1985); the wider of both counts, as Angrist and
-//! Pischke (2009) advise for few points.
+//! it is. Therefore the F test is made on the cuts alone, and the intervals are those of points that scatter unequally
+//! ([`UnequalScatter`]).
 
 use super::cuts::SteadyPoint;
 use super::load_loss::near;
 use crate::estimators::LoadLossLaw;
-use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, fit};
+use crate::estimators::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit};
 use crate::statistics::count;
 use serde::Serialize;
 
@@ -34,8 +33,8 @@ pub(super) struct FittedLoss {
     pub(super) speed_rpm: Option<f64>,
     /// Of both forms, where there are two speeds to tell them apart.
     pub(super) residuals: Option<FormResiduals>,
-    /// Covariance of `1 + a0` and a1: the usual one, and the one by each point's own residual.
-    pub(super) covariances: [[[f64; 2]; 2]; 2],
+    /// Variances of combinations of `1 + a0` and a1.
+    pub(super) scatter: UnequalScatter,
     /// Where a0 stands among the coefficients; a1 follows.
     at: usize,
 }
@@ -60,8 +59,8 @@ pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLo
     let of_form = |speed_rpm: Option<f64>| {
         let (power, columns) = design(points, speeds, speed_rpm, false);
         let regression = fit(&power, &columns, Intercept::None)?;
-        let covariances = [usual(&regression, at), by_own_residuals(&regression, &columns, at)];
-        Ok::<_, Refusal>(FittedLoss { regression, speed_rpm, residuals: None, covariances, at })
+        let scatter = UnequalScatter::new(&regression, &columns, &[at, at + 1]);
+        Ok::<_, Refusal>(FittedLoss { regression, speed_rpm, residuals: None, scatter, at })
     };
     let same = of_form(None)?;
     if at < 2 {
@@ -73,28 +72,6 @@ pub(super) fn fitted(points: &[&SteadyPoint], speeds: &[f64]) -> Result<FittedLo
     // Where both leave the same, the source's form holds.
     let better = if torque_sd_w < same_sd_w { torque } else { same };
     Ok(FittedLoss { residuals, ..better })
-}
-
-fn usual(regression: &Regression, at: usize) -> [[f64; 2]; 2] {
-    [at, at + 1].map(|a| [at, at + 1].map(|b| regression.covariance(a, b)))
-}
-
-fn by_own_residuals(regression: &Regression, columns: &[Column], at: usize) -> [[f64; 2]; 2] {
-    let mut sum = [[0.0; 2]; 2];
-    for (row, (residual, leverage)) in regression.residuals.iter().zip(&regression.leverage).enumerate() {
-        let influence = [at, at + 1].map(|coefficient| {
-            let inverse = &regression.inverse[coefficient];
-            inverse.iter().zip(columns).map(|(entry, column)| entry * column.values[row]).sum::<f64>()
-        });
-        // A point that alone determines a coefficient has no residual to speak of.
-        let own = (residual / (1.0 - leverage).max(1e-6)).powi(2);
-        for (a, entries) in sum.iter_mut().enumerate() {
-            for (b, entry) in entries.iter_mut().enumerate() {
-                *entry += influence[a] * influence[b] * own;
-            }
-        }
-    }
-    sum
 }
 
 /// Do the speeds want coefficients of their own? On the cuts alone, each less the no-load power of its speed. `None` for one speed,

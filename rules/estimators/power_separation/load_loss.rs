@@ -9,7 +9,7 @@ use super::forms::{FittedLoss, FormResiduals, by_speed, fitted};
 use super::reference::{PowerReference, ReferenceChoice, referenced};
 use super::rows::rows;
 use super::stretches::{SAME_SPEED, stretches};
-use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, t_quantile};
+use crate::estimators::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
 use crate::estimators::{LoadLossLaw, STAGES};
 use crate::statistics::count;
 use adapters::Recording;
@@ -256,50 +256,34 @@ fn check_share(points: &[&SteadyPoint], regression: &Regression, speeds: &[f64])
     Err(Refusal::new(RefusalKind::Unit, what, next))
 }
 
-/// a0 and a1 with their covariance, widened by what is not known of the reference's scale: with `Pc` known to a factor,
-/// `1 + a0` goes with its inverse and `a1` with the inverse of its square.
-struct Widening {
+/// a0 and a1, with what is not known of the reference's scale: with `Pc` known to a factor, `1 + a0` goes with its inverse and `a1`
+/// with the inverse of its square.
+struct Widening<'a> {
+    scatter: &'a UnequalScatter,
     gain: f64,
     quadratic: f64,
-    /// Widened covariances of `1 + a0` and a1; the wider one counts.
-    covariances: [[[f64; 2]; 2]; 2],
-    t: f64,
+    /// Variance of the logarithm of the factor.
+    scale: f64,
 }
 
-impl Widening {
-    fn of(fitted: &FittedLoss, at: usize, reference: PowerReference) -> Self {
-        let regression = &fitted.regression;
-        let (gain, quadratic) = (regression.coefficients[at].value, regression.coefficients[at + 1].value);
+impl<'a> Widening<'a> {
+    fn of(fitted: &'a FittedLoss, at: usize, reference: PowerReference) -> Self {
+        let value = |at: usize| fitted.regression.coefficients[at].value;
         let scale = match reference {
             PowerReference::Removal { relative_sd } => relative_sd * relative_sd,
             PowerReference::Torque | PowerReference::Force => 0.0,
         };
-        Self {
-            gain,
-            quadratic,
-            covariances: fitted.covariances.map(|[[of_gain, of_both], [_, of_quadratic]]| {
-                let of_both = of_both + 2.0 * scale * gain * quadratic;
-                [
-                    [of_gain + scale * gain * gain, of_both],
-                    [of_both, of_quadratic + 4.0 * scale * quadratic * quadratic],
-                ]
-            }),
-            t: t_quantile(0.5 + 0.5 * CONFIDENCE, regression.degrees_of_freedom),
-        }
+        Self { scatter: &fitted.scatter, gain: value(at), quadratic: value(at + 1), scale }
     }
 
     /// `offset + a (1 + a0) + b a1`.
     fn told(&self, offset: f64, a: f64, b: f64) -> IntervalEstimate {
         let value = offset + a * self.gain + b * self.quadratic;
-        let variances = self
-            .covariances
-            .map(|[[gain, both], [_, quadratic]]| a * a * gain + 2.0 * a * b * both + b * b * quadratic);
-        let standard_error = variances.into_iter().fold(0.0, f64::max).sqrt();
-        IntervalEstimate {
-            value,
-            standard_error,
-            interval: (value - self.t * standard_error, value + self.t * standard_error),
-        }
+        let (scatter, degrees_of_freedom) = self.scatter.of(&[a, b]);
+        let by_scale = self.scale * (a * self.gain + 2.0 * b * self.quadratic).powi(2);
+        let standard_error = (scatter + by_scale).sqrt();
+        let half = t_quantile(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom) * standard_error;
+        IntervalEstimate { value, standard_error, interval: (value - half, value + half) }
     }
 }
 

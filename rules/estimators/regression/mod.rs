@@ -15,6 +15,7 @@ mod plausible;
 mod prediction;
 mod refusal;
 mod series;
+mod unequal;
 
 pub use distributions::{f_quantile, f_upper_tail, t_quantile, t_two_sided};
 pub use least_squares::{Coefficient, Column, Intercept, Regression, fit, fit_weighted};
@@ -22,6 +23,7 @@ pub use plausible::{Mistake, Plausible};
 pub use prediction::{FTest, FitPrediction};
 pub use refusal::{Refusal, RefusalKind};
 pub use series::{SteadyLevel, integrated_autocorrelation, level, without_pulses};
+pub use unequal::UnequalScatter;
 
 /// The probability that every stated interval covers.
 pub const CONFIDENCE: f64 = 0.95;
