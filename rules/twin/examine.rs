@@ -8,7 +8,7 @@ use super::verdicts::unit_of;
 use crate::physics::Scene;
 use crate::statistics::{count, median};
 use adapters::Recording;
-use adapters::channel::ChannelId;
+use adapters::channel::{ChannelId, Kind};
 use adapters::recording::Numbers;
 
 /// Share of values outside the physical range beyond which the unit must be wrong.
@@ -55,18 +55,23 @@ pub fn examine(recording: &Recording, model: &Model) -> Examination {
 }
 
 /// Values outside what is physically possible in the channel's unit.
+///
+/// Of a measured quantity only the size tells the unit: a current is recorded below zero where its meter has noise at rest or gives
+/// the direction, and its unit is right all the same.
 fn range(name: &str, numbers: &Numbers, found: &mut Examination) {
     let Some(channel) = ChannelId::of(name).map(ChannelId::channel) else { return };
     let outside = |x: &f64| !channel.holds(*x);
-    let wrong = numbers.present().filter(outside).count();
-    if wrong == 0 {
+    let outsiders = numbers.present().filter(outside).count();
+    if outsiders == 0 {
         return;
     }
     let all = numbers.count_present();
     let example = numbers.present().find(outside).unwrap_or_default();
     let (low, high) = channel.range;
     let unit = if channel.unit == "1" { String::new() } else { format!(" {}", channel.unit) };
-    let text = format!("{name}: {wrong} of {all} values lie outside {low} to {high}{unit}, such as {example}");
+    let text = format!("{name}: {outsiders} of {all} values lie outside {low} to {high}{unit}, such as {example}");
+    let is_of_wrong_size = |x: &f64| outside(x) && (channel.kind == Kind::Held || x.abs() > low.abs().max(high.abs()));
+    let wrong = numbers.present().filter(is_of_wrong_size).count();
     if count(wrong) > OUTSIDE_SHARE_MAX * count(all) {
         let next =
             if channel.unit == "1" { "check the scale".to_owned() } else { format!("record it in {}", channel.unit) };
@@ -193,6 +198,20 @@ mod tests {
         for wanted in ["engaged: 3 of 3 values lie outside 0 to 1", "kelvin", "kW for W"] {
             assert!(all.contains(wanted), "{wanted} in:\n{all}");
         }
+    }
+
+    /// Half the rows below zero: noise of a current meter at rest. Ten thousand times the size: milliamperes.
+    #[test]
+    fn a_current_below_zero_has_no_wrong_unit() {
+        let of = |factor: f64| {
+            let rows = [-0.07, 0.03, -0.02, 12.0].iter().zip(0..);
+            let rows: Vec<String> = rows.map(|(amps, second)| format!("{second},1000,340,{}", amps * factor)).collect();
+            examined(&format!("time_s,spindle_speed_rpm,spindle_power_w,spindle_current_a\n{}\n", rows.join("\n")))
+        };
+        assert_eq!(of(1.0).unusable, Vec::<String>::new());
+        assert!(of(1.0).notes.iter().any(|note| note.contains("2 of 4 values lie outside 0 to 10000 A")));
+        let milli = of(1e3).unusable.join("\n");
+        assert!(milli.contains("wrong unit? record it in A"), "{milli}");
     }
 
     #[test]
