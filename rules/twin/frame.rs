@@ -213,6 +213,12 @@ impl Frame {
         self.weights.clear();
     }
 
+    /// The same where every group counts as much as any other and nothing has a level of its own.
+    #[must_use]
+    pub fn with_all_rows_alike(&self) -> Self {
+        Self { weights: Vec::new(), quiet: Vec::new(), levels: None, ..self.clone() }
+    }
+
     /// How many groups weigh less than the rest because their innovation is outlandish.
     #[must_use]
     pub fn heavy(&self) -> usize {

@@ -7,7 +7,7 @@
 
 use super::diagnose::{Case, ordinary_noise};
 use super::fit::{Data, Fit, fit_at, fit_levels};
-use super::holdout::{HoldoutNoise, predict};
+use super::holdout::{HoldoutNoise, Prediction, predict};
 use super::linear::dot;
 use super::model::Part;
 use super::noise::Arma;
@@ -81,6 +81,19 @@ impl Case<'_> {
             }
         }
         Checked { fit: fit.clone(), left: own }
+    }
+
+    /// The baseline as it predicts the units held out best: as given, or by plain least squares. Units held out choose
+    /// nothing that is told; whatever is told beside the baseline must beat the better of both.
+    pub(super) fn strictest(&mut self, base: Fit) -> (Fit, Option<Prediction>) {
+        let given = self.predict(&base);
+        let plain = self.frame.with_all_rows_alike();
+        let mut data = Data { scene: &mut self.scene, frame: &plain, recorded: &self.recorded };
+        let Some(plain) = fit_levels(&mut data, &base.parts) else { return (base, given) };
+        let predicted = self.predict(&plain);
+        let error = |prediction: &Option<Prediction>| self.quality(prediction.as_ref()?).held_out_rmse;
+        let is_better = error(&given).zip(error(&predicted)).is_some_and(|(given, plain)| plain < given);
+        if is_better { (plain, predicted) } else { (base, given) }
     }
 
     /// What is left of the fitted units when each is predicted by the same parts fitted to the others in one noise, and

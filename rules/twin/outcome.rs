@@ -92,8 +92,8 @@ impl Outcome {
         let none = empty();
         let (checked_base, checked) = (case.checked(&base, last.noise), case.checked(&last, last.noise));
         let inner = checked_base.left.zip(checked.left);
-        let (reported_base, reported) = (checked_base.fit, checked.fit);
-        let before = case.predict(&reported_base).unwrap_or_else(|| none.clone());
+        let (reported_base, before) = case.strictest(checked_base.fit);
+        let (reported, before) = (checked.fit, before.unwrap_or_else(|| none.clone()));
         let after = case.predict(&reported).unwrap_or(none);
         let totals = Totals { before: &before.total, after: &after.total };
         let shown = case.shown(&last, &totals);
