@@ -135,9 +135,6 @@ pub struct Form {
     pub ln_choices: f64,
 }
 
-/// Name of the form of [`Effect::still`].
-pub const STILL: &str = "still";
-
 impl Form {
     /// A form with these shape parameters.
     #[must_use]
@@ -155,12 +152,6 @@ impl Form {
     #[must_use]
     pub fn whole(self) -> Self {
         Self { known: vec![("share", 1.0)], ..self }
-    }
-
-    /// The form in which a state stands still.
-    #[must_use]
-    pub fn still() -> Self {
-        Self { name: STILL, ..Self::default() }
     }
 
     /// The value of a shape parameter.
@@ -204,12 +195,6 @@ pub trait Effect: Sync + Send {
     /// Do they change with the losses that the cut causes as well?
     fn reads_load_at_output(&self) -> bool {
         false
-    }
-
-    /// The form in which a state that changes with time stands still, for an effect that is nothing without it: to be
-    /// compared with, never proposed.
-    fn still(&self) -> Option<Form> {
-        None
     }
 
     /// The column of this recording that nothing else in the catalogue follows: whatever bends over it is this effect, if

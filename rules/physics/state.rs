@@ -1,6 +1,6 @@
 //! States that effects carry: first-order lags with true time stamps, across pauses where they are known.
 
-use super::{Form, Scene};
+use super::Scene;
 
 /// A first-order state `dx/dt = (u - x) / tau_s`, exact for an input held between rows, starting from zero. Across a
 /// known pause the input is held for ten periods, then it is zero; across an unknown pause the state stands still.
@@ -101,19 +101,13 @@ pub fn elapsed_s(scene: &Scene) -> Vec<f64> {
 /// The value of `values` at `time_s[row] - delay_s` within the run, linearly between rows; held beyond its ends.
 #[must_use]
 pub fn delayed(scene: &Scene, values: &[f64], delay_s: f64) -> Vec<f64> {
-    delayed_by(scene, values, |_| delay_s)
-}
-
-/// The same with a delay of its own for every row.
-#[must_use]
-pub fn delayed_by(scene: &Scene, values: &[f64], delay_s: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut shifted = vec![0.0; values.len()];
     for run in scene.runs() {
         let time_s = &scene.time_s()[run.clone()];
         let inside = &values[run.clone()];
         let mut at = 0;
         for (index, now_s) in time_s.iter().enumerate() {
-            let wanted_s = now_s - delay_s(run.start + index);
+            let wanted_s = now_s - delay_s;
             while at > 0 && time_s[at] > wanted_s {
                 at -= 1;
             }
@@ -124,20 +118,6 @@ pub fn delayed_by(scene: &Scene, values: &[f64], delay_s: impl Fn(usize) -> f64)
         }
     }
     shifted
-}
-
-/// The form of a delay that shows edges late by a whole number of rows, as each lies between the samples.
-pub const BETWEEN_SAMPLES: &str = "between_samples";
-
-/// The same by the delay of a form; where that acts between samples, by the hidden delay in s of every row, where it has
-/// been found.
-#[must_use]
-pub fn delayed_between_samples(scene: &Scene, kind: &str, values: &[f64], form: &Form) -> Vec<f64> {
-    let delay_s = form.value("delay_s").unwrap_or(0.0);
-    match scene.latent(kind).filter(|_| form.name == BETWEEN_SAMPLES) {
-        Some(hidden_s) => delayed_by(scene, values, |row| hidden_s[row]),
-        None => delayed(scene, values, delay_s),
-    }
 }
 
 fn between(time_s: &[f64], values: &[f64], at: usize, wanted_s: f64) -> f64 {

@@ -226,8 +226,6 @@ mod tests {
         let shapes = || {
             vec![
                 Shape::Bent(vec![2.0, 5.0]),
-                Shape::Above(3.0),
-                Shape::Below(4.0),
                 Shape::Peak(900.0, 80.0),
                 Shape::Fading(3.0),
                 Shape::Wave(7.0, 3),

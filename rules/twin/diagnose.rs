@@ -18,7 +18,7 @@ use super::verdicts;
 use crate::physics::{Block, Scene, blocks_of};
 use crate::statistics::{count, median, robust_deviation};
 use adapters::Recording;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Rows below which nothing is claimed: the verdict is `cannot_tell`.
 const ROWS_MIN: usize = 60;
@@ -32,10 +32,7 @@ const CREEPING: [&str; 3] = ["zero_drift", "bearing_warm_up", "preload_growth"];
 pub fn diagnose(recording: &Recording, model: &Model, seed: u64) -> Result<Diagnosis, Vec<String>> {
     let mut whole = Case::new(recording, model)?;
     if !excerpt::is_long(&whole.scene) {
-        let first = whole.diagnosed(seed);
-        let Some(mut other) = whole.with_the_strange_fitted(&first) else { return Ok(first) };
-        let second = other.diagnosed(seed);
-        return Ok(if second.verdict.is_silent() { first } else { second });
+        return Ok(whole.diagnosed(seed));
     }
     let pieces = excerpt::close(&whole.scene, &whole.units);
     let (first, whole) = whole.seen_through(&pieces, seed);
@@ -76,8 +73,6 @@ pub struct Case<'a> {
     pub unbent: Option<Vec<Part>>,
     /// Effects at edges that show with every row in full.
     pub seen_at_edges: Vec<SeenForm>,
-    /// Standard errors of the delays that show between samples, by kind, s.
-    pub delay_errors_s: BTreeMap<&'static str, f64>,
     /// The whole recording where this is an excerpt of it.
     pub whole: Option<Box<Case<'a>>>,
 }
@@ -125,7 +120,6 @@ impl<'a> Case<'a> {
             switching: None,
             unbent: None,
             seen_at_edges: Vec::new(),
-            delay_errors_s: BTreeMap::new(),
             whole: None,
         }
     }
@@ -150,19 +144,19 @@ impl<'a> Case<'a> {
         };
         let base = if self.give_levels(&base) { self.fit_baseline().unwrap_or(base) } else { base };
         let base = self.weigh_edges(base);
-        let answer = self.answer(&base, seed);
+        let answer = self.answered(base.clone(), seed);
         self.show_hidden(&base);
         let outcome = Outcome::new(self, answer).confirmed(self);
         verdicts::judge(self, outcome)
     }
 
-    /// What is found, without some kinds, and what is doubted of it.
-    pub(super) fn answered(&mut self, base: Fit, refused: &[String], seed: u64) -> SearchAnswer {
-        let (mut found, designs) = self.search(&base, refused, seed);
+    /// What is found, and what is doubted of it.
+    pub(super) fn answered(&mut self, base: Fit, seed: u64) -> SearchAnswer {
+        let (mut found, designs) = self.search(&base, seed);
         let base = self.settle(base, &mut found);
         let doubt = self.doubt(&base, &mut found, &designs, seed);
         let found = if doubt.unknown.is_none() { self.worth_claiming(found, &base, &designs) } else { found };
-        SearchAnswer { base, found, designs, doubt, slight_entry: false }
+        SearchAnswer { base, found, designs, doubt }
     }
 
     /// The case in which the answer is told: the whole recording.
@@ -230,7 +224,7 @@ impl<'a> Case<'a> {
         found.map(|frame| self.frame = frame).is_some()
     }
 
-    fn search(&mut self, base: &Fit, refused: &[String], seed: u64) -> (SearchResult, Vec<Design>) {
+    fn search(&mut self, base: &Fit, seed: u64) -> (SearchResult, Vec<Design>) {
         self.simulate_baseline(base);
         let mut designs = designs(&self.scene, &self.frame, self.model);
         if self.frame.levels.is_some() {
@@ -242,7 +236,6 @@ impl<'a> Case<'a> {
         designs.extend(self.hidden_switch(base));
         designs.extend(self.hidden_ripple(base));
         designs.extend(self.hidden_tone(base));
-        designs.retain(|design| !refused.contains(&design.kind));
         let found = self.searched(base, &designs, seed);
         if self.shows_switch_beside(&found.best, &mut designs) {
             let found = self.searched(base, &designs, seed);

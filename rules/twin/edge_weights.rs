@@ -1,27 +1,21 @@
 //! Edges: a clock that lags, a meter that averages, an inertia or an entry nobody modelled leaves a few great innovations
 //! at every edge and nothing between. Rows that look outlandish weigh little, so that spikes say little - and then the
 //! whole effect says little. Before the search, therefore, the effects that act at edges are fitted with every row in
-//! full; where one of them makes most of the outlandish rows ordinary, the rows are weighed by what it leaves. A delay is
-//! fitted twice: as what it comes to in the mean, and as it acts between samples (`sampled`).
+//! full; where one of them makes most of the outlandish rows ordinary, the rows are weighed by what it leaves.
 
 use super::designs::{AT_EDGES, Design, design, designs_of};
 use super::diagnose::Case;
-use super::fit::{Fit, fit, fit_levels, residual};
+use super::fit::{Fit, fit, fit_levels};
 use super::model::{Part, simulate};
 use super::noise::Arma;
-use super::sampled::{self, Edges};
 use super::scan::{HypothesisBank, best_of_each_law};
 use super::search::FIRST_INFORMATION;
-use crate::physics::state::BETWEEN_SAMPLES;
 use crate::physics::{Effect, Form};
-use crate::statistics::robust_deviation;
 
 /// Outlandish rows below which it makes no difference that they weigh little.
 const OUTLYING_ROWS_MIN: usize = 5;
 /// Effects fitted in full after the scan.
 const FITTED: usize = 6;
-/// Rounds of which edges are late and the fit beside them.
-const ROUNDS: usize = 3;
 /// Kinds that act at the edges of the speed.
 const AT_EDGES_OF_SPEED: [&str; 2] = ["spindle_inertia", "regeneration"];
 
@@ -108,71 +102,13 @@ impl Case<'_> {
         let mut scores = bank.scan(&base, self.ln_rows(&base));
         scores.retain(|score| score.gain > 0.0);
         let chosen = best_of_each_law(&scores, &at_edges, FITTED);
-        let mut fits: Vec<Fit> = chosen
+        chosen
             .iter()
             .filter_map(|score| {
                 let parts = [base.parts.as_slice(), std::slice::from_ref(&at_edges[score.design].part)].concat();
                 self.with_data(|data| fit(data, &parts, base.noise))
             })
-            .collect();
-        fits.extend(self.fits_between_samples(&base, &at_edges));
-        fits
-    }
-
-    /// Fits with the delays among effects at edges as they act between samples.
-    fn fits_between_samples(&mut self, base: &Fit, at_edges: &[Design]) -> Vec<Fit> {
-        if !self.electric() || !self.is_row_by_row() {
-            return Vec::new();
-        }
-        let delays = at_edges.iter().filter_map(|design| design.part.effect_and_form());
-        let mut delays: Vec<&'static dyn Effect> = delays.map(|(effect, _)| effect).collect();
-        delays.dedup_by_key(|effect| effect.doc().kind);
-        delays.retain(|effect| effect.form_names().contains(&BETWEEN_SAMPLES));
-        delays.into_iter().filter_map(|effect| self.fit_between_samples(effect, base)).collect()
-    }
-
-    /// Which edges are late and the fit beside them, in turn.
-    fn fit_between_samples(&mut self, effect: &'static dyn Effect, base: &Fit) -> Option<Fit> {
-        let noise = self.frame.noise_between_outliers(&base.residual, base.noise);
-        let mut with_it = Fit { noise, ..base.clone() };
-        for _ in 0..ROUNDS {
-            let alone = &with_it.parts[..base.parts.len()];
-            let residual = self.with_data(|data| residual(data, alone))?;
-            let innovations = self.frame.whiten(&with_it.residual, with_it.noise);
-            let deviation = robust_deviation(innovations).filter(|deviation| *deviation > 0.0)?;
-            let form = self.between_samples(effect, &residual, (with_it.noise, deviation))?;
-            let part = super::designs::design(effect, &form, &self.scene, &self.frame)?.part;
-            let parts = [alone, &[part]].concat();
-            with_it = self.with_data(|data| fit(data, &parts, with_it.noise))?;
-        }
-        Some(with_it)
-    }
-
-    /// A delay that shows between samples in this residual, with the edges it has late as the hidden state of the scene.
-    fn between_samples(&mut self, effect: &dyn Effect, residual: &[f64], noise: (Arma, f64)) -> Option<Form> {
-        let period_s = self.scene.period_s();
-        let at = |rows: i32| {
-            let mut form = effect.default_form(&self.scene);
-            form.shape = vec![("delay_s", f64::from(rows) * period_s)];
-            let (_, column) = effect.columns(&self.scene, &form)?.into_iter().next()?;
-            Some(self.frame.reduce(&column))
-        };
-        let shifted = sampled::ROWS.map(at).collect::<Option<Vec<Vec<f64>>>>()?;
-        let found = Edges::new(residual, &self.frame, noise, shifted).find()?;
-        let kind = effect.doc().kind;
-        let mut late_s = vec![found.rows * period_s; self.scene.rows()];
-        for (group, late_rows) in found.late_rows.iter().enumerate() {
-            late_s[self.frame.rows(group)].fill(late_rows * period_s);
-        }
-        self.scene.set_latent(kind, late_s);
-        let delay_s = found.rows * period_s;
-        self.delay_errors_s.insert(kind, found.rows_error * period_s);
-        Some(Form {
-            name: BETWEEN_SAMPLES,
-            known: vec![("share", 1.0), ("delay_s", delay_s)],
-            ln_choices: 0.5 * found.price,
-            ..Form::of(&[("delay_s", delay_s)])
-        })
+            .collect()
     }
 }
 

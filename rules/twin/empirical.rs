@@ -40,10 +40,6 @@ pub enum Multiplier {
 pub enum Shape {
     /// A line that bends at these values, increasing.
     Bent(Vec<f64>),
-    /// Nothing up to this value, a line from there upwards.
-    Above(f64),
-    /// Nothing down to this value, a line from there downwards.
-    Below(f64),
     /// A peak at one value, of this half width: the power that a resonance takes over the speed that excites it.
     Peak(f64, f64),
     /// What is there at first and fades over this distance.
@@ -85,7 +81,7 @@ impl Empirical {
     /// Is it one height of a given shape, rather than a line that bends where the recording asks for it?
     #[must_use]
     pub fn is_simple(&self) -> bool {
-        !matches!(self.shape, Shape::Bent(_) | Shape::Above(_) | Shape::Below(_))
+        !matches!(self.shape, Shape::Bent(_))
     }
 
     /// The same form with its place, width or time constant moved by this share of itself; nothing for a bent line.
@@ -93,7 +89,7 @@ impl Empirical {
     pub(super) fn neighbours(&self, step: f64) -> Vec<Self> {
         let (up, down) = (1.0 + step, 1.0 / (1.0 + step));
         let shapes = match self.shape {
-            Shape::Bent(_) | Shape::Above(_) | Shape::Below(_) => Vec::new(),
+            Shape::Bent(_) => Vec::new(),
             Shape::Peak(centre, width) => vec![
                 Shape::Peak(centre + step * width.max(0.2 * centre), width),
                 Shape::Peak(centre - step * width.max(0.2 * centre), width),
@@ -133,8 +129,6 @@ impl Empirical {
             |law: &dyn Fn(f64) -> f64| values.iter().zip(&factor).map(|(x, factor)| factor * law(along(*x))).collect();
         let knots = match &self.shape {
             Shape::Bent(knots) => knots,
-            Shape::Above(knot) => return Some(vec![("slope".to_owned(), column(&|x| (x - along(*knot)).max(0.0)))]),
-            Shape::Below(knot) => return Some(vec![("slope".to_owned(), column(&|x| (along(*knot) - x).max(0.0)))]),
             Shape::Peak(centre, width) => {
                 let (centre, width) = (along(*centre), width / self.scale);
                 return Some(vec![("level".to_owned(), column(&|x| 1.0 / (1.0 + ((x - centre) / width).powi(2))))]);
@@ -184,8 +178,6 @@ impl Empirical {
                 let knots: Vec<String> = knots.iter().map(|knot| format!("{knot:.4}")).collect();
                 format!("bent line over {} with bends at {}", self.channel, knots.join(", "))
             }
-            Shape::Above(knot) => format!("line over {} above {knot:.4}, nothing below", self.channel),
-            Shape::Below(knot) => format!("line over {} below {knot:.4}, nothing above", self.channel),
             Shape::Peak(centre, width) => format!("peak over {} at {centre:.4}, half width {width:.4}", self.channel),
             Shape::Fading(over) => format!("exp(-{} / {over:.4})", self.channel),
             Shape::Wave(period, _) => format!("wave over {} with a period of {period:.4}", self.channel),
@@ -218,14 +210,6 @@ impl Empirical {
         let along = |value: f64| (value - self.origin) / self.scale;
         let knots = match &self.shape {
             Shape::Bent(knots) => knots,
-            Shape::Above(knot) => {
-                let knot = along(*knot);
-                return format!("slope * (if {x} > {knot:?} {{ {x} - {knot:?} }} else {{ 0.0 }})");
-            }
-            Shape::Below(knot) => {
-                let knot = along(*knot);
-                return format!("slope * (if {x} < {knot:?} {{ {knot:?} - {x} }} else {{ 0.0 }})");
-            }
             Shape::Peak(centre, width) => {
                 return format!("level / (1.0 + (({x} - {:?}) / {:?}) ** 2.0)", along(*centre), width / self.scale);
             }
@@ -281,7 +265,7 @@ pub(super) fn as_design(form: Empirical, scene: &Scene, frame: &Frame) -> Option
         Shape::Bent(_) => 0,
         Shape::Peak(..) => 2,
         Shape::RecurringPulses { .. } => 3,
-        Shape::Above(_) | Shape::Below(_) | Shape::Fading(_) | Shape::Wave(..) => 1,
+        Shape::Fading(_) | Shape::Wave(..) => 1,
     };
     let among = match form.shape {
         Shape::Wave(_, among) | Shape::RecurringPulses { among, .. } => among,

@@ -13,16 +13,14 @@
 //! 4. What no recording shows: every law is a little wrong in proportion (GUM, type B), and an effect in the cut may or
 //!    may not pass through the load loss that the model knows.
 
-use super::agreement::{between, cleared};
 use super::diagnose::Case;
 use super::diagnosis::ParameterEstimate;
 use super::fit::Fit;
 use super::hidden_tone;
-use super::linear::dot;
+use super::linear::{dot, extend_basis, project_out};
 use super::model::{Part, PartFunction};
 use super::ripple::Ripple;
 use super::verdicts::unit_of;
-use crate::physics::state::BETWEEN_SAMPLES;
 use crate::physics::{Entry, unit_in};
 use crate::statistics::count;
 
@@ -73,7 +71,6 @@ pub(super) fn estimates(case: &Case<'_>, fit: &Fit, part: usize) -> Vec<Paramete
         })
         .chain(followed)
         .chain(tone_estimate(case, &fit.parts[part]))
-        .chain(delay_between_samples(case, &fit.parts[part]))
         .collect()
 }
 
@@ -182,18 +179,24 @@ fn tone_estimate(case: &Case<'_>, part: &Part) -> Option<ParameterEstimate> {
     Some(ParameterEstimate { name: "amplitude".to_owned(), value, low, high, unit: "1".to_owned() })
 }
 
-/// The delay of a part that acts between samples: as often as edges were late.
-fn delay_between_samples(case: &Case<'_>, part: &Part) -> Option<ParameterEstimate> {
-    let (_, form) = part.effect_and_form().filter(|_| part.has_form(BETWEEN_SAMPLES))?;
-    let value = form.value("delay_s")?;
-    let half = INTERVAL * case.delay_errors_s.get(part.kind.as_str())?;
-    Some(ParameterEstimate {
-        name: "delay_s".to_owned(),
-        value,
-        low: value - half,
-        high: value + half,
-        unit: "s".to_owned(),
-    })
+/// Variance of a coefficient between groups beyond what the noise makes of it: DerSimonian and Laird, Controlled Clinical
+/// Trials 7 (1986) 177. `told` holds what each group knows of it (weight, score), `variance` is that of one innovation.
+fn between(told: &[(f64, f64)], q: f64, variance: f64) -> f64 {
+    let sum: f64 = told.iter().map(|(weight, _)| weight).sum();
+    let squares: f64 = told.iter().map(|(weight, _)| weight * weight).sum();
+    ((q - count(told.len().saturating_sub(1))) * variance / (sum - squares / sum)).max(0.0)
+}
+
+/// A parameter's whitened tangent with those of all others taken out.
+fn cleared(white: &[Vec<f64>], index: usize) -> Vec<f64> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for (_, column) in white.iter().enumerate().filter(|(other, _)| *other != index) {
+        let _ = extend_basis(&mut basis, column.clone(), 1e-8);
+    }
+    let mut own = white[index].clone();
+    project_out(&basis, &mut own);
+    project_out(&basis, &mut own);
+    own
 }
 
 #[cfg(test)]

@@ -14,11 +14,9 @@
 //! 7. Every fit is shown on runs that took no part in fitting, choosing or stopping. They may only withdraw: where the
 //!    error there does not fall, nothing is told but that, with the place and the next experiment.
 
-mod agreement;
 pub mod bind;
 mod channel;
 mod compare;
-mod confirmed;
 mod consumer;
 mod corroborated;
 pub mod designs;
@@ -48,17 +46,13 @@ pub mod latent;
 mod levels;
 pub mod live;
 mod load_dependent_noise;
-mod localised;
 pub mod locate;
-mod misnamed;
 pub mod model;
 pub mod model_file;
 mod next_step;
 pub mod noise;
 mod offered;
 mod outcome;
-#[cfg(test)]
-mod overflowing_tank;
 mod path_state;
 mod periodic;
 pub mod plan;
@@ -69,11 +63,8 @@ mod replaceable;
 pub mod report;
 pub mod rhythm;
 pub mod ripple;
-mod rivals;
-mod sampled;
 pub mod scan;
 pub mod search;
-mod second_look;
 pub mod size;
 pub mod table;
 pub mod term;

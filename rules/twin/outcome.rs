@@ -1,6 +1,5 @@
 //! What a search comes to: the names and what is doubted of them, and the fits that the verdict compares.
 
-use super::confirmed::Totals;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
 use super::diagnosis::{Fits, Rows, UNKNOWN, Verdict};
@@ -17,15 +16,6 @@ pub(super) struct SearchAnswer {
     pub(super) found: SearchResult,
     pub(super) designs: Vec<Design>,
     pub(super) doubt: Doubt,
-    /// Did an entry or an exit that is too slight to be one explain as much?
-    pub(super) slight_entry: bool,
-}
-
-impl SearchAnswer {
-    /// What is named, or what is described without a name, explains so much.
-    pub(super) fn information(&self) -> f64 {
-        self.doubt.unknown.as_ref().map_or(self.found.best.information, |unknown| unknown.information)
-    }
 }
 
 /// What does not hold in runs that took no part in fitting it.
@@ -71,10 +61,6 @@ pub struct Outcome {
     pub unknown: Option<Unknown>,
     /// A cause without a name that explains as much as the named ones.
     pub nameless: Option<Nameless>,
-    /// Did an entry or an exit that is too slight to be one explain as much?
-    pub slight_entry: bool,
-    /// The kind that is in doubt although nothing else explains as much.
-    pub doubted: Option<String>,
     /// The fits compared.
     pub fits: Fits,
     /// Row by row.
@@ -86,7 +72,7 @@ pub struct Outcome {
 impl Outcome {
     /// Simulates what was found over every row.
     pub(super) fn new(case: &mut Case<'_>, answer: SearchAnswer) -> Self {
-        let SearchAnswer { base, found, designs, doubt: Doubt { unknown, nameless }, slight_entry } = answer;
+        let SearchAnswer { base, found, designs, doubt: Doubt { unknown, nameless } } = answer;
         let last = unknown.as_ref().map_or_else(|| found.best.fit.clone(), |unknown| unknown.fit.clone());
         let empty = || Prediction { total: vec![0.0; case.told().scene.rows()], contributions: Vec::new() };
         let none = empty();
@@ -95,9 +81,6 @@ impl Outcome {
         let (reported_base, before) = case.strictest(checked_base.fit);
         let (reported, before) = (checked.fit, before.unwrap_or_else(|| none.clone()));
         let after = case.predict(&reported).unwrap_or(none);
-        let totals = Totals { before: &before.total, after: &after.total };
-        let shown = case.shown(&last, &totals);
-        let doubted = if unknown.is_none() { case.doubted(&found.best, shown) } else { None };
         let first = case.parts.len();
         let labels = last.parts[first..].iter().map(|part| part.label().to_owned());
         let added: Vec<(String, Vec<f64>)> = labels.zip(after.contributions.iter().skip(first).cloned()).collect();
@@ -127,8 +110,6 @@ impl Outcome {
             designs,
             unknown,
             nameless,
-            slight_entry,
-            doubted,
             fits,
             rows,
             added,
@@ -163,19 +144,19 @@ impl Outcome {
     pub(super) fn confirmed(self, case: &mut Case<'_>) -> Self {
         let Some(withdrawn) = self.refuted() else { return self };
         let fewer = if self.unknown.is_none() { self.without_one(case, withdrawn.among_fitted) } else { None };
-        let Self { base, mut found, designs, nameless, slight_entry, .. } = self;
+        let Self { base, mut found, designs, nameless, .. } = self;
         if let Some((position, less)) = fewer {
             found.best = less;
             found.p_values.remove(position.min(found.p_values.len() - 1));
             let doubt = Doubt { unknown: None, nameless };
-            let mut fewer = Self::new(case, SearchAnswer { base, found, designs, doubt, slight_entry }).confirmed(case);
+            let mut fewer = Self::new(case, SearchAnswer { base, found, designs, doubt }).confirmed(case);
             if let Some(last) = &mut fewer.withdrawn {
                 last.found = withdrawn.found;
             }
             return fewer;
         }
         found.best = Hypothesis { members: Vec::new(), fit: base.clone(), information: 0.0 };
-        let nothing = SearchAnswer { base, found, designs, doubt: Doubt::NONE, slight_entry: false };
+        let nothing = SearchAnswer { base, found, designs, doubt: Doubt::NONE };
         Self { withdrawn: Some(withdrawn), ..Self::new(case, nothing) }
     }
 

@@ -5,7 +5,7 @@ use super::drift::stands_out;
 use super::fit::{Data, Fit, fit};
 use super::gate::p_value;
 use super::model::Part;
-use super::scan::{HypothesisBank, best_of_each_law, likeliest, price_of};
+use super::scan::{HypothesisBank, best_of_each_law, price_of};
 use crate::physics::catalogue::dry_friction::slips;
 use crate::physics::catalogue::meter_window::LATE;
 use crate::physics::drive::{is_axis_output, is_power, motion, turns};
@@ -29,10 +29,6 @@ const STEP_SHARE: f64 = 0.05;
 /// The p-value that a finding must not exceed: by this test alone, two in a hundred recordings of noise and nothing else
 /// would be reported.
 pub const P_MAX: f64 = 0.02;
-/// Information by which a fault of the measurement may explain less than a cause in the machine and still be named first.
-const MEASURED_AS_WELL: f64 = 3.0;
-/// Share by which more was found than is named, from which the names are not the whole story.
-const UNNAMED_SHARE: f64 = 0.25;
 /// Faults of a meter.
 pub(super) const METER: [&str; 6] = ["sensor_gain", "zero_drift", "offset", "clock_lag", "meter_window", "saturation"];
 
@@ -81,16 +77,6 @@ pub struct SearchResult {
     pub others: Vec<Hypothesis>,
     /// The p-value of the best hypothesis that was refused, when nothing was accepted.
     pub refused_p: Option<f64>,
-}
-
-impl SearchResult {
-    /// Do others explain much more than what is named? What they name besides was not worth a name, so that something
-    /// real is left, and what is named may be no more than its likeness.
-    #[must_use]
-    pub fn leaves_much_unnamed(&self) -> bool {
-        let most = self.others.iter().map(|other| other.information).fold(0.0, f64::max);
-        most > (1.0 + UNNAMED_SHARE) * self.best.information
-    }
 }
 
 /// A search in progress.
@@ -157,9 +143,6 @@ impl<'a, 'b> EffectSearch<'a, 'b> {
             best = next;
         }
         let best = self.pruned(best);
-        self.try_rivals_at_edges(&best);
-        let best = self.beside_rivals(best);
-        let best = self.meter_first(best);
         self.tried.sort_by(|a, b| b.information.total_cmp(&a.information));
         p_values.truncate(best.members.len());
         SearchResult { best, p_values, others: self.tried, refused_p }
@@ -176,7 +159,7 @@ impl<'a, 'b> EffectSearch<'a, 'b> {
         } else {
             STEP_INFORMATION.max(STEP_SHARE * from.information)
         };
-        (next.information > from.information + needed).then(|| self.swapped(next))
+        (next.information > from.information + needed).then_some(next)
     }
 
     /// The best hypothesis with one more member, or two where two are better than one.
@@ -250,59 +233,9 @@ impl<'a, 'b> EffectSearch<'a, 'b> {
         price_of(self.bank.designs, members, self.ln_rows)
     }
 
-    /// Replaces members one by one where another explains more beside the rest.
-    fn swapped(&mut self, mut best: Hypothesis) -> Hypothesis {
-        for position in self.standing..best.members.len() {
-            if best.members.len() < 2 {
-                break;
-            }
-            let Some(rest) = self.without(&best, position) else { continue };
-            for other in self.extend(&rest, PARTNERS) {
-                if other.information > best.information + 1.0 {
-                    best = other;
-                }
-            }
-        }
-        best
-    }
-
     fn without(&mut self, from: &Hypothesis, position: usize) -> Option<Hypothesis> {
         let (members, parts) = from.taken_out(position);
         self.fitted(members, &parts, from.fit.noise)
-    }
-
-    /// Fits the other effects that act at edges in the place of one beside others: sampled seldom, they are much alike.
-    fn try_rivals_at_edges(&mut self, best: &Hypothesis) {
-        let at_edges = |member: &usize| AT_EDGES.contains(&self.bank.designs[*member].kind.as_str());
-        let Some(position) = best.members.iter().position(at_edges).filter(|_| best.members.len() > 1) else { return };
-        let named = self.bank.designs[best.members[position]].kind.clone();
-        let Some(rest) = self.without(best, position) else { return };
-        let scores = self.bank.scan(&rest.fit, self.ln_rows);
-        for kind in AT_EDGES.into_iter().filter(|kind| *kind != named) {
-            let rival = likeliest(scores.iter().filter(|score| self.bank.designs[score.design].kind == kind));
-            let _tried = rival.and_then(|score| self.with(&rest, score.design));
-        }
-    }
-
-    /// Of two explanations that the recording does not tell apart, one a fault of the measurement and one of the machine,
-    /// the measurement is named first: it is looked at sooner, and the other stands beside it.
-    fn meter_first(&mut self, best: Hypothesis) -> Hypothesis {
-        let as_well = MEASURED_AS_WELL * best.fit.dispersion(self.data.frame);
-        let kinds = |of: &Hypothesis| -> Vec<&str> {
-            of.members.iter().map(|member| self.bank.designs[*member].kind.as_str()).collect()
-        };
-        let ours = kinds(&best);
-        let as_good = self.tried.iter().filter(|other| {
-            let theirs = kinds(other);
-            let new: Vec<&&str> = theirs.iter().filter(|kind| !ours.contains(kind)).collect();
-            let gone: Vec<&&str> = ours.iter().filter(|kind| !theirs.contains(kind)).collect();
-            let swapped = matches!((new.as_slice(), gone.as_slice()), ([new], [gone])
-                if METER.contains(new) && !METER.contains(gone));
-            theirs.len() == ours.len() && swapped && best.information - other.information < as_well
-        });
-        let Some(other) = as_good.max_by(|a, b| a.information.total_cmp(&b.information)).cloned() else { return best };
-        self.tried.push(best);
-        other
     }
 
     /// Drops members that have become superfluous.

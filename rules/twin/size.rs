@@ -1,6 +1,5 @@
 //! Size: what is too small to be claimed, however surely it is there.
 
-use super::agreement::differs_by_run;
 use super::designs::Design;
 use super::diagnose::{Case, distance, ordinary_noise};
 use super::fit::{Fit, fit};
@@ -66,7 +65,6 @@ impl Case<'_> {
 
     fn smallest_unclaimable(&mut self, best: &Hypothesis, base: &Fit, designs: &[Design]) -> Option<usize> {
         let deviation = ordinary_noise(&best.fit);
-        let first = best.first_part();
         let several = best.members.len() > 1;
         let ln_rows = self.ln_rows(base);
         let unclaimable = |position: usize| {
@@ -79,7 +77,6 @@ impl Case<'_> {
             let paid = price(&designs[best.members[position]], ln_rows);
             let beyond_doubt = gained >= if minor { BEYOND_DOUBT_BESIDE } else { BEYOND_DOUBT_INFORMATION };
             let drops = several && gained < paid
-                || minor && differs_by_run(&best.fit, &self.frame, first + position)
                 || self.negligible(&without.residual, &best.fit.residual, deviation, beyond_doubt)
                 || several && !self.predicts_more(&without, &best.fit);
             drops.then_some((position, gained))

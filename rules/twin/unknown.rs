@@ -5,7 +5,6 @@
 //! disagree on what explains most (`agreement`); and where nothing is named, a line that explains enough is an alarm
 //! without a name.
 
-use super::agreement::differs_by_run;
 use super::channel::SIMULATED_OUTPUT;
 use super::designs::Design;
 use super::diagnose::{Case, ordinary_noise};
@@ -13,7 +12,6 @@ use super::empirical::{Multiplier, as_design};
 use super::events::event_designs;
 use super::fit::{Fit, fit};
 use super::gate::p_value;
-use super::localised::end_designs;
 use super::model::{PartFunction, simulate};
 use super::offered::{empirical_designs, products};
 use super::periodic::waves;
@@ -47,17 +45,11 @@ const SHARPENING: [f64; 3] = [0.15, 0.06, 0.02];
 const SHARPENINGS_MAX: usize = 4;
 /// Information that a move must bring.
 const SHARPER: f64 = 0.5;
-/// Share of what is named that a nameless form must explain before runs that disagree put the names in doubt: what
-/// explains much more than any form could is only not quite the same in every run.
-const CLOSE_SHARE: f64 = 0.7;
 /// Names that stand although a form without a name explains a little more, and the share of it that they must explain.
 /// Wrong names explain up to 0.78 of it, right ones in another form than the catalogue's 0.86 and more; too little costs
 /// wrong names, too much costs right ones.
 const NAMES_MAX: usize = 2;
 const NAMED_SHARE: f64 = 0.85;
-/// Share of what is named that must be left without an effect, or that effect is most of it.
-const MOST: f64 = 0.5;
-
 /// What remains unexplained, described.
 pub struct Unknown {
     /// The baseline and the empirical form, fitted together.
@@ -138,8 +130,6 @@ struct WithdrawnNames<'a> {
     leading: bool,
     /// What the model file excludes, where it explains clearly more.
     excluded: Option<&'a str>,
-    /// Much more was found than is named: what is left of it has no name.
-    unnamed: bool,
 }
 
 /// The empirical forms of a case, and what each explains on top of the baseline alone.
@@ -157,7 +147,6 @@ impl Case<'_> {
         let left = left.into_iter().flatten();
         forms.extend(left.filter_map(|form| as_design(form, &self.scene, &self.frame)));
         if found.best.members.is_empty() {
-            forms.extend(end_designs(&self.scene, &self.frame));
             forms.extend(event_designs(&self.scene, &self.frame, base));
             forms.extend(products(&self.scene, &self.frame));
         }
@@ -168,20 +157,13 @@ impl Case<'_> {
         let replaceable = self.replaceable(base, &found.best, designs, &yardsticks);
         let leading = replaceable.iter().any(|replaceable| replaceable.share >= LEADING_SHARE);
         let excluded = self.outdone_by_excluded(base, &found.best, designs, seed);
-        let withdrawn = WithdrawnNames { leading, excluded: excluded.as_deref(), unnamed: false };
+        let withdrawn = WithdrawnNames { leading, excluded: excluded.as_deref() };
         let unknown = self.unknown(base, found, &yardsticks, withdrawn, seed);
-        let mut beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
+        let beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
         if unknown.is_some() && beside.is_none() {
             return Doubt { unknown, nameless: None };
         }
         self.drop_minor(base, found, designs, &yardsticks, replaceable);
-        if beside.is_none() && found.leaves_much_unnamed() {
-            let unknown = self.unknown(base, found, &yardsticks, WithdrawnNames { unnamed: true, ..withdrawn }, seed);
-            beside = unknown.as_ref().and_then(|unknown| self.named_nearly_as_well(unknown, found, designs));
-            if unknown.is_some() && beside.is_none() {
-                return Doubt { unknown, nameless: None };
-            }
-        }
         let nameless = self.nameless(base, found, designs, &yardsticks);
         let first = found.best.members.first().filter(|_| excluded.is_some());
         let named = first.map(|member| Nameless { instead_of: designs[*member].kind.clone(), delta_ic: 0.0 });
@@ -248,14 +230,10 @@ impl Case<'_> {
             && !self.is_another_shape(&alone.design, best);
         // Names that explain as much beside the empirical form as without it are not put in doubt by it.
         let stands = |given: FormFit| named + on_top.information - given.information > STANDS_SHARE * named;
-        let close = alone.information > CLOSE_SHARE * named;
-        let own = self.is_over_own_column(&alone.design, best);
-        let unlike = anything && close && !own && self.unlike(&found.best);
         let refined = self.is_another_shape(&on_top.design, best);
         let doubted = remains && !refined && !(anything && self.with_form(base, &on_top.design).is_some_and(stands));
-        let WithdrawnNames { leading, excluded, unnamed } = withdrawn;
-        let unnamed = unnamed && alone.information > named;
-        let instead = better || unlike || leading || unnamed || excluded.is_some() && alone.information > 0.0;
+        let WithdrawnNames { leading, excluded } = withdrawn;
+        let instead = better || leading || excluded.is_some() && alone.information > 0.0;
         if !(doubted || instead) {
             return None;
         }
@@ -272,7 +250,6 @@ impl Case<'_> {
         if !better && excluded.is_none() && p > P_MAX {
             return None;
         }
-        let alone = self.localised(base, alone);
         Some(Unknown {
             fit: alone.fit,
             information: alone.information,
@@ -323,16 +300,6 @@ impl Case<'_> {
         let rests: Vec<(usize, f64)> = (0..best.members.len()).map(rest).collect();
         let (most, _) = rests.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(Nameless { instead_of: designs[best.members[most]].kind.clone(), delta_ic: delta_ic.max(0.0) })
-    }
-
-    /// Is what explains most of it another one in every run?
-    fn unlike(&mut self, best: &Hypothesis) -> bool {
-        let first = best.first_part();
-        (0..best.members.len()).any(|position| {
-            differs_by_run(&best.fit, &self.frame, first + position)
-                && (best.members.len() == 1
-                    || self.without(best, position).is_some_and(|rest| rest.information < MOST * best.information))
-        })
     }
 
     /// Is a nameless form no more than another shape of what has been named? A bent line over the velocity of the axis, or

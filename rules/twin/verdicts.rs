@@ -5,21 +5,17 @@ use super::diagnosis::{Alternative, Diagnosis, Experiment, Missing, ParameterEst
 use super::estimate::estimates;
 use super::fit::Fit;
 use super::locate::{Region, region};
-use super::misnamed::ENTRY;
 use super::model::{Model, Part, PartFunction, simulate};
 use super::next_step::alternative;
 use super::outcome::Outcome;
-use super::sampled::SURPRISE_MAX;
 use super::search::{Hypothesis, METER, RESOLVED};
-use crate::physics::effect;
-use crate::physics::state::BETWEEN_SAMPLES;
 use adapters::channel::quantity;
 
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
 /// What is said of a name that is in doubt where no other name is near.
 const NOT_RULED_OUT: &str =
-    "; runs, tools or held-out rows differ in how much of it they show, so something beside it is not ruled out";
+    "; something without a name explains nearly as much, or rows held out show less of it, so that is not ruled out";
 /// Classes within which a name that is in doubt is compared with the next: beyond, no other name is an explanation.
 const FURTHER: f64 = 5.0;
 /// The kind whose mean delay may be too short to be told from a lag.
@@ -61,16 +57,9 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative(UNKNOWN, &nameless.instead_of, nameless.delta_ic));
     }
-    let doubtful = outcome.fits.carries_little() || outcome.found.leaves_much_unnamed();
+    let doubtful = outcome.fits.carries_little();
     if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
         alternatives.extend(missing.first().map(|first| alternative(UNKNOWN, &first.effect, 0.0)));
-    }
-    let is_named = |kind: &&String| missing.iter().any(|named| named.effect == **kind);
-    if let Some(doubted) = outcome.doubted.as_ref().filter(is_named).filter(|_| !alternatives.iter().any(is_nameless)) {
-        alternatives.push(alternative(UNKNOWN, doubted, 0.0));
-    }
-    if let Some(like) = missing.iter().find(|named| outcome.slight_entry && is_like_an_entry(&named.effect)) {
-        alternatives.push(alternative(ENTRY, &like.effect, 0.0));
     }
     if missing.iter().any(|named| is_hardly_a_window(named, case.scene.period_s())) {
         let lag = "clock_lag";
@@ -124,11 +113,6 @@ fn is_hardly_a_window(named: &Missing, period_s: f64) -> bool {
 /// Is it a cause without a name?
 fn is_nameless(other: &Alternative) -> bool {
     other.effect == UNKNOWN
-}
-
-/// Is a tool that enters or leaves the work confused with this?
-fn is_like_an_entry(kind: &str) -> bool {
-    effect(ENTRY).is_some_and(|entry| entry.doc().rivals.contains(&kind))
 }
 
 /// The unit at the end of a channel's name, as a symbol.
@@ -239,12 +223,9 @@ fn alternatives_within(case: &Case<'_>, outcome: &Outcome, class: f64) -> Vec<Al
     }
     // Where a fit leaves more than noise, likelihoods mean that much less.
     let within = class * best.fit.dispersion(&case.frame);
-    let between_samples = acts_between_samples(outcome, best);
     let mut all: Vec<Alternative> = Vec::new();
     for other in &outcome.found.others {
         let delta = best.information - other.information - forgiven(outcome, other);
-        let both_between_samples = between_samples && acts_between_samples(outcome, other);
-        let within = if both_between_samples { within.max(SURPRISE_MAX) } else { within };
         if other.members.len() != best.members.len() || delta > within {
             continue;
         }
@@ -259,12 +240,6 @@ fn alternatives_within(case: &Case<'_>, outcome: &Outcome, class: f64) -> Vec<Al
     }
     all.sort_by(|a, b| a.delta_ic.total_cmp(&b.delta_ic));
     all
-}
-
-/// Is one of its members a delay as it acts between samples? Two of them have nearly all edges in common, and no single
-/// edge, which may stand there for a reason of its own, is to decide between a clock and a flag.
-fn acts_between_samples(outcome: &Outcome, hypothesis: &Hypothesis) -> bool {
-    hypothesis.members.iter().any(|member| outcome.designs[*member].part.has_form(BETWEEN_SAMPLES))
 }
 
 /// Reluctance to name a fault of a meter, where one stands in the place of something else: it guards against false alarms

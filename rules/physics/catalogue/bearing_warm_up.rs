@@ -3,7 +3,7 @@
 use crate::physics::drive::{krpm, slide_to_the, sliding, speed_to_the};
 use crate::physics::excitation::{lag_forms, varies};
 use crate::physics::state::{decay, first_order};
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, STILL, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Friction that falls as the bearings warm.
 #[derive(Debug, Clone, Copy)]
@@ -82,9 +82,6 @@ impl Effect for BearingWarmUp {
     fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let velocity = sliding(scene);
         let friction = friction(scene, velocity.as_deref())?;
-        if form.name == STILL {
-            return Some(vec![("initial", friction)]);
-        }
         if form.name == "measured" {
             let temperature = scene.role(Role::Temperature)?;
             let first = *temperature.first()?;
@@ -98,10 +95,6 @@ impl Effect for BearingWarmUp {
             ("drop", friction.iter().zip(&warmth).map(|(g, w)| -g * w).collect()),
             ("initial", friction.iter().zip(&left).map(|(g, left)| g * left).collect()),
         ])
-    }
-
-    fn still(&self) -> Option<Form> {
-        Some(Form::still())
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {

@@ -2,7 +2,7 @@
 
 use crate::physics::drive::rate;
 use crate::physics::excitation::{delays, varies};
-use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
+use crate::physics::state::delayed;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Meter late or early against the controller.
@@ -12,7 +12,7 @@ pub struct ClockLag;
 static DOC: EffectDoc = EffectDoc {
     kind: "clock_lag",
     family: "measurement",
-    law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
+    law: "y = share * (S(t - delay) - S(t)), S the simulated output; small: y = -lag_s * dS/dt",
     parameters: &[
         ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the delay explains all", "为1时延时可完全解释"),
         ParameterDoc::linear(
@@ -56,7 +56,7 @@ impl Effect for ClockLag {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["delay", "small", BETWEEN_SAMPLES]
+        &["delay", "small"]
     }
 
     fn forms(&self, scene: &Scene) -> Vec<Form> {
@@ -74,7 +74,7 @@ impl Effect for ClockLag {
         if form.name == "small" {
             return Some(vec![("lag_s", rate(scene, simulated).iter().map(|rate| -rate).collect())]);
         }
-        let late = delayed_between_samples(scene, DOC.kind, simulated, form);
+        let late = delayed(scene, simulated, form.value("delay_s").unwrap_or(0.0));
         Some(vec![("share", late.iter().zip(simulated).map(|(late, now)| late - now).collect())])
     }
 

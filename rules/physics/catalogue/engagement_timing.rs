@@ -2,7 +2,7 @@
 
 use crate::physics::cut::cut;
 use crate::physics::excitation::delays;
-use crate::physics::state::{BETWEEN_SAMPLES, delayed_between_samples};
+use crate::physics::state::delayed;
 use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Engagement flag late or early.
@@ -12,7 +12,7 @@ pub struct EngagementTiming;
 static DOC: EffectDoc = EffectDoc {
     kind: "engagement_timing",
     family: "measurement",
-    law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut, losses included; between_samples: each edge late by one of the two whole numbers of rows beside the delay",
+    law: "y = share * (engaged(t - delay) - engaged(t)) * L, L held from the nearest row in the cut, losses included",
     parameters: &[
         ParameterDoc::linear("share", "1", (0.0, 1.5), "one, when the timing explains all", "为1时时序可完全解释"),
         ParameterDoc::shape(
@@ -48,10 +48,6 @@ impl Effect for EngagementTiming {
         &DOC
     }
 
-    fn form_names(&self) -> &'static [&'static str] {
-        &[BETWEEN_SAMPLES]
-    }
-
     fn forms(&self, scene: &Scene) -> Vec<Form> {
         if scene.load().is_none() || cut(scene).is_none() || scene.passes().len() < 3 {
             return Vec::new();
@@ -64,7 +60,7 @@ impl Effect for EngagementTiming {
     fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let engaged = scene.role(Role::Engaged)?;
         let load = held_from_cut(scene, scene.load_at_output()?, engaged);
-        let shifted = delayed_between_samples(scene, DOC.kind, engaged, form);
+        let shifted = delayed(scene, engaged, form.value("delay_s").unwrap_or(0.0));
         let law = |row: usize| (shifted[row] - engaged[row]) * load[row];
         Some(vec![("share", (0..scene.rows()).map(law).collect())])
     }

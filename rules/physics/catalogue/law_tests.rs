@@ -186,16 +186,6 @@ fn every_edge_wears_at_a_rate_of_its_own_and_breaks_in() {
 }
 
 #[test]
-fn a_state_that_stands_still_leaves_its_law_over_speed() {
-    let speed = |row: usize| 1000.0 + row as f64;
-    let idle = with_inputs(3600, 1.0, "spindle_power_w", &[("spindle_speed_rpm", &speed)]);
-    for (kind, power) in [("bearing_warm_up", 5.0 / 3.0), ("preload_growth", 2.0)] {
-        let still = column(kind, &idle, &effect(kind).expect("known").still().expect("a state"));
-        assert!((still[1000] - 2.0_f64.powf(power)).abs() < 1e-9, "{kind}: {}", still[1000]);
-    }
-}
-
-#[test]
 fn directions_differ_only_where_both_are_visited() {
     let one_way = with_inputs(100, 0.1, "force_n", &[("velocity_m_s", &|row| 0.1 + row as f64 / 100.0)]);
     assert!(forms("direction_asymmetry", &one_way).is_empty());

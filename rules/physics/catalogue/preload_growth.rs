@@ -3,7 +3,7 @@
 use crate::physics::drive::{driven_krpm, krpm, speed_to_the};
 use crate::physics::excitation::lag_forms;
 use crate::physics::state::first_order;
-use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, STILL, Scene, Texts};
+use crate::physics::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Friction that rises with bearing preload.
 #[derive(Debug, Clone, Copy)]
@@ -69,9 +69,6 @@ impl Effect for PreloadGrowth {
 
     fn columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let friction = speed_to_the(scene, 2.0)?;
-        if form.name == STILL {
-            return Some(vec![("growth", friction)]);
-        }
         let heat: Vec<f64> = krpm(scene)?.iter().map(|n| n.powf(5.0 / 3.0)).collect();
         let tau_s = form.value("tau_s").unwrap_or(TAU_S);
         let mut warmth = first_order(scene, &heat, tau_s);
@@ -80,10 +77,6 @@ impl Effect for PreloadGrowth {
             warmth.iter_mut().zip(&slow).for_each(|(warmth, slow)| *warmth -= slow);
         }
         Some(vec![("growth", friction.iter().zip(&warmth).map(|(g, w)| g * w).collect())])
-    }
-
-    fn still(&self) -> Option<Form> {
-        Some(Form::still())
     }
 
     fn default_form(&self, _scene: &Scene) -> Form {
