@@ -148,7 +148,7 @@ impl<'a, 'b> EffectSearch<'a, 'b> {
         SearchResult { best, p_values, others: self.tried, refused_p }
     }
 
-    /// The next hypothesis on the path, swapped to its best, when it brings enough.
+    /// The next hypothesis on the path, when it brings enough.
     fn next_step(&mut self, from: &Hypothesis) -> Option<Hypothesis> {
         if from.members.len() >= EFFECTS_MAX {
             return None;

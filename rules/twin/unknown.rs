@@ -1,9 +1,8 @@
 //! Unknown: something real remains, and no named effect is what it is.
 //!
 //! The yardstick is a bent line over one channel (`empirical`). Names are withdrawn where such a line explains clearly
-//! more than all of them, or much on top of them in a way that leaves the names little to explain, and where the runs
-//! disagree on what explains most (`agreement`); and where nothing is named, a line that explains enough is an alarm
-//! without a name.
+//! more than all of them, or much on top of them in a way that leaves the names little to explain; and where nothing is
+//! named, a line that explains enough is an alarm without a name.
 
 use super::channel::SIMULATED_OUTPUT;
 use super::designs::Design;
