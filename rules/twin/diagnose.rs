@@ -151,7 +151,7 @@ impl<'a> Case<'a> {
     }
 
     /// What is found, and what is doubted of it.
-    pub(super) fn answered(&mut self, base: Fit, seed: u64) -> SearchAnswer {
+    fn answered(&mut self, base: Fit, seed: u64) -> SearchAnswer {
         let (mut found, designs) = self.search(&base, seed);
         let base = self.settle(base, &mut found);
         let doubt = self.doubt(&base, &mut found, &designs, seed);

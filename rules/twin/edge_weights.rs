@@ -26,12 +26,6 @@ pub struct SeenForm {
     noise: Arma,
 }
 
-/// Logarithm of the likelihood of a fit without what choosing its last part explains.
-fn priced(fit: &Fit) -> f64 {
-    let choice = fit.parts.last().and_then(Part::effect_and_form).map_or(0.0, |(_, form)| form.ln_choices);
-    fit.log_likelihood - choice
-}
-
 impl Case<'_> {
     /// The baseline, fitted with the rows weighed by what an effect at the edges leaves, where there is one.
     pub(super) fn weigh_edges(&mut self, base: Fit) -> Fit {
@@ -43,7 +37,7 @@ impl Case<'_> {
         self.frame.weigh_all_alike();
         let fits = self.fits_at_edges(&base);
         self.seen_in_full(&base, &fits);
-        let likelihood = |a: &&Fit, b: &&Fit| priced(a).total_cmp(&priced(b));
+        let likelihood = |a: &&Fit, b: &&Fit| a.log_likelihood.total_cmp(&b.log_likelihood);
         let Some(best) = fits.iter().max_by(likelihood).filter(|best| {
             // It must make half of the outlandish rows ordinary, in noise that a few others do not make look white.
             let noise = self.frame.noise_between_outliers(&best.residual, best.noise);
@@ -68,7 +62,7 @@ impl Case<'_> {
         let Some(plain) = self.with_data(|data| fit(data, &base.parts, base.noise)) else { return };
         let ln_rows = self.ln_rows(&plain);
         let seen = fits.iter().filter(|fit| {
-            let gained = 2.0 * (priced(fit) - plain.log_likelihood);
+            let gained = 2.0 * (fit.log_likelihood - plain.log_likelihood);
             gained > FIRST_INFORMATION + ln_rows
         });
         let form = |fit: &Fit| {

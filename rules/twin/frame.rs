@@ -213,7 +213,7 @@ impl Frame {
         self.weights.clear();
     }
 
-    /// The same where every group counts as much as any other and nothing has a level of its own.
+    /// The same for plain least squares: every group counts as much as any other, and nothing has a level of its own.
     #[must_use]
     pub fn with_all_rows_alike(&self) -> Self {
         Self { weights: Vec::new(), quiet: Vec::new(), levels: None, ..self.clone() }

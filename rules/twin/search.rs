@@ -91,7 +91,7 @@ pub struct EffectSearch<'a, 'b> {
     pub ln_rows: f64,
     /// Seed of the resampling.
     pub seed: u64,
-    pub(super) tried: Vec<Hypothesis>,
+    tried: Vec<Hypothesis>,
     /// How many of the first members stand already.
     standing: usize,
     /// The baseline beside an effect at the edges, where that effect bends it: another place to start from.
@@ -214,12 +214,7 @@ impl<'a, 'b> EffectSearch<'a, 'b> {
         best
     }
 
-    pub(super) fn fitted(
-        &mut self,
-        members: Vec<usize>,
-        parts: &[Part],
-        noise: super::noise::Arma,
-    ) -> Option<Hypothesis> {
+    fn fitted(&mut self, members: Vec<usize>, parts: &[Part], noise: super::noise::Arma) -> Option<Hypothesis> {
         let fit = fit(self.data, parts, noise)?;
         let added = &fit.parts[self.base.parts.len()..];
         if !added.iter().all(|part| plausible(part, &fit, self.data)) {

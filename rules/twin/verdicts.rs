@@ -14,8 +14,7 @@ use adapters::channel::quantity;
 /// Information within which two explanations cannot be told apart.
 pub(super) const CLASS_INFORMATION: f64 = 6.0;
 /// What is said of a name that is in doubt where no other name is near.
-const NOT_RULED_OUT: &str =
-    "; something without a name explains nearly as much, or rows held out show less of it, so that is not ruled out";
+const NOT_RULED_OUT: &str = "; something without a name explains nearly as much, or rows held out show less of it: another cause is not ruled out";
 /// Classes within which a name that is in doubt is compared with the next: beyond, no other name is an explanation.
 const FURTHER: f64 = 5.0;
 /// The kind whose mean delay may be too short to be told from a lag.
@@ -57,8 +56,7 @@ pub fn judge(case: &mut Case<'_>, outcome: Outcome) -> Diagnosis {
     if let Some(nameless) = outcome.nameless.as_ref().filter(|_| !missing.is_empty()) {
         alternatives.push(alternative(UNKNOWN, &nameless.instead_of, nameless.delta_ic));
     }
-    let doubtful = outcome.fits.carries_little();
-    if alternatives.is_empty() && outcome.unknown.is_none() && doubtful {
+    if alternatives.is_empty() && outcome.unknown.is_none() && outcome.fits.carries_little() {
         alternatives.extend(missing.first().map(|first| alternative(UNKNOWN, &first.effect, 0.0)));
     }
     if missing.iter().any(|named| is_hardly_a_window(named, case.scene.period_s())) {
