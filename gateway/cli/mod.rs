@@ -20,9 +20,12 @@ mod gateway_options;
 mod help;
 mod history;
 mod identify;
+mod lang;
 mod metrics;
+mod model;
 mod person;
 mod pulses;
+mod recording;
 mod replay;
 mod rules;
 mod run;
@@ -58,6 +61,9 @@ pub type CommandResult = Result<CommandOutcome, CannotRun>;
 struct Arguments {
     #[command(flatten)]
     log: LogArguments,
+    /// Language of everything that is printed; without it that of the computer (LANG).
+    #[arg(long, global = true, value_enum, value_name = "LANG")]
+    lang: Option<lang::Lang>,
     #[command(subcommand)]
     command: Option<CliCommand>,
     #[command(flatten)]
@@ -106,6 +112,10 @@ enum CliCommand {
     Simulate(simulate::SimulateArguments),
     /// Compare a model with recordings: where they differ, which physics was left out, the model with it.
     Diagnose(diagnose::DiagnoseArguments),
+    /// How a file of another program is understood; its map.
+    Recording(recording::RecordingArguments),
+    /// A first model of a machine; whether a model fits a recording.
+    Model(model::ModelArguments),
     /// The catalogue of physical effects.
     Effects(effects::EffectsArguments),
     /// Learn a machine's numbers from recordings of it.
@@ -150,6 +160,7 @@ enum CliCommand {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    lang::choose(arguments.lang);
     let done = dispatch(arguments);
     log::flush();
     match done {
@@ -181,6 +192,8 @@ fn dispatch(arguments: Arguments) -> CommandResult {
         CliCommand::History(history) => history::run(history),
         CliCommand::Simulate(simulate) => simulate::simulate(simulate),
         CliCommand::Diagnose(diagnose) => diagnose::diagnose(diagnose),
+        CliCommand::Recording(recording) => recording::run(&recording),
+        CliCommand::Model(model) => model::run(model),
         CliCommand::Effects(effects) => effects::effects(effects),
         CliCommand::Identify(identify) => identify::identify(&identify),
         CliCommand::Commission(commission) => commission::run(&commission),

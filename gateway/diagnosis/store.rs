@@ -2,6 +2,7 @@
 //! the experiment it asks for as a plan and as steps. Files in a folder of the data directory, found by a key that follows from
 //! the row, so that no second list can disagree with the history.
 
+use super::context::DiagnosisContext;
 use super::steps::{DiagnosisStep, steps};
 use crate::files::{read_text, replace};
 use crate::history;
@@ -115,11 +116,12 @@ impl DiagnosisStore {
         row: &history::Diagnosis,
         found: &twin::Diagnosis,
         recording: &Recording,
+        context: &DiagnosisContext,
     ) -> std::io::Result<()> {
         let key = key(row);
         let put = |part, text: &str| replace(&self.path(&key, part), text);
         for language in [Language::En, Language::Zh] {
-            put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, language }))?;
+            put(DiagnosisFile::Page(language), &page(&PageInput { diagnosis: found, recording, context, language }))?;
         }
         let mut words = DiagnosisTexts { summary_zh: summary_zh(found), ..DiagnosisTexts::default() };
         if let Ok(plan) = plan::plan(found, recording) {
