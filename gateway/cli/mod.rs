@@ -18,6 +18,7 @@ mod effects;
 mod fleet;
 mod gateway_options;
 mod help;
+mod help_zh;
 mod history;
 mod identify;
 mod lang;
@@ -37,8 +38,9 @@ pub(crate) use crate::cannot_run::CannotRun;
 use crate::config::LogConfig;
 use crate::log::{self, LogFormat};
 use crate::reload::read_directory;
+use ::rules::physics::explain::Language;
 use ::rules::script::{Host, ScriptProblem, shipped};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -159,7 +161,9 @@ enum CliCommand {
 /// Parses the arguments of this process and does what they say.
 #[must_use]
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let language = lang::asked_in(std::env::args_os()).unwrap_or_else(lang::of_computer);
+    let matches = command(language).get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     lang::choose(arguments.lang);
     let done = dispatch(arguments);
     log::flush();
@@ -171,6 +175,12 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// The command line, its help in this language.
+fn command(language: Language) -> clap::Command {
+    let command = Arguments::command();
+    if language == Language::Zh { help_zh::translated(command) } else { command }
 }
 
 fn dispatch(arguments: Arguments) -> CommandResult {

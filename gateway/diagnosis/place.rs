@@ -1,5 +1,5 @@
 //! Where an effect acts, in the fewest words that cover it: conditions on what a person can set or see (a speed, a tool, the age of an edge, the time on
-//! the clock), found by what they cover of the effect's energy, less the share of the rows that they take in, less a price for each condition and each
+//! the clock), found by what they cover of the rows in which it acts, less the share of the rows that they take in, less a price for each condition and each
 //! word of a list. So a threshold is told in place of a list of runs.
 
 use adapters::Recording;
@@ -8,7 +8,7 @@ use adapters::recording::{Words, derived};
 use rules::twin::Diagnosis;
 use rules::twin::locate::Condition;
 
-/// Price of one condition, in shares of the energy,
+/// Price of one condition, in shares of what is covered,
 const CONDITION_PRICE: f64 = 0.03;
 /// and of each further word of a list.
 const WORD_PRICE: f64 = 0.02;
@@ -57,7 +57,7 @@ pub fn refine(diagnosis: &mut Diagnosis, recording: &Recording) {
         })
         .collect();
     for (index, values) in regions {
-        let energy = search.energy(&values);
+        let energy = search.weights(&values);
         let known = diagnosis.mismatch[index].conditions.clone();
         let (found, value) = search.best(&energy);
         if value > search.value(&known, &energy) + BETTER {
@@ -111,6 +111,18 @@ impl<'a> Search<'a> {
 
     fn energy(&self, contribution: &[f64]) -> Vec<f64> {
         self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x * x)).collect()
+    }
+
+    /// How much the effect acts in each row: fully from the lower quarter of its sizes on, so that neither one great row nor slow growth decides where it
+    /// is said to act.
+    fn weights(&self, contribution: &[f64]) -> Vec<f64> {
+        let sizes: Vec<f64> = self.rows.iter().map(|row| contribution.get(*row).map_or(0.0, |x| x.abs())).collect();
+        let mut acting: Vec<f64> = sizes.iter().copied().filter(|size| *size > 0.0).collect();
+        acting.sort_by(f64::total_cmp);
+        let usual = acting.get(acting.len() / 2).copied().unwrap_or(0.0);
+        let acting: Vec<f64> = acting.into_iter().filter(|size| *size > 0.1 * usual).collect();
+        let full = acting.get(acting.len() / 4).copied().unwrap_or(f64::MIN_POSITIVE);
+        sizes.into_iter().map(|size| (size / full).min(1.0)).collect()
     }
 
     #[expect(clippy::cast_precision_loss, reason = "some thousand rows")]
@@ -294,7 +306,7 @@ mod tests {
     fn a_threshold_is_told_and_not_a_list_of_runs() {
         let (recording, effect) = recording();
         let search = Search::new(&recording, "spindle_power_w");
-        let (found, _) = search.best(&search.energy(&effect));
+        let (found, _) = search.best(&search.weights(&effect));
         let [Condition::Range { column, min: Some(min), max: None }] = &found[..] else { panic!("{found:?}") };
         assert_eq!(column, "cutting_time_min");
         assert!((min - 1.0).abs() < 0.1, "{min}");
@@ -306,6 +318,6 @@ mod tests {
     fn what_acts_everywhere_needs_no_words() {
         let (recording, _) = recording();
         let search = Search::new(&recording, "spindle_power_w");
-        assert!(search.best(&search.energy(&vec![5.0; recording.rows()])).0.is_empty());
+        assert!(search.best(&search.weights(&vec![5.0; recording.rows()])).0.is_empty());
     }
 }

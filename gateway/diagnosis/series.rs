@@ -234,14 +234,15 @@ fn by_course(
                 |time_s: f64| (time_s - matched.lag_s + matched.drift * matched.middle_s) / (1.0 + matched.drift);
             let cells =
                 recording.time_s.iter().map(|time_s| interpolated(&series.time_s, numbers, back(*time_s))).collect();
-            let (lag, correlation) = (short(matched.lag_s), short(matched.correlation));
+            let (lag, correlation) = (short(matched.lag_s.abs()), short(matched.correlation));
+            let (way, way_zh) = if matched.lag_s < 0.0 { ("earlier", "提前") } else { ("later", "滞后") };
             Ok((
                 cells,
                 Bilingual::new(
                     format!(
-                        "laid beside by its course: {lag} s later on the clock of the recording (correlation {correlation})"
+                        "laid beside by its course: {lag} s {way} on the clock of the recording (correlation {correlation})"
                     ),
-                    format!("按曲线对齐：在记录时钟上滞后{lag} s（相关系数{correlation}）"),
+                    format!("按曲线对齐：在记录时钟上{way_zh}{lag} s（相关系数{correlation}）"),
                 ),
             ))
         }

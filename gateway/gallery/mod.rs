@@ -46,13 +46,13 @@ pub const EXAMPLES: [Example; 3] = [
     },
     Example {
         name: "axis",
-        en: "A feed axis back and forth: its motor draws more current than simulated, somewhere",
-        zh: "进给轴往复运动：电机电流在某处高于仿真",
+        en: "A feed axis back and forth at four speeds: its motor draws another current than simulated",
+        zh: "进给轴以四种速度往复运动：电机电流与仿真不同",
         file: "example axis.csv.gz",
         recording: include_bytes!("axis.csv.gz"),
         model: include_str!("axis.toml"),
-        truth_en: "The guideway is tight between 420 and 560 mm: 0.55 A against the motion, in both directions.",
-        truth_zh: "导轨在420至560 mm之间偏紧：双向各增加0.55 A阻力电流。",
+        truth_en: "Dry friction: 1.35 A against the motion, the same at every speed. The model knew friction that grows with speed only.",
+        truth_zh: "干摩擦：1.35 A阻力电流，与速度无关。模型只含随速度增大的摩擦。",
     },
 ];
 

@@ -88,7 +88,7 @@ fn result_document(files: &FileDiagnoses, result: &FileDiagnosis) -> Value {
     json!({
         "key": result.key, "file": result.file, "by": result.by, "at_ms": result.at_ms, "from_ms": result.at_ms, "to_ms": result.at_ms,
         "verdict": result.verdict, "summary": result.summary, "summary_zh": words.summary_zh, "missing": result.missing,
-        "diagnosis": result.diagnosis, "steps": words.steps, "minutes": words.minutes,
+        "diagnosis": result.diagnosis, "steps": words.steps, "minutes": words.minutes, "effects": words.effects,
         "page": format!("/api/v1/diagnoses/{}/page", result.key), "model": has_model, "truth": gallery::of_file(&result.file),
     })
 }

@@ -25,7 +25,7 @@ export const WORDS = {
   gate_armed: ["ARMED by {0} until {1}: the box changes the feed, never above the dial.", "{0} 已允许写入，至 {1}：网关会调整进给，不超过操作面板。"],
   nothing: ["nothing", "无"], because: ["Because", "原因"], back_to_dial: ["Back to the dial", "交还操作面板"], arm: ["Arm …", "允许写入……"],
   arm_title: ["Let the box change the feed?", "允许网关调整进给？"], arm_words: ["For the time you choose the box may lower and raise the feed within its limits. It ends by itself, and at once with “Back to the dial”.", "在所选时间内，网关可在限值内升降进给。到时自动结束，也可随时“交还操作面板”。"], arm_for: ["For how long", "持续时间"],
-  braking: ["the spindle brakes and gives power back", "主轴制动，回馈电能"], finished_count: ["{0} finished", "已完成 {0} 件"], handbook_english: ["The handbook is in English.", "手册正文为英文。"], status_link: ["status", "状态"],
+  braking: ["the spindle brakes and gives power back", "主轴制动，回馈电能"], finished_count: ["{0} finished", "已完成 {0} 件"], handbook_english: ["", "集成与操作所需章节为中文，其余章节为英文。"], status_link: ["status", "状态"],
   wear_judged: ["this moment; the lamp judges whole parts", "瞬时值；指示灯按整件判断"],
   machine_power: ["whole machine {0}", "整机 {0}"], strip_label: ["Spindle {0} W: no-load {1} W, cutting {2} W", "主轴 {0} W：空载 {1} W，切削 {2} W"],
   last_ten_minutes: ["Last ten minutes", "最近十分钟"], open_history: ["Open history", "打开历史"],
@@ -108,6 +108,7 @@ export const WORDS = {
   rows_compared: ["{0} rows", "{0} 行"], file_stage_waiting: ["begins", "开始"], file_stage_reading: ["reads the file", "读取文件"], file_stage_comparing: ["fits the model and tries every known effect", "拟合模型并逐一试验已知效应"], file_stage_writing: ["writes the report", "生成报告"], file_diagnosis_done: ["Finished after {0}; the answer stands below.", "用时 {0}，结果见下方。"],
   file: ["File", "文件"], compared: ["All diagnoses of files", "全部文件诊断"], error_before_fit: ["Error before", "之前误差"], error_after_fit: ["Error after", "之后误差"],
   gallery: ["Try it: three recordings with a hidden cause", "试一试：三个隐藏原因的记录"], gallery_words: ["Each lacks one cause in its model. Have it found first, then ask for the truth.", "每个记录的模型都缺少一个原因。先让系统查找，再查看真相。"], tell_truth: ["What was hidden?", "真相是什么？"],
+  unknown_effect: ["unknown", "未知效应"], series_words: ["Your simulation as given is off by {0}; with gain {2} and offset {3} by {1}.", "您的仿真误差为 {0}；乘以 {2} 加 {3} 后为 {1}。"],
   new_rule: ["New rule", "新建规则"], new_rule_words: ["It begins as a draft with an example. Nothing counts before it is activated.", "新规则以示例草稿开始，启用前不生效。"], new_rule_name: ["Name (small letters, digits, _)", "名称（小写字母、数字、_）"], rule_exists: ["{0} is there already.", "{0} 已存在。"],
   // rules
   rules_words: ["A change is a draft until you activate it. It must pass its trials; run it over the history first.", "修改在“启用”前只是草稿，须通过试验，建议先回放历史。"], editor: ["Script", "脚本"], save_draft: ["Save draft", "保存草稿"], run_trials: ["Run trials", "运行试验"], backtest: ["Backtest", "历史回放"], activate: ["Activate", "启用"], discard_draft: ["Discard draft", "放弃草稿"], backtest_span: ["How much history", "回放时长"], last_span: ["last {0}", "最近 {0}"],

@@ -60,7 +60,7 @@ def mill():
 
 
 def axis():
-    """A feed axis, 10 runs back and forth over 700 mm: it runs tight between 420 and 560 mm."""
+    """A feed axis, 10 runs back and forth over 700 mm at four speeds: dry friction against the motion."""
     rng, state, rows, t = random.Random(37), [0.0], [], 0.0
     for run in range(10):
         x, speed = 20.0, [3000, 6000, 9000, 4500][run % 4]
@@ -70,8 +70,7 @@ def axis():
             if x > 700 or x < 20:
                 way, x = -way, min(max(x, 20.0), 700.0)
             v = way * speed
-            tight = 0.55 if 420 <= x <= 560 else 0.0
-            current = (1.35 + tight) * math.tanh(v / 20) + 6e-5 * v + 0.1 + noise(rng, state, 0.02, 0.05)
+            current = 1.35 * math.tanh(v / 20) + 6e-5 * v + 0.1 + noise(rng, state, 0.02, 0.05)
             rows.append([round(t, 2), f"run {run + 1}", round(v), round(x, 2), round(current, 4)])
             t += 0.5
     put("axis", ["time_s", "run", "axis_velocity_mm_min", "axis_position_mm", "axis_current_a"], rows)

@@ -1,9 +1,8 @@
-//! Columns of several clocks in one file, brought onto one: that of the slowest series that still is within a tenth of the fastest.
-//! What is faster is averaged over its steps, what is slower is interpolated between its samples, flags and words hold.
+//! Columns of several clocks in one file, brought onto one: that of the slowest series that still is within a tenth of the fastest. Each value is
+//! taken at its times: interpolated between neighbours, flags and words held. Nothing is averaged: a mean over a step would look like a slow meter.
 
 use super::plan::{Note, NoteKind};
 use crate::recording::{Cells, Numbers, Recording, Words};
-use std::ops::Range;
 
 /// A series with less than this share of the samples of the longest one does not give the clock.
 const SLOW_SHARE: usize = 10;
@@ -61,8 +60,8 @@ fn tell(blocks: &[Recording], axis: usize, same_rows: bool, notes: &mut Vec<Note
     let name = blocks[axis].columns().first().map_or("", |column| column.name.as_str());
     notes.push(Note::new(
         NoteKind::Assumption,
-        format!("{count} clocks in the file: brought onto that of {name}; faster values are averaged over its steps, slower ones interpolated"),
-        format!("文件中有{count}个时钟：统一到{name}的时钟；较快的值按步长取平均，较慢的值插值"),
+        format!("{count} clocks in the file: brought onto that of {name}, each value taken at its times"),
+        format!("文件中有{count}个时钟：统一到{name}的时钟，各值取该时刻的值"),
     ));
     let length = |block: &Recording| block.time_s.last().unwrap_or(&0.0) - block.time_s.first().unwrap_or(&0.0);
     let (short, long) =
@@ -107,27 +106,17 @@ fn resampled(axis: &[f64], times: &[f64], numbers: &Numbers) -> Numbers {
     let present: Vec<usize> = (0..times.len()).filter(|row| numbers.get(*row).is_some()).collect();
     let own: Vec<f64> = present.iter().map(|row| times[*row]).collect();
     let values: Vec<f64> = present.iter().filter_map(|row| numbers.get(*row)).collect();
-    let (step, axis_step) = (usual_step(&own), usual_step(axis));
+    let step = usual_step(&own);
     let is_flag = values.iter().all(|value| *value == 0.0 || *value == 1.0);
-    let averages = step > 0.0 && step < 0.75 * axis_step && !is_flag;
     axis.iter()
         .map(|at_s| {
             if is_flag {
                 last_before(&own, *at_s).map(|row| values[row])
-            } else if averages {
-                mean(&own, &values, at_s - axis_step / 2.0..at_s + axis_step / 2.0)
             } else {
                 interpolated(&own, &values, *at_s, GAP_STEPS * step)
             }
         })
         .collect()
-}
-
-#[expect(clippy::cast_precision_loss, reason = "rows of one step")]
-fn mean(times: &[f64], values: &[f64], span: Range<f64>) -> Option<f64> {
-    let from = times.partition_point(|time_s| *time_s < span.start);
-    let to = times.partition_point(|time_s| *time_s < span.end);
-    (to > from).then(|| values[from..to].iter().sum::<f64>() / (to - from) as f64)
 }
 
 fn interpolated(times: &[f64], values: &[f64], at_s: f64, gap_s: f64) -> Option<f64> {
@@ -151,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_slower_clock_is_kept_and_the_faster_values_are_averaged() {
+    fn the_slower_clock_is_kept_and_the_faster_values_are_taken_at_its_times() {
         let slow = block(&[0.0, 1.0, 2.0], "slow", &[1.0, 2.0, 3.0]);
         let fast = block(
             &[0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0],
@@ -162,7 +151,7 @@ mod tests {
         let merged = merge(vec![fast, slow], false, &mut notes);
         assert_eq!(merged.time_s, [0.0, 1.0, 2.0]);
         let fast: Vec<_> = merged.numbers("fast").expect("kept").iter().flatten().collect();
-        assert_eq!(fast, [0.5, 3.5, 7.0]);
+        assert_eq!(fast, [0.0, 4.0, 8.0]);
         assert!(notes[0].text.en.contains("2 clocks"));
     }
 

@@ -5,7 +5,7 @@ use crate::clock::{SECOND_NS, TimeNs};
 
 /// Which number of a date is the day where the year stands last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DateOrder {
+pub(crate) enum DateOrder {
     /// 26.11.2026
     DayFirst,
     /// 11/26/2026
@@ -14,7 +14,7 @@ pub enum DateOrder {
 
 /// The date of a written moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WrittenDate {
+pub(crate) enum WrittenDate {
     /// Year, month, day.
     YearFirst(i16, i8, i8),
     /// Two numbers in an order that the text alone need not tell, and the year; was it written with points?
@@ -23,13 +23,13 @@ pub enum WrittenDate {
 
 /// A moment as written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WrittenMoment {
+pub(crate) struct WrittenMoment {
     /// The date; `None`: a time of day alone.
-    pub date: Option<WrittenDate>,
+    pub(crate) date: Option<WrittenDate>,
     /// Nanoseconds since midnight; `None`: a date alone.
-    pub time_of_day_ns: Option<i64>,
+    pub(crate) time_of_day_ns: Option<i64>,
     /// Seconds east of Greenwich, where the text says it.
-    pub offset_s: Option<i32>,
+    pub(crate) offset_s: Option<i32>,
 }
 
 struct Scanner<'a> {
@@ -61,7 +61,7 @@ impl Scanner<'_> {
 
 /// Takes a text as a moment.
 #[must_use]
-pub fn written_moment(text: &str) -> Option<WrittenMoment> {
+pub(crate) fn written_moment(text: &str) -> Option<WrittenMoment> {
     let text = text.trim_start_matches('\'');
     if text.len() < 5 || text.len() > 48 || !text.starts_with(|c: char| c.is_ascii_digit()) {
         return None;
@@ -157,20 +157,20 @@ fn offset(scanner: &mut Scanner<'_>) -> Option<Option<i32>> {
 
 /// What all moments of a column say together about the order of day and month.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct OrderEvidence {
+pub(crate) struct OrderEvidence {
     /// Dates whose first number is greater than 12,
-    pub day_first: u64,
+    pub(crate) day_first: u64,
     /// and whose second one is.
-    pub month_first: u64,
+    pub(crate) month_first: u64,
     /// Dates with the year last.
-    pub year_last: u64,
+    pub(crate) year_last: u64,
     /// Of them written with points: the day stands first.
-    pub points: u64,
+    pub(crate) points: u64,
 }
 
 impl OrderEvidence {
     /// Takes a date into account.
-    pub fn see(&mut self, date: WrittenDate) {
+    pub(crate) fn see(&mut self, date: WrittenDate) {
         if let WrittenDate::YearLast(first, second, _, points) = date {
             self.year_last += 1;
             self.day_first += u64::from(first > 12);
@@ -183,7 +183,7 @@ impl OrderEvidence {
     ///
     /// # Errors
     /// Both numbers are months in every date, or the dates contradict one another.
-    pub fn order(&self) -> Result<DateOrder, ()> {
+    pub(crate) fn order(&self) -> Result<DateOrder, ()> {
         match (self.day_first > 0, self.month_first > 0) {
             (true, false) => Ok(DateOrder::DayFirst),
             (false, true) => Ok(DateOrder::MonthFirst),
@@ -197,7 +197,7 @@ impl WrittenMoment {
     /// Nanoseconds since 1970 as a clock of the place counts; a date alone is its midnight, a time alone is of 1970-01-01.
     /// `None` where there is no such date.
     #[must_use]
-    pub fn local_ns(&self, order: DateOrder) -> Option<TimeNs> {
+    pub(crate) fn local_ns(&self, order: DateOrder) -> Option<TimeNs> {
         let days = match self.date {
             None => 0,
             Some(date) => {

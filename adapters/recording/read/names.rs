@@ -229,7 +229,7 @@ impl ForeignName {
     pub fn meaning(&self) -> Option<&'static str> {
         let known = DICTIONARY.iter().find(|(column, words)| {
             let is_it = words.contains(&self.squeezed.as_str())
-                || words.iter().any(|word| word.len() > 14 && word.is_ascii() && self.squeezed.contains(word));
+                || words.iter().any(|word| word.len() > 14 && word.is_ascii() && self.whole.contains(word));
             is_it && self.suits(column)
         });
         known.map(|(column, _)| *column)

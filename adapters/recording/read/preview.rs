@@ -87,7 +87,10 @@ pub fn preview_rows(recording: &Recording, rows: usize) -> (Vec<String>, Vec<Vec
     let head =
         std::iter::once(name.to_owned()).chain(recording.columns().iter().map(|column| column.name.clone())).collect();
     let value = |cells: &Cells, row: usize| match cells {
-        Cells::Numbers(numbers) => numbers.get(row).map_or_else(String::new, |number| number.to_string()),
+        // As many digits as a measurement has, so that a converted 306.9 is not 306.90000000000003.
+        Cells::Numbers(numbers) => numbers
+            .get(row)
+            .map_or_else(String::new, |number| format!("{number:.8e}").parse::<f64>().unwrap_or(number).to_string()),
         Cells::Words(words) => words.get(row).unwrap_or("").to_owned(),
     };
     let row = |row: usize| {

@@ -58,11 +58,12 @@ pub(super) fn resolve(raw: &[RawTime], runs: Option<&Words>, mapping: &TimeMappi
 
 /// Rows within which time must increase: all of them, or those of a run.
 fn stretches(rows: usize, runs: Option<&Words>) -> Vec<std::ops::Range<usize>> {
-    let Some(runs) = runs else { return vec![0..rows] };
     let mut found: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..rows {
         match found.last_mut() {
-            Some(stretch) if runs.code(stretch.start) == runs.code(row) => stretch.end = row + 1,
+            Some(stretch) if runs.is_none_or(|runs| runs.code(stretch.start) == runs.code(row)) => {
+                stretch.end = row + 1
+            }
             _ => found.push(row..row + 1),
         }
     }

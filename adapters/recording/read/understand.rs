@@ -184,7 +184,7 @@ fn unknown_mappings(columns: &Columns<'_>) -> Result<(), RecordingError> {
     };
     let Some(lost) = columns.mapping.column.iter().find(|mapped| !has(mapped)) else { return Ok(()) };
     let known: Vec<&str> = columns.names.iter().map(|name| name.text.as_str()).collect();
-    let near = crate::channel::nearest(&lost.from, known.into_iter());
+    let near = crate::channel::nearest(&lost.from, known);
     let hint = near.map_or_else(String::new, |near| format!("; did you mean {near}?"));
     Err(columns.wrong(
         format!("the map names a column {:?}, which the file does not have{hint}", lost.from),
@@ -425,7 +425,7 @@ fn flag_note(survey: &ColumnSurvey, target: &Target, notes: &mut Vec<Note>) {
 fn became(name: &ForeignName, target: &Target) -> Note {
     let change = match (target.factor, target.offset) {
         (factor, offset) if (factor - 1.0).abs() < 1e-12 && offset == 0.0 => String::new(),
-        (factor, offset) if offset == 0.0 => format!(" ({}x)", short(factor)),
+        (factor, 0.0) => format!(" ({}x)", short(factor)),
         (factor, offset) => {
             format!(" ({}x {} {})", short(factor), if offset < 0.0 { "-" } else { "+" }, short(offset.abs()))
         }

@@ -28,7 +28,6 @@ impl<'a> Bytes<'a> {
         Some(taken)
     }
 
-    number!(u16, u16);
     number!(u32, u32);
     number!(u64, u64);
     number!(i64, i64);

@@ -7,9 +7,11 @@ use super::super::cell::Cell;
 use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::CELLS_IN_MEMORY_MAX;
+use super::super::moment::{DateOrder, written_moment};
 use super::super::table::{MemoryTable, OwnedCell, Step, Table};
 use super::super::text::{Separator, TextTable};
 use crate::bilingual::Bilingual;
+use crate::clock::{SECOND_NS, TimeNs};
 
 const END: &str = "***End_of_Header***";
 
@@ -21,6 +23,10 @@ struct LvmHead {
     delta_s: Option<f64>,
     x0_s: f64,
     no_x: bool,
+    /// Times are counted from the date and time of the head.
+    is_relative: bool,
+    date: String,
+    time: String,
 }
 
 pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
@@ -37,6 +43,7 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
     let mut cells = 0;
     let mut named = false;
     let mut row_number = 0_u32;
+    let mut of_time: Vec<usize> = Vec::new();
     text.visit(&mut |row| {
         let words: Vec<&str> =
             row.cells.iter().map(|cell| if let Cell::Text(text) = cell { *text } else { "" }).collect();
@@ -57,6 +64,7 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
                 return Ok(Step::Enough);
             }
             named = true;
+            of_time = (0..words.len()).filter(|place| words[*place] == "X_Value").collect();
             table.rows.extend(head.header_rows(row.line, &words));
             return Ok(Step::Next);
         }
@@ -67,6 +75,11 @@ pub(super) fn open(input: Input) -> Result<MemoryTable, RecordingError> {
                 .map_or(OwnedCell::Empty, |delta_s| OwnedCell::Number(head.x0_s + f64::from(row_number) * delta_s));
         }
         row_number += 1;
+        for place in &of_time {
+            if let Some(cell) = owned.get_mut(*place) {
+                *cell = head.moment(std::mem::replace(cell, OwnedCell::Empty));
+            }
+        }
         cells += owned.len();
         table.rows.push((row.line, owned));
         if cells > CELLS_IN_MEMORY_MAX {
@@ -102,9 +115,34 @@ impl LvmHead {
             "X_Columns" => self.no_x = values.first().is_some_and(|value| value.eq_ignore_ascii_case("no")),
             "Y_Unit_Label" => self.units = values.iter().map(|value| (*value).to_owned()).collect(),
             "Delta_X" => self.delta_s = values.first().and_then(number),
+            "Time_Pref" => {
+                self.is_relative = values.first().is_some_and(|value| value.eq_ignore_ascii_case("relative"))
+            }
+            "Date" => self.date = values.first().map_or_else(String::new, |value| (*value).to_owned()),
+            "Time" => self.time = values.first().map_or_else(String::new, |value| (*value).to_owned()),
             "X0" => self.x0_s = values.first().and_then(number).unwrap_or(0.0),
             _ => {}
         }
+    }
+
+    /// When the times begin, on the clock of the place.
+    fn start_ns(&self) -> Option<TimeNs> {
+        let moment = written_moment(&format!("{} {}", self.date, self.time)).filter(|_| self.is_relative)?;
+        moment.local_ns(DateOrder::DayFirst)
+    }
+
+    /// A cell of time as a moment, where the beginning is known.
+    fn moment(&self, cell: OwnedCell) -> OwnedCell {
+        let Some(start_ns) = self.start_ns() else { return cell };
+        let seconds = match &cell {
+            OwnedCell::Number(seconds) => Some(*seconds),
+            OwnedCell::Text(text) => text.replace(',', ".").parse::<f64>().ok(),
+            _ => None,
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        seconds.map_or(cell, |seconds| {
+            OwnedCell::Local(start_ns.saturating_add((seconds * SECOND_NS as f64).round() as i64))
+        })
     }
 
     /// The names, their time columns with a unit, and the units of the channels behind them.
@@ -112,6 +150,7 @@ impl LvmHead {
         let mut channel = 0;
         let cell = |name: &&str| {
             let text = match *name {
+                "X_Value" if self.start_ns().is_some() => "X_Value".to_owned(),
                 "X_Value" => "X_Value [s]".to_owned(),
                 "Comment" | "" => (*name).to_owned(),
                 name => {

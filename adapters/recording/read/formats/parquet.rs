@@ -64,7 +64,7 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
             append(&mut cells, group.get_column_reader(index).map_err(bad)?, column).map_err(bad)?;
         }
         // The index that pandas writes without a name.
-        let name = if column.name().starts_with("__index_level_") { "" } else { column.name() };
+        let name = if column.name().starts_with("__index_level_") { "index" } else { column.name() };
         table.columns.push((name.to_owned(), cells));
     }
     Ok(table)
