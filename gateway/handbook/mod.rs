@@ -45,6 +45,7 @@ chapters! {
     "page",
     "outputs",
     "fleet",
+    "conformance",
     "mismatch",
     "twin",
     "measured",

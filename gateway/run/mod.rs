@@ -336,13 +336,18 @@ async fn serve(
     };
     tokio::select! {
         () = obey(run_flags) => Notice::new(Severity::Info, "stopping", "stopping: the history is being closed").say(),
-        () = until_closed(live) => {}
+        () = until_closed(live.clone()) => {}
     }
-    // What the sinks have delivered is noted by the last commit of the history.
+    run_flags.stop.store(true, Ordering::SeqCst);
+    // The last commit of the history waits for the sinks; who asks twice does not want to wait.
+    tokio::select! {
+        () = obey(run_flags) => outputs.into_iter().for_each(|outputs| outputs.outbox.hurry()),
+        () = until_closed(live.clone()) => {}
+    }
+    until_closed(live).await;
     if let Some(sinks) = sinks {
         sinks.stop().await;
     }
-    run_flags.stop.store(true, Ordering::SeqCst);
     if let Some(server) = server {
         server.stop().await;
     }

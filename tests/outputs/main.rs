@@ -18,6 +18,7 @@ mod certificates;
 mod delivery;
 mod fake_sink;
 mod host;
+mod layouts;
 mod outage;
 mod plain;
 mod requests;
